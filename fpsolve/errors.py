@@ -1,0 +1,52 @@
+"""What fpsolve raises. Bad arguments of the dataclasses raise pydantic's `ValidationError`, a `ValueError`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+
+class FpsolveError(Exception):
+    """Base of every error that fpsolve raises on purpose; its text says what to do."""
+
+
+class NoSuchExponent(FpsolveError):
+    """Λ(p) does not exist for this noise and this p: it is infinite."""
+
+
+class MeshError(FpsolveError):
+    """A mesh that cannot carry the problem: not a tensor grid, or no line at an impact."""
+
+
+class NotConverged(FpsolveError):
+    """The eigenvalue iteration did not settle.
+
+    Attributes:
+        partial: the best result that was reached, or None where there is none.
+    """
+
+    def __init__(self, message: str, partial: Any = None) -> None:
+        super().__init__(message)
+        self.partial = partial
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with a file: which key, on which line, and the sentence that says how to mend it."""
+
+    key: str
+    line: int | None
+    sentence: str
+
+
+class CaseError(FpsolveError):
+    """A case file that cannot be run; the text has one line for each fault of the file."""
+
+    def __init__(self, file: str, faults: Sequence[Fault]) -> None:
+        self.file, self.faults = file, tuple(faults)
+        super().__init__("\n".join(self._line(fault) for fault in self.faults))
+
+    def _line(self, fault: Fault) -> str:
+        place = self.file if fault.line is None else f"{self.file}:{fault.line}"
+        return f"{place}: {fault.key}: {fault.sentence}" if fault.key else f"{place}: {fault.sentence}"

@@ -1,0 +1,247 @@
+"""The moment Lyapunov exponent Λ(p) over many p, and what follows from it: λ = Λ′(0), Λ″(0) and δ_p."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fpsolve import perturbation
+from fpsolve.eigen import PrincipalPair, principal_pair, second_derivative
+from fpsolve.errors import NoSuchExponent, NotConverged
+from fpsolve.generator import TiltedGenerator
+from fpsolve.mesh import CylinderMesh, make_mesh
+from fpsolve.noise import FloatArray, NonGaussianNoise
+from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.perturbation import AnyNoise
+
+MEANINGLESS = 1e-2
+"""An estimated error above this share of the scale of Λ(p) is no result."""
+SEARCH_INTERVAL = (-20.0, 20.0)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number and the estimate of its error."""
+
+    value: float
+    error_estimate: float
+
+
+@dataclass(frozen=True, eq=False)
+class MomentLyapunov:
+    """Λ(p) at several p.
+
+    Attributes:
+        p: the moments, shape (n,), in the order asked for.
+        value: Λ(p), per unit time, shape (n,).
+        derivative: Λ′(p), shape (n,).
+        error_estimate: estimate of |error of `value`|, from a finer mesh and a wider noise interval, with the
+            bound of rounding added, shape (n,).
+        residual: backward error of the eigenpairs, shape (n,).
+        pairs: the eigenpairs, one for each p.
+        warnings: sentences on p where `error_estimate` exceeds rtol.
+    """
+
+    p: FloatArray
+    value: FloatArray
+    derivative: FloatArray
+    error_estimate: FloatArray
+    residual: FloatArray
+    pairs: tuple[PrincipalPair, ...]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ExponentSolver:
+    """Λ(p) of one oscillator and one noise on a mesh, each solve starting from the nearest p solved before.
+
+    Args:
+        oscillator: the vibro-impact oscillator.
+        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands.
+        mesh: the mesh; None for the default one of `make_mesh`.
+
+    Raises:
+        NoSuchExponent: the variance of the noise is infinite.
+    """
+
+    oscillator: VibroImpactOscillator
+    noise: AnyNoise
+    mesh: CylinderMesh | None = None
+    generator: TiltedGenerator = field(init=False)
+    _finer: TiltedGenerator = field(init=False)
+    _known: dict[int, dict[float, PrincipalPair]] = field(init=False, default_factory=lambda: {0: {}, 1: {}})
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.noise.standard_deviation):
+            raise NoSuchExponent(
+                "the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"
+            )
+        mesh = make_mesh() if self.mesh is None else self.mesh
+        object.__setattr__(self, "generator", TiltedGenerator(self.oscillator, self.noise, mesh))
+        object.__setattr__(self, "_finer", TiltedGenerator(self.oscillator, self.noise, mesh.enriched()))
+
+    def pair(self, p: float) -> PrincipalPair:
+        """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
+        return self._solve(0, p)
+
+    def moments(
+        self, p: ArrayLike, *, rtol: float = 1e-8, advance: Callable[[], None] = lambda: None
+    ) -> MomentLyapunov:
+        """Λ(p) at several p; `advance` is called after each.
+
+        Raises:
+            NoSuchExponent: Λ(p) is infinite for one of the p.
+            NotConverged: some p failed; `partial` is the `MomentLyapunov` of the others.
+        """
+        points = np.atleast_1d(np.asarray(p, dtype=float))
+        if points.ndim != 1 or points.size == 0 or not np.all(np.isfinite(points)):
+            raise ValueError(f"p must be a finite number or a non-empty list of finite numbers, got {p!r}")
+        for point in points:
+            check_existence(self.noise, float(point))
+        pairs, errors, failures = {}, {}, []
+        for i in np.argsort(np.abs(points), kind="stable"):
+            try:
+                pairs[i], errors[i] = self._solve_with_error(float(points[i]))
+            except NotConverged as failure:
+                failures.append(str(failure))
+            advance()
+        done = sorted(pairs)
+        result = self._result([pairs[i] for i in done], np.array([errors[i] for i in done]), rtol)
+        if failures:
+            raise NotConverged("\n".join(failures), result)
+        return result
+
+    def lyapunov_exponent(self) -> Estimate:
+        """λ = Λ′(0), Eq. (2)."""
+        return self._difference(lambda pair: pair.derivative)
+
+    def variance_rate(self) -> Estimate:
+        """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖."""
+        return self._difference(second_derivative)
+
+    def stability_index(self, interval: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | None:
+        """δ_p, the non-zero root of Λ(p); None where Λ has no such root in the interval.
+
+        Λ is convex, so Λ(p)/p increases and has one root at most: a safeguarded Newton iteration on it.
+        """
+        low, high = interval if _is_thin_tailed(self.noise) else (-1.0, 0.0)
+        ratio, slope = self._ratio(0.0)
+        p = float(np.clip(-ratio / slope, low, high))
+        tried: set[float] = set()
+        for _ in range(60):
+            tried.add(p)
+            ratio, slope = self._ratio(p)
+            low, high = (p, high) if ratio < 0 else (low, p)
+            new = p - ratio / slope
+            if abs(new - p) <= 1e-13 * max(1.0, abs(p)):
+                break
+            if not low < new < high:
+                new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
+            if low == high:
+                return None
+            p = new
+        pair = self.pair(p)
+        error = abs(self._solve(1, p).value - pair.value) + pair.rounding
+        return Estimate(p, error / abs(pair.derivative))
+
+    def _ratio(self, p: float) -> tuple[float, float]:
+        """Λ(p)/p and its derivative; near p = 0 by Λ′(p/2), whose error is p²Λ‴/24."""
+        if abs(p) < 1e-3:
+            return self.pair(p / 2).derivative, 0.5 * second_derivative(self.pair(0.0))
+        pair = self.pair(p)
+        return pair.value / p, (pair.derivative - pair.value / p) / p
+
+    def _difference(self, quantity: Callable[[PrincipalPair], float]) -> Estimate:
+        coarse, fine = (quantity(self._solve(level, 0.0)) for level in (0, 1))
+        return Estimate(coarse, abs(fine - coarse) + self.pair(0.0).rounding)
+
+    def _solve(self, level: int, p: float) -> PrincipalPair:
+        """The pair on the mesh (level 0) or the finer one (level 1), from the nearest p known there."""
+        check_existence(self.noise, p)
+        known = self._known[level]
+        if p not in known:
+            nearest = min(known, key=lambda other: abs(other - p), default=None)
+            start = None if nearest is None else known[nearest]
+            known[p] = principal_pair((self.generator, self._finer)[level], p, start=start)
+        return known[p]
+
+    def _solve_with_error(self, p: float) -> tuple[PrincipalPair, float]:
+        pair = self._solve(0, p)
+        error = abs(self._solve(1, p).value - pair.value) + pair.rounding
+        scale = self._scale(pair)
+        if error > MEANINGLESS * scale and p != 0:
+            raise NotConverged(
+                f"Λ({p:g}) = {pair.value:.6g} has an estimated error of {error:.1g}, more than {MEANINGLESS:g} of its "
+                f"scale {scale:.3g}; use more cells, or a wider noise interval",
+                pair,
+            )
+        return pair, error
+
+    def _scale(self, pair: PrincipalPair) -> float:
+        """max(|Λ|, the terms of Eq. (37) before they cancel)."""
+        return max(abs(pair.value), float(perturbation.moment_scale(self.oscillator, self.noise, pair.p)))
+
+    def _result(self, pairs: Sequence[PrincipalPair], errors: FloatArray, rtol: float) -> MomentLyapunov:
+        short = [(k.p, e) for k, e in zip(pairs, errors, strict=True) if k.p != 0 and e > rtol * self._scale(k)]
+        warnings: tuple[str, ...] = ()
+        if short:
+            p, error = max(short, key=lambda item: item[1])
+            warnings = (
+                f"rtol = {rtol:g} is not met at {len(short)} of {len(pairs)} moments, worst at p = {p:g} with an "
+                f"estimated error of {error:.1e}; use more cells, or a wider noise interval, or a larger rtol",
+            )
+        return MomentLyapunov(
+            p=np.array([k.p for k in pairs]),
+            value=np.array([k.value for k in pairs]),
+            derivative=np.array([k.derivative for k in pairs]),
+            error_estimate=errors,
+            residual=np.array([k.residual for k in pairs]),
+            pairs=tuple(pairs),
+            warnings=warnings,
+        )
+
+
+def moment_lyapunov(
+    oscillator: VibroImpactOscillator,
+    noise: AnyNoise,
+    p: ArrayLike,
+    *,
+    rtol: float = 1e-8,
+    mesh: CylinderMesh | None = None,
+) -> MomentLyapunov:
+    """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
+
+    Args:
+        oscillator: the vibro-impact oscillator.
+        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands.
+        p: one moment, or an array of shape (n,).
+        rtol: an `error_estimate` above rtol·max(|Λ|, the terms of Eq. (37) before they cancel) gives a warning.
+        mesh: the mesh; None for the default one, made for weak noise.
+
+    Raises:
+        ValueError: p is not finite, or empty.
+        NoSuchExponent: Λ(p) is infinite.
+        NotConverged: the mesh does not resolve the problem at some p; `partial` is the result for the others.
+    """
+    return ExponentSolver(oscillator, noise, mesh).moments(p, rtol=rtol)
+
+
+def check_existence(noise: AnyNoise, p: float) -> None:
+    """Refuse p for which the algebraic tails of Eq. (9), r₀ > 1, make E‖x‖^p infinite.
+
+    Raises:
+        NoSuchExponent: r₀ > 1 and p is not in [−1, 0].
+    """
+    if not _is_thin_tailed(noise) and not -1 <= p <= 0:
+        raise NoSuchExponent(
+            f"Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated "
+            'domain would only hide it; choose p in [-1, 0], r0 <= 1, or treatment = "ou-reduction"'
+        )
+
+
+def _is_thin_tailed(noise: AnyNoise) -> bool:
+    return not (isinstance(noise, NonGaussianNoise) and noise.r0 > 1)

@@ -1,0 +1,139 @@
+"""The tilted generator L(p) = L₀ + ε L₁ + ε² L₂ of Eq. (19), in weak form.
+
+For trial T and test w, every integral weighted by P_s(ξ):
+
+    ⟨w, L₀T⟩ = −½σ² ∫ P_s w_ξ T_ξ + transport(ω)      L₁: transport(h₁ξ) + p ∫ P_s q₁ξ w T
+    L₂: transport(h₂) + p ∫ P_s q₂ w T                impact: (R^p − 1) ω ∫ P_s w(φ⁻) T(φ⁺) at φ = π/2, 3π/2
+
+transport(v) = ∫ P_s v w T_φ, plus at each φ-vertex the point load ∫ P_s v (T(φ⁺) − T(φ⁻)) w on the trace of w
+from which the whole phase speed ω + ε h₁ξ + ε² h₂ points away (upwinding): w(φ⁻) where it is positive, w(φ⁺)
+where it is negative. With the impact the load is that of R^p T(φ⁺) − T(φ⁻). At the ends of the ξ-interval the
+condition is natural: no probability flux.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import csc_matrix, csr_matrix, kron
+
+from fpsolve.mesh import CylinderMesh
+from fpsolve.noise import FloatArray, Noise
+from fpsolve.oscillator import VibroImpactOscillator, h1, q1
+from fpsolve.space import Coefficient, CylinderSpace, one
+
+
+class TiltedGenerator:
+    """L(p) of Eq. (19) on a mesh: matrices for any p, from parts assembled once.
+
+    Args:
+        oscillator: the vibro-impact oscillator.
+        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands.
+        mesh: half circle (its principal eigenvalue is that of the full circle) or full circle.
+    """
+
+    def __init__(self, oscillator: VibroImpactOscillator, noise: Noise, mesh: CylinderMesh) -> None:
+        self.oscillator, self.noise = oscillator, noise
+        self.space = CylinderSpace(mesh, noise)
+
+    def L0(self) -> csr_matrix:
+        """L₀ = ½σ²∂ξξ + b(ξ)∂ξ + ω∂φ."""
+        rate = 0.5 * (self.noise.diffusion / self.noise.standard_deviation) ** 2
+        diffusion = -rate * kron(self.space.phase.mass(), self.space.noise.stiffness())
+        return diffusion + self._transport(self._omega, one)
+
+    def L1(self, p: float) -> csr_matrix:
+        """L₁ = ξ(h₁∂φ + p q₁)."""
+        return self._transport(h1, self._xi) + p * self._reaction(q1, self._xi)
+
+    def L2(self, p: float) -> csr_matrix:
+        """L₂ = h₂∂φ + p q₂ between impacts."""
+        return self._transport(self.oscillator.h2, one) + p * self._reaction(self.oscillator.q2, one)
+
+    def impact(self, p: float) -> csr_matrix:
+        """The impacts' point load beyond continuity, (R^p − 1) ω w(φ⁻) T(φ⁺)."""
+        return math.expm1(p * self.oscillator.log_impact_factor) * self._impact_load
+
+    @cached_property
+    def mass(self) -> csc_matrix:
+        """∫ P_s w T."""
+        return csc_matrix(kron(self.space.phase.mass(), self.space.noise.mass()))
+
+    def at(self, p: float) -> csc_matrix:
+        """The matrix of L(p)."""
+        return csc_matrix(self._even_part + p * self._linear_part + self.impact(p))
+
+    def derivative(self, p: float) -> csc_matrix:
+        """The matrix of dL/dp = ε q₁ξ + ε² q₂ + ln R · R^p · (impact load)."""
+        log_factor = self.oscillator.log_impact_factor
+        return csc_matrix(self._linear_part + log_factor * math.exp(p * log_factor) * self._impact_load)
+
+    def second_derivative(self, p: float) -> csc_matrix:
+        """The matrix of d²L/dp², all of it from the impacts."""
+        log_factor = self.oscillator.log_impact_factor
+        return csc_matrix(log_factor**2 * math.exp(p * log_factor) * self._impact_load)
+
+    def upper_bound(self, p: float) -> float:
+        """A number right of Λ(p): the supremum of p(ε q₁ξ + ε² q₂), and of the impacts spread evenly over φ."""
+        eps, c1 = self.oscillator.epsilon, self.oscillator.c1
+        xi = self.noise.standard_deviation * self.space.mesh.z_lines[[0, -1]]
+        growth = max(0.0, *(p * (eps * xi + eps**2 * c1)))
+        speed = self.oscillator.omega + 0.5 * np.max(np.abs(eps * xi + eps**2 * c1))
+        return growth + max(0.0, p * self.oscillator.log_impact_factor) * speed / math.pi
+
+    @cached_property
+    def _even_part(self) -> csr_matrix:
+        eps = self.oscillator.epsilon
+        return self.L0() + eps * self.L1(0.0) + eps**2 * self.L2(0.0)
+
+    @cached_property
+    def _linear_part(self) -> csr_matrix:
+        eps = self.oscillator.epsilon
+        return eps * self._reaction(q1, self._xi) + eps**2 * self._reaction(self.oscillator.q2, one)
+
+    @cached_property
+    def _impact_load(self) -> csr_matrix:
+        at = self.space.mesh.impact_vertices
+        load = self.oscillator.omega * self.space.left_trace[at].T @ self.space.right_trace[at]
+        return csr_matrix(kron(csr_matrix(load), self.space.noise.mass()))
+
+    def _omega(self, phi: FloatArray) -> FloatArray:
+        return np.full_like(phi, self.oscillator.omega)
+
+    def _xi(self, z: FloatArray) -> FloatArray:
+        return self.noise.standard_deviation * z
+
+    def _reaction(self, f: Coefficient, g: Coefficient) -> csr_matrix:
+        """∫ P_s f(φ) g(z) w T."""
+        return csr_matrix(kron(self.space.phase.mass(f), self.space.noise.mass(g)))
+
+    def _transport(self, f: Coefficient, g: Coefficient) -> csr_matrix:
+        """∫ P_s f(φ) g(z) w T_φ and its upwind point loads at the φ-vertices."""
+        phase, noise, vertices = self.space.phase, self.space.noise, self.space.mesh.phi_lines[:-1]
+        jumps = f(vertices)[:, None] * (self.space.right_trace - self.space.left_trace)
+        forward = ~self._reversals
+        total = kron(phase.convection(f) + csr_matrix(self.space.left_trace[forward].T @ jumps[forward]), noise.mass(g))
+        for j in np.flatnonzero(self._reversals):
+            for trace, direction in ((self.space.left_trace[j], 1), (self.space.right_trace[j], -1)):
+                load = csr_matrix(np.outer(trace, jumps[j]))
+                total = total + kron(load, noise.mass(self._upwind(g, vertices[j], direction)))
+        return csr_matrix(total)
+
+    @cached_property
+    def _reversals(self) -> Any:
+        """At which φ-vertices the phase speed is negative for some ξ of the interval, boolean."""
+        ends = self.space.mesh.z_lines[[0, -1], None]
+        return np.any(self._phase_speed(self.space.mesh.phi_lines[:-1], ends) < 0, axis=0)
+
+    def _phase_speed(self, phi: ArrayLike, z: FloatArray) -> FloatArray:
+        """ω + ε h₁ξ + ε² h₂."""
+        eps = self.oscillator.epsilon
+        return self.oscillator.omega + eps * h1(phi) * self._xi(z) + eps**2 * self.oscillator.h2(phi)
+
+    def _upwind(self, g: Coefficient, phi: float, direction: int) -> Coefficient:
+        """g(z) where the phase speed at φ has the asked direction, 1 or −1; 0 elsewhere."""
+        return lambda z: g(z) * ((self._phase_speed(phi, z) >= 0) == (direction > 0))

@@ -1,0 +1,180 @@
+"""The coloured noise ξ(t), Eqs. (7)-(16): the non-Gaussian process and the Ornstein-Uhlenbeck process.
+
+Both satisfy dξ = b(ξ) dt + σ dW with a stationary density P_s, and b = ½σ² (ln P_s)′, so that the noise
+part of the generator is self-adjoint in P_s. The discretisation needs only what `Noise` names.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+from scipy.special import beta, xlog1py
+
+FloatArray = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0)]
+STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+
+class Noise(Protocol):
+    """What the discretisation asks of a noise: dξ = ½σ² (ln P_s)′ dt + σ dW."""
+
+    @property
+    def diffusion(self) -> float:
+        """σ, the coefficient of dW."""
+
+    @property
+    def standard_deviation(self) -> float:
+        """Stationary standard deviation of ξ: one noise unit, z = ξ/std."""
+
+    @property
+    def half_width(self) -> float:
+        """The support of ξ is (−half_width, half_width); ∞ where it is the whole line."""
+
+    @property
+    def end_exponent(self) -> float:
+        """a in P_s ~ (half_width − |ξ|)^a at the ends of a bounded support; 0 on the whole line."""
+
+    def density(self, xi: ArrayLike) -> FloatArray:
+        """Stationary density P_s(ξ)."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class OrnsteinUhlenbeck:
+    """Ornstein-Uhlenbeck noise dξ = −α₀ ξ dt + σ₀ dW, Eq. (15).
+
+    Args:
+        alpha: relaxation rate α₀ > 0, in 1/time.
+        sigma: coefficient of the Wiener process, σ₀ > 0.
+
+    Raises:
+        pydantic.ValidationError: a parameter is not a finite number in its range.
+    """
+
+    alpha: Positive
+    sigma: Positive
+
+    @property
+    def diffusion(self) -> float:
+        return self.sigma
+
+    @property
+    def standard_deviation(self) -> float:
+        """σ₀/√(2α₀)."""
+        return self.sigma / math.sqrt(2 * self.alpha)
+
+    @property
+    def half_width(self) -> float:
+        return math.inf
+
+    @property
+    def end_exponent(self) -> float:
+        return 0.0
+
+    def drift(self, xi: ArrayLike) -> FloatArray:
+        """−α₀ ξ."""
+        return -self.alpha * np.asarray(xi, dtype=float)
+
+    def density(self, xi: ArrayLike) -> FloatArray:
+        """Gaussian density with variance σ₀²/(2α₀)."""
+        z = np.asarray(xi, dtype=float) / self.standard_deviation
+        return np.exp(-0.5 * z**2) / (math.sqrt(2 * math.pi) * self.standard_deviation)
+
+    def spectral_density(self, omega: float) -> float:
+        """S(ω) = σ₀²/(α₀² + ω²), Eq. (16)."""
+        return self.sigma**2 / (self.alpha**2 + omega**2)
+
+
+@dataclass(frozen=True, config=STRICT)
+class NonGaussianNoise:
+    """Non-Gaussian coloured noise dξ = −V′(ξ)/τ₀ dt + (√(2D₀)/τ₀) dW, Eqs. (7)-(8).
+
+    r₀ = 1 is the Ornstein-Uhlenbeck process; r₀ < 1 has bounded support, r₀ > 1 algebraic tails.
+
+    Args:
+        D0: noise intensity D₀ > 0.
+        tau0: correlation time τ₀ > 0.
+        r0: departure from the Gaussian noise, r₀ < 3 (beyond, Eq. (9) cannot be normalised).
+
+    Raises:
+        pydantic.ValidationError: a parameter is not a finite number in its range.
+    """
+
+    D0: Positive
+    tau0: Positive
+    r0: Annotated[float, Field(lt=3)]
+
+    @property
+    def _curvature(self) -> float:
+        """b in 1 + b ξ², the bracket of Eqs. (8)-(9): b = τ₀(r₀ − 1)/(2D₀)."""
+        return self.tau0 * (self.r0 - 1) / (2 * self.D0)
+
+    @property
+    def diffusion(self) -> float:
+        """√(2D₀)/τ₀, which is σ₀ of Eq. (14)."""
+        return math.sqrt(2 * self.D0) / self.tau0
+
+    @property
+    def variance(self) -> float:
+        """⟨ξ²⟩ of Eq. (10): 2D₀/(τ₀(5 − 3r₀)) for r₀ < 5/3, otherwise ∞."""
+        return 2 * self.D0 / (self.tau0 * (5 - 3 * self.r0)) if self.r0 < 5 / 3 else math.inf
+
+    @property
+    def standard_deviation(self) -> float:
+        return math.sqrt(self.variance)
+
+    @property
+    def half_width(self) -> float:
+        """√(2D₀/(τ₀(1 − r₀))) for r₀ < 1, otherwise ∞."""
+        return 1 / math.sqrt(-self._curvature) if self.r0 < 1 else math.inf
+
+    @property
+    def end_exponent(self) -> float:
+        return 1 / (1 - self.r0) if self.r0 < 1 else 0.0
+
+    def potential(self, xi: ArrayLike) -> FloatArray:
+        """V(ξ) of Eq. (8); its limit ξ²/2 for r₀ = 1; NaN outside the support."""
+        square = np.asarray(xi, dtype=float) ** 2
+        if self.r0 == 1:
+            return square / 2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self.D0 / (self.tau0 * (self.r0 - 1)) * np.log1p(self._curvature * square)
+
+    def drift(self, xi: ArrayLike) -> FloatArray:
+        """−V′(ξ)/τ₀ = −(ξ/τ₀)/(1 + τ₀(r₀ − 1)ξ²/(2D₀)), Eq. (11) before its approximation."""
+        xi = np.asarray(xi, dtype=float)
+        return -xi / self.tau0 / (1 + self._curvature * xi**2)
+
+    def density(self, xi: ArrayLike) -> FloatArray:
+        """P_s(ξ) of Eq. (9) with the exponent −1/(r₀ − 1), normalised in closed form; 0 outside the support."""
+        xi = np.asarray(xi, dtype=float)
+        if self.r0 == 1:
+            return self.ou_reduction().density(xi)
+        bracket = self._curvature * xi**2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            power = np.exp(xlog1py(-1 / (self.r0 - 1), bracket))
+        return np.where(bracket > -1, power, 0.0) / self._normalisation
+
+    @property
+    def _normalisation(self) -> float:
+        """Z of Eq. (9): B(a + 1, ½)/√|b| for r₀ < 1 and B(a − ½, ½)/√b for r₀ > 1, with a = 1/|r₀ − 1|."""
+        a = 1 / abs(self.r0 - 1)
+        return float(beta(a + 1 if self.r0 < 1 else a - 0.5, 0.5)) / math.sqrt(abs(self._curvature))
+
+    def ou_reduction(self) -> OrnsteinUhlenbeck:
+        """The Ornstein-Uhlenbeck process of Eqs. (12)-(14): α₀ = 1/τ₁, σ₀ = √(2D₀)/τ₀.
+
+        Raises:
+            ValueError: r₀ ≥ 5/3, where ⟨ξ²⟩ is infinite and Eq. (11) has no meaning.
+        """
+        if self.r0 >= 5 / 3:
+            raise ValueError(
+                f"r0 = {self.r0} has no Ornstein-Uhlenbeck reduction: Eqs. (11)-(12) need r0 < 5/3, "
+                "where the variance (10) is finite"
+            )
+        tau1 = 2 * (2 - self.r0) / (5 - 3 * self.r0) * self.tau0
+        return OrnsteinUhlenbeck(alpha=1 / tau1, sigma=self.diffusion)
