@@ -175,7 +175,7 @@ class CylinderSpace:
         z = self.mesh.z_lines
         exponent = noise.end_exponent
         self.phase = LineSpace(self.mesh.phi_lines, self.mesh.phi_degree, discontinuous=True)
-        self.density = lambda x: unit * noise.density(unit * x)
+        self.density: Coefficient = lambda x: unit * noise.density(unit * x)
         self.noise = LineSpace(
             z,
             self.mesh.xi_degree,
