@@ -19,6 +19,10 @@ class MeshError(FpsolveError):
     """A mesh that cannot carry the problem: not a tensor grid, or no line at an impact."""
 
 
+class OutputError(FpsolveError):
+    """A place where results cannot be written."""
+
+
 class NotConverged(FpsolveError):
     """The eigenvalue iteration did not settle.
 

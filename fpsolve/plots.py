@@ -1,0 +1,107 @@
+"""Figures for print: finite-element results as markers, perturbation theory as lines, as in the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fpsolve.files import atomic
+from fpsolve.noise import FloatArray
+
+SYMBOLS = {
+    "p": "$p$",
+    "oscillator.epsilon": r"$\varepsilon$",
+    "oscillator.omega": r"$\omega$",
+    "oscillator.restitution": "$r$",
+    "oscillator.c1": "$c_1$",
+    "oscillator.c2": "$c_2$",
+    "oscillator.c3": "$c_3$",
+    "noise.D0": "$D_0$",
+    "noise.tau0": r"$\tau_0$",
+    "noise.r0": "$r_0$",
+}
+TITLES = {
+    "p": "order of the moment $p$",
+    "oscillator.omega": r"natural frequency $\omega$ (rad/time)",
+    "oscillator.restitution": "coefficient of restitution $r$",
+    "oscillator.c1": "damping coefficient $c_1$ (1/time)",
+    "noise.D0": "noise intensity $D_0$",
+    "noise.tau0": r"correlation time $\tau_0$ (time)",
+    "noise.r0": "departure from Gaussian noise $r_0$",
+    "moment": r"moment Lyapunov exponent $\Lambda(p)$ (1/time)",
+    "lyapunov_exponent": r"largest Lyapunov exponent $\lambda$ (1/time)",
+    "stability_index": r"stability index $\delta_p$",
+}
+EQUATIONS = {"moment": "(37)", "lyapunov_exponent": "(39)", "stability_index": "(38)"}
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
+_MARKERS = "osD^v<>"
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One curve of a figure: markers at (x, y), a line through (line_x, line_y).
+
+    Attributes:
+        varied: the parameters that tell it from the others, for the legend.
+    """
+
+    varied: dict[str, float]
+    x: FloatArray
+    y: FloatArray
+    line_x: FloatArray
+    line_y: FloatArray
+
+
+def write_figure(series: Sequence[Series], x: str, y: str, title: str, paths: Sequence[Path]) -> None:
+    """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
+
+    Args:
+        series: the curves.
+        x: "p" or the dotted key of a parameter.
+        y: "moment", "lyapunov_exponent" or "stability_index".
+        title: stands above the axes.
+        paths: .png, .pdf or what else matplotlib writes.
+    """
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with rc_context({"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12, "pdf.fonttype": 42}):
+        figure = Figure(figsize=(7.2, 5.0), dpi=160, layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.add_subplot(xlabel=TITLES.get(x, SYMBOLS.get(x, x)), ylabel=TITLES[y])
+        axes.set_title(title, wrap=True)
+        axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+        for i, item in enumerate(series):
+            _draw(axes, item, i)
+        _add_legend(axes, EQUATIONS[y])
+        axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+        axes.margins(x=0.03)
+        for path in paths:
+            with atomic(path) as temporary:
+                figure.savefig(temporary, metadata={"CreationDate": None} if path.suffix == ".pdf" else None)
+
+
+def _draw(axes: Any, item: Series, i: int) -> None:
+    colour, marker = _COLOURS[i % len(_COLOURS)], _MARKERS[i % len(_MARKERS)]
+    every = max(1, round(item.x.size / 17))
+    label = ", ".join(f"{SYMBOLS.get(key, key)} = {value:g}" for key, value in item.varied.items())
+    axes.plot(item.line_x, item.line_y, color=colour, linewidth=1.6)
+    axes.plot(
+        item.x, item.y, marker, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6,
+        markevery=every, label=label or None,
+    )  # fmt: skip
+
+
+def _add_legend(axes: Any, equation: str) -> None:
+    """Colours tell the curves apart; two grey entries tell the method."""
+    handles, labels = axes.get_legend_handles_labels()
+    grey = {"color": "0.35"}
+    marker = axes.plot([], [], "o", markersize=7, markerfacecolor="none", markeredgewidth=1.6, **grey)
+    line = axes.plot([], [], "-", linewidth=1.6, **grey)
+    axes.legend(
+        [*handles, *marker, *line], [*labels, "finite elements", f"perturbation, Eq. {equation}"],
+        frameon=False, fontsize=11,
+    )  # fmt: skip
