@@ -170,9 +170,9 @@ def _rayleigh_iteration(generator: TiltedGenerator, p: float, x: FloatArray, y: 
 
 def _pair(generator: TiltedGenerator, p: float, operator: Any, x: FloatArray, y: FloatArray) -> PrincipalPair:
     """Normalise both vectors and measure the pair: two-sided Rayleigh quotient, backward errors, signs."""
-    mass, span = generator.mass, generator.space.mesh.span
-    x = x / (generator.space.constant() @ (mass @ x) / span)
-    y = y / (y @ (mass @ x) * 2 * np.pi / span)
+    mass, one = generator.mass, generator.space.constant()
+    x = x * (one @ (mass @ one)) / (one @ (mass @ x))
+    y = y / (y @ (mass @ x) * 2 * np.pi / generator.space.mesh.span)
     norm = y @ (mass @ x)
     value = y @ (operator @ x) / norm
     size = abs(operator).sum(axis=0).max()

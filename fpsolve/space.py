@@ -80,11 +80,12 @@ class LineSpace:
         return int(self._parts[0].N)
 
     def constant(self) -> FloatArray:
-        """Coefficients of the function 1, shape (size,): the hat functions add up to it."""
-        hats = np.arange(self.size) < self.lines.size
-        if self._discontinuous:
-            hats = np.arange(self.size) % (self.degree + 1) < 2
-        return hats / self._scale.diagonal()
+        """Coefficients of the function 1, shape (size,): 1 at nodes, 0 for the bubbles of degree 3 and more."""
+        if self.degree <= 2:
+            return 1 / self._scale.diagonal()
+        index = np.arange(self.size)
+        nodal = index % (self.degree + 1) < 2 if self._discontinuous else index < self.lines.size
+        return nodal / self._scale.diagonal()
 
     def mass(self, f: Coefficient = one) -> csr_matrix:
         """∫ w f u v."""
@@ -121,10 +122,10 @@ class LineSpace:
 
     def _table(self, basis: Any) -> tuple[FloatArray, csr_matrix]:
         """Points of a basis and the matrix that evaluates there."""
-        points = basis.global_coordinates().value[0]
+        points = np.asarray(basis.global_coordinates())[0]
         rows = np.arange(points.size).reshape(points.shape)
         columns = [np.broadcast_to(dofs[:, None], rows.shape) for dofs in basis.element_dofs]
-        entries = np.concatenate([np.ravel(function[0].value) for function in basis.basis])
+        entries = np.concatenate([np.ravel(np.asarray(function[0])) for function in basis.basis])
         index = np.tile(rows.ravel(), basis.Nbfun), np.concatenate([c.ravel() for c in columns])
         matrix = csr_matrix((entries, index), shape=(points.size, self.size))
         return points.ravel(), matrix @ self._scale
@@ -150,7 +151,7 @@ class LineSpace:
     def _assemble(self, f: Coefficient, form: Callable[..., FloatArray]) -> csr_matrix:
         total = 0
         for basis in self._parts:
-            x = basis.global_coordinates().value[0]
+            x = np.asarray(basis.global_coordinates())[0]
             factor = self._weight(x) * f(x)
             total += skfem.BilinearForm(lambda u, v, _, k=factor: k * form(u, v)).assemble(basis)
         return csr_matrix(self._scale @ total @ self._scale)

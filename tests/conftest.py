@@ -1,0 +1,36 @@
+"""What the tests share: the parameter sets of Fig. 1 and of the strong-noise problems."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fpsolve.exponent import ExponentSolver
+from fpsolve.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.oscillator import VibroImpactOscillator
+
+FIG1 = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
+FIG1_NOISE = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
+UNIT_NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
+
+
+@pytest.fixture(scope="session")
+def fig1_solver() -> ExponentSolver:
+    return ExponentSolver(FIG1, FIG1_NOISE.ou_reduction())
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20)
+
+
+def oracle_arguments(oscillator: VibroImpactOscillator, noise: OrnsteinUhlenbeck) -> dict[str, float]:
+    """Plain numbers for the reference codes in tests/oracles."""
+    return {
+        "alpha": noise.alpha,
+        "sigma": noise.sigma,
+        "omega": oscillator.omega,
+        "epsilon": oscillator.epsilon,
+        "c1": oscillator.c1,
+        "log_R": oscillator.log_impact_factor,
+    }
