@@ -77,7 +77,9 @@ def test_finite_elements_leave_second_order_theory_by_epsilon_to_the_fourth(name
     constants = []
     for epsilon in (0.2, 0.1, 0.05, 0.025):
         oscillator = VibroImpactOscillator(**parameters, epsilon=epsilon)
-        difference = ExponentSolver(oscillator, noise).pair(p).value - perturbation.moment_exponent(oscillator, noise, p)
+        difference = ExponentSolver(oscillator, noise).pair(p).value - perturbation.moment_exponent(
+            oscillator, noise, p
+        )
         constants.append(difference / epsilon**4)
     # the next term is ε⁶: each halving of ε divides the distance to the limit by four
     steps = np.abs(np.diff(constants))
