@@ -209,7 +209,7 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
     for p, value, error, theory in zip(
         moments.p, moments.value, moments.error_estimate, result.moments_perturbation, strict=True
     ):
-        table.add_row(f"{p:g}", digits(value, error), f"{error:.0e}", f"{theory:.6g}", f"{value - theory:.2e}")
+        table.add_row(f"{p:g}", digits(value, error), f"{error:.0e}", f"{theory + 0.0:.6g}", f"{value - theory:.2e}")
     return table
 
 
@@ -274,10 +274,11 @@ def _align(table: Table) -> None:
 
 
 def digits(value: float, error: float, most: int = 13) -> str:
-    """A number with the digits that its error leaves, at most so many significant ones."""
-    scale = abs(value) or 1.0
-    count = most if error <= 0 else math.floor(math.log10(scale)) - math.floor(math.log10(error)) + 1
-    return f"{value:#.{min(max(count, 1), most)}g}"
+    """A number with the digits that its error leaves, at most so many significant ones; 0 where it leaves none."""
+    if abs(value) <= error:
+        return "0"
+    count = most if error <= 0 else math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
+    return f"{value:#.{min(max(count, 1), most)}g}".rstrip(".")
 
 
 if __name__ == "__main__":

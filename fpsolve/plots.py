@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,6 +69,7 @@ def write_figure(series: Sequence[Series], x: str, y: str, title: str, paths: Se
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
     with rc_context({"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12, "pdf.fonttype": 42}):
         figure = Figure(figsize=(7.2, 5.0), dpi=160, layout="constrained")
         FigureCanvasAgg(figure)

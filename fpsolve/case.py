@@ -1,0 +1,253 @@
+"""A case file: TOML in, a validated `Case` out, or one message for each fault of the file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
+
+from fpsolve import perturbation
+from fpsolve.document import read_document
+from fpsolve.errors import CaseError, Fault, MeshError
+from fpsolve.mesh import CylinderMesh
+from fpsolve.messages import Refusal, explain, nearest, refuse, shown
+from fpsolve.noise import FloatArray
+from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.schema import (
+    Expectation,
+    FigureSection,
+    MeshSection,
+    Moments,
+    NoiseSection,
+    OutputSection,
+    Section,
+    Text,
+    Values,
+    Vary,
+    flat,
+    same,
+)
+
+MAX_CURVES = 10_000
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One parameter set of a case.
+
+    Attributes:
+        oscillator, noise: what the solver takes.
+        parameters: every parameter by its dotted key, such as "noise.D0".
+        varied: those of them that [vary] names.
+    """
+
+    oscillator: VibroImpactOscillator
+    noise: perturbation.AnyNoise
+    parameters: Mapping[str, float | str]
+    varied: Mapping[str, float]
+
+
+def _oscillator(value: Any) -> Any:
+    return VibroImpactOscillator(**value) if isinstance(value, dict) else value
+
+
+class Case(Section):
+    """What one case file says; made by `load_case`.
+
+    Raises:
+        pydantic.ValidationError: with every fault of the sections and of what they say about each other.
+    """
+
+    title: Text
+    oscillator: Annotated[VibroImpactOscillator, BeforeValidator(_oscillator)]
+    noise: NoiseSection
+    moments: Moments
+    vary: Vary = Field(default_factory=dict)
+    mesh: MeshSection = MeshSection()
+    figure: FigureSection = FigureSection()
+    output: OutputSection = OutputSection()
+    expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
+    _path: Path = PrivateAttr(default=Path("case.toml"))
+
+    @property
+    def path(self) -> Path:
+        return self._path
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending."""
+        return self._path.stem
+
+    @property
+    def p(self) -> FloatArray:
+        """The orders of the moments, shape (n,)."""
+        return self.moments.values
+
+    @property
+    def rtol(self) -> float:
+        return self.moments.rtol
+
+    def curves(self) -> tuple[Curve, ...]:
+        """One curve for each combination of the varied values, the last key varying fastest."""
+        return tuple(self.curve(varied) for varied in _combinations(self.vary))
+
+    def curve(self, varied: Mapping[str, float]) -> Curve:
+        """The case's parameter set with some parameters replaced, by their dotted keys."""
+        return _curve(self.oscillator, self.noise, varied)
+
+    def cylinder_mesh(self) -> CylinderMesh | None:
+        """The mesh that the case states; None leaves it to the solver."""
+        return self.mesh.mesh(self.path.parent)
+
+    @field_validator("moments")
+    @classmethod
+    def _is_computable(cls, moments: Moments, info: ValidationInfo) -> Moments:
+        refuse(_curve_refusals(info.data | {"moments": moments}, {}))
+        return moments
+
+    @field_validator("vary")
+    @classmethod
+    def _makes_curves(cls, vary: dict[str, Values], info: ValidationInfo) -> dict[str, Values]:
+        number = math.prod(map(len, vary.values()))
+        if number > MAX_CURVES:
+            text = f"makes {number} curves; must be at most {MAX_CURVES}; list fewer values"
+            refuse([((), None, text)])
+        refuse(_curve_refusals(info.data, vary))
+        return vary
+
+    @field_validator("mesh")
+    @classmethod
+    def _can_be_made(cls, mesh: MeshSection, info: ValidationInfo) -> MeshSection:
+        try:
+            with np.errstate(all="ignore"):
+                mesh.mesh((info.context or {}).get("folder", Path()))
+        except (MeshError, OSError, ValueError) as error:
+            text = f"got {shown(mesh.file)}; {error}" if mesh.file else str(error)
+            refuse([(("file",) if mesh.file else (), mesh.file, text)])
+        return mesh
+
+    @field_validator("figure")
+    @classmethod
+    def _is_varied(cls, figure: FigureSection, info: ValidationInfo) -> FigureSection:
+        known = ("p", *info.data.get("vary", (figure.x,)))
+        if figure.x not in known:
+            text = f"got {shown(figure.x)}; must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
+            refuse([(("x",), figure.x, text)])
+        return figure
+
+    @field_validator("output")
+    @classmethod
+    def _are_computed(cls, output: OutputSection, info: ValidationInfo) -> OutputSection:
+        wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
+        refuse(_p_refusals(info.data, wanted))
+        return output
+
+    @field_validator("expect")
+    @classmethod
+    def _can_be_checked(cls, expect: tuple[Expectation, ...], info: ValidationInfo) -> Any:
+        wanted = (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None)
+        refuse([*_p_refusals(info.data, wanted), *_where_refusals(info.data, expect)])
+        return expect
+
+
+def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
+    """Read and check a case file.
+
+    Args:
+        path: a TOML file.
+        overrides: texts such as "oscillator.omega=2.0", each a key with its sections and a TOML value.
+
+    Raises:
+        CaseError: with every fault of the file and of the overrides, each with its line and its remedy.
+    """
+    document = read_document(path, overrides)
+    faults = list(document.faults)
+    try:
+        case = Case.model_validate(document.data, context={"folder": Path(path).parent})
+    except ValidationError as error:
+        faults += [document.fault(*fault) for fault in explain(error, Case)]
+    except RecursionError:
+        faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
+    if faults:
+        raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
+    case._path = Path(path)
+    return case
+
+
+def _curve(oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Mapping[str, float]) -> Curve:
+    system = asdict(oscillator) | {"impact": oscillator.impact.value}
+    parameters: dict[str, Any] = flat({"oscillator": system, "noise": noise.model_dump()}) | varied
+    return Curve(
+        oscillator=VibroImpactOscillator(**_section("oscillator", parameters)),
+        noise=NoiseSection(**_section("noise", parameters)).process(),
+        parameters=parameters,
+        varied=varied,
+    )
+
+
+def _section(name: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    return {key.partition(".")[2]: value for key, value in parameters.items() if key.startswith(f"{name}.")}
+
+
+def _combinations(vary: Mapping[str, Values]) -> Iterator[dict[str, float]]:
+    return (dict(zip(vary, values, strict=True)) for values in product(*vary.values()))
+
+
+def _curve_refusals(valid: Mapping[str, Any], vary: Mapping[str, Values]) -> Iterator[Refusal]:
+    """The first combination whose parameters contradict each other or overflow."""
+    if not {"oscillator", "noise", "moments"} <= valid.keys():
+        return
+    p = np.max(np.abs(valid["moments"].values))
+    for varied in _combinations(vary):
+        reason = _obstacle(valid["oscillator"], valid["noise"], varied, p)
+        if reason:
+            setting = ", ".join(f"{key} = {value}" for key, value in varied.items())
+            yield (), varied, f"with {setting}: {reason}" if varied else reason
+            return
+
+
+def _obstacle(oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Mapping[str, float], p: float) -> str:
+    """Why there is no such curve, or nothing."""
+    try:
+        curve = _curve(oscillator, noise, varied)
+        with np.errstate(all="ignore"):
+            scale = perturbation.moment_scale(curve.oscillator, curve.noise, p)
+            sizes = [scale, perturbation.stability_index(curve.oscillator, curve.noise)]
+    except ValidationError as error:
+        context = error.errors()[0].get("ctx", {})
+        return str(context.get("error", f"the noise has no finite strength; {_MODERATE}"))
+    except ArithmeticError:
+        sizes = [math.inf]
+    return "" if np.all(np.isfinite(sizes)) else f"Eqs. (37)-(38) overflow; {_MODERATE}"
+
+
+_MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
+
+
+def _p_refusals(valid: Mapping[str, Any], wanted: Iterable[tuple[tuple[str | int, ...], float]]) -> Iterator[Refusal]:
+    moments: Moments | None = valid.get("moments")
+    for path, p in wanted:
+        if moments is not None and not moments.has(p):
+            first, last = moments.values[[0, -1]]
+            known = f"moments.p ({moments.values.size} values, {first:g} to {last:g})"
+            yield path, p, f"got {p}; must be among {known}; add it there, or choose one of them"
+
+
+def _where_refusals(valid: Mapping[str, Any], expect: Sequence[Expectation]) -> Iterator[Refusal]:
+    vary: Mapping[str, Values] | None = valid.get("vary")
+    if vary is None:
+        return
+    stated = ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items())
+    for i, key, value in stated:
+        if key not in vary:
+            guess, known = nearest(key, vary), ", ".join(vary) or "none"
+            yield (i, "where", key), value, f"is not varied;{guess} varied keys: {known}; add it to [vary]"
+        elif not any(same(value, other) for other in vary[key]):
+            known = shown(vary[key])
+            yield (i, "where", key), value, f"got {value}; must be one of {known}; add it to [vary]"
