@@ -1,0 +1,164 @@
+"""The command line: exit codes, messages, and where they go."""
+
+import pytest
+
+from fpsolve.cli import BAD_INPUT, CHECK_FAILED, NOT_CONVERGED, digits, main
+from tests.test_report import HOPELESS, TEXT, files
+
+
+@pytest.fixture
+def case(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "test.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    return str(path)
+
+
+def test_run_prints_a_table_and_writes_the_results(case, tmp_path, capsys):
+    assert main(["run", case]) == 0
+    out, err = capsys.readouterr()
+    for text in (
+        "Λ(p)",
+        "Eq. (37)",
+        "difference",
+        "noise.D0 = 0.1",
+        "0.01416314365",
+        "0.0141494",
+        "written: results/test",
+    ):
+        assert text in out
+    assert "\x1b" not in out
+    assert "warning" not in err
+    assert "summary.json" in files(tmp_path / "results/test")
+
+
+def test_out_and_set(case, tmp_path, capsys):
+    assert (
+        main(["run", case, "--out", "elsewhere", "--set", "moments.p=[1.0]", "--set", "output.eigenfunctions=[]"]) == 0
+    )
+    assert "summary.json" in files(tmp_path / "elsewhere/test")
+    assert not (tmp_path / "results").exists()
+    assert " 0.0002850955" in capsys.readouterr().out
+
+
+def test_set_takes_negative_values(case):
+    assert main(["check", case, "--set", "oscillator.c1=-0.2"]) == 0
+
+
+def test_a_figure_over_a_parameter_prints_one_row_a_curve(case, capsys):
+    overrides = ['figure={ x = "noise.D0", y = "lyapunov_exponent" }', "output.eigenfunctions=[]"]
+    assert main(["run", case, "--set", overrides[0], "--set", overrides[1]]) == 0
+    out = capsys.readouterr().out
+    assert "…" not in out
+    for text in ("D0", "λ", "Eq. (39)", "δ_p", "Eq. (38)", "0.0010839"):
+        assert text in out
+
+
+def test_check_exits_1_when_a_value_differs(case, tmp_path, capsys):
+    good = '[[expect]]\nquantity = "moment"\np = 0.0\nvalue = 0.0\natol = 1e-12\nsource = "conservation"\n'
+    (tmp_path / "good.toml").write_text(TEXT + good, encoding="utf-8")
+    (tmp_path / "bad.toml").write_text(TEXT + good.replace("value = 0.0", "value = 1.0"), encoding="utf-8")
+    assert main(["check", "good.toml"]) == 0
+    assert "ok" in capsys.readouterr().out
+    assert main(["check", "good.toml", "bad.toml"]) == CHECK_FAILED
+    out = capsys.readouterr().out
+    assert "differs" in out
+    assert "conservation" in out
+    assert not (tmp_path / "results").exists()
+
+
+def test_check_says_when_a_case_expects_nothing(case, capsys):
+    assert main(["check", case]) == 0
+    assert "nothing is expected; add [[expect]]" in capsys.readouterr().out
+
+
+def test_faults_of_all_cases_are_listed_and_nothing_is_written(case, tmp_path, capsys):
+    (tmp_path / "bad.toml").write_text(TEXT.replace("omega = 1.0", "omega = -1.0"), encoding="utf-8")
+    assert main(["run", case, "bad.toml", "missing.toml"]) == BAD_INPUT
+    out, err = capsys.readouterr()
+    assert "bad.toml:5: oscillator.omega: got -1.0" in err
+    assert "missing.toml" in err
+    assert "Traceback" not in err
+    assert out == ""
+    assert not (tmp_path / "results").exists()
+
+
+def test_namesakes_are_refused(case, tmp_path, capsys):
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/test.toml").write_text(TEXT, encoding="utf-8")
+    assert main(["run", case, "other/test.toml"]) == BAD_INPUT
+    assert 'several cases are called "test"' in capsys.readouterr().err
+
+
+def test_not_converged_exits_3_with_the_partial_results(case, capsys):
+    assert main(["run", case, "--set", "oscillator.epsilon=1.5", "--set", HOPELESS]) == NOT_CONVERGED
+    out, err = capsys.readouterr()
+    assert "use more cells" in err
+    assert "written: results/test" in out
+
+
+def test_infinite_moments_exit_2(case, tmp_path, capsys):
+    assert main(["run", case, "--set", "noise.treatment='exact'", "--set", "noise.r0=1.1"]) == BAD_INPUT
+    assert "Λ(2) is infinite" in capsys.readouterr().err
+    assert not (tmp_path / "results").exists()
+
+
+def test_unwritable_output_exits_2(case, capsys):
+    assert main(["run", case, "--out", "/proc/none"]) == BAD_INPUT
+    assert "choose another --out" in capsys.readouterr().err
+
+
+def test_a_short_interval_gives_a_warning(case, capsys):
+    assert main(["run", case, "--set", "mesh={ xi_min = -4.0, xi_max = 4.0 }"]) == 0
+    assert "warning: rtol = 1e-08 is not met" in capsys.readouterr().err
+
+
+def test_mesh_writes_a_file_that_a_case_can_name(case, tmp_path, capsys):
+    assert (
+        main(["mesh", "sub/graded.vtu", "--phi-cells", "3", "--xi-cells", "6", "--grading", "2", "--xi-min", "-7"]) == 0
+    )
+    assert "written: sub/graded.vtu (18 cells, 1815 unknowns)" in capsys.readouterr().out
+    assert main(["check", case, "--set", 'mesh.file="sub/graded.vtu"']) == 0
+
+
+def test_impossible_meshes_exit_2(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for arguments in (["mesh", "a.vtu", "--phi-cells", "0"], ["mesh", "a.stl"], ["mesh", "a.vtu", "--xi-min", "1"]):
+        assert main(arguments) == BAD_INPUT
+        assert "Traceback" not in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "arguments", [["run"], ["bogus"], ["run", "a.toml", "--no-such-option"], ["mesh", "a.vtu", "--phi-cells", "x"]]
+)
+def test_wrong_usage_exits_2(arguments, capsys):
+    assert main(arguments) == BAD_INPUT
+    assert "Error" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["run", "check", "mesh"])
+def test_help_shows_an_example(command, capsys):
+    assert main([command, "--help"]) == 0
+    assert f"Example: fpsolve {command} " in capsys.readouterr().out
+
+
+def test_version(capsys):
+    from importlib.metadata import version
+
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == f"fpsolve {version('fpsolve')}"
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (0.0141631436533, 9e-13, "0.0141631436533"),
+        (0.0141631436533, 1e-6, "0.014163"),
+        (-123.456, 0.1, "-123.5"),
+        (1e-17, 1e-15, "0"),
+        (2.0, 0.0, "2.000000000000"),
+    ],
+)
+def test_digits_are_those_that_the_error_leaves(value, error, text):
+    assert digits(value, error) == text

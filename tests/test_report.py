@@ -1,0 +1,195 @@
+"""Running a case: what is written, that it agrees with what was computed, and that failures lose nothing."""
+
+import csv
+import json
+from importlib.metadata import version
+
+import numpy as np
+import pytest
+
+import fpsolve
+from fpsolve import report
+from fpsolve.errors import NoSuchExponent, NotConverged, OutputError
+
+TEXT = """
+title = "A test"
+[oscillator]
+epsilon = 0.1
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 0.5
+tau0 = 0.5
+r0 = 0.95
+treatment = "ou-reduction"
+[moments]
+p = [2.0, 0.0, -1.0]
+[vary]
+"noise.D0" = [0.1, 1.0]
+[output]
+eigenfunctions = [2.0]
+"""
+
+
+@pytest.fixture
+def case(tmp_path):
+    return write(tmp_path, TEXT)
+
+
+def write(folder, text, overrides=()):
+    path = folder / "test.toml"
+    path.write_text(text, encoding="utf-8")
+    return fpsolve.load_case(path, overrides)
+
+
+def files(folder):
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
+    results = fpsolve.run(case, tmp_path / "out")
+    summary = json.loads((tmp_path / "out" / "test" / "summary.json").read_text(encoding="utf-8"))
+    assert list(summary) == ["case", "title", "fpsolve_version", "curves"]
+    assert (summary["case"], summary["title"]) == ("test", "A test")
+    assert summary["fpsolve_version"] == version("fpsolve")
+    for curve, result, D0 in zip(summary["curves"], results, (0.1, 1.0), strict=True):
+        assert curve["varied"] == {"noise.D0": D0}
+        assert curve["parameters"]["noise.D0"] == D0
+        assert curve["parameters"]["oscillator.impact"] == "delta"
+        assert curve["parameters"]["noise.treatment"] == "ou-reduction"
+        assert [row["p"] for row in curve["moments"]] == [2.0, 0.0, -1.0]
+        keys = {"p", "value", "derivative", "perturbation", "error_estimate", "residual"}
+        assert all(set(row) == keys for row in curve["moments"])
+        np.testing.assert_array_equal([row["value"] for row in curve["moments"]], result.moments.value)
+        assert curve["lyapunov_exponent"]["value"] == result.lyapunov_exponent.value
+        assert set(curve["stability_index"]) >= {"value", "perturbation"}
+        assert curve["variance_rate"]["value"] > 0
+        assert curve["mesh"]["unknowns"] == result.solver.generator.space.size
+        assert curve["warnings"] == []
+    assert summary["curves"][1]["moments"][0]["value"] == pytest.approx(0.0141631436533, rel=1e-10)
+    assert summary["curves"][1]["moments"][0]["perturbation"] == pytest.approx(0.014149421727, rel=1e-10)
+
+
+def test_table_holds_every_curve_and_moment(case, tmp_path):
+    results = fpsolve.run(case, tmp_path)
+    with (tmp_path / "test" / "moments.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6
+    assert list(rows[0])[:3] == ["noise.D0", "p", "value"]
+    values = np.concatenate([result.moments.value for result in results])
+    np.testing.assert_array_equal([float(row["value"]) for row in rows], values)
+
+
+def test_all_files_are_there_and_no_temporary_ones(case, tmp_path):
+    fpsolve.run(case, tmp_path / "out")
+    names = files(tmp_path / "out" / "test")
+    expected = {"summary.json", "moments.csv", "figure.png", "figure.pdf", "density.vtu", "show.py"}
+    assert expected | {"eigenfunctions.pvd", "eigenfunctions-2.pvd"} <= names
+    assert not [name for name in names if name.split("/")[-1].startswith(".")]
+    assert (tmp_path / "out" / "test" / "figure.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "out" / "test" / "figure.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_tables_are_the_same_bytes_twice(case, tmp_path):
+    for name in ("first", "second"):
+        fpsolve.run(case, tmp_path / name)
+    for file in ("summary.json", "moments.csv"):
+        assert (tmp_path / "first/test" / file).read_bytes() == (tmp_path / "second/test" / file).read_bytes()
+
+
+def test_no_eigenfunctions_where_none_are_asked_for(tmp_path):
+    case = write(tmp_path, TEXT.replace("[2.0]\n", "[]\n"))
+    fpsolve.run(case, tmp_path / "out")
+    assert not [name for name in files(tmp_path / "out") if "eigenfunctions" in name]
+
+
+def test_without_vary_there_is_one_curve(tmp_path):
+    case = write(tmp_path, TEXT.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', ""))
+    (result,) = fpsolve.run(case, tmp_path / "out")
+    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    assert summary["curves"][0]["varied"] == {}
+    assert summary["curves"][0]["parameters"]["noise.D0"] == 0.5 == result.curve.parameters["noise.D0"]
+
+
+def test_missing_stability_index_is_null_and_said(tmp_path):
+    overrides = ["oscillator.omega=10.0", "oscillator.c1=-1.0", "oscillator.restitution=0.5"]
+    case = write(tmp_path, TEXT, overrides)
+    fpsolve.run(case, tmp_path / "out")
+    curve = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"][0]
+    assert curve["stability_index"] is None
+    assert curve["warnings"] == ["no stability index: Λ(p) has no root p ≠ 0 in [-20, 20]"]
+
+
+HOPELESS = "mesh={ phi_cells = 1, phi_degree = 2, xi_cells = 2, xi_degree = 3 }"
+
+
+def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
+    """The strong-noise curve fails at p = 2 and −1; the weak one and p = 0 are kept."""
+    text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
+    case = write(tmp_path, text, [HOPELESS])
+    with pytest.raises(NotConverged, match="use more cells") as caught:
+        fpsolve.run(case, tmp_path / "out")
+    assert len(caught.value.partial) == 2
+    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    assert [row["p"] for row in summary["curves"][0]["moments"]] == [2.0, 0.0, -1.0]
+    assert 0.0 in [row["p"] for row in summary["curves"][1]["moments"]]
+    assert len(summary["curves"][1]["moments"]) < 3
+    assert "use more cells" in summary["curves"][1]["warnings"][-1]
+    assert {"figure.png", "moments.csv"} <= files(tmp_path / "out/test")
+
+
+def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
+    calls = []
+
+    def interrupt():
+        calls.append(1)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fpsolve.run(case, tmp_path / "out", advance=interrupt)
+    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    assert [curve["varied"]["noise.D0"] for curve in summary["curves"]] == [0.1]
+    assert "eigenfunctions.pvd" in files(tmp_path / "out/test")
+
+
+def test_infinite_moments_are_refused_before_anything_is_written(tmp_path):
+    case = write(tmp_path, TEXT, ["noise.treatment='exact'", "noise.r0=1.1"])
+    with pytest.raises(NoSuchExponent, match=r"test\.toml: moments\.p: Λ\(2\) is infinite"):
+        fpsolve.run(case, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unwritable_folder_is_refused_before_solving(case, tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    calls = []
+    with pytest.raises(OutputError, match=r"file/test cannot be made: .*choose another --out"):
+        fpsolve.run(case, tmp_path / "file", advance=lambda: calls.append(1))
+    assert calls == []
+
+
+def test_advance_is_called_once_for_each_moment(case, tmp_path):
+    calls = []
+    fpsolve.run(case, tmp_path, advance=lambda: calls.append(1))
+    assert len(calls) == report.work(case) == 6
+
+
+def test_expectations_are_compared_where_they_select(tmp_path):
+    expect = """
+[[expect]]
+quantity = "moment"
+p = 2.0
+value = 0.0141631436533
+rtol = 1e-9
+source = "reference"
+where = { "noise.D0" = 1.0 }
+[[expect]]
+quantity = "lyapunov_exponent"
+value = 0.5
+atol = 1e-3
+source = "wrong on purpose"
+"""
+    case = write(tmp_path, TEXT + expect)
+    comparisons = report.compare(case, list(report.solve(case)))
+    assert [(item.varied["noise.D0"], item.met) for item in comparisons] == [(1.0, True), (0.1, False), (1.0, False)]
