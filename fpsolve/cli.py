@@ -229,15 +229,16 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     """One row for each parameter set: λ, Eq. (39), δ_p and Eq. (38)."""
     from fpsolve import perturbation
 
-    table = Table(*case.vary, "λ", "Eq. (39)", "δ_p", "Eq. (38)", title=case.title, title_justify="left")
+    names = (key.partition(".")[2] for key in case.vary)
+    table = Table(*names, "λ", "Eq. (39)", "δ_p", "Eq. (38)", title=case.title, title_justify="left")
     _align(table)
     for result in results:
         curve, exponent, index = result.curve, result.lyapunov_exponent, result.stability_index
         table.add_row(
             *(f"{value:g}" for value in curve.varied.values()),
-            digits(exponent.value, exponent.error_estimate, most=8),
+            digits(exponent.value, exponent.error_estimate, most=7),
             f"{perturbation.lyapunov_exponent(curve.oscillator, curve.noise):.6g}",
-            digits(index.value, index.error_estimate, most=8) if index else "none found",
+            digits(index.value, index.error_estimate, most=7) if index else "none found",
             f"{perturbation.stability_index(curve.oscillator, curve.noise):.6g}",
         )
     return table

@@ -84,8 +84,8 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
 def _density(pair: PrincipalPair, combine: Callable[[FloatArray, FloatArray], FloatArray]) -> Density:
     """P_s times a combination of T and T*/P_s, normalised, repeated from a half circle to the full one."""
     space, unit = pair.generator.space, pair.generator.noise.standard_deviation
-    phi, phi_weights, phi_values = space.phase.quadrature()
-    z, z_weights, z_values = space.noise.quadrature()
+    phi, phi_weights, phi_values = space.phase.points, space.phase.weights, space.phase.values
+    z, z_weights, z_values = space.noise.points, space.noise.weights, space.noise.values
     right, left = (phi_values @ (z_values @ v.reshape(space.phase.size, -1).T).T for v in (pair.right, pair.left))
     turns = round(2 * math.pi / space.mesh.span)
     values = np.tile(combine(right, left) * space.density(z) / unit, (turns, 1))

@@ -100,8 +100,20 @@ class CylinderMesh:
         return replace(self, z_lines=np.concatenate([[lower], inside, [upper]]))
 
     def enriched(self) -> CylinderMesh:
-        """A finer mesh to measure this one's error by: degrees raised by 2, the noise interval widened by 15 %."""
-        return CylinderMesh(self.phi_lines, 1.15 * self.z_lines, self.phi_degree + 2, self.xi_degree + 2)
+        """A finer mesh to measure this one's error by: higher degrees, and a further ξ-cell at each end.
+
+        Where a degree cannot be raised, the cells are halved.
+        """
+        beyond = np.concatenate([[1.15 * self.z_lines[0]], self.z_lines, [1.15 * self.z_lines[-1]]])
+        phi_lines, phi_degree = _raised(self.phi_lines, self.phi_degree, 2)
+        z_lines, xi_degree = _raised(beyond, self.xi_degree, 1)
+        return CylinderMesh(phi_lines, z_lines, phi_degree, xi_degree)
+
+
+def _raised(lines: FloatArray, degree: int, by: int) -> tuple[FloatArray, int]:
+    if degree + by <= MAX_DEGREE:
+        return lines, degree + by
+    return np.sort(np.concatenate([lines, 0.5 * (lines[:-1] + lines[1:])])), degree
 
 
 def make_mesh(

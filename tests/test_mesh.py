@@ -86,6 +86,17 @@ def test_a_bounded_noise_cuts_the_mesh_off_at_its_support():
     np.testing.assert_allclose(make_mesh(xi_cells=8).within(4.001).z_lines, [-4.001, -2, 0, 2, 4.001])
 
 
+def test_enriched_meshes_are_finer_and_wider_at_every_degree():
+    for degree in (1, 9, 19, 20):
+        mesh = make_mesh(phi_degree=degree, xi_degree=degree)
+        finer = mesh.enriched()
+        for lines, order in (("phi_lines", "phi_degree"), ("z_lines", "xi_degree")):
+            unknowns = [(getattr(m, lines).size - 1) * (getattr(m, order) + 1) for m in (mesh, finer)]
+            assert unknowns[1] > unknowns[0]
+            assert set(getattr(mesh, lines)) <= set(getattr(finer, lines))
+        assert finer.z_lines[-1] > mesh.z_lines[-1]
+
+
 GOOD = {"phi_lines": [np.pi / 2, 3 * np.pi / 2], "z_lines": [-8.0, 0.0, 8.0], "phi_degree": 4, "xi_degree": 4}
 
 

@@ -1,6 +1,7 @@
 """ParaView files: what pyvista and ParaView itself read back from them, and the script that draws them."""
 
 import ast
+import itertools
 import json
 import os
 import shutil
@@ -15,8 +16,9 @@ import pytest
 import pyvista
 from vtkmodules.vtkCommonDataModel import vtkLagrangeQuadrilateral
 
-import fpsolve
+from fpsolve.eigen import principal_pair
 from fpsolve.exponent import ExponentSolver
+from fpsolve.generator import TiltedGenerator
 from fpsolve.mesh import CylinderMesh, make_mesh
 from fpsolve.noise import NonGaussianNoise
 from fpsolve.oscillator import VibroImpactOscillator
@@ -24,17 +26,17 @@ from fpsolve.perturbation import first_order_eigenfunction
 from fpsolve.vtk import copy_show_script, write_density, write_eigenfunctions
 from tests.conftest import FIG1, UNIT_NOISE
 
-HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.3)
-FINE = {"phi_degree": 16, "xi_cells": 8}
+HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.2)
+FINE = {"phi_degree": 14, "xi_cells": 8}
 MOMENTS = (-1.0, 0.0, 2.0)
 INSTALL = "apt-get install --no-install-recommends paraview python3-paraview xvfb xauth"
 QUARTERS = np.pi * np.array([-0.3, 0.1, 0.5, 0.8, 1.2, 1.5, 1.7])
 MESHES = {
-    "half circle": make_mesh(**FINE),
+    "half circle": make_mesh(phi_cells=4, **FINE),
     "half circle, cells across 0 and pi": make_mesh(phi_cells=3, **FINE),
-    "full circle": make_mesh(full_circle=True, **FINE),
-    "full circle, seam at -0.3 pi": CylinderMesh(QUARTERS, np.linspace(-8, 8, 9), 16, 9),
-    "half circle, seam at 7.2 pi": CylinderMesh(np.pi * np.array([7.2, 7.5, 7.9, 8.2]), np.linspace(-8, 8, 9), 16, 9),
+    "full circle": make_mesh(phi_cells=4, full_circle=True, **FINE),
+    "full circle, seam at -0.3 pi": CylinderMesh(QUARTERS, np.linspace(-8, 8, 9), 14, 9),
+    "half circle, seam at 7.2 pi": CylinderMesh(np.pi * np.array([7.2, 7.5, 7.9, 8.2]), np.linspace(-8, 8, 9), 14, 9),
 }
 
 
@@ -61,20 +63,21 @@ def sides(grid, phi, name):
     found = []
     for side in (left, right):
         points = np.unique(grid.cell_connectivity.reshape(grid.n_cells, -1)[side])
-        points = points[np.abs(grid.points[points, 0] - phi) < 1e-12]
+        points = points[np.abs(grid.points[points, 0] - phi) < 1e-9]
         found.append(grid[name][points[np.argsort(grid.points[points, 1])]])
     return found
 
 
 def integral(grid, name):
-    """∫ of the Lagrange polynomials, their nodes numbered by VTK's own function."""
+    """∫ of the Lagrange polynomials of an array, or of given values, their nodes numbered by VTK's own function."""
+    values = grid[name] if isinstance(name, str) else name
     k = round(np.sqrt(grid.cell_connectivity.size / grid.n_cells)) - 1
     order = [vtkLagrangeQuadrilateral.PointIndexFromIJK(i, j, [k, k]) for i in range(k + 1) for j in range(k + 1)]
     nodes = grid.cell_connectivity.reshape(grid.n_cells, -1)[:, order]
     t = np.arange(k + 1) / k
     rule = np.linalg.solve(np.vander(t, increasing=True).T, 1 / np.arange(1, k + 2))
     areas = np.prod(np.ptp(grid.points[nodes], axis=1)[:, :2], axis=1)
-    return areas @ grid[name][nodes] @ np.outer(rule, rule).ravel()
+    return areas @ values[nodes] @ np.outer(rule, rule).ravel()
 
 
 @pytest.mark.parametrize("phi", [np.pi / 2, 3 * np.pi / 2])
@@ -83,17 +86,19 @@ def test_jump_at_the_impacts(grids, p, phi):
     """T(φ⁻) = R^p T(φ⁺) at every ξ where the tilted density lives; and T* jumps the other way."""
     (before, after), density = sides(grids[p], phi, "T"), sides(grids[p], phi, "tilted_density")[0]
     living = density > 1e-4 * density.max()
-    assert np.count_nonzero(living) > 100
+    assert np.count_nonzero(living) > 60
     np.testing.assert_allclose((before / after)[living], HARD.impact_factor(p), rtol=1e-8)
     before, after = sides(grids[p], phi, "T_adjoint")
-    np.testing.assert_allclose((after / before)[living], HARD.impact_factor(p), rtol=1e-7)
+    np.testing.assert_allclose((after / before)[living], HARD.impact_factor(p), rtol=1e-6)
 
 
 def test_nothing_else_jumps(grids):
-    for phi in np.unique(np.round(grids[2.0].points[:, 0], 12)):
-        if abs(np.cos(phi)) > 1e-6 and 0 < phi < 6.28:
-            before, after = sides(grids[2.0], phi, "tilted_density")
-            assert np.abs(before - after).max() < 1e-7
+    grid = grids[2.0]
+    corners = grid.points[grid.cell_connectivity.reshape(grid.n_cells, -1)[:, 0], 0]
+    for phi in np.unique(np.round(corners, 12)):
+        if abs(np.cos(phi)) > 1e-6 and phi > 0:
+            before, after = sides(grid, phi, "tilted_density")
+            np.testing.assert_allclose(before, after, atol=1e-7)
 
 
 def test_full_circle_is_covered_once(grids):
@@ -101,8 +106,9 @@ def test_full_circle_is_covered_once(grids):
     assert set(grid.celltypes) == {pyvista.CellType.LAGRANGE_QUADRILATERAL}
     np.testing.assert_allclose(grid.bounds[:2], [0, 2 * np.pi], rtol=1e-15)
     np.testing.assert_allclose(grid.bounds[2:4], np.array([-8, 8]) * UNIT_NOISE.standard_deviation)
-    grid["one"] = np.ones(grid.n_points)
-    assert integral(grid, "one") == pytest.approx(2 * np.pi * 16 * UNIT_NOISE.standard_deviation, rel=1e-12)
+    assert integral(grid, np.ones(grid.n_points)) == pytest.approx(
+        2 * np.pi * 16 * UNIT_NOISE.standard_deviation, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("p", MOMENTS)
@@ -116,12 +122,12 @@ def test_point_data(grids, p):
     np.testing.assert_allclose(grid["tilted_density"], grid["T"] * grid["T_adjoint"])
     for name in ("tilted_density", "stationary_density"):
         assert integral(grid, name) == pytest.approx(1, abs=1e-6)
-    grid["weighted"] = grid["T"] * UNIT_NOISE.density(grid.points[:, 1]) / (2 * np.pi)
-    assert integral(grid, "weighted") == pytest.approx(1, abs=1e-6)
+    weight = UNIT_NOISE.density(grid.points[:, 1]) / (2 * np.pi)
+    assert integral(grid, grid["T"] * weight) == pytest.approx(1, abs=1e-6)
 
 
 def test_at_p_zero(grids):
-    np.testing.assert_allclose(grids[0.0]["T"], 1, rtol=1e-10)
+    np.testing.assert_allclose(grids[0.0]["T"], 1, rtol=1e-7)
     np.testing.assert_allclose(grids[0.0]["T_adjoint"], grids[2.0]["stationary_density"], atol=1e-14)
 
 
@@ -202,14 +208,12 @@ def test_bounded_noise(tmp_path):
     assert grid["T_adjoint"][np.abs(grid["z"]) == grid["z"].max()] == pytest.approx(0, abs=1e-6)
 
 
-def test_far_out_where_the_density_underflows(tmp_path):
-    mesh = make_mesh(phi_degree=6, xi_cells=90, xi_degree=2, xi_min=-45, xi_max=8)
-    try:
-        solver = ExponentSolver(FIG1, UNIT_NOISE, mesh)
-    except fpsolve.errors.FpsolveError:
-        pytest.skip("the discretisation refuses such an interval")
-    grid = written(tmp_path, solver, [1.0])[1.0]
+def test_far_out_where_the_density_is_tiny(tmp_path):
+    mesh = make_mesh(phi_degree=6, xi_cells=90, xi_degree=2, xi_min=-37, xi_max=8)
+    pair = principal_pair(TiltedGenerator(FIG1, UNIT_NOISE, mesh), 0.0)
+    grid = pyvista.read(write_eigenfunctions(tmp_path, [pair], pair)[1])
     assert all(np.all(np.isfinite(grid[name])) for name in grid.point_data)
+    assert np.abs(grid["T_adjoint"][grid["z"] < -30]).max() < 1e-100
 
 
 def test_collection(tmp_path, fig1_solver):
@@ -278,16 +282,19 @@ def test_script_needs_only_the_standard_library_and_paraview(tmp_path):
 @pytest.fixture(scope="module")
 def paraview():
     """Runs a script in ParaView's Python, on a virtual display."""
-    command = [shutil.which("xvfb-run"), "-a", shutil.which("pvpython")]
-    if None in command:
+    display, python = shutil.which("xvfb-run"), shutil.which("pvpython")
+    if not (display and python):
         message = f"ParaView is missing: {INSTALL}"
         if os.environ.get("FPSOLVE_REQUIRE_PARAVIEW"):
             pytest.fail(message)
         pytest.skip(message)
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
 
+    numbers = itertools.count(100 + 20 * (os.getpid() % 1000))
+
     def run(folder, *arguments):
-        arguments = [str(word) for word in (*command, *arguments)]
+        """Each on a display of its own, as one that is just being closed may still look open."""
+        arguments = [str(word) for word in (display, "-n", next(numbers), "-a", python, *arguments)]
         return subprocess.run(arguments, capture_output=True, text=True, cwd=folder, env=environment, timeout=300)
 
     return run
@@ -341,7 +348,7 @@ def test_paraview_reads_the_collection(paraview, results, tmp_path):
         assert found["fields"][p] == pytest.approx([float(p), solver.pair(float(p)).value], abs=1e-14)
         lines, ratios = np.transpose(jumps)
         assert {int(k) for k in lines} == {2, 5}  # π/2 and 3π/2, rounded
-        assert ratios.size > 200
+        assert ratios.size > 120
         np.testing.assert_allclose(ratios, HARD.impact_factor(float(p)), rtol=1e-8)
 
 

@@ -1,0 +1,214 @@
+"""Draw the eigenfunctions that lie beside this file, in ParaView.
+
+    pvpython show.py                          T(phi, xi) at p = 2 as a surface, saved to eigenfunctions.png
+    pvpython show.py --cylinder --p 1         wrapped on a cylinder: phi around it, xi along it
+    pvpython show.py --field tilted_density --output tilted.png
+
+Where there is no display: xvfb-run -a pvpython show.py
+In ParaView itself: Run Script of the Python Shell, or Macros > Import new macro; the time is then p.
+The black lines are the impacts, where T jumps.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from paraview import simple  # type: ignore[import-not-found, unused-ignore]
+
+FOLDER = ""  # where the results were written
+SYMBOLS = {"T": "T", "T_adjoint": "T*", "tilted_density": "T T*", "stationary_density": "T* at p = 0"}
+COLOURS = "Viridis (matplotlib)"
+NEGLIGIBLE = 1e-3
+"""xi is shown where the stationary or the tilted density exceeds this share of its maximum."""
+BOX = (1.0, 0.75, 0.4)
+"""Edges of the picture's box along phi, xi and the height."""
+LENGTH = 2.0
+"""Length of the cylinder, whose radius is 1."""
+CAMERA = {False: (-1.2, -2, 1.6), True: (-1.5, -1.5, 1.3)}
+ANGLE = {False: 28, True: 21}
+"""From where the plane (False) and the cylinder (True) are seen, and the viewing angle in degrees."""
+SUBDIVISION = 3
+"""How often each Lagrange cell is halved to look smooth."""
+BLACK = (0.0, 0.0, 0.0)
+
+
+def main(arguments: list[str]) -> None:
+    chosen = options(arguments)
+    view = simple.GetActiveViewOrCreate("RenderView")
+    simple.HideAll(view)
+    view.ViewSize, view.OrientationAxesVisibility = [1600, 1000], 0
+    reader, p = load(chosen.collection, chosen.p)
+    draw(reader, view, p, chosen)
+    simple.Render(view)  # the first time it turns the camera
+    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA[chosen.cylinder], [0, 0, 0], [0, 0, 1]
+    view.ResetCamera(True)
+    view.CameraViewAngle = ANGLE[chosen.cylinder]
+    simple.SaveScreenshot(str(chosen.output), view, OverrideColorPalette="WhiteBackground")
+    print(f"p = {p:g}: {chosen.output}")
+
+
+def options(arguments: list[str]) -> argparse.Namespace:
+    """The command line, with the collection and the picture found."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cylinder", action="store_true", help="wrap (phi, xi) on a cylinder")
+    parser.add_argument("--field", default="T", choices=SYMBOLS, help="what to draw (default: T)")
+    parser.add_argument("--p", type=float, default=2.0, help="the moment: the nearest one there is (default: 2)")
+    parser.add_argument("--output", type=Path, help="the picture, .png or .jpg (default: the collection's name, .png)")
+    parser.add_argument("--collection", type=Path, help="default: eigenfunctions.pvd beside this file")
+    chosen = parser.parse_args(arguments)
+    chosen.collection = chosen.collection or beside_this_file("eigenfunctions.pvd")
+    chosen.output = chosen.output or chosen.collection.with_suffix(".png")
+    if not chosen.collection.is_file():
+        raise SystemExit(f"there is no {chosen.collection}; name the collection with --collection FILE.pvd")
+    if chosen.output.suffix not in (".png", ".jpg"):
+        raise SystemExit(f"--output {chosen.output} is no picture; give it the ending .png or .jpg")
+    return chosen
+
+
+def beside_this_file(name: str) -> Path:
+    """A file of the results; ParaView's menus do not tell a script where it lies."""
+    script = globals().get("__file__")
+    folders = [Path(script).resolve().parent] if script else [Path.cwd(), Path(FOLDER)]
+    return next((folder / name for folder in folders if (folder / name).is_file()), folders[-1] / name)
+
+
+def load(collection: Path, p: float) -> tuple[Any, float]:
+    """The collection at the p nearest to the one asked for, and that p."""
+    reader = simple.PVDReader(FileName=str(collection))
+    p = min(reader.TimestepValues, key=lambda known: abs(known - p))
+    scene = simple.GetAnimationScene()
+    scene.UpdateAnimationUsingDataTimeSteps()
+    scene.AnimationTime = p
+    reader.UpdatePipeline(p)
+    return reader, p
+
+
+def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
+    """The surface with its impact lines, labels and colours."""
+    source, limits = scaled(strip(reader, p), chosen.field, p)
+    bounds = source.GetDataInformation().GetBounds()
+    marked = simple.Calculator(Input=source, ResultArrayName="wall", Function="abs(cos(coordsX))")
+    shape = cylinder(marked, limits, bounds) if chosen.cylinder else height(marked)
+    display = simple.Show(shape, view)
+    if chosen.cylinder:
+        label_cylinder(view, bounds)
+    else:
+        label_box(view, display, limits, bounds)
+    lines = simple.Show(impacts(shape, p), view)
+    simple.ColorBy(lines, None)
+    lines.Scale, lines.LineWidth, lines.AmbientColor, lines.DiffuseColor = display.Scale, 3, BLACK, BLACK
+    paint(display, view, limits, SYMBOLS[chosen.field])
+    facts = simple.PythonAnnotation(Input=reader, ArrayAssociation="Field Data")
+    facts.Expression = '"p = %g     Lambda(p) = %.6g" % (p[0], round(float(Lambda[0]), 14) + 0.0)'
+    text = simple.Show(facts, view)
+    text.FontSize, text.WindowLocation = 28, "Upper Center"
+
+
+def between(source: Any, name: str, low: float, high: float, p: float, every: bool = True) -> Any:
+    """The cells of which every point, or at least one, has low <= name <= high."""
+    cells = simple.Threshold(Input=source, Scalars=["POINTS", name], LowerThreshold=low, UpperThreshold=high)
+    cells.AllScalars = int(every)
+    cells.UpdatePipeline(p)
+    return cells
+
+
+def strip(reader: Any, p: float) -> Any:
+    """The cells of the noise interval where the stationary or the tilted density lives."""
+    ends: list[float] = []
+    for density in ("stationary_density", "tilted_density"):
+        top = reader.PointData[density].GetRange()[1]
+        living = between(reader, density, NEGLIGIBLE * top, top, p, every=False)
+        ends.extend(living.PointData["z"].GetRange())
+        simple.Delete(living)
+    return between(reader, "z", min(ends), max(ends), p)
+
+
+def scaled(source: Any, field: str, p: float) -> tuple[Any, tuple[float, float]]:
+    """The field divided by its maximum, at every p by its own, and its range at this p."""
+    result = simple.PythonCalculator(Input=source, Expression=f"{field}/max({field})", ArrayName="scaled")
+    result.UpdatePipeline(p)
+    low, high = result.PointData["scaled"].GetRange()
+    return result, (low if high - low > 1e-6 else 0.0, high)
+
+
+def height(source: Any) -> Any:
+    """The field as height over the (phi, xi) plane."""
+    return simple.WarpByScalar(Input=source, Scalars=["POINTS", "scaled"])
+
+
+def cylinder(source: Any, limits: tuple[float, float], bounds: tuple[float, ...]) -> Any:
+    """phi around the axis, xi along it, and the field as radius from 1 to 1.5."""
+    (low, high), (bottom, top) = limits, bounds[2:4]
+    wrapped = simple.Calculator(Input=source, CoordinateResults=1)
+    wrapped.Function = (
+        f"(1 + 0.5*(scaled - {low!r})/{high - low!r})*(cos(coordsX)*iHat + sin(coordsX)*jHat)"
+        f" + {LENGTH / (top - bottom)!r}*(coordsY - {bottom!r})*kHat"
+    )
+    return wrapped
+
+
+def impacts(shape: Any, p: float) -> Any:
+    """Both edges of the surface at the impact lines, where cos phi = 0."""
+    facets = simple.ExtractSurface(Input=shape, NonlinearSubdivisionLevel=SUBDIVISION)
+    edges = simple.FeatureEdges(Input=facets, BoundaryEdges=1, FeatureEdges=0, NonManifoldEdges=0, ManifoldEdges=0)
+    return between(edges, "wall", 0, 1e-6, p)
+
+
+def label_box(view: Any, display: Any, limits: tuple[float, float], bounds: tuple[float, ...]) -> None:
+    """A box of pleasing shape with ticks and titles."""
+    low, high = (*bounds[:4:2], limits[0]), (*bounds[1:4:2], limits[1])
+    axes = view.AxesGrid
+    display.Scale = axes.DataScale = [BOX[i] / (high[i] - low[i]) for i in range(3)]
+    axes.Visibility, axes.AxesToLabel = 1, 7
+    axes.XTitle, axes.YTitle, axes.ZTitle = "\n\nphi", "xi     ", ""
+    axes.XAxisUseCustomLabels, axes.XAxisLabels = 1, [k * math.pi / 2 for k in range(4)]
+    axes.XAxisNotation, axes.XAxisPrecision = "Fixed", 2
+    for axis in "XYZ":
+        setattr(axes, f"{axis}TitleFontSize", 30)
+        setattr(axes, f"{axis}LabelFontSize", 24)
+
+
+def label_cylinder(view: Any, bounds: tuple[float, ...]) -> None:
+    """phi around the upper rim, xi at both ends."""
+    view.AxesGrid.Visibility = 0
+    for k, words in enumerate(("phi = 0", "pi/2", "pi", "3 pi/2")):
+        caption(view, words, [2 * math.cos(k * math.pi / 2), 2 * math.sin(k * math.pi / 2), LENGTH])
+    for xi, at in ((bounds[2], 0), (bounds[3], LENGTH)):
+        caption(view, f"xi = {xi:.3g}", [1.2, -1.2, at])
+
+
+def caption(view: Any, words: str, position: list[float]) -> None:
+    """Words at a point of space, facing the observer."""
+    display = simple.Show(simple.Text(Text=words), view, "TextSourceRepresentation")
+    display.TextPropMode, display.BillboardPosition, display.FontSize = "Billboard 3D Text", position, 28
+
+
+def paint(display: Any, view: Any, limits: tuple[float, float], symbol: str) -> None:
+    """Colours, smooth Lagrange cells and the colour bar."""
+    display.NonlinearSubdivisionLevel = SUBDIVISION
+    display.Ambient, display.Diffuse = 0.45, 0.55
+    simple.ColorBy(display, ("POINTS", "scaled"))
+    colours = simple.GetColorTransferFunction("scaled")
+    colours.ApplyPreset(COLOURS, True)
+    colours.RescaleTransferFunction(*limits)
+    bar = simple.GetScalarBar(colours, view)
+    bar.Title, bar.ComponentTitle, bar.HorizontalTitle = f"{symbol} / max", "", 1
+    bar.TitleFontSize, bar.LabelFontSize = 28, 24
+    bar.AutomaticLabelFormat, bar.LabelFormat, bar.RangeLabelFormat = 0, "%-#.2g", "%-#.2g"
+    bar.WindowLocation, bar.Position, bar.ScalarBarLength = "Any Location", [0.89, 0.25], 0.45
+    display.SetScalarBarVisibility(view, True)
+
+
+if not __name__.endswith("show"):  # ParaView's shells do not always run a script as __main__
+    words = getattr(sys, "argv", None) or [""]
+    is_command = Path(words[0]).name == Path(globals().get("__file__", "unknown")).name
+    try:
+        main(words[1:] if is_command else [])
+    except SystemExit as refusal:
+        if is_command:
+            raise
+        print(refusal)  # to leave would close ParaView
