@@ -1,8 +1,8 @@
 """The principal eigenvalue of L(p), Eq. (19), with both eigenfunctions; and the rightmost part of the spectrum.
 
 For a real shift σ > Λ the resolvent (σ − L)⁻¹ is a positive operator whose largest eigenvalue is 1/(σ − Λ):
-seen from the right, Λ is the nearest eigenvalue. From there, or from the pair at a neighbouring p, two-sided
-Rayleigh quotient iteration converges cubically; that it found the principal pair is then checked by the one
+seen from the right, Λ is the nearest eigenvalue. From there, or quicker from the pair at a neighbouring p,
+two-sided Rayleigh quotient iteration converges cubically; that it found the principal pair is checked by the one
 property that no other pair has: T > 0 and T* > 0 (Perron-Frobenius; one of the two is enough).
 """
 
@@ -70,10 +70,10 @@ def principal_pair(generator: TiltedGenerator, p: float, *, start: PrincipalPair
         NotConverged: the iteration stalls, or both T and T* change sign: the mesh does not resolve the problem.
             `partial` is the pair that was reached.
     """
-    if start is not None:
-        pair = _rayleigh_iteration(generator, p, start.right, start.left)
-        if pair.residual <= BACKWARD_ERROR_LIMIT and max(pair.sign_defects) <= SURELY_POSITIVE:
-            return pair
+    one = generator.space.constant()  # T₀ and T₀*/P_s of weak noise, Eqs. (26) and (28)
+    pair = _rayleigh_iteration(generator, p, *((one, one) if start is None else (start.right, start.left)))
+    if pair.residual <= BACKWARD_ERROR_LIMIT and max(pair.sign_defects) <= SURELY_POSITIVE:
+        return pair
     pair = _rayleigh_iteration(generator, p, *_from_the_right(generator, p))
     if pair.residual > BACKWARD_ERROR_LIMIT or min(pair.sign_defects[:2]) > POSITIVE:
         raise NotConverged(
@@ -158,8 +158,8 @@ def _rayleigh_iteration(generator: TiltedGenerator, p: float, x: FloatArray, y: 
             break
         try:
             factor = _factor(operator - best.value * mass)
-        except RuntimeError:  # the shift is an eigenvalue to the last bit
-            break
+        except RuntimeError:  # singular: the shift is the eigenvalue to the last bit
+            factor = _factor(operator - (best.value + 1e-10 * generator.oscillator.omega) * mass)
         x, y = best.right, best.left
         for _ in range(STEPS_PER_FACTOR):
             x, y = factor.solve(mass @ x), factor.solve(mass @ y, trans="T")
