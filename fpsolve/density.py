@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fpsolve.eigen import PrincipalPair
 from fpsolve.noise import FloatArray
@@ -30,9 +31,11 @@ class Density:
     xi_weights: FloatArray
     values: FloatArray
 
-    def mean(self, f: Callable[[FloatArray, FloatArray], FloatArray]) -> float:
-        """∫ f(φ, ξ) ρ dφ dξ; f gets φ as a column and ξ as a row."""
-        return float(self.phi_weights @ (f(self.phi[:, None], self.xi[None]) * self.values) @ self.xi_weights)
+    def mean(self, f: Callable[[FloatArray, FloatArray], ArrayLike]) -> float:
+        """∫ f(φ, ξ) ρ dφ dξ; f gets φ as a column and ξ as a row, and may return either, or a number."""
+        return float(
+            self.phi_weights @ (np.asarray(f(self.phi[:, None], self.xi[None])) * self.values) @ self.xi_weights
+        )
 
     def phi_marginal(self) -> FloatArray:
         """∫ρ dξ at `phi`, shape (m,)."""

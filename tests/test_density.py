@@ -35,7 +35,7 @@ def solver(request):
 
 def test_stationary_density_integrates_to_1(solver):
     density = stationary_density(solver.pair(0.0))
-    assert density.mean(lambda phi, xi: 1 + 0 * phi * xi) == pytest.approx(1, abs=1e-13)
+    assert density.mean(lambda phi, xi: 1.0) == pytest.approx(1, abs=1e-13)
     assert density.phi_marginal() @ density.phi_weights == pytest.approx(1, abs=1e-13)
     assert density.phi[0] < 0.5 * np.pi + 0.1
     assert density.phi_weights.sum() == pytest.approx(2 * np.pi)
@@ -46,7 +46,7 @@ def test_noise_marginal_is_the_stationary_density_of_the_noise(solver):
     expected = solver.noise.density(density.xi)
     np.testing.assert_allclose(density.xi_marginal(), expected, rtol=0, atol=1e-10 * expected.max())
     assert np.abs(density.xi_marginal() - expected) @ density.xi_weights < 1e-10
-    variance = density.mean(lambda phi, xi: xi**2 + 0 * phi)
+    variance = density.mean(lambda phi, xi: xi**2)
     assert variance == pytest.approx(solver.noise.standard_deviation**2, rel=1e-10)
 
 
@@ -84,11 +84,11 @@ def test_tilted_mean_of_the_derivative_of_the_generator_is_the_slope(fig1_solver
     eps = oscillator.epsilon
     slope = density.mean(lambda phi, xi: eps * xi * q1(phi) + eps**2 * oscillator.q2(phi))
     assert slope == pytest.approx(pair.derivative, rel=1e-10)
-    assert density.mean(lambda phi, xi: 1 + 0 * phi * xi) == pytest.approx(1, abs=1e-13)
+    assert density.mean(lambda phi, xi: 1.0) == pytest.approx(1, abs=1e-13)
 
 
 def test_tilt_moves_the_noise_towards_the_sign_of_p(fig1_solver):
-    means = [tilted_density(fig1_solver.pair(p)).mean(lambda phi, xi: xi + 0 * phi) for p in (-2.0, 0.0, 2.0)]
+    means = [tilted_density(fig1_solver.pair(p)).mean(lambda phi, xi: xi) for p in (-2.0, 0.0, 2.0)]
     assert means[0] < -0.01 < abs(means[1]) + 0.005 < means[2]
     assert means[1] == pytest.approx(0, abs=1e-12)
 
