@@ -6,7 +6,7 @@ import csv
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 
 from fpsolve import perturbation
 from fpsolve.case import Case, Curve
+from fpsolve.eigen import PrincipalPair
 from fpsolve.errors import NoSuchExponent, NotConverged, OutputError
 from fpsolve.exponent import SEARCH_INTERVAL, Estimate, ExponentSolver, MomentLyapunov, check_existence
 from fpsolve.files import atomic
@@ -22,6 +23,7 @@ from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import FloatArray
 from fpsolve.plots import Series, write_figure
 from fpsolve.schema import Expectation
+from fpsolve.space import CylinderSpace
 
 Advance = Callable[[], None]
 
@@ -36,7 +38,8 @@ class CurveResult:
         moments_perturbation: Eq. (37) at the same p.
         lyapunov_exponent, variance_rate: λ and Λ″(0).
         stability_index: δ_p; None where there is none in the interval searched.
-        solver: the problem on its mesh, for more of it.
+        stationary: the eigenpair at p = 0; None once it is no longer needed.
+        mesh: what was used, ξ in noise units.
         warnings: what limits these numbers.
         failures: why some p are missing.
     """
@@ -47,9 +50,14 @@ class CurveResult:
     lyapunov_exponent: Estimate
     stability_index: Estimate | None
     variance_rate: Estimate
-    solver: ExponentSolver
+    stationary: PrincipalPair | None
+    mesh: dict[str, Any]
     warnings: tuple[str, ...]
     failures: tuple[str, ...] = ()
+
+    def without_pairs(self) -> CurveResult:
+        """The numbers without the eigenpairs, whose matrices take some 20 MB a curve."""
+        return replace(self, moments=replace(self.moments, pairs=()), stationary=None)
 
 
 @dataclass(frozen=True)
@@ -82,9 +90,9 @@ def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: N
     _prepare(folder)
     results: list[CurveResult] = []
     for number, result in enumerate(solve(case, advance=advance), start=1):
-        results.append(result)
-        _write_tables(case, results, folder)
         _write_paraview(case, result, number, folder)
+        results.append(result.without_pairs())
+        _write_tables(case, results, folder)
     write_figure(_series(case, results), case.figure.x, case.figure.y, case.title, _pictures(folder))
     failures = [failure for result in results for failure in result.failures]
     if failures:
@@ -152,7 +160,8 @@ def _solve_curve(curve: Curve, mesh: CylinderMesh | None, p: FloatArray, rtol: f
         lyapunov_exponent=solver.lyapunov_exponent(),
         stability_index=index,
         variance_rate=solver.variance_rate(),
-        solver=solver,
+        stationary=solver.pair(0.0),
+        mesh=_mesh(solver.generator.space),
         warnings=(*warnings, *failures),
         failures=failures,
     )
@@ -196,7 +205,7 @@ def _summary(result: CurveResult) -> dict[str, Any]:
         "lyapunov_exponent": _estimate(result.lyapunov_exponent, perturbation.lyapunov_exponent(oscillator, noise)),
         "stability_index": _estimate(result.stability_index, perturbation.stability_index(oscillator, noise)),
         "variance_rate": _estimate(result.variance_rate, perturbation.variance_rate(oscillator, noise)),
-        "mesh": _mesh(result),
+        "mesh": result.mesh,
         "warnings": list(result.warnings),
     }
 
@@ -220,9 +229,8 @@ def _estimate(estimate: Estimate | None, theory: float) -> dict[str, float] | No
     return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": theory}
 
 
-def _mesh(result: CurveResult) -> dict[str, Any]:
-    """The mesh that was used, ξ in noise units."""
-    mesh = result.solver.generator.space.mesh
+def _mesh(space: CylinderSpace) -> dict[str, Any]:
+    mesh = space.mesh
     return {
         "full_circle": mesh.is_full_circle,
         "phi_cells": mesh.phi_lines.size - 1,
@@ -231,7 +239,7 @@ def _mesh(result: CurveResult) -> dict[str, Any]:
         "xi_degree": mesh.xi_degree,
         "xi_min": float(mesh.z_lines[0]),
         "xi_max": float(mesh.z_lines[-1]),
-        "unknowns": result.solver.generator.space.size,
+        "unknowns": space.size,
     }
 
 
@@ -239,7 +247,9 @@ def _write_paraview(case: Case, result: CurveResult, number: int, folder: Path) 
     """Eigenfunctions of a curve; with the first one also the stationary density and the script."""
     from fpsolve.vtk import copy_show_script, write_density, write_eigenfunctions
 
-    stationary = result.solver.pair(0.0)
+    stationary = result.stationary
+    if stationary is None:
+        return
     if number == 1:
         write_density(folder / "density.vtu", stationary)
     wanted = case.output.eigenfunctions

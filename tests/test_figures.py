@@ -19,7 +19,7 @@ NAMES = sorted(path.stem for path in CASES.glob("*.toml"))
 @cache
 def solved(name):
     case = load_case(CASES / f"{name}.toml")
-    return case, list(report.solve(case))
+    return case, [result.without_pairs() for result in report.solve(case)]
 
 
 def index(result):
