@@ -1,7 +1,6 @@
 """ParaView files: what pyvista and ParaView itself read back from them, and the script that draws them."""
 
 import ast
-import itertools
 import json
 import os
 import shutil
@@ -281,23 +280,28 @@ def test_script_needs_only_the_standard_library_and_paraview(tmp_path):
 
 @pytest.fixture(scope="module")
 def paraview():
-    """Runs a script in ParaView's Python, on a virtual display."""
-    display, python = shutil.which("xvfb-run"), shutil.which("pvpython")
-    if not (display and python):
+    """Runs a script in ParaView's Python, on a virtual display that says when it is ready."""
+    server, python = shutil.which("Xvfb"), shutil.which("pvpython")
+    if not (server and python):
         message = f"ParaView is missing: {INSTALL}"
         if os.environ.get("FPSOLVE_REQUIRE_PARAVIEW"):
             pytest.fail(message)
         pytest.skip(message)
+    ready, tell = os.pipe()
+    display = subprocess.Popen([server, "-displayfd", str(tell), "-screen", "0", "1280x1024x24"], pass_fds=[tell])
+    os.close(tell)
+    with os.fdopen(ready) as stream:
+        number = stream.readline().strip()
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-
-    numbers = itertools.count(100 + 20 * (os.getpid() % 1000))
+    environment["DISPLAY"] = f":{number}"
 
     def run(folder, *arguments):
-        """Each on a display of its own, as one that is just being closed may still look open."""
-        arguments = [str(word) for word in (display, "-n", next(numbers), "-a", python, *arguments)]
-        return subprocess.run(arguments, capture_output=True, text=True, cwd=folder, env=environment, timeout=300)
+        words = [python, *map(str, arguments)]
+        return subprocess.run(words, capture_output=True, text=True, cwd=folder, env=environment, timeout=300)
 
-    return run
+    yield run
+    display.terminate()
+    display.wait()
 
 
 @pytest.fixture(scope="module")
