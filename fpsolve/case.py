@@ -13,11 +13,11 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
 from fpsolve import perturbation
-from fpsolve.document import read_document
-from fpsolve.errors import CaseError, Fault, MeshError
+from fpsolve.document import Document, read_document
+from fpsolve.errors import CaseError, Fault, MeshError, NoSuchExponent
 from fpsolve.mesh import CylinderMesh
 from fpsolve.messages import Refusal, explain, nearest, refuse, shown
-from fpsolve.noise import FloatArray
+from fpsolve.noise import AnyNoise, FloatArray, check_existence
 from fpsolve.oscillator import VibroImpactOscillator
 from fpsolve.schema import (
     Expectation,
@@ -48,7 +48,7 @@ class Curve:
     """
 
     oscillator: VibroImpactOscillator
-    noise: perturbation.AnyNoise
+    noise: AnyNoise
     parameters: Mapping[str, float | str]
     varied: Mapping[str, float]
 
@@ -93,6 +93,11 @@ class Case(Section):
     def rtol(self) -> float:
         return self.moments.rtol
 
+    @property
+    def is_exact(self) -> bool:
+        """Whether the noise is Eq. (7) as it stands; perturbation theory then has its reduction only."""
+        return self.noise.treatment == "exact"
+
     def curves(self) -> tuple[Curve, ...]:
         """One curve for each combination of the varied values, the last key varying fastest."""
         return tuple(self.curve(varied) for varied in _combinations(self.vary))
@@ -108,7 +113,8 @@ class Case(Section):
     @field_validator("moments")
     @classmethod
     def _is_computable(cls, moments: Moments, info: ValidationInfo) -> Moments:
-        refuse(_curve_refusals(info.data | {"moments": moments}, {}))
+        is_varied = (info.context or {}).get("varies", False)  # then the curves decide which moments exist
+        refuse(_curve_refusals(info.data | {"moments": moments}, {}, with_existence=not is_varied))
         return moments
 
     @field_validator("vary")
@@ -137,7 +143,8 @@ class Case(Section):
     def _is_varied(cls, figure: FigureSection, info: ValidationInfo) -> FigureSection:
         known = ("p", *info.data.get("vary", (figure.x,)))
         if figure.x not in known:
-            text = f"got {shown(figure.x)}; must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
+            guess = nearest(figure.x, known)
+            text = f"got {shown(figure.x)};{guess} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
             refuse([(("x",), figure.x, text)])
         return figure
 
@@ -169,7 +176,10 @@ def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     document = read_document(path, overrides)
     faults = list(document.faults)
     try:
-        case = Case.model_validate(document.data, context={"folder": Path(path).parent})
+        case = Case.model_validate(
+            document.data, context={"folder": Path(path).parent, "varies": bool(document.data.get("vary"))}
+        )
+        faults += _hidden_overrides(case, document)
     except ValidationError as error:
         faults += [document.fault(*fault) for fault in explain(error, Case)]
     except RecursionError:
@@ -178,6 +188,14 @@ def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
         raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
     case._path = Path(path)
     return case
+
+
+def _hidden_overrides(case: Case, document: Document) -> Iterator[Fault]:
+    """Values of the command line that [vary] would replace."""
+    for key in case.vary:
+        if isinstance(document.places.get(key), str):
+            remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
+            yield document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}")
 
 
 def _curve(oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Mapping[str, float]) -> Curve:
@@ -199,32 +217,50 @@ def _combinations(vary: Mapping[str, Values]) -> Iterator[dict[str, float]]:
     return (dict(zip(vary, values, strict=True)) for values in product(*vary.values()))
 
 
-def _curve_refusals(valid: Mapping[str, Any], vary: Mapping[str, Values]) -> Iterator[Refusal]:
-    """The first combination whose parameters contradict each other or overflow."""
+def _curve_refusals(
+    valid: Mapping[str, Any], vary: Mapping[str, Values], *, with_existence: bool = True
+) -> Iterator[Refusal]:
+    """The first combination whose parameters contradict each other or overflow, or whose moments are infinite."""
     if not {"oscillator", "noise", "moments"} <= valid.keys():
         return
-    p = np.max(np.abs(valid["moments"].values))
+    p = valid["moments"].values
     for varied in _combinations(vary):
         reason = _obstacle(valid["oscillator"], valid["noise"], varied, p)
+        if not reason and with_existence:
+            reason = _infinite(_curve(valid["oscillator"], valid["noise"], varied).noise, p)
         if reason:
             setting = ", ".join(f"{key} = {value}" for key, value in varied.items())
             yield (), varied, f"with {setting}: {reason}" if varied else reason
             return
 
 
-def _obstacle(oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Mapping[str, float], p: float) -> str:
+def _obstacle(
+    oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Mapping[str, float], p: FloatArray
+) -> str:
     """Why there is no such curve, or nothing."""
     try:
         curve = _curve(oscillator, noise, varied)
         with np.errstate(all="ignore"):
-            scale = perturbation.moment_scale(curve.oscillator, curve.noise, p)
-            sizes = [scale, perturbation.stability_index(curve.oscillator, curve.noise)]
+            sizes = np.append(
+                perturbation.moment_scale(curve.oscillator, curve.noise, p),
+                perturbation.stability_index(curve.oscillator, curve.noise),
+            )
     except ValidationError as error:
         context = error.errors()[0].get("ctx", {})
         return str(context.get("error", f"the noise has no finite strength; {_MODERATE}"))
     except ArithmeticError:
-        sizes = [math.inf]
+        sizes = np.array([math.inf])
     return "" if np.all(np.isfinite(sizes)) else f"Eqs. (37)-(38) overflow; {_MODERATE}"
+
+
+def _infinite(noise: AnyNoise, p: FloatArray) -> str:
+    """Why some Λ(p) is infinite, or nothing."""
+    try:
+        for extreme in (p.max(), p.min()):
+            check_existence(noise, float(extreme))
+    except NoSuchExponent as error:
+        return str(error)
+    return ""
 
 
 _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"

@@ -7,10 +7,11 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, Token
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -55,19 +56,16 @@ def run(
 
     loaded = _load(cases, overrides)
     _refuse_namesakes(loaded)
-    failures = []
+    code = 0
     for case in loaded:
         try:
             with _progress(case.name, report.work(case)) as advance:
                 results = report.run(case, out, advance=advance)
         except NotConverged as failure:
-            failures.append(failure)
-            results = failure.partial
+            results, code = failure.partial, NOT_CONVERGED
         _print_results(case, results)
         print(f"written: {out / case.name}")
-    for unfinished in failures:
-        _print_error(str(unfinished))
-    return NOT_CONVERGED if failures else 0
+    return code
 
 
 @app.command
@@ -84,24 +82,30 @@ def check(cases: Cases, *, overrides: Overrides = None) -> int:
             results = [result.without_pairs() for result in report.solve(case, advance=advance)]
         comparisons = report.compare(case, results)
         _print_comparisons(case, comparisons)
-        failures = [failure for result in results for failure in result.failures]
-        for failure in failures:
-            _print_error(failure)
-        if failures:
+        _print_warnings(case, results)
+        if any(result.failures for result in results):
             code = NOT_CONVERGED
         elif not all(comparison.met for comparison in comparisons):
             code = max(code, CHECK_FAILED)
     return code
 
 
+def _whole(_: type, tokens: Sequence[Token]) -> int:
+    """A whole number; cyclopts alone would take 2.5 for 2."""
+    return int(tokens[0].value)
+
+
+Count = Annotated[int, Parameter(converter=_whole)]
+
+
 @app.command
 def mesh(
     output: Annotated[Path, Parameter(help="The file to write: .vtu for ParaView, .msh for Gmsh.")],
     *,
-    phi_cells: Annotated[int, Parameter(help="Cells in the phase from one impact to the next.")] = 2,
-    phi_degree: Annotated[int, Parameter(help="Degree of the elements in the phase.")] = 10,
-    xi_cells: Annotated[int, Parameter(help="Cells in the noise.")] = 4,
-    xi_degree: Annotated[int, Parameter(help="Degree of the elements in the noise.")] = 9,
+    phi_cells: Annotated[Count, Parameter(help="Cells in the phase from one impact to the next.")] = 2,
+    phi_degree: Annotated[Count, Parameter(help="Degree of the elements in the phase.")] = 10,
+    xi_cells: Annotated[Count, Parameter(help="Cells in the noise.")] = 4,
+    xi_degree: Annotated[Count, Parameter(help="Degree of the elements in the noise.")] = 9,
     xi_min: Annotated[float, Parameter(help="Lower end of the noise, in standard deviations.")] = -8.0,
     xi_max: Annotated[float, Parameter(help="Upper end of the noise, in standard deviations.")] = 8.0,
     grading: Annotated[
@@ -134,6 +138,9 @@ def mesh(
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; the exit code is 0 for success, 1 a failed check, 2 bad input, 3 not converged."""
+    for stream in (sys.stdout, sys.stderr):  # a terminal that has no Greek shows "?" for it
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
     try:
         code = app(argv, result_action="return_value", exit_on_error=False, error_console=_stderr())
     except CycloptsError:  # cyclopts has said what is wrong
@@ -145,7 +152,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _print_error(str(failure))
         return BAD_INPUT
     except KeyboardInterrupt:
-        _print_error("interrupted; what was finished is kept")
+        _print_error("interrupted")
         return INTERRUPTED
     return code if isinstance(code, int) else 0
 
@@ -197,13 +204,24 @@ def _print_results(case: Case, results: Sequence[CurveResult]) -> None:
             console.print(_indices(result), highlight=False)
     else:
         console.print(_curve_table(case, results))
-    for warning in sorted({text for result in results for text in result.warnings}):
-        _stderr().print(Text(f"warning: {warning}"), style="yellow", soft_wrap=True)
+    _print_warnings(case, results)
+
+
+def _print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
+    """What limits the numbers of each curve, and why some are missing."""
+    for result in results:
+        failures = {line for failure in result.failures for line in failure.splitlines()}
+        for text in result.warnings:
+            kind, style = ("not converged", "bold red") if text in failures else ("warning", "yellow")
+            place = ", ".join([case.name, *(f"{key} = {value:g}" for key, value in result.curve.varied.items())])
+            _stderr().print(Text(f"{kind}: {place}: {text}"), style=style, soft_wrap=True)
 
 
 def _moment_table(case: Case, result: CurveResult) -> Table:
     """p, Λ(p), Eq. (37) and the difference."""
-    table = Table("p", "Λ(p)", "± error", "Eq. (37)", "difference", title=_heading(case, result), title_justify="left")
+    table = Table(
+        "p", "Λ(p)", "± error", _theory(case, "(37)"), "difference", title=_heading(case, result), title_justify="left"
+    )
     _align(table)
     moments = result.moments
     for p, value, error, theory in zip(
@@ -221,8 +239,10 @@ def _indices(result: CurveResult) -> str:
         ("δ_p", result.stability_index),
         ("Λ″(0)", result.variance_rate),
     ):
-        parts.append(f"{name} = {digits(estimate.value, estimate.error_estimate) if estimate else 'none found'}")
-    return "  ".join(parts) + "\n"
+        if estimate:
+            text = f"{digits(estimate.value, estimate.error_estimate, most=9)} ± {estimate.error_estimate:.0e}"
+        parts.append(f"{name} = {text if estimate else 'none found'}")
+    return "   ".join(parts) + "\n"
 
 
 def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
@@ -230,7 +250,9 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     from fpsolve import perturbation
 
     names = (key.partition(".")[2] for key in case.vary)
-    table = Table(*names, "λ", "Eq. (39)", "δ_p", "Eq. (38)", title=case.title, title_justify="left")
+    table = Table(
+        *names, "λ", _theory(case, "(39)"), "δ_p", _theory(case, "(38)"), title=case.title, title_justify="left"
+    )
     _align(table)
     for result in results:
         curve, exponent, index = result.curve, result.lyapunov_exponent, result.stability_index
@@ -244,24 +266,33 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     return table
 
 
+def _theory(case: Case, equation: str) -> str:
+    """Heading of a column of perturbation theory, which knows the exact noise by its reduction only."""
+    return f"Eq. {equation}, reduced" if case.is_exact else f"Eq. {equation}"
+
+
 def _print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
-    table = Table(
-        "quantity", "where", "expected", "computed", "", title=f"{case.name}: {case.title}", title_justify="left"
-    )
+    console = Console()
+    if not comparisons:
+        console.print(f"{case.name}: nothing is expected; add [[expect]] to the case", markup=False)
+        return
+    table = Table("quantity", "expected", "computed", "difference", "", title=f"{case.name}: {case.title}")
+    table.title_justify = "left"
+    _align(table)
+    table.columns[0].justify, table.columns[0].no_wrap, table.columns[0].overflow = "left", False, "fold"
     for item in comparisons:
         expectation = item.expectation
         name = expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
+        where = "".join(f"\n{key} = {value:g}" for key, value in item.varied.items())
         table.add_row(
-            f"{name}\n[dim]{expectation.source}[/dim]",
-            ", ".join(f"{key} = {value:g}" for key, value in item.varied.items()),
-            f"{expectation.value:.12g}",
+            f"{name}{where}\n[dim]{expectation.source}[/dim]",
+            f"{expectation.value:.12g}\n± {item.tolerance:.0e}",
             "none" if item.value is None else f"{item.value:.12g}",
+            "" if item.value is None else f"{item.value - expectation.value:.1e}",
             "[green]ok[/green]" if item.met else "[bold red]differs[/bold red]",
         )
-    Console().print(
-        table if comparisons else f"{case.name}: nothing is expected; add [[expect]] to the case",
-        markup=bool(comparisons),
-    )
+    console.print(table)
+    console.print(f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok")
 
 
 def _heading(case: Case, result: CurveResult) -> str:

@@ -168,8 +168,9 @@ class Document:
     def override(self, text: str) -> None:
         """Apply one `key=value` of the command line; what is wrong with it joins the faults."""
         try:
-            path = _override_path(text)
-            value = _at(tomllib.loads(text), path)
+            text_as_toml = _quoted_if_bare(text)
+            path = _override_path(text_as_toml)
+            value = _at(tomllib.loads(text_as_toml), path)
             _assign(self.data, dotted(path).split("."), value)
         except (ValueError, RecursionError) as error:
             sentence = f"{error}; write it as in {_OVERRIDE_EXAMPLES}"
@@ -180,6 +181,18 @@ class Document:
             self.places[dotted(path)] = f"--set {text}"
             for end in range(1, len(path)):
                 self.places.setdefault(dotted(path[:end]), f"--set {text}")
+
+
+def _quoted_if_bare(text: str) -> str:
+    """key=word as key="word": a shell takes the quotes away."""
+    key, equals, value = text.partition("=")
+    is_word = re.fullmatch(r"[A-Za-z./~][\w./~ -]*", value.strip()) and value.strip() not in (
+        "true",
+        "false",
+        "nan",
+        "inf",
+    )
+    return f'{key}{equals}"{value.strip()}"' if is_word else text
 
 
 def _override_path(text: str) -> tuple[str | int, ...]:
@@ -267,4 +280,19 @@ def _syntax_fault(text: str, message: str) -> Fault:
             key, second = scanner.repeated
             first, key = scanner.lines[key], re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", key)
             return Fault(key, second, f"set twice, first on line {first}; remove one of them")
-    return Fault("", line, f"not valid TOML: {message}; mend the syntax, see https://toml.io")
+    shown = text.splitlines()[line - 1].strip() if line and line <= text.count("\n") + 1 else ""
+    return Fault("", line, f"not valid TOML: {message}; {_syntax_remedy(shown)}")
+
+
+def _syntax_remedy(line: str) -> str:
+    """What a line that is no TOML probably lacks."""
+    key, _, value = (part.strip() for part in line.partition("="))
+    if re.search(r"[^\x00-\x7f]", key):
+        return f"{key} needs plain letters, as in omega = 1.0"
+    if re.fullmatch(r"-?\d+,\d+", value):
+        return f"write the decimal point as in {key} = {value.replace(',', '.')}"
+    if re.fullmatch(r"-?[\d.]+(e-?\d+)?\s*[A-Za-z/]+.*", value):
+        return f"write the number alone, without a unit: {line}"
+    if re.fullmatch(r"[A-Za-z][\w./-]*", value):
+        return f'write a text in quotes, as in {key} = "{value}"'
+    return f"mend the syntax{' of: ' + line if line else ''}, see https://toml.io"

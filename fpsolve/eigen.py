@@ -8,7 +8,7 @@ property that no other pair has: T > 0 and T* > 0 (Perron-Frobenius; one of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -49,13 +49,13 @@ class PrincipalPair:
 
     p: float
     value: float
-    right: FloatArray
-    left: FloatArray
+    right: FloatArray = field(repr=False)
+    left: FloatArray = field(repr=False)
     derivative: float
     residual: float
     rounding: float
     sign_defects: tuple[float, float, float]
-    generator: TiltedGenerator
+    generator: TiltedGenerator = field(repr=False)
 
 
 def principal_pair(generator: TiltedGenerator, p: float, *, start: PrincipalPair | None = None) -> PrincipalPair:

@@ -14,13 +14,13 @@ from fpsolve.eigen import PrincipalPair, principal_pair, second_derivative
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.generator import TiltedGenerator
 from fpsolve.mesh import CylinderMesh, make_mesh
-from fpsolve.noise import FloatArray, NonGaussianNoise
+from fpsolve.noise import AnyNoise, FloatArray, check_existence, finite_moments
 from fpsolve.oscillator import VibroImpactOscillator
-from fpsolve.perturbation import AnyNoise
 
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
 SEARCH_INTERVAL = (-20.0, 20.0)
+REMEDY = "use more cells ([mesh] phi_cells, xi_cells) or a wider noise interval (xi_min, xi_max)"
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class MomentLyapunov:
     derivative: FloatArray
     error_estimate: FloatArray
     residual: FloatArray
-    pairs: tuple[PrincipalPair, ...]
+    pairs: tuple[PrincipalPair, ...] = field(repr=False)
     warnings: tuple[str, ...] = ()
 
 
@@ -128,7 +128,7 @@ class ExponentSolver:
 
         Λ is convex, so Λ(p)/p increases and has one root at most: a safeguarded Newton iteration on it.
         """
-        low, high = interval if _is_thin_tailed(self.noise) else (-1.0, 0.0)
+        low, high = np.clip(interval, *finite_moments(self.noise))
         ratio, slope = self._ratio(0.0)
         p = float(np.clip(-ratio / slope, low, high))
         tried: set[float] = set()
@@ -176,7 +176,7 @@ class ExponentSolver:
         if error > MEANINGLESS * scale and p != 0:
             raise NotConverged(
                 f"Λ({p:g}) = {pair.value:.6g} has an estimated error of {error:.1g}, more than {MEANINGLESS:g} of its "
-                f"scale {scale:.3g}; use more cells, or a wider noise interval",
+                f"scale {scale:.3g}; {REMEDY}",
                 pair,
             )
         return pair, error
@@ -186,13 +186,14 @@ class ExponentSolver:
         return max(abs(pair.value), float(perturbation.moment_scale(self.oscillator, self.noise, pair.p)))
 
     def _result(self, pairs: Sequence[PrincipalPair], errors: FloatArray, rtol: float) -> MomentLyapunov:
-        short = [(k.p, e) for k, e in zip(pairs, errors, strict=True) if k.p != 0 and e > rtol * self._scale(k)]
+        shares = [(k.p, e / self._scale(k)) for k, e in zip(pairs, errors, strict=True) if k.p != 0]
+        short = [(p, share) for p, share in shares if share > rtol]
         warnings: tuple[str, ...] = ()
         if short:
-            p, error = max(short, key=lambda item: item[1])
+            p, share = max(short, key=lambda item: item[1])
             warnings = (
                 f"rtol = {rtol:g} is not met at {len(short)} of {len(pairs)} moments, worst at p = {p:g} with an "
-                f"estimated error of {error:.1e}; use more cells, or a wider noise interval, or a larger rtol",
+                f"estimated relative error of {share:.1e}; {REMEDY}, or use a larger rtol",
             )
         return MomentLyapunov(
             p=np.array([k.p for k in pairs]),
@@ -228,20 +229,3 @@ def moment_lyapunov(
         NotConverged: the mesh does not resolve the problem at some p; `partial` is the result for the others.
     """
     return ExponentSolver(oscillator, noise, mesh).moments(p, rtol=rtol)
-
-
-def check_existence(noise: AnyNoise, p: float) -> None:
-    """Refuse p for which the algebraic tails of Eq. (9), r₀ > 1, make E‖x‖^p infinite.
-
-    Raises:
-        NoSuchExponent: r₀ > 1 and p is not in [−1, 0].
-    """
-    if not _is_thin_tailed(noise) and not -1 <= p <= 0:
-        raise NoSuchExponent(
-            f"Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated "
-            'domain would only hide it; choose p in [-1, 0], r0 <= 1, or treatment = "ou-reduction"'
-        )
-
-
-def _is_thin_tailed(noise: AnyNoise) -> bool:
-    return not (isinstance(noise, NonGaussianNoise) and noise.r0 > 1)

@@ -15,6 +15,8 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 from scipy.special import beta, xlog1py
 
+from fpsolve.errors import NoSuchExponent
+
 FloatArray = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0)]
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
@@ -178,3 +180,27 @@ class NonGaussianNoise:
             )
         tau1 = 2 * (2 - self.r0) / (5 - 3 * self.r0) * self.tau0
         return OrnsteinUhlenbeck(alpha=1 / tau1, sigma=self.diffusion)
+
+
+AnyNoise = OrnsteinUhlenbeck | NonGaussianNoise
+
+
+def finite_moments(noise: AnyNoise) -> tuple[float, float]:
+    """The p for which Λ(p) is finite, as a closed interval: [−1, 0] for the algebraic tails of r₀ > 1, else all."""
+    if isinstance(noise, NonGaussianNoise) and noise.r0 > 1:
+        return -1.0, 0.0
+    return -math.inf, math.inf
+
+
+def check_existence(noise: AnyNoise, p: float) -> None:
+    """Refuse a p for which E‖x‖^p is infinite.
+
+    Raises:
+        NoSuchExponent: p is not among the `finite_moments` of the noise.
+    """
+    low, high = finite_moments(noise)
+    if not low <= p <= high:
+        raise NoSuchExponent(
+            f"Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
+            f'hide it; choose p in [{low:g}, {high:g}], r0 <= 1, or treatment = "ou-reduction"'
+        )

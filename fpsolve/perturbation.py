@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.noise import FloatArray, NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.noise import AnyNoise, FloatArray, NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.oscillator import VibroImpactOscillator
-
-AnyNoise = OrnsteinUhlenbeck | NonGaussianNoise
 
 
 def reduced(noise: AnyNoise) -> OrnsteinUhlenbeck:

@@ -37,7 +37,7 @@ TITLES = {
 }
 EQUATIONS = {"moment": "(37)", "lyapunov_exponent": "(39)", "stability_index": "(38)"}
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
-_MARKERS = "osD^v<>"
+_MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,9 @@ class Series:
     line_y: FloatArray
 
 
-def write_figure(series: Sequence[Series], x: str, y: str, title: str, paths: Sequence[Path]) -> None:
+def write_figure(
+    series: Sequence[Series], x: str, y: str, title: str, paths: Sequence[Path], *, is_reduced: bool = False
+) -> None:
     """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
 
     Args:
@@ -64,6 +66,7 @@ def write_figure(series: Sequence[Series], x: str, y: str, title: str, paths: Se
         y: "moment", "lyapunov_exponent" or "stability_index".
         title: stands above the axes.
         paths: .png, .pdf or what else matplotlib writes.
+        is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -78,7 +81,7 @@ def write_figure(series: Sequence[Series], x: str, y: str, title: str, paths: Se
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
             _draw(axes, item, i)
-        _add_legend(axes, EQUATIONS[y])
+        _add_legend(axes, EQUATIONS[y] + (", reduced noise" if is_reduced else ""))
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         axes.margins(x=0.03)
         for path in paths:
@@ -88,7 +91,7 @@ def write_figure(series: Sequence[Series], x: str, y: str, title: str, paths: Se
 
 def _draw(axes: Any, item: Series, i: int) -> None:
     colour, marker = _COLOURS[i % len(_COLOURS)], _MARKERS[i % len(_MARKERS)]
-    every = max(1, round(item.x.size / 17))
+    every = max(1, item.x.size // 25)
     label = ", ".join(f"{SYMBOLS.get(key, key)} = {value:g}" for key, value in item.varied.items())
     axes.plot(item.line_x, item.line_y, color=colour, linewidth=1.6)
     axes.plot(

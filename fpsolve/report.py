@@ -16,11 +16,11 @@ import numpy as np
 from fpsolve import perturbation
 from fpsolve.case import Case, Curve
 from fpsolve.eigen import PrincipalPair
-from fpsolve.errors import NoSuchExponent, NotConverged, OutputError
-from fpsolve.exponent import SEARCH_INTERVAL, Estimate, ExponentSolver, MomentLyapunov, check_existence
+from fpsolve.errors import NotConverged, OutputError
+from fpsolve.exponent import SEARCH_INTERVAL, Estimate, ExponentSolver, MomentLyapunov
 from fpsolve.files import atomic
 from fpsolve.mesh import CylinderMesh
-from fpsolve.noise import FloatArray
+from fpsolve.noise import FloatArray, finite_moments
 from fpsolve.plots import Series, write_figure
 from fpsolve.schema import Expectation
 from fpsolve.space import CylinderSpace
@@ -67,6 +67,7 @@ class Comparison:
     expectation: Expectation
     varied: dict[str, float]
     value: float | None
+    tolerance: float
     met: bool
 
 
@@ -81,19 +82,21 @@ def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: N
         advance: called after each moment, `work(case)` times in all.
 
     Raises:
-        NoSuchExponent: Λ(p) is infinite for one of the case's p; nothing is written.
         OutputError: the folder cannot be made or written to; nothing is solved.
         NotConverged: some p failed; everything else is written, and `partial` holds it.
     """
-    _refuse_infinite(case)
     folder = Path(out) / case.name
     _prepare(folder)
     results: list[CurveResult] = []
+    written: set[Path] = set()
     for number, result in enumerate(solve(case, advance=advance), start=1):
-        _write_paraview(case, result, number, folder)
+        written |= _write_paraview(case, result, number, folder)
         results.append(result.without_pairs())
         _write_tables(case, results, folder)
-    write_figure(_series(case, results), case.figure.x, case.figure.y, case.title, _pictures(folder))
+    write_figure(
+        _series(case, results), case.figure.x, case.figure.y, case.title, _pictures(folder), is_reduced=case.is_exact
+    )
+    _remove_stale(folder, written)
     failures = [failure for result in results for failure in result.failures]
     if failures:
         raise NotConverged("\n".join(failures), tuple(results))
@@ -106,8 +109,7 @@ def work(case: Case) -> int:
 
 
 def solve(case: Case, *, advance: Advance = lambda: None) -> Iterator[CurveResult]:
-    """Solve the curves of a case one after the other. Raises as `run` does for infinite Λ(p)."""
-    _refuse_infinite(case)
+    """Solve the curves of a case one after the other; what did not converge is in their `failures`."""
     mesh = case.cylinder_mesh()
     for curve in case.curves():
         yield _solve_curve(curve, mesh, case.p, case.rtol, advance)
@@ -121,15 +123,6 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
         for result in results
         if expectation.selects(result.curve.varied)
     ]
-
-
-def _refuse_infinite(case: Case) -> None:
-    for curve in case.curves():
-        for p in case.p:
-            try:
-                check_existence(curve.noise, float(p))
-            except NoSuchExponent as failure:
-                raise NoSuchExponent(f"{case.path}: moments.p: {failure}") from failure
 
 
 def _prepare(folder: Path) -> None:
@@ -151,7 +144,7 @@ def _solve_curve(curve: Curve, mesh: CylinderMesh | None, p: FloatArray, rtol: f
     index = solver.stability_index()
     warnings = list(moments.warnings)
     if index is None:
-        low, high = SEARCH_INTERVAL
+        low, high = np.clip(SEARCH_INTERVAL, *finite_moments(curve.noise))
         warnings.append(f"no stability index: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]")
     return CurveResult(
         curve=curve,
@@ -162,7 +155,7 @@ def _solve_curve(curve: Curve, mesh: CylinderMesh | None, p: FloatArray, rtol: f
         variance_rate=solver.variance_rate(),
         stationary=solver.pair(0.0),
         mesh=_mesh(solver.generator.space),
-        warnings=(*warnings, *failures),
+        warnings=(*warnings, *(line for failure in failures for line in failure.splitlines())),
         failures=failures,
     )
 
@@ -176,7 +169,7 @@ def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
         value = None if estimate is None else estimate.value
     tolerance = max(expectation.atol or 0.0, (expectation.rtol or 0.0) * abs(expectation.value))
     met = value is not None and abs(value - expectation.value) <= tolerance
-    return Comparison(expectation, dict(result.curve.varied), value, met)
+    return Comparison(expectation, dict(result.curve.varied), value, tolerance, met)
 
 
 def _write_tables(case: Case, results: Sequence[CurveResult], folder: Path) -> None:
@@ -243,21 +236,31 @@ def _mesh(space: CylinderSpace) -> dict[str, Any]:
     }
 
 
-def _write_paraview(case: Case, result: CurveResult, number: int, folder: Path) -> None:
-    """Eigenfunctions of a curve; with the first one also the stationary density and the script."""
+def _write_paraview(case: Case, result: CurveResult, number: int, folder: Path) -> set[Path]:
+    """Eigenfunctions of a curve, which are returned; with the first one also the stationary density and the script."""
     from fpsolve.vtk import copy_show_script, write_density, write_eigenfunctions
 
     stationary = result.stationary
     if stationary is None:
-        return
+        return set()
     if number == 1:
         write_density(folder / "density.vtu", stationary)
     wanted = case.output.eigenfunctions
     pairs = [k for k in result.moments.pairs if wanted is None or np.any(np.isclose(k.p, wanted, rtol=0, atol=1e-12))]
-    if pairs:
-        stem = "eigenfunctions" if number == 1 else f"eigenfunctions-{number}"
-        write_eigenfunctions(folder, pairs, stationary, stem=stem)
-        copy_show_script(folder)
+    if not pairs:
+        return set()
+    copy_show_script(folder)
+    stem = "eigenfunctions" if number == 1 else f"eigenfunctions-{number}"
+    return set(write_eigenfunctions(folder, pairs, stationary, stem=stem))
+
+
+def _remove_stale(folder: Path, written: set[Path]) -> None:
+    """Eigenfunctions that an earlier run left for curves or p that are no more."""
+    for path in {*folder.glob("eigenfunctions*.pvd"), *folder.glob("eigenfunctions*/p*.vtu")} - written:
+        path.unlink()
+    for path in folder.glob("eigenfunctions*"):
+        if path.is_dir() and not any(path.iterdir()):
+            path.rmdir()
 
 
 def _pictures(folder: Path) -> list[Path]:
@@ -289,4 +292,7 @@ def _parameter_series(case: Case, others: dict[str, float], group: Sequence[Curv
     line = np.linspace(x.min(), x.max(), 200)
     theory = getattr(perturbation, case.figure.y)
     curves = [case.curve({**others, case.figure.x: float(value)}) for value in line]
-    return Series(others, x, y, line, np.array([theory(curve.oscillator, curve.noise) for curve in curves]))
+    line_y = np.array([theory(curve.oscillator, curve.noise) for curve in curves])
+    if case.figure.y == "stability_index":  # it has poles, and is sought in this interval only
+        line_y[(line_y < SEARCH_INTERVAL[0]) | (line_y > SEARCH_INTERVAL[1])] = np.nan
+    return Series(others, x, y, line, line_y)

@@ -17,7 +17,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from paraview import simple  # type: ignore[import-not-found, unused-ignore]
+try:
+    from paraview import simple  # type: ignore[import-not-found, unused-ignore]
+except ImportError:
+    raise SystemExit("this script runs in ParaView's Python: pvpython show.py") from None
 
 FOLDER = ""  # where the results were written
 SYMBOLS = {"T": "T", "T_adjoint": "T*", "tilted_density": "T T*", "stationary_density": "T* at p = 0"}
@@ -61,11 +64,14 @@ def options(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--collection", type=Path, help="default: eigenfunctions.pvd beside this file")
     chosen = parser.parse_args(arguments)
     chosen.collection = chosen.collection or beside_this_file("eigenfunctions.pvd")
-    chosen.output = chosen.output or chosen.collection.with_suffix(".png")
+    shape = "-cylinder" if chosen.cylinder else ""
+    chosen.output = chosen.output or chosen.collection.with_name(f"{chosen.collection.stem}{shape}.png")
     if not chosen.collection.is_file():
         raise SystemExit(f"there is no {chosen.collection}; name the collection with --collection FILE.pvd")
     if chosen.output.suffix not in (".png", ".jpg"):
         raise SystemExit(f"--output {chosen.output} is no picture; give it the ending .png or .jpg")
+    if not chosen.output.resolve().parent.is_dir():
+        raise SystemExit(f"--output {chosen.output}: there is no such folder; make it, or choose another")
     return chosen
 
 

@@ -256,6 +256,13 @@ def test_override(write: Write, override: str, key: str, value: float | str) -> 
     assert load_case(write(SMALL), [override]).curves()[0].parameters[key] == value
 
 
+def test_override_of_a_text_needs_no_quotes(write: Write) -> None:
+    case = load_case(write(SMALL), ["oscillator.impact=restitution", "noise.treatment=exact", "title=Two words"])
+    assert case.curves()[0].parameters["oscillator.impact"] == "restitution"
+    assert case.is_exact
+    assert case.title == "Two words"
+
+
 @pytest.mark.parametrize("stated", ['"noise.D0" = [1]', "noise.D0 = [1]", ""])
 @pytest.mark.parametrize("override", ['vary."noise.D0"=[2]', "vary.noise.D0=[2]", 'vary={"noise.D0"=[2]}'])
 def test_override_of_a_varied_key(write: Write, stated: str, override: str) -> None:

@@ -1,5 +1,9 @@
 """The command line: exit codes, messages, and where they go."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, NOT_CONVERGED, digits, main
@@ -110,7 +114,9 @@ def test_unwritable_output_exits_2(case, capsys):
 
 def test_a_short_interval_gives_a_warning(case, capsys):
     assert main(["run", case, "--set", "mesh={ xi_min = -4.0, xi_max = 4.0 }"]) == 0
-    assert "warning: rtol = 1e-08 is not met" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "warning: test, noise.D0 = 1: rtol = 1e-08 is not met" in err
+    assert "[mesh] phi_cells, xi_cells" in err
 
 
 def test_mesh_writes_a_file_that_a_case_can_name(case, tmp_path, capsys):
@@ -119,6 +125,19 @@ def test_mesh_writes_a_file_that_a_case_can_name(case, tmp_path, capsys):
     )
     assert "written: sub/graded.vtu (18 cells, 1815 unknowns)" in capsys.readouterr().out
     assert main(["check", case, "--set", 'mesh.file="sub/graded.vtu"']) == 0
+
+
+def test_exact_noise_says_that_the_theory_is_for_the_reduced_one(case, capsys):
+    assert main(["run", case, "--set", "noise.treatment=exact"]) == 0
+    assert "Eq. (37), reduced" in capsys.readouterr().out
+
+
+def test_a_terminal_without_greek_is_no_obstacle(case):
+    environment = os.environ | {"PYTHONIOENCODING": "ascii"}
+    command = [sys.executable, "-m", "fpsolve.cli", "check", case]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_impossible_meshes_exit_2(tmp_path, monkeypatch, capsys):

@@ -9,7 +9,7 @@ import pytest
 
 import fpsolve
 from fpsolve import report
-from fpsolve.errors import NoSuchExponent, NotConverged, OutputError
+from fpsolve.errors import CaseError, NotConverged, OutputError
 
 TEXT = """
 title = "A test"
@@ -156,10 +156,35 @@ def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
 
 
 def test_infinite_moments_are_refused_before_anything_is_written(tmp_path):
-    case = write(tmp_path, TEXT, ["noise.treatment='exact'", "noise.r0=1.1"])
-    with pytest.raises(NoSuchExponent, match=r"test\.toml: moments\.p: Λ\(2\) is infinite"):
-        fpsolve.run(case, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+    """The case says so, with the line of the values that are to blame."""
+    with pytest.raises(CaseError, match=r"test\.toml:15: vary: with noise\.D0 = 0\.1: Λ\(2\) is infinite"):
+        write(tmp_path, TEXT, ["noise.treatment='exact'", "noise.r0=1.1"])
+    text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"noise.r0" = [0.9, 1.1]')
+    with pytest.raises(CaseError, match=r"vary: with noise\.r0 = 1\.1: Λ\(2\) is infinite"):
+        write(tmp_path, text, ["noise.treatment='exact'"])
+    write(tmp_path, text, ["noise.treatment='exact'", "moments.p=[-1.0, 0.0]", "output.eigenfunctions=[]"])
+    write(tmp_path, TEXT.replace("r0 = 0.95", "r0 = 1.1").replace('"noise.D0" = [0.1, 1.0]', '"noise.r0" = [0.9, 0.8]'))
+
+
+def test_a_value_that_vary_would_replace_is_refused(tmp_path):
+    with pytest.raises(CaseError, match=r"--set noise\.D0=7: noise\.D0: has no effect, as the case varies noise\.D0"):
+        write(tmp_path, TEXT, ["noise.D0=7"])
+
+
+def test_a_second_run_leaves_no_eigenfunctions_of_the_first(tmp_path):
+    fpsolve.run(write(tmp_path, TEXT), tmp_path / "out")
+    fpsolve.run(write(tmp_path, TEXT, ["vary={}", "output.eigenfunctions=[-1.0]"]), tmp_path / "out")
+    names = {name for name in files(tmp_path / "out/test") if name.startswith("eigenfunctions")}
+    assert names == {"eigenfunctions.pvd", "eigenfunctions/p-1.0.vtu"}
+    assert not (tmp_path / "out/test/eigenfunctions-2").exists()
+
+
+def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
+    case = write(tmp_path, TEXT, ["noise.treatment='exact'"])
+    result = next(report.solve(case))
+    reduced = next(report.solve(write(tmp_path, TEXT)))
+    np.testing.assert_array_equal(result.moments_perturbation, reduced.moments_perturbation)
+    assert case.is_exact
 
 
 def test_an_unwritable_folder_is_refused_before_solving(case, tmp_path):
