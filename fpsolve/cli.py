@@ -222,7 +222,7 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
     table = Table(
         "p", "Λ(p)", "± error", _theory(case, "(37)"), "difference", title=_heading(case, result), title_justify="left"
     )
-    _align(table)
+    _align(table, case)
     moments = result.moments
     for p, value, error, theory in zip(
         moments.p, moments.value, moments.error_estimate, result.moments_perturbation, strict=True
@@ -253,7 +253,7 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     table = Table(
         *names, "λ", _theory(case, "(39)"), "δ_p", _theory(case, "(38)"), title=case.title, title_justify="left"
     )
-    _align(table)
+    _align(table, case)
     for result in results:
         curve, exponent, index = result.curve, result.lyapunov_exponent, result.stability_index
         table.add_row(
@@ -267,8 +267,8 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
 
 
 def _theory(case: Case, equation: str) -> str:
-    """Heading of a column of perturbation theory, which knows the exact noise by its reduction only."""
-    return f"Eq. {equation}, reduced" if case.is_exact else f"Eq. {equation}"
+    """Heading of a column of perturbation theory, starred where it has another noise than the solution."""
+    return f"Eq. {equation}*" if case.is_exact else f"Eq. {equation}"
 
 
 def _print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
@@ -278,7 +278,8 @@ def _print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
         return
     table = Table("quantity", "expected", "computed", "difference", "", title=f"{case.name}: {case.title}")
     table.title_justify = "left"
-    _align(table)
+    for column in table.columns:
+        column.justify, column.no_wrap = "right", True
     table.columns[0].justify, table.columns[0].no_wrap, table.columns[0].overflow = "left", False, "fold"
     for item in comparisons:
         expectation = item.expectation
@@ -300,9 +301,11 @@ def _heading(case: Case, result: CurveResult) -> str:
     return f"{case.title}: {varied}" if varied else case.title
 
 
-def _align(table: Table) -> None:
+def _align(table: Table, case: Case) -> None:
     for column in table.columns:
         column.justify, column.no_wrap = "right", True
+    if case.is_exact:
+        table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
 
 
 def digits(value: float, error: float, most: int = 13) -> str:

@@ -129,7 +129,9 @@ def test_mesh_writes_a_file_that_a_case_can_name(case, tmp_path, capsys):
 
 def test_exact_noise_says_that_the_theory_is_for_the_reduced_one(case, capsys):
     assert main(["run", case, "--set", "noise.treatment=exact"]) == 0
-    assert "Eq. (37), reduced" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "Eq. (37)*" in out
+    assert "* for the noise reduced by Eqs. (12)-(14)" in out
 
 
 def test_a_terminal_without_greek_is_no_obstacle(case):
