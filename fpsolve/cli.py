@@ -258,7 +258,7 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
         curve, exponent, index = result.curve, result.lyapunov_exponent, result.stability_index
         table.add_row(
             *(f"{value:g}" for value in curve.varied.values()),
-            digits(exponent.value, exponent.error_estimate, most=7),
+            digits(exponent.value, exponent.error_estimate, most=7) if exponent else "none found",
             f"{perturbation.lyapunov_exponent(curve.oscillator, curve.noise):.6g}",
             digits(index.value, index.error_estimate, most=7) if index else "none found",
             f"{perturbation.stability_index(curve.oscillator, curve.noise):.6g}",

@@ -127,6 +127,9 @@ class ExponentSolver:
         """δ_p, the non-zero root of Λ(p); None where Λ has no such root in the interval.
 
         Λ is convex, so Λ(p)/p increases and has one root at most: a safeguarded Newton iteration on it.
+
+        Raises:
+            NotConverged: the mesh does not resolve some p on the way.
         """
         low, high = np.clip(interval, *finite_moments(self.noise))
         ratio, slope = self._ratio(0.0)
@@ -144,6 +147,8 @@ class ExponentSolver:
             if low == high:
                 return None
             p = new
+        else:
+            raise NotConverged(f"the stability index did not settle, last near p = {p:g}; {REMEDY}")
         pair = self.pair(p)
         error = abs(self._solve(1, p).value - pair.value) + pair.rounding
         return Estimate(p, error / abs(pair.derivative))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from fpsolve.schema import Expectation
 from fpsolve.space import CylinderSpace
 
 Advance = Callable[[], None]
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +37,8 @@ class CurveResult:
         curve: the parameters, the oscillator and the noise.
         moments: Λ(p); where some p failed, of the others.
         moments_perturbation: Eq. (37) at the same p.
-        lyapunov_exponent, variance_rate: λ and Λ″(0).
-        stability_index: δ_p; None where there is none in the interval searched.
+        lyapunov_exponent, variance_rate: λ and Λ″(0); None where p = 0 did not converge.
+        stability_index: δ_p; None where there is none in the interval searched, or it did not converge.
         stationary: the eigenpair at p = 0; None once it is no longer needed.
         mesh: what was used, ξ in noise units.
         warnings: what limits these numbers.
@@ -47,9 +48,9 @@ class CurveResult:
     curve: Curve
     moments: MomentLyapunov
     moments_perturbation: FloatArray
-    lyapunov_exponent: Estimate
+    lyapunov_exponent: Estimate | None
     stability_index: Estimate | None
-    variance_rate: Estimate
+    variance_rate: Estimate | None
     stationary: PrincipalPair | None
     mesh: dict[str, Any]
     warnings: tuple[str, ...]
@@ -141,23 +142,35 @@ def _solve_curve(curve: Curve, mesh: CylinderMesh | None, p: FloatArray, rtol: f
         moments = solver.moments(p, rtol=rtol, advance=advance)
     except NotConverged as failure:
         moments, failures = failure.partial, (str(failure),)
-    index = solver.stability_index()
     warnings = list(moments.warnings)
-    if index is None:
+    index, obstacle = _attempt(solver.stability_index)
+    if index is None and not obstacle:
         low, high = np.clip(SEARCH_INTERVAL, *finite_moments(curve.noise))
         warnings.append(f"no stability index: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]")
+    exponent, no_exponent = _attempt(solver.lyapunov_exponent)
+    rate, _ = _attempt(solver.variance_rate)
+    stationary, _ = _attempt(lambda: solver.pair(0.0))
+    warnings += [f"no stability index: {obstacle}"] * bool(obstacle) + [no_exponent] * bool(no_exponent)
     return CurveResult(
         curve=curve,
         moments=moments,
         moments_perturbation=perturbation.moment_exponent(curve.oscillator, curve.noise, moments.p),
-        lyapunov_exponent=solver.lyapunov_exponent(),
+        lyapunov_exponent=exponent,
         stability_index=index,
-        variance_rate=solver.variance_rate(),
-        stationary=solver.pair(0.0),
+        variance_rate=rate,
+        stationary=stationary,
         mesh=_mesh(solver.generator.space),
         warnings=(*warnings, *(line for failure in failures for line in failure.splitlines())),
         failures=failures,
     )
+
+
+def _attempt(compute: Callable[[], Found]) -> tuple[Found | None, str]:
+    """What is computed, or why it did not converge."""
+    try:
+        return compute(), ""
+    except NotConverged as failure:
+        return None, str(failure)
 
 
 def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
