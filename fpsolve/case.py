@@ -241,16 +241,17 @@ def _obstacle(
     try:
         curve = _curve(oscillator, noise, varied)
         with np.errstate(all="ignore"):
+            factors = [curve.oscillator.impact_factor(float(extreme)) for extreme in (p.max(), p.min())]
             sizes = np.append(
                 perturbation.moment_scale(curve.oscillator, curve.noise, p),
-                perturbation.stability_index(curve.oscillator, curve.noise),
+                [perturbation.stability_index(curve.oscillator, curve.noise), *factors],
             )
     except ValidationError as error:
         context = error.errors()[0].get("ctx", {})
         return str(context.get("error", f"the noise has no finite strength; {_MODERATE}"))
     except ArithmeticError:
         sizes = np.array([math.inf])
-    return "" if np.all(np.isfinite(sizes)) else f"Eqs. (37)-(38) overflow; {_MODERATE}"
+    return "" if np.all(np.isfinite(sizes)) else f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
 
 
 def _infinite(noise: AnyNoise, p: FloatArray) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter, Token
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
@@ -220,7 +221,13 @@ def _print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
 def _moment_table(case: Case, result: CurveResult) -> Table:
     """p, Λ(p), Eq. (37) and the difference."""
     table = Table(
-        "p", "Λ(p)", "± error", _theory(case, "(37)"), "difference", title=_heading(case, result), title_justify="left"
+        "p",
+        "Λ(p)",
+        "± error",
+        _theory(case, "(37)"),
+        "difference",
+        title=Text(_heading(case, result)),
+        title_justify="left",
     )
     _align(table, case)
     moments = result.moments
@@ -251,7 +258,7 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
 
     names = (key.partition(".")[2] for key in case.vary)
     table = Table(
-        *names, "λ", _theory(case, "(39)"), "δ_p", _theory(case, "(38)"), title=case.title, title_justify="left"
+        *names, "λ", _theory(case, "(39)"), "δ_p", _theory(case, "(38)"), title=Text(case.title), title_justify="left"
     )
     _align(table, case)
     for result in results:
@@ -276,7 +283,7 @@ def _print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
     if not comparisons:
         console.print(f"{case.name}: nothing is expected; add [[expect]] to the case", markup=False)
         return
-    table = Table("quantity", "expected", "computed", "difference", "", title=f"{case.name}: {case.title}")
+    table = Table("quantity", "expected", "computed", "difference", "", title=Text(f"{case.name}: {case.title}"))
     table.title_justify = "left"
     for column in table.columns:
         column.justify, column.no_wrap = "right", True
@@ -286,7 +293,7 @@ def _print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
         name = expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
         where = "".join(f"\n{key} = {value:g}" for key, value in item.varied.items())
         table.add_row(
-            f"{name}{where}\n[dim]{expectation.source}[/dim]",
+            f"{name}{where}\n[dim]{escape(expectation.source)}[/dim]",
             f"{expectation.value:.12g}\n± {item.tolerance:.0e}",
             "none" if item.value is None else f"{item.value:.12g}",
             "" if item.value is None else f"{item.value - expectation.value:.1e}",

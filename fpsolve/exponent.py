@@ -82,7 +82,8 @@ class ExponentSolver:
             )
         mesh = make_mesh() if self.mesh is None else self.mesh
         object.__setattr__(self, "generator", TiltedGenerator(self.oscillator, self.noise, mesh))
-        object.__setattr__(self, "_finer", TiltedGenerator(self.oscillator, self.noise, mesh.enriched()))
+        finer = mesh.enriched(1.15 if math.isinf(finite_moments(self.noise)[1]) else 2.0)  # 2 sees algebraic tails
+        object.__setattr__(self, "_finer", TiltedGenerator(self.oscillator, self.noise, finer))
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
@@ -116,12 +117,14 @@ class ExponentSolver:
         return result
 
     def lyapunov_exponent(self) -> Estimate:
-        """λ = Λ′(0), Eq. (2)."""
-        return self._difference(lambda pair: pair.derivative)
+        """λ = Λ′(0), Eq. (2). Raises `NotConverged`."""
+        scale = perturbation.lyapunov_scale(self.oscillator, self.noise)
+        return self._difference("λ", lambda pair: pair.derivative, scale)
 
     def variance_rate(self) -> Estimate:
-        """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖."""
-        return self._difference(second_derivative)
+        """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖. Raises `NotConverged`."""
+        scale = perturbation.variance_rate(self.oscillator, self.noise)
+        return self._difference("Λ″(0)", second_derivative, scale)
 
     def stability_index(self, interval: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | None:
         """δ_p, the non-zero root of Λ(p); None where Λ has no such root in the interval.
@@ -131,16 +134,16 @@ class ExponentSolver:
         Raises:
             NotConverged: the mesh does not resolve some p on the way.
         """
-        low, high = np.clip(interval, *finite_moments(self.noise))
-        ratio, slope = self._ratio(0.0)
-        p = float(np.clip(-ratio / slope, low, high))
+        low, high = (float(end) for end in np.clip(interval, *finite_moments(self.noise)))
+        ratio, slope, _ = self._ratio(0.0)
+        p = min(max(-ratio / slope, low), high)
         tried: set[float] = set()
         for _ in range(60):
             tried.add(p)
-            ratio, slope = self._ratio(p)
+            ratio, slope, rounding = self._ratio(p)
             low, high = (p, high) if ratio < 0 else (low, p)
             new = p - ratio / slope
-            if abs(new - p) <= 1e-13 * max(1.0, abs(p)):
+            if abs(new - p) <= max(1e-13 * max(1.0, abs(p)), 4 * rounding / slope):
                 break
             if not low < new < high:
                 new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
@@ -149,20 +152,39 @@ class ExponentSolver:
             p = new
         else:
             raise NotConverged(f"the stability index did not settle, last near p = {p:g}; {REMEDY}")
-        pair = self.pair(p)
-        error = abs(self._solve(1, p).value - pair.value) + pair.rounding
-        return Estimate(p, error / abs(pair.derivative))
+        (_, slope, rounding), (finer_ratio, finer_slope, _) = self._ratio(p), self._ratio(p, level=1)
+        error = (abs(finer_ratio) + 2 * rounding) / min(slope, finer_slope)  # a Newton step on the finer mesh
+        return self._checked("the stability index", Estimate(p, error), 1.0)
 
-    def _ratio(self, p: float) -> tuple[float, float]:
-        """Λ(p)/p and its derivative; near p = 0 by Λ′(p/2), whose error is p²Λ‴/24."""
+    def _ratio(self, p: float, level: int = 0) -> tuple[float, float, float]:
+        """Λ(p)/p, its derivative and its rounding; near p = 0 by Λ′(p/2), whose error is p²Λ‴/24.
+
+        Λ′ carries the rounding of the eigenvectors in first order, Λ in second.
+        """
         if abs(p) < 1e-3:
-            return self.pair(p / 2).derivative, 0.5 * second_derivative(self.pair(0.0))
-        pair = self.pair(p)
-        return pair.value / p, (pair.derivative - pair.value / p) / p
+            pair, middle = self._solve(level, 0.0), self._solve(level, p / 2)
+            ratio, slope, rounding = middle.derivative, 0.5 * second_derivative(pair), 1e3 * pair.rounding
+        else:
+            pair = self._solve(level, p)
+            ratio, rounding = pair.value / p, pair.rounding / abs(p)
+            slope = (pair.derivative - ratio) / p
+        if not slope > 0:
+            raise NotConverged(f"Λ(p)/p does not increase at p = {p:g}, as convexity demands; {REMEDY}")
+        return ratio, slope, rounding
 
-    def _difference(self, quantity: Callable[[PrincipalPair], float]) -> Estimate:
+    def _difference(self, name: str, quantity: Callable[[PrincipalPair], float], scale: float) -> Estimate:
         coarse, fine = (quantity(self._solve(level, 0.0)) for level in (0, 1))
-        return Estimate(coarse, abs(fine - coarse) + self.pair(0.0).rounding)
+        return self._checked(name, Estimate(coarse, abs(fine - coarse) + self.pair(0.0).rounding), scale)
+
+    def _checked(self, name: str, estimate: Estimate, scale: float) -> Estimate:
+        """An estimate whose error leaves it a meaning."""
+        if not estimate.error_estimate <= MEANINGLESS * max(abs(estimate.value), scale):
+            raise NotConverged(
+                f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "
+                f"mean anything; {REMEDY}",
+                estimate,
+            )
+        return estimate
 
     def _solve(self, level: int, p: float) -> PrincipalPair:
         """The pair on the mesh (level 0) or the finer one (level 1), from the nearest p known there."""
@@ -171,14 +193,17 @@ class ExponentSolver:
         if p not in known:
             nearest = min(known, key=lambda other: abs(other - p), default=None)
             start = None if nearest is None else known[nearest]
-            known[p] = principal_pair((self.generator, self._finer)[level], p, start=start)
+            try:
+                known[p] = principal_pair((self.generator, self._finer)[level], p, start=start)
+            except (ArithmeticError, RuntimeError, ValueError) as failure:
+                raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure}); {REMEDY}") from failure
         return known[p]
 
     def _solve_with_error(self, p: float) -> tuple[PrincipalPair, float]:
         pair = self._solve(0, p)
         error = abs(self._solve(1, p).value - pair.value) + pair.rounding
         scale = self._scale(pair)
-        if error > MEANINGLESS * scale and p != 0:
+        if not (error <= MEANINGLESS * scale or p == 0):
             raise NotConverged(
                 f"Λ({p:g}) = {pair.value:.6g} has an estimated error of {error:.1g}, more than {MEANINGLESS:g} of its "
                 f"scale {scale:.3g}; {REMEDY}",

@@ -99,12 +99,17 @@ class CylinderMesh:
         inside = self.z_lines[(self.z_lines > lower + sliver) & (self.z_lines < upper - sliver)]
         return replace(self, z_lines=np.concatenate([[lower], inside, [upper]]))
 
-    def enriched(self) -> CylinderMesh:
-        """A finer mesh to measure this one's error by: higher degrees, and a further ξ-cell at each end.
+    def enriched(self, widening: float = 1.15) -> CylinderMesh:
+        """A finer mesh to measure this one's error by: higher degrees, and further ξ-cells at each end.
 
-        Where a degree cannot be raised, the cells are halved.
+        The ends move out by the factor `widening`, by one noise unit at least. Where a degree cannot be raised, the
+        cells are halved.
         """
-        beyond = np.concatenate([[1.15 * self.z_lines[0]], self.z_lines, [1.15 * self.z_lines[-1]]])
+        lower, upper = self.z_lines[[0, -1]]
+        steps = np.linspace(0, 1, math.ceil(math.log(widening, 1.5)) + 1)[1:]
+        below = lower + steps * min((widening - 1) * lower, -1)
+        above = upper + steps * max((widening - 1) * upper, 1)
+        beyond = np.concatenate([below[::-1], self.z_lines, above])
         phi_lines, phi_degree = _raised(self.phi_lines, self.phi_degree, 2)
         z_lines, xi_degree = _raised(beyond, self.xi_degree, 1)
         return CylinderMesh(phi_lines, z_lines, phi_degree, xi_degree)

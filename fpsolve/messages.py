@@ -60,7 +60,7 @@ GLOSSARY: Mapping[str, tuple[str, str]] = {
     "mesh": ("the finite elements", "[mesh]"),
     "mesh.file": ("a mesh file, by its path from the case file", 'file = "../meshes/default.vtu"'),
     "mesh.phi_cells": ("cells around the phase", "phi_cells = 2"),
-    "mesh.phi_degree": ("degree of the elements in the phase", "phi_degree = 12"),
+    "mesh.phi_degree": ("degree of the elements in the phase", "phi_degree = 10"),
     "mesh.xi_cells": ("cells along the noise", "xi_cells = 4"),
     "mesh.xi_degree": ("degree of the elements along the noise", "xi_degree = 9"),
     "mesh.xi_min": ("lower end of the noise, in standard deviations", "xi_min = -8.0"),

@@ -72,6 +72,12 @@ def lyapunov_exponent(oscillator: VibroImpactOscillator, noise: AnyNoise) -> flo
     return oscillator.epsilon**2 / 8 * (s2 + 4 * (oscillator.c1 - _mean_loss(oscillator)))
 
 
+def lyapunov_scale(oscillator: VibroImpactOscillator, noise: AnyNoise) -> float:
+    """The sum of the absolute values of the terms of Eq. (39): the scale of an error of λ."""
+    _, s2 = _spectral_densities(oscillator, noise)
+    return oscillator.epsilon**2 / 8 * (s2 + 4 * (abs(oscillator.c1) + _mean_loss(oscillator)))
+
+
 def variance_rate(oscillator: VibroImpactOscillator, noise: AnyNoise) -> float:
     """ε²Λ₂″(0) = ε²(S(2ω) + 2S(0))/8, from Eq. (37): the growth rate of the variance of ln ‖x‖."""
     s0, s2 = _spectral_densities(oscillator, noise)

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from fpsolve.files import atomic
@@ -77,7 +78,7 @@ def write_figure(
         figure = Figure(figsize=(7.2, 5.0), dpi=160, layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot(xlabel=TITLES.get(x, SYMBOLS.get(x, x)), ylabel=TITLES[y])
-        axes.set_title(title, wrap=True)
+        axes.set_title(fill(title, 80), parse_math=False)
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
             _draw(axes, item, i)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -16,8 +17,8 @@ import numpy as np
 from fpsolve import perturbation
 from fpsolve.case import Case, Curve
 from fpsolve.eigen import PrincipalPair
-from fpsolve.errors import NotConverged, OutputError
-from fpsolve.exponent import SEARCH_INTERVAL, Estimate, ExponentSolver, MomentLyapunov
+from fpsolve.errors import MeshError, NotConverged, OutputError
+from fpsolve.exponent import REMEDY, SEARCH_INTERVAL, Estimate, ExponentSolver, MomentLyapunov
 from fpsolve.files import atomic
 from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import FloatArray, finite_moments
@@ -88,6 +89,17 @@ def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: N
     """
     folder = Path(out) / case.name
     _prepare(folder)
+    try:
+        results = _solve_and_write(case, folder, advance)
+    except OSError as failure:
+        raise OutputError(f"{failure.filename or folder} cannot be written: {failure.strerror}") from failure
+    failures = [failure for result in results for failure in result.failures]
+    if failures:
+        raise NotConverged("\n".join(failures), results)
+    return results
+
+
+def _solve_and_write(case: Case, folder: Path, advance: Advance) -> tuple[CurveResult, ...]:
     results: list[CurveResult] = []
     written: set[Path] = set()
     for number, result in enumerate(solve(case, advance=advance), start=1):
@@ -98,9 +110,6 @@ def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: N
         _series(case, results), case.figure.x, case.figure.y, case.title, _pictures(folder), is_reduced=case.is_exact
     )
     _remove_stale(folder, written)
-    failures = [failure for result in results for failure in result.failures]
-    if failures:
-        raise NotConverged("\n".join(failures), tuple(results))
     return tuple(results)
 
 
@@ -113,7 +122,10 @@ def solve(case: Case, *, advance: Advance = lambda: None) -> Iterator[CurveResul
     """Solve the curves of a case one after the other; what did not converge is in their `failures`."""
     mesh = case.cylinder_mesh()
     for curve in case.curves():
-        yield _solve_curve(curve, mesh, case.p, case.rtol, advance)
+        try:
+            yield _solve_curve(curve, mesh, case.p, case.rtol, advance)
+        except MeshError as failure:
+            raise MeshError(f"{case.path}: mesh, or the finer one that measures its error: {failure}") from failure
 
 
 def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
@@ -148,9 +160,10 @@ def _solve_curve(curve: Curve, mesh: CylinderMesh | None, p: FloatArray, rtol: f
         low, high = np.clip(SEARCH_INTERVAL, *finite_moments(curve.noise))
         warnings.append(f"no stability index: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]")
     exponent, no_exponent = _attempt(solver.lyapunov_exponent)
-    rate, _ = _attempt(solver.variance_rate)
+    rate, no_rate = _attempt(solver.variance_rate)
     stationary, _ = _attempt(lambda: solver.pair(0.0))
     warnings += [f"no stability index: {obstacle}"] * bool(obstacle) + [no_exponent] * bool(no_exponent)
+    warnings += [no_rate] * bool(no_rate) + _imprecise(curve, exponent, index, rate, rtol)
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -163,6 +176,23 @@ def _solve_curve(curve: Curve, mesh: CylinderMesh | None, p: FloatArray, rtol: f
         warnings=(*warnings, *(line for failure in failures for line in failure.splitlines())),
         failures=failures,
     )
+
+
+def _imprecise(
+    curve: Curve, exponent: Estimate | None, index: Estimate | None, rate: Estimate | None, rtol: float
+) -> list[str]:
+    """Which of λ, δ_p and Λ″(0) miss rtol, on their scales in Eqs. (38)-(39) before terms cancel."""
+    scales = (
+        ("λ", exponent, perturbation.lyapunov_scale(curve.oscillator, curve.noise)),
+        ("δ_p", index, 1.0),
+        ("Λ″(0)", rate, perturbation.variance_rate(curve.oscillator, curve.noise)),
+    )
+    return [
+        f"rtol = {rtol:g} is not met by {name}: {estimate.value:.6g} has an estimated error of "
+        f"{estimate.error_estimate:.1e}; {REMEDY}, or use a larger rtol"
+        for name, estimate, scale in scales
+        if estimate and estimate.error_estimate > rtol * max(abs(estimate.value), scale)
+    ]
 
 
 def _attempt(compute: Callable[[], Found]) -> tuple[Found | None, str]:
@@ -269,11 +299,12 @@ def _write_paraview(case: Case, result: CurveResult, number: int, folder: Path) 
 
 def _remove_stale(folder: Path, written: set[Path]) -> None:
     """Eigenfunctions that an earlier run left for curves or p that are no more."""
-    for path in {*folder.glob("eigenfunctions*.pvd"), *folder.glob("eigenfunctions*/p*.vtu")} - written:
-        path.unlink()
-    for path in folder.glob("eigenfunctions*"):
-        if path.is_dir() and not any(path.iterdir()):
-            path.rmdir()
+    ours = re.compile(r"eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)")
+    for path in {*folder.glob("*.pvd"), *folder.glob("*/*.vtu")} - written:
+        if ours.fullmatch(path.relative_to(folder).as_posix()):
+            path.unlink()
+            if path.parent != folder and not any(path.parent.iterdir()):
+                path.parent.rmdir()
 
 
 def _pictures(folder: Path) -> list[Path]:

@@ -71,6 +71,15 @@ def test_check_exits_1_when_a_value_differs(case, tmp_path, capsys):
     assert not (tmp_path / "results").exists()
 
 
+def test_titles_and_sources_are_plain_text(tmp_path, capsys):
+    expect = "[[expect]]\nquantity = 'moment'\np = 0.0\nvalue = 0.0\natol = 1e-12\nsource = 'in [/x] of [vary]'\n"
+    (tmp_path / "plain.toml").write_text(TEXT.replace("A test", "see [/b] of [vary]") + expect, encoding="utf-8")
+    assert main(["check", str(tmp_path / "plain.toml")]) == 0
+    out = capsys.readouterr().out
+    assert "see [/b] of [vary]" in out
+    assert "in [/x] of [vary]" in out
+
+
 def test_check_says_when_a_case_expects_nothing(case, capsys):
     assert main(["check", case]) == 0
     assert "nothing is expected; add [[expect]]" in capsys.readouterr().out

@@ -79,18 +79,17 @@ def test_repeated_solves_are_identical():
     assert first.value == second.value
 
 
-def test_a_misleading_start_changes_nothing():
-    """Started from the eigenvector of a noise mode, the iteration notices and begins again from the right."""
-    generator = TiltedGenerator(FIG1, UNIT_NOISE, make_mesh())
-    good = principal_pair(generator, 2.0)
-    z = generator.space.noise.evaluation(np.linspace(0, 1, 12))[0]
-    values = np.kron(np.ones(generator.space.phase.size), np.zeros(generator.space.noise.size))
-    values.reshape(generator.space.phase.size, -1)[:] = np.outer(
-        generator.space.phase.constant(),
-        np.linalg.lstsq(generator.space.noise.evaluation(np.linspace(0, 1, 12))[1].toarray(), z, rcond=None)[0],
-    )
-    misleading = type(good)(**(vars(good) | {"right": values, "left": values, "value": -1.0}))
-    assert principal_pair(generator, 2.0, start=misleading).value == pytest.approx(good.value, rel=1e-12)
+def test_the_generator_is_the_sum_of_its_terms():
+    """L(p) = L₀ + ε L₁(p) + ε² L₂(p) + impact(p), Eq. (19), and its derivative in p."""
+    oscillator = VibroImpactOscillator(omega=1.2, restitution=0.7, c1=-0.3, epsilon=0.8)
+    generator = TiltedGenerator(oscillator, UNIT_NOISE, make_mesh(phi_cells=3))
+    p, h = 1.7, 1e-4
+    total = generator.L0() + 0.8 * generator.L1(p) + 0.8**2 * generator.L2(p) + generator.impact(p)
+    assert abs(generator.at(p) - total).max() < 1e-12
+    slope = (generator.at(p + h) - generator.at(p - h)) / (2 * h)
+    assert abs(generator.derivative(p) - slope).max() < 1e-6
+    curvature = (generator.derivative(p + h) - generator.derivative(p - h)) / (2 * h)
+    assert abs(generator.second_derivative(p) - curvature).max() < 1e-6
 
 
 def test_a_mesh_that_resolves_nothing_raises_with_the_partial_pair():

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from fpsolve import perturbation
 from fpsolve.eigen import principal_pair, second_derivative
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent import ExponentSolver, moment_lyapunov
@@ -196,6 +197,58 @@ def test_no_stability_index_within_the_interval_is_none():
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
     solver = ExponentSolver(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3))
     assert solver.stability_index() is None
+
+
+def test_steps_in_p_do_not_lead_to_another_eigenvalue():
+    """Slow noise tilts far: the second eigenfunction changes its sign where P_s is negligible, but T T* is not."""
+    oscillator = VibroImpactOscillator(omega=10.0, restitution=0.8, c1=0.1, epsilon=0.1)
+    noise = NonGaussianNoise(D0=1.0, tau0=20.0, r0=0.95).ou_reduction()
+    mesh = make_mesh(phi_cells=2, phi_degree=12, xi_cells=24, xi_degree=8, xi_min=-8, xi_max=24)
+    stepped = moment_lyapunov(oscillator, noise, [0.0, 5.0, 10.0, 15.0], mesh=mesh)
+    alone = moment_lyapunov(oscillator, noise, 15.0, mesh=mesh)
+    assert stepped.value[-1] == pytest.approx(alone.value[0], rel=1e-10)
+    oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(oscillator, noise), p=15.0, harmonics=8, hermite=200)
+    assert alone.value[0] == pytest.approx(oracle, rel=1e-7)
+
+
+def test_errors_of_algebraic_tails_are_seen():
+    """r₀ > 1: a mesh four times as wide, and twice as fine around, moves λ by a few error estimates at most.
+
+    Far out the noise turns the phase back, in layers that the default mesh resolves slowly.
+    """
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
+    for r0 in (1.1, 1.15, 1.2):
+        noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0)
+        near = ExponentSolver(oscillator, noise).lyapunov_exponent()
+        wide = make_mesh(phi_cells=4, xi_cells=12, xi_min=-32, xi_max=32, grading=4.0)
+        far = ExponentSolver(oscillator, noise, wide).lyapunov_exponent()
+        assert abs(near.value - far.value) <= 5 * near.error_estimate
+
+
+def test_errors_of_a_lopsided_mesh_are_seen():
+    with pytest.raises(NotConverged, match=r"use more cells .* or a wider noise interval"):
+        moment_lyapunov(FIG1, FIG1_NOISE.ou_reduction(), 2.0, mesh=make_mesh(xi_min=-0.01))
+
+
+def test_indices_without_meaning_are_refused():
+    solver = ExponentSolver(VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=5.0), UNIT_NOISE)
+    for compute in (solver.lyapunov_exponent, solver.variance_rate):
+        with pytest.raises(NotConverged):
+            compute()
+
+
+def test_numbers_beyond_floating_point_are_refused():
+    with pytest.raises(NotConverged, match="beyond floating-point numbers"):
+        moment_lyapunov(FIG1, FIG1_NOISE.ou_reduction(), -1e6)
+
+
+@pytest.mark.parametrize("epsilon", [1e-2, 1e-4, 1e-5])
+def test_stability_index_of_the_weakest_noise(epsilon):
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=-0.3, epsilon=epsilon)
+    noise = FIG1_NOISE.ou_reduction()
+    index = ExponentSolver(oscillator, noise).stability_index()
+    theory = perturbation.stability_index(oscillator, noise)
+    assert abs(index.value - theory) <= index.error_estimate + 10 * epsilon**2
 
 
 def test_unresolved_mesh_is_said():

@@ -179,6 +179,30 @@ def test_a_second_run_leaves_no_eigenfunctions_of_the_first(tmp_path):
     assert not (tmp_path / "out/test/eigenfunctions-2").exists()
 
 
+def test_files_of_the_user_are_left_alone(case, tmp_path):
+    folder = tmp_path / "out/test"
+    mine = [
+        folder / name
+        for name in ("eigenfunctions-mine.pvd", "eigenfunctions_paper/paper.vtu", "eigenfunctions/paper.vtu")
+    ]
+    for path in mine:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("mine", encoding="utf-8")
+    fpsolve.run(case, tmp_path / "out")
+    assert all(path.read_text(encoding="utf-8") == "mine" for path in mine)
+
+
+def test_titles_are_plain_text(tmp_path):
+    case = write(tmp_path, TEXT.replace('"A test"', r"'see [/b] and $\foo$ of [vary]'"))
+    fpsolve.run(case, tmp_path / "out")
+
+
+def test_a_place_that_cannot_be_written_is_an_output_error(case, tmp_path):
+    (tmp_path / "out/test/summary.json").mkdir(parents=True)
+    with pytest.raises(OutputError, match=r"cannot be written"):
+        fpsolve.run(case, tmp_path / "out")
+
+
 def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
     case = write(tmp_path, TEXT, ["noise.treatment='exact'"])
     result = next(report.solve(case))
