@@ -22,6 +22,7 @@ from fpsolve.errors import FpsolveError, NotConverged
 
 if TYPE_CHECKING:
     from fpsolve.case import Case
+    from fpsolve.exponent import Estimate
     from fpsolve.report import Comparison, CurveResult
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
@@ -229,7 +230,8 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
         title=Text(_heading(case, result)),
         title_justify="left",
     )
-    _align(table, case)
+    _align(table)
+    _explain_star(table, case)
     moments = result.moments
     for p, value, error, theory in zip(
         moments.p, moments.value, moments.error_estimate, result.moments_perturbation, strict=True
@@ -246,9 +248,8 @@ def _indices(result: CurveResult) -> str:
         ("δ_p", result.stability_index),
         ("Λ″(0)", result.variance_rate),
     ):
-        if estimate:
-            text = f"{digits(estimate.value, estimate.error_estimate, most=9)} ± {estimate.error_estimate:.0e}"
-        parts.append(f"{name} = {text if estimate else 'none found'}")
+        error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
+        parts.append(f"{name} = {_digits_of(estimate, most=9)}{error}")
     return "   ".join(parts) + "\n"
 
 
@@ -260,14 +261,15 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     table = Table(
         *names, "λ", _theory(case, "(39)"), "δ_p", _theory(case, "(38)"), title=Text(case.title), title_justify="left"
     )
-    _align(table, case)
+    _align(table)
+    _explain_star(table, case)
     for result in results:
-        curve, exponent, index = result.curve, result.lyapunov_exponent, result.stability_index
+        curve = result.curve
         table.add_row(
             *(f"{value:g}" for value in curve.varied.values()),
-            digits(exponent.value, exponent.error_estimate, most=7) if exponent else "none found",
+            _digits_of(result.lyapunov_exponent, most=7),
             f"{perturbation.lyapunov_exponent(curve.oscillator, curve.noise):.6g}",
-            digits(index.value, index.error_estimate, most=7) if index else "none found",
+            _digits_of(result.stability_index, most=7),
             f"{perturbation.stability_index(curve.oscillator, curve.noise):.6g}",
         )
     return table
@@ -285,8 +287,7 @@ def _print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
         return
     table = Table("quantity", "expected", "computed", "difference", "", title=Text(f"{case.name}: {case.title}"))
     table.title_justify = "left"
-    for column in table.columns:
-        column.justify, column.no_wrap = "right", True
+    _align(table)
     table.columns[0].justify, table.columns[0].no_wrap, table.columns[0].overflow = "left", False, "fold"
     for item in comparisons:
         expectation = item.expectation
@@ -308,11 +309,18 @@ def _heading(case: Case, result: CurveResult) -> str:
     return f"{case.title}: {varied}" if varied else case.title
 
 
-def _align(table: Table, case: Case) -> None:
+def _align(table: Table) -> None:
     for column in table.columns:
         column.justify, column.no_wrap = "right", True
+
+
+def _explain_star(table: Table, case: Case) -> None:
     if case.is_exact:
         table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
+
+
+def _digits_of(estimate: Estimate | None, most: int) -> str:
+    return digits(estimate.value, estimate.error_estimate, most) if estimate else "none found"
 
 
 def digits(value: float, error: float, most: int = 13) -> str:

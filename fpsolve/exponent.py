@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -25,10 +26,20 @@ REMEDY = "use more cells ([mesh] phi_cells, xi_cells) or a wider noise interval 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number and the estimate of its error."""
+    """A number, the estimate of its error, and what both are measured by.
+
+    Attributes:
+        scale: size of the terms that the number is the sum of, where they may cancel.
+    """
 
     value: float
     error_estimate: float
+    scale: float
+
+    @property
+    def relative_error(self) -> float:
+        """The error over the larger of |value| and the scale."""
+        return self.error_estimate / max(abs(self.value), self.scale, sys.float_info.min)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +165,7 @@ class ExponentSolver:
             raise NotConverged(f"the stability index did not settle, last near p = {p:g}; {REMEDY}")
         (_, slope, rounding), (finer_ratio, finer_slope, _) = self._ratio(p), self._ratio(p, level=1)
         error = (abs(finer_ratio) + 2 * rounding) / min(slope, finer_slope)  # a Newton step on the finer mesh
-        return self._checked("the stability index", Estimate(p, error), 1.0)
+        return _checked("the stability index", Estimate(p, error, scale=1.0))
 
     def _ratio(self, p: float, level: int = 0) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative and its rounding; near p = 0 by Λ′(p/2), whose error is p²Λ‴/24.
@@ -174,17 +185,7 @@ class ExponentSolver:
 
     def _difference(self, name: str, quantity: Callable[[PrincipalPair], float], scale: float) -> Estimate:
         coarse, fine = (quantity(self._solve(level, 0.0)) for level in (0, 1))
-        return self._checked(name, Estimate(coarse, abs(fine - coarse) + self.pair(0.0).rounding), scale)
-
-    def _checked(self, name: str, estimate: Estimate, scale: float) -> Estimate:
-        """An estimate whose error leaves it a meaning."""
-        if not estimate.error_estimate <= MEANINGLESS * max(abs(estimate.value), scale):
-            raise NotConverged(
-                f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "
-                f"mean anything; {REMEDY}",
-                estimate,
-            )
-        return estimate
+        return _checked(name, Estimate(coarse, abs(fine - coarse) + self.pair(0.0).rounding, scale))
 
     def _solve(self, level: int, p: float) -> PrincipalPair:
         """The pair on the mesh (level 0) or the finer one (level 1), from the nearest p known there."""
@@ -202,21 +203,18 @@ class ExponentSolver:
     def _solve_with_error(self, p: float) -> tuple[PrincipalPair, float]:
         pair = self._solve(0, p)
         error = abs(self._solve(1, p).value - pair.value) + pair.rounding
-        scale = self._scale(pair)
-        if not (error <= MEANINGLESS * scale or p == 0):
-            raise NotConverged(
-                f"Λ({p:g}) = {pair.value:.6g} has an estimated error of {error:.1g}, more than {MEANINGLESS:g} of its "
-                f"scale {scale:.3g}; {REMEDY}",
-                pair,
-            )
+        if p != 0:  # where Λ = 0 has no scale
+            _checked(f"Λ({p:g})", self._estimate(pair, error))
         return pair, error
 
-    def _scale(self, pair: PrincipalPair) -> float:
-        """max(|Λ|, the terms of Eq. (37) before they cancel)."""
-        return max(abs(pair.value), float(perturbation.moment_scale(self.oscillator, self.noise, pair.p)))
+    def _estimate(self, pair: PrincipalPair, error: float) -> Estimate:
+        """Λ(p) on the scale of the terms of Eq. (37) before they cancel."""
+        scale = float(perturbation.moment_scale(self.oscillator, self.noise, pair.p))
+        return Estimate(pair.value, error, scale)
 
     def _result(self, pairs: Sequence[PrincipalPair], errors: FloatArray, rtol: float) -> MomentLyapunov:
-        shares = [(k.p, e / self._scale(k)) for k, e in zip(pairs, errors, strict=True) if k.p != 0]
+        estimates = [(k.p, self._estimate(k, e)) for k, e in zip(pairs, errors, strict=True) if k.p != 0]
+        shares = [(p, estimate.relative_error) for p, estimate in estimates]
         short = [(p, share) for p, share in shares if share > rtol]
         warnings: tuple[str, ...] = ()
         if short:
@@ -234,6 +232,17 @@ class ExponentSolver:
             pairs=tuple(pairs),
             warnings=warnings,
         )
+
+
+def _checked(name: str, estimate: Estimate) -> Estimate:
+    """An estimate whose error leaves it a meaning."""
+    if not estimate.relative_error <= MEANINGLESS:
+        raise NotConverged(
+            f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "
+            f"mean anything; {REMEDY}",
+            estimate,
+        )
+    return estimate
 
 
 def moment_lyapunov(

@@ -70,12 +70,12 @@ class TiltedGenerator:
     def derivative(self, p: float) -> csc_matrix:
         """The matrix of dL/dp = ε q₁ξ + ε² q₂ + ln R · R^p · (impact load)."""
         log_factor = self.oscillator.log_impact_factor
-        return csc_matrix(self._linear_part + log_factor * math.exp(p * log_factor) * self._impact_load)
+        return csc_matrix(self._linear_part + log_factor * self.oscillator.impact_factor(p) * self._impact_load)
 
     def second_derivative(self, p: float) -> csc_matrix:
         """The matrix of d²L/dp², all of it from the impacts."""
         log_factor = self.oscillator.log_impact_factor
-        return csc_matrix(log_factor**2 * math.exp(p * log_factor) * self._impact_load)
+        return csc_matrix(log_factor**2 * self.oscillator.impact_factor(p) * self._impact_load)
 
     def upper_bound(self, p: float) -> float:
         """A number right of Λ(p): the supremum of p(ε q₁ξ + ε² q₂), and of the impacts spread evenly over φ."""

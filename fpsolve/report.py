@@ -163,7 +163,7 @@ def _solve_curve(curve: Curve, mesh: CylinderMesh | None, p: FloatArray, rtol: f
     rate, no_rate = _attempt(solver.variance_rate)
     stationary, _ = _attempt(lambda: solver.pair(0.0))
     warnings += [f"no stability index: {obstacle}"] * bool(obstacle) + [no_exponent] * bool(no_exponent)
-    warnings += [no_rate] * bool(no_rate) + _imprecise(curve, exponent, index, rate, rtol)
+    warnings += [no_rate] * bool(no_rate) + _imprecise({"λ": exponent, "δ_p": index, "Λ″(0)": rate}, rtol)
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -178,20 +178,13 @@ def _solve_curve(curve: Curve, mesh: CylinderMesh | None, p: FloatArray, rtol: f
     )
 
 
-def _imprecise(
-    curve: Curve, exponent: Estimate | None, index: Estimate | None, rate: Estimate | None, rtol: float
-) -> list[str]:
-    """Which of λ, δ_p and Λ″(0) miss rtol, on their scales in Eqs. (38)-(39) before terms cancel."""
-    scales = (
-        ("λ", exponent, perturbation.lyapunov_scale(curve.oscillator, curve.noise)),
-        ("δ_p", index, 1.0),
-        ("Λ″(0)", rate, perturbation.variance_rate(curve.oscillator, curve.noise)),
-    )
+def _imprecise(estimates: dict[str, Estimate | None], rtol: float) -> list[str]:
+    """Which of some named numbers miss rtol."""
     return [
         f"rtol = {rtol:g} is not met by {name}: {estimate.value:.6g} has an estimated error of "
         f"{estimate.error_estimate:.1e}; {REMEDY}, or use a larger rtol"
-        for name, estimate, scale in scales
-        if estimate and estimate.error_estimate > rtol * max(abs(estimate.value), scale)
+        for name, estimate in estimates.items()
+        if estimate and estimate.relative_error > rtol
     ]
 
 

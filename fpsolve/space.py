@@ -87,9 +87,10 @@ class LineSpace:
         self._measure = self.weights * weight(self.points)
         self._vertices = np.unique(np.concatenate([basis.element_dofs[:2] for basis in bases], axis=None))
         self._transform = self._orthogonalise(bases)
-        self._norms = np.sqrt(self._matrix(bases, np.asarray).power(2).T @ self._measure)
+        values = self._matrix(bases, np.asarray)
+        self._norms = np.sqrt(values.power(2).T @ self._measure)
         self._transform = self._transform @ diags(1 / self._norms)
-        self.values = self._matrix(bases, np.asarray)
+        self.values = values @ diags(1 / self._norms)
         self._slopes = self._matrix(bases, lambda function: function.grad[0])
         self._evaluations: dict[bytes, tuple[FloatArray, csr_matrix]] = {}
 
