@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from fpsolve.eigen import spectrum as spectrum
     from fpsolve.errors import CaseError as CaseError
     from fpsolve.errors import FpsolveError as FpsolveError
-    from fpsolve.errors import MeshError as MeshError
     from fpsolve.errors import NotConverged as NotConverged
     from fpsolve.exponent import ExponentSolver as ExponentSolver
-    from fpsolve.exponent import moment_lyapunov as moment_lyapunov
+    from fpsolve.function import MomentLyapunovFunction as MomentLyapunovFunction
+    from fpsolve.function import moment_lyapunov as moment_lyapunov
     from fpsolve.generator import TiltedGenerator as TiltedGenerator
     from fpsolve.mesh import CylinderMesh as CylinderMesh
     from fpsolve.mesh import make_mesh as make_mesh
@@ -38,7 +38,7 @@ _HOMES = {
     "CylinderMesh": "mesh",
     "ExponentSolver": "exponent",
     "FpsolveError": "errors",
-    "MeshError": "errors",
+    "MomentLyapunovFunction": "function",
     "NonGaussianNoise": "noise",
     "NotConverged": "errors",
     "OrnsteinUhlenbeck": "noise",
@@ -48,7 +48,7 @@ _HOMES = {
     "furstenberg_khasminskii": "density",
     "load_case": "case",
     "make_mesh": "mesh",
-    "moment_lyapunov": "exponent",
+    "moment_lyapunov": "function",
     "principal_pair": "eigen",
     "run": "report",
     "spectrum": "eigen",

@@ -13,11 +13,12 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
 from fpsolve import perturbation
+from fpsolve.adapt import Budget
 from fpsolve.document import Document, read_document
 from fpsolve.errors import CaseError, Fault, MeshError, NoSuchExponent
 from fpsolve.mesh import CylinderMesh
 from fpsolve.messages import Refusal, explain, nearest, refuse, shown
-from fpsolve.noise import AnyNoise, FloatArray, check_existence
+from fpsolve.noise import AnyNoise, FloatArray, NonGaussianNoise, check_existence
 from fpsolve.oscillator import VibroImpactOscillator
 from fpsolve.schema import (
     Expectation,
@@ -57,6 +58,10 @@ def _oscillator(value: Any) -> Any:
     return VibroImpactOscillator(**value) if isinstance(value, dict) else value
 
 
+def _budget(value: Any) -> Any:
+    return Budget(**value) if isinstance(value, dict) else value
+
+
 class Case(Section):
     """What one case file says; made by `load_case`.
 
@@ -68,6 +73,7 @@ class Case(Section):
     oscillator: Annotated[VibroImpactOscillator, BeforeValidator(_oscillator)]
     noise: NoiseSection
     moments: Moments
+    budget: Annotated[Budget, BeforeValidator(_budget)] = Field(default_factory=Budget)
     vary: Vary = Field(default_factory=dict)
     mesh: MeshSection = MeshSection()
     figure: FigureSection = FigureSection()
@@ -94,6 +100,15 @@ class Case(Section):
         return self.moments.rtol
 
     @property
+    def shown(self) -> FloatArray:
+        """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread."""
+        if self.output.eigenfunctions is not None:
+            wanted = np.array(self.output.eigenfunctions)
+            return self.p[[int(np.argmin(np.abs(self.p - each))) for each in wanted]] if wanted.size else wanted
+        count = self.p.size
+        return np.sort(self.p)[np.unique(np.linspace(0, count - 1, min(count, 9)).round().astype(int))]
+
+    @property
     def is_exact(self) -> bool:
         """Whether the noise is Eq. (7) as it stands; perturbation theory then has its reduction only."""
         return self.noise.treatment == "exact"
@@ -105,6 +120,10 @@ class Case(Section):
     def curve(self, varied: Mapping[str, float]) -> Curve:
         """The case's parameter set with some parameters replaced, by their dotted keys."""
         return _curve(self.oscillator, self.noise, varied)
+
+    def original_noise(self, curve: Curve) -> NonGaussianNoise:
+        """The noise of Eq. (7) behind a curve, whatever its treatment."""
+        return NoiseSection(**_section("noise", curve.parameters)).original()
 
     def cylinder_mesh(self) -> CylinderMesh | None:
         """The mesh that the case states; None leaves it to the solver."""

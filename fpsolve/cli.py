@@ -22,8 +22,8 @@ from fpsolve.errors import FpsolveError, NotConverged
 
 if TYPE_CHECKING:
     from fpsolve.case import Case
+    from fpsolve.curves import Comparison, CurveResult
     from fpsolve.exponent import Estimate
-    from fpsolve.report import Comparison, CurveResult
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 
@@ -54,14 +54,14 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
-    from fpsolve import report
+    from fpsolve import curves, report
 
     loaded = _load(cases, overrides)
     _refuse_namesakes(loaded)
     code = 0
     for case in loaded:
         try:
-            with _progress(case.name, report.work(case)) as advance:
+            with _progress(case.name, curves.work(case)) as advance:
                 results = report.run(case, out, advance=advance)
         except NotConverged as failure:
             results, code = failure.partial, NOT_CONVERGED
@@ -76,13 +76,13 @@ def check(cases: Cases, *, overrides: Overrides = None) -> int:
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
-    from fpsolve import report
+    from fpsolve import curves
 
     code = 0
     for case in _load(cases, overrides):
-        with _progress(case.name, report.work(case)) as advance:
-            results = [result.without_pairs() for result in report.solve(case, advance=advance)]
-        comparisons = report.compare(case, results)
+        with _progress(case.name, curves.work(case)) as advance:
+            results = [result.without_pairs() for result in curves.solve(case, advance=advance)]
+        comparisons = curves.compare(case, results)
         _print_comparisons(case, comparisons)
         _print_warnings(case, results)
         if any(result.failures for result in results):
@@ -210,13 +210,17 @@ def _print_results(case: Case, results: Sequence[CurveResult]) -> None:
 
 
 def _print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
-    """What limits the numbers of each curve, and why some are missing."""
+    """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
     for result in results:
         failures = {line for failure in result.failures for line in failure.splitlines()}
-        for text in result.warnings:
-            kind, style = ("not converged", "bold red") if text in failures else ("warning", "yellow")
-            place = ", ".join([case.name, *(f"{key} = {value:g}" for key, value in result.curve.varied.items())])
+        place = ", ".join([case.name, *(f"{key} = {value:g}" for key, value in result.curve.varied.items())])
+        kinds = [
+            ("not converged", "bold red") if text in failures else ("warning", "yellow") for text in result.warnings
+        ]
+        for (kind, style), text in zip(kinds, result.warnings, strict=True):
             _stderr().print(Text(f"{kind}: {place}: {text}"), style=style, soft_wrap=True)
+        for text in result.notes:
+            _stderr().print(Text(f"note: {place}: {text}"), style="cyan", soft_wrap=True)
 
 
 def _moment_table(case: Case, result: CurveResult) -> Table:

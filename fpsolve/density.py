@@ -61,12 +61,12 @@ def stationary_density(pair: PrincipalPair) -> Density:
 
 def adjoint_density(pair: PrincipalPair) -> Density:
     """T*(φ, ξ; p) normalised to 1."""
-    return _density(pair, lambda right, left: left)
+    return _density(pair, lambda right, left, factor: left / factor)
 
 
 def tilted_density(pair: PrincipalPair) -> Density:
     """T T*: how phase and noise are distributed along the paths that carry the p-th moment."""
-    return _density(pair, lambda right, left: right * left)
+    return _density(pair, lambda right, left, factor: right * left)
 
 
 def furstenberg_khasminskii(pair: PrincipalPair) -> float:
@@ -84,14 +84,17 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     return growth + oscillator.omega * oscillator.log_impact_factor * float(np.sum(at_impacts))
 
 
-def _density(pair: PrincipalPair, combine: Callable[[FloatArray, FloatArray], FloatArray]) -> Density:
-    """P_s times a combination of T and T*/P_s, normalised, repeated from a half circle to the full one."""
+def _density(pair: PrincipalPair, combine: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]) -> Density:
+    """The weight times a combination of both eigenfunctions, normalised, repeated from a half circle to the full one.
+
+    The eigenfunctions come without the factor that the space gives them; it is the third argument of `combine`.
+    """
     space, unit = pair.generator.space, pair.generator.noise.standard_deviation
     phi, phi_weights, phi_values = space.phase.points, space.phase.weights, space.phase.values
     z, z_weights, z_values = space.noise.points, space.noise.weights, space.noise.values
     right, left = (phi_values @ (z_values @ v.reshape(space.phase.size, -1).T).T for v in (pair.right, pair.left))
     turns = round(2 * math.pi / space.mesh.span)
-    values = np.tile(combine(right, left) * space.density(z) / unit, (turns, 1))
+    values = np.tile(combine(right, left, space.factor(z)) * space.weight(z) / unit, (turns, 1))
     phi = np.concatenate([phi + k * space.mesh.span for k in range(turns)])
     phi_weights = np.tile(phi_weights, turns)
     total = phi_weights @ values @ (z_weights * unit)

@@ -1,27 +1,37 @@
-"""The moment Lyapunov exponent Λ(p) over many p, and what follows from it: λ = Λ′(0), Λ″(0) and δ_p."""
+"""The moment Lyapunov exponent Λ(p) at single p, each with an error estimate: `ExponentSolver`, `moment_lyapunov`."""
 
 from __future__ import annotations
 
 import math
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from threadpoolctl import ThreadpoolController
 
 from fpsolve import perturbation
-from fpsolve.eigen import PrincipalPair, principal_pair, second_derivative
+from fpsolve.adapt import REMEDY, SAFETY, Budget, fits, is_beaten, resolve
+from fpsolve.eigen import PrincipalPair, second_derivative
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.generator import TiltedGenerator
-from fpsolve.mesh import CylinderMesh, make_mesh
+from fpsolve.estimate import Solution, Stage
+from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import AnyNoise, FloatArray, check_existence, finite_moments
 from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.space import CylinderSpace
 
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
-SEARCH_INTERVAL = (-20.0, 20.0)
-REMEDY = "use more cells ([mesh] phi_cells, xi_cells) or a wider noise interval (xi_min, xi_max)"
+SMALL_P = 1e-2
+"""Below it the discretisation is chosen at this p, as Λ and its error go to zero together."""
+TINY_P = 1e-3
+"""Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
+NEIGHBOURS = 6
+"""How many known eigenfunctions those of another p are interpolated from."""
+MESH_REMEDY = "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]"
 
 
 @dataclass(frozen=True)
@@ -50,10 +60,10 @@ class MomentLyapunov:
         p: the moments, shape (n,), in the order asked for.
         value: Λ(p), per unit time, shape (n,).
         derivative: Λ′(p), shape (n,).
-        error_estimate: estimate of |error of `value`|, from a finer mesh and a wider noise interval, with the
-            bound of rounding added, shape (n,).
+        error_estimate: estimate of |error of `value`|, from a finer mesh, the ends of the noise interval and the
+            bound of rounding, shape (n,).
         residual: backward error of the eigenpairs, shape (n,).
-        pairs: the eigenpairs, one for each p.
+        pairs: the eigenpairs, one for each p; none where Λ was interpolated.
         warnings: sentences on p where `error_estimate` exceeds rtol.
     """
 
@@ -68,64 +78,120 @@ class MomentLyapunov:
 
 @dataclass(frozen=True, eq=False)
 class ExponentSolver:
-    """Λ(p) of one oscillator and one noise on a mesh, each solve starting from the nearest p solved before.
+    """Λ(p) of one oscillator and one noise, each solve starting from the nearest p solved before.
 
     Args:
         oscillator: the vibro-impact oscillator.
         noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands.
-        mesh: the mesh; None for the default one of `make_mesh`.
+        mesh: a mesh for all p; None chooses one for each p that meets rtol.
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
+        budget: what the choice of a mesh may cost.
+        uniform: measure the error of Λ(p)/p at every p by its scale at p = 0, as an interpolation over p needs it.
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
+        ValueError: rtol is not positive.
     """
 
     oscillator: VibroImpactOscillator
     noise: AnyNoise
     mesh: CylinderMesh | None = None
-    generator: TiltedGenerator = field(init=False)
-    _finer: TiltedGenerator = field(init=False)
-    _known: dict[int, dict[float, PrincipalPair]] = field(init=False, default_factory=lambda: {0: {}, 1: {}})
+    _: KW_ONLY
+    rtol: float = 1e-8
+    budget: Budget = field(default_factory=Budget)
+    uniform: bool = False
+    _known: dict[float, tuple[Stage, Solution]] = field(init=False, default_factory=dict)
+    _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
+    _stages: list[Stage] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.noise.standard_deviation):
             raise NoSuchExponent(
                 "the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"
             )
-        mesh = make_mesh() if self.mesh is None else self.mesh
-        object.__setattr__(self, "generator", TiltedGenerator(self.oscillator, self.noise, mesh))
-        finer = mesh.enriched(1.15 if math.isinf(finite_moments(self.noise)[1]) else 2.0)  # 2 sees algebraic tails
-        object.__setattr__(self, "_finer", TiltedGenerator(self.oscillator, self.noise, finer))
+        if not (math.isfinite(self.rtol) and self.rtol > 0):
+            raise ValueError(f"rtol is {self.rtol!r}; it must be a positive number such as 1e-8")
+        if self.mesh is not None:
+            widening = 1.15 if math.isinf(finite_moments(self.noise)[1]) else 2.0  # 2 sees algebraic tails
+            self._stages.append(Stage.on(self.oscillator, self.noise, self.mesh, widening=widening))
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
-        return self._solve(0, p)
+        return self.solution(p).pair
 
-    def moments(
-        self, p: ArrayLike, *, rtol: float = 1e-8, advance: Callable[[], None] = lambda: None
-    ) -> MomentLyapunov:
+    def solution(self, p: float) -> Solution:
+        """The principal eigenpairs at p on a mesh and on a finer one.
+
+        Raises:
+            NoSuchExponent: Λ(p) is infinite.
+            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
+        """
+        check_existence(self.noise, p)
+        if p in self._failed:
+            raise self._failed[p]
+        if p not in self._known:
+            try:
+                with _one_thread().limit(limits=1):
+                    self._known[p] = self._adapted(p) if self.mesh is None else self._tried(self._stages[0], p)
+                for stage, _ in self._known.values():  # a curve walks from stage to stage, and seldom back
+                    if stage is not self._known[p][0]:
+                        stage.release()
+            except NotConverged as failure:
+                self._failed[p] = failure
+                raise
+            except np.linalg.LinAlgError as failure:
+                raise NotConverged(f"Λ({p:g}) cannot be solved on this mesh ({failure}); {MESH_REMEDY}") from failure
+            except (ArithmeticError, RuntimeError, ValueError) as failure:
+                raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
+        return self._known[p][1]
+
+    def largest(self) -> CylinderSpace | None:
+        """The space on which the p of the largest size was solved; None where none was."""
+        return self._known[max(self._known, key=abs)][0].coarse.space if self._known else None
+
+    def scale(self, p: float) -> float:
+        """The sum of the absolute values of the terms of Eq. (37)."""
+        return float(perturbation.moment_scale(self.oscillator, self.noise, p))
+
+    def tolerance(self, p: float, value: float) -> float:
+        """The largest error allowed of a value of Λ(p)."""
+        if self.uniform:
+            return self.rtol * abs(p) * perturbation.lyapunov_scale(self.oscillator, self.noise)
+        return self.rtol * max(abs(value), self.scale(p))
+
+    def relaxed(self) -> ExponentSolver:
+        """The same solver without `uniform`, and with all that is known already."""
+        other = replace(self, uniform=False)
+        for name in ("_known", "_failed", "_stages"):
+            object.__setattr__(other, name, getattr(self, name))
+        return other
+
+    def moments(self, p: ArrayLike, *, advance: Callable[[], None] = lambda: None) -> MomentLyapunov:
         """Λ(p) at several p; `advance` is called after each.
 
         Raises:
             NoSuchExponent: Λ(p) is infinite for one of the p.
             NotConverged: some p failed; `partial` is the `MomentLyapunov` of the others.
         """
-        points = np.atleast_1d(np.asarray(p, dtype=float))
-        if points.ndim != 1 or points.size == 0 or not np.all(np.isfinite(points)):
-            raise ValueError(f"p must be a finite number or a non-empty list of finite numbers, got {p!r}")
-        for point in points:
-            check_existence(self.noise, float(point))
-        pairs, errors, failures = {}, {}, []
-        for i in np.argsort(np.abs(points), kind="stable"):
+        points = checked_moments(p, self.noise)
+        solutions, failures = {}, []
+        for i in best_order(points):
             try:
-                pairs[i], errors[i] = self._solve_with_error(float(points[i]))
+                solution = self.solution(float(points[i]))
+                if points[i] != 0:  # where Λ = 0 has no scale
+                    checked(f"Λ({points[i]:g})", self.estimate(solution))
+                solutions[i] = solution
             except NotConverged as failure:
                 failures.append(str(failure))
             advance()
-        done = sorted(pairs)
-        result = self._result([pairs[i] for i in done], np.array([errors[i] for i in done]), rtol)
+        result = self._result([solutions[i] for i in sorted(solutions)])
         if failures:
             raise NotConverged("\n".join(failures), result)
         return result
+
+    def estimate(self, solution: Solution) -> Estimate:
+        """Λ(p) on the scale of the terms of Eq. (37) before they cancel."""
+        return Estimate(solution.pair.value, solution.error, self.scale(solution.pair.p))
 
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2). Raises `NotConverged`."""
@@ -137,134 +203,143 @@ class ExponentSolver:
         scale = perturbation.variance_rate(self.oscillator, self.noise)
         return self._difference("Λ″(0)", second_derivative, scale)
 
-    def stability_index(self, interval: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | None:
-        """δ_p, the non-zero root of Λ(p); None where Λ has no such root in the interval.
+    def ratio(self, p: float) -> tuple[float, float, float]:
+        """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0.
 
-        Λ is convex, so Λ(p)/p increases and has one root at most: a safeguarded Newton iteration on it.
-
-        Raises:
-            NotConverged: the mesh does not resolve some p on the way.
+        Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss.
         """
-        low, high = (float(end) for end in np.clip(interval, *finite_moments(self.noise)))
-        ratio, slope, _ = self._ratio(0.0)
-        p = min(max(-ratio / slope, low), high)
-        tried: set[float] = set()
-        for _ in range(60):
-            tried.add(p)
-            ratio, slope, rounding = self._ratio(p)
-            low, high = (p, high) if ratio < 0 else (low, p)
-            new = p - ratio / slope
-            if abs(new - p) <= max(1e-13 * max(1.0, abs(p)), 4 * rounding / slope):
-                break
-            if not low < new < high:
-                new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
-            if low == high:
-                return None
-            p = new
-        else:
-            raise NotConverged(f"the stability index did not settle, last near p = {p:g}; {REMEDY}")
-        (_, slope, rounding), (finer_ratio, finer_slope, _) = self._ratio(p), self._ratio(p, level=1)
-        error = (abs(finer_ratio) + 2 * rounding) / min(slope, finer_slope)  # a Newton step on the finer mesh
-        return _checked("the stability index", Estimate(p, error, scale=1.0))
-
-    def _ratio(self, p: float, level: int = 0) -> tuple[float, float, float]:
-        """Λ(p)/p, its derivative and its rounding; near p = 0 by Λ′(p/2), whose error is p²Λ‴/24.
-
-        Λ′ carries the rounding of the eigenvectors in first order, Λ in second.
-        """
-        if abs(p) < 1e-3:
-            pair, middle = self._solve(level, 0.0), self._solve(level, p / 2)
-            ratio, slope, rounding = middle.derivative, 0.5 * second_derivative(pair), 1e3 * pair.rounding
-        else:
-            pair = self._solve(level, p)
-            ratio, rounding = pair.value / p, pair.rounding / abs(p)
-            slope = (pair.derivative - ratio) / p
-        if not slope > 0:
-            raise NotConverged(f"Λ(p)/p does not increase at p = {p:g}, as convexity demands; {REMEDY}")
-        return ratio, slope, rounding
+        if abs(p) >= TINY_P:
+            solution = self.solution(p)
+            value = solution.pair.value / p
+            return value, (solution.pair.derivative - value) / p, solution.error / abs(p)
+        points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
+        solutions = [self.solution(point) for point in points]
+        value, finer = (
+            float(np.mean([pair.derivative for pair in pairs]))
+            for pairs in zip(*((each.pair, each.finer) for each in solutions), strict=True)
+        )
+        rounding = max(each.pair.rounding for each in solutions)
+        return value, 0.5 * second_derivative(solutions[0].pair), abs(finer - value) + rounding
 
     def _difference(self, name: str, quantity: Callable[[PrincipalPair], float], scale: float) -> Estimate:
-        coarse, fine = (quantity(self._solve(level, 0.0)) for level in (0, 1))
-        return _checked(name, Estimate(coarse, abs(fine - coarse) + self.pair(0.0).rounding, scale))
+        solution = self.solution(0.0)
+        coarse, fine = quantity(solution.pair), quantity(solution.finer)
+        return checked(name, Estimate(coarse, abs(fine - coarse) + solution.pair.rounding, scale))
 
-    def _solve(self, level: int, p: float) -> PrincipalPair:
-        """The pair on the mesh (level 0) or the finer one (level 1), from the nearest p known there."""
-        check_existence(self.noise, p)
-        known = self._known[level]
-        if p not in known:
-            nearest = min(known, key=lambda other: abs(other - p), default=None)
-            start = None if nearest is None else known[nearest]
-            try:
-                known[p] = principal_pair((self.generator, self._finer)[level], p, start=start)
-            except (ArithmeticError, RuntimeError, ValueError) as failure:
-                raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure}); {REMEDY}") from failure
-        return known[p]
+    def _tried(self, stage: Stage, p: float) -> tuple[Stage, Solution]:
+        """The solution at p on a stage: from those around p on it, or from the nearest one."""
+        known = sorted(
+            (solution.pair for other, solution in self._known.values() if other is stage),
+            key=lambda pair: abs(pair.p - p),
+        )
+        near = known[:NEIGHBOURS]
+        is_inside = bool(near) and min(pair.p for pair in near) < p < max(pair.p for pair in near)
+        return stage, stage.solve(p, near if is_inside else near[:1])
 
-    def _solve_with_error(self, p: float) -> tuple[PrincipalPair, float]:
-        pair = self._solve(0, p)
-        error = abs(self._solve(1, p).value - pair.value) + pair.rounding
-        if p != 0:  # where Λ = 0 has no scale
-            _checked(f"Λ({p:g})", self._estimate(pair, error))
-        return pair, error
-
-    def _estimate(self, pair: PrincipalPair, error: float) -> Estimate:
-        """Λ(p) on the scale of the terms of Eq. (37) before they cancel."""
-        scale = float(perturbation.moment_scale(self.oscillator, self.noise, pair.p))
-        return Estimate(pair.value, error, scale)
-
-    def _result(self, pairs: Sequence[PrincipalPair], errors: FloatArray, rtol: float) -> MomentLyapunov:
-        estimates = [(k.p, self._estimate(k, e)) for k, e in zip(pairs, errors, strict=True) if k.p != 0]
-        shares = [(p, estimate.relative_error) for p, estimate in estimates]
-        short = [(p, share) for p, share in shares if share > rtol]
-        warnings: tuple[str, ...] = ()
-        if short:
-            p, share = max(short, key=lambda item: item[1])
-            warnings = (
-                f"rtol = {rtol:g} is not met at {len(short)} of {len(pairs)} moments, worst at p = {p:g} with an "
-                f"estimated relative error of {share:.1e}; {REMEDY}, or use a larger rtol",
+    def _adapted(self, p: float) -> tuple[Stage, Solution]:
+        """A solution that meets rtol, on the stage of the nearest p if that does, otherwise on a new one."""
+        nearest = min(self._known, key=lambda q: abs(q - p), default=None)
+        if nearest is not None:
+            stage = self._known[nearest][0]
+            if fits(stage, self.oscillator, self.noise, nearest, p):
+                try:
+                    tried = self._tried(stage, p)
+                except NotConverged:
+                    tried = None
+                if (
+                    tried is not None
+                    and self._suffices(tried[1])
+                    and not is_beaten(self.oscillator, self.noise, tried[1].pair)
+                ):
+                    return tried
+        q = p if abs(p) >= SMALL_P else math.copysign(SMALL_P, p if p else sum(self._directions()))
+        for rtol in self.rtol * 10.0 ** -np.arange(4):
+            share = rtol / self.rtol
+            new = resolve(
+                self.oscillator,
+                self.noise,
+                q,
+                tolerance=lambda value, q=q, share=share: share * self.tolerance(q, value),  # type: ignore[misc]
+                rtol=rtol,
+                budget=self.budget,
             )
+            self._known.setdefault(q, new)
+            if q == p:
+                return new
+            tried = self._tried(new[0], p)
+            if self._suffices(tried[1]):
+                return tried
+        raise NotConverged(f"Λ({p:g}) did not converge on the meshes for p = {q:g}; {REMEDY}")
+
+    def _directions(self) -> tuple[float, float]:
+        low, high = finite_moments(self.noise)
+        return (-1.0 if low < 0 else 0.0, 2.0 if high > 0 else 0.0)
+
+    def _suffices(self, solution: Solution) -> bool:
+        """Whether Λ(p), and at p = 0 its derivative, meets rtol; for tiny p apart from rounding."""
+        pair = solution.pair
+        if abs(pair.p) < TINY_P:
+            scale = perturbation.lyapunov_scale(self.oscillator, self.noise)
+            error, allowed = abs(pair.derivative - solution.finer.derivative), self.rtol * scale
+        else:
+            error, allowed = solution.error, self.tolerance(pair.p, pair.value)
+        return SAFETY * error <= allowed
+
+    def _result(self, solutions: Sequence[Solution]) -> MomentLyapunov:
+        pairs = tuple(solution.pair for solution in solutions)
+        p, errors = np.array([pair.p for pair in pairs]), np.array([solution.error for solution in solutions])
+        value = np.array([pair.value for pair in pairs])
         return MomentLyapunov(
-            p=np.array([k.p for k in pairs]),
-            value=np.array([k.value for k in pairs]),
-            derivative=np.array([k.derivative for k in pairs]),
+            p=p,
+            value=value,
+            derivative=np.array([pair.derivative for pair in pairs]),
             error_estimate=errors,
-            residual=np.array([k.residual for k in pairs]),
-            pairs=tuple(pairs),
-            warnings=warnings,
+            residual=np.array([pair.residual for pair in pairs]),
+            pairs=pairs,
+            warnings=self.missed(p, value, errors),
+        )
+
+    def missed(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[str, ...]:
+        """A warning about the p at which the estimated error exceeds rtol, or nothing."""
+        size = np.where(p == 0, math.inf, np.maximum(np.abs(value), [self.scale(float(each)) for each in p]))
+        shares = error / size
+        if not np.any(shares > self.rtol):
+            return ()
+        worst = int(np.argmax(shares))
+        remedy = MESH_REMEDY if self.mesh is not None else "as rounding limits it"
+        return (
+            f"rtol = {self.rtol:g} is not met at {np.count_nonzero(shares > self.rtol)} of {p.size} moments, worst at "
+            f"p = {p[worst]:g} with an estimated relative error of {shares[worst]:.1e}; {remedy}, or use a larger rtol",
         )
 
 
-def _checked(name: str, estimate: Estimate) -> Estimate:
-    """An estimate whose error leaves it a meaning."""
+@cache
+def _one_thread() -> ThreadpoolController:
+    """Keeps BLAS from threads, which for the small blocks of a sparse LU cost three times what they save."""
+    return ThreadpoolController()
+
+
+def best_order(p: FloatArray) -> Any:
+    """Indices of p, inwards from the largest and then from the smallest: a mesh for a large |p| serves smaller ones."""
+    return np.lexsort((-np.abs(p), p < 0))
+
+
+def checked_moments(p: ArrayLike, noise: AnyNoise) -> FloatArray:
+    """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
+    points = np.atleast_1d(np.asarray(p, dtype=float))
+    if points.ndim != 1 or points.size == 0 or not np.all(np.isfinite(points)):
+        raise ValueError(f"p must be a finite number or a non-empty list of finite numbers, got {p!r}")
+    for point in points:
+        check_existence(noise, float(point))
+    return points
+
+
+def checked(name: str, estimate: Estimate) -> Estimate:
+    """An estimate whose error leaves it a meaning. Raises `NotConverged`."""
     if not estimate.relative_error <= MEANINGLESS:
         raise NotConverged(
             f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "
-            f"mean anything; {REMEDY}",
+            f"mean anything; {MESH_REMEDY}",
             estimate,
         )
     return estimate
-
-
-def moment_lyapunov(
-    oscillator: VibroImpactOscillator,
-    noise: AnyNoise,
-    p: ArrayLike,
-    *,
-    rtol: float = 1e-8,
-    mesh: CylinderMesh | None = None,
-) -> MomentLyapunov:
-    """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
-
-    Args:
-        oscillator: the vibro-impact oscillator.
-        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands.
-        p: one moment, or an array of shape (n,).
-        rtol: an `error_estimate` above rtol·max(|Λ|, the terms of Eq. (37) before they cancel) gives a warning.
-        mesh: the mesh; None for the default one, made for weak noise.
-
-    Raises:
-        ValueError: p is not finite, or empty.
-        NoSuchExponent: Λ(p) is infinite.
-        NotConverged: the mesh does not resolve the problem at some p; `partial` is the result for the others.
-    """
-    return ExponentSolver(oscillator, noise, mesh).moments(p, rtol=rtol)

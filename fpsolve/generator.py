@@ -14,15 +14,16 @@ condition is natural: no probability flux.
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csc_matrix, csr_matrix, kron
 
+from fpsolve.kronecker import KroneckerPattern, KroneckerSum
 from fpsolve.mesh import CylinderMesh
-from fpsolve.noise import FloatArray, Noise
+from fpsolve.noise import AnyNoise, FloatArray
 from fpsolve.oscillator import VibroImpactOscillator, h1, q1
 from fpsolve.space import Coefficient, CylinderSpace, one
 
@@ -34,29 +35,35 @@ class TiltedGenerator:
         oscillator: the vibro-impact oscillator.
         noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands.
         mesh: half circle (its principal eigenvalue is that of the full circle) or full circle.
+        tilt: s of the factor exp(s z) in the trial and test functions, see `CylinderSpace`.
     """
 
-    def __init__(self, oscillator: VibroImpactOscillator, noise: Noise, mesh: CylinderMesh) -> None:
+    def __init__(
+        self, oscillator: VibroImpactOscillator, noise: AnyNoise, mesh: CylinderMesh, tilt: float = 0.0
+    ) -> None:
         self.oscillator, self.noise = oscillator, noise
-        self.space = CylinderSpace(mesh, noise)
+        self.space = CylinderSpace(mesh, noise, tilt)
+        # functions that do not hold this object, as the space keeps them with the forms that it has made
+        self._omega: Coefficient = partial(np.full_like, fill_value=oscillator.omega)
+        self._xi: Coefficient = partial(np.multiply, noise.standard_deviation)
 
-    def L0(self) -> csr_matrix:
+    def L0(self) -> KroneckerSum:
         """L₀ = ½σ²∂ξξ + b(ξ)∂ξ + ω∂φ."""
         rate = 0.5 * (self.noise.diffusion / self.noise.standard_deviation) ** 2
-        diffusion = -rate * kron(self.space.phase.mass(), self.space.noise.stiffness())
-        return diffusion + self._transport(self._omega, one)
+        diffusion = KroneckerSum.of(self.space.phase.mass(), self.space.noise.stiffness(self.space.tilt))
+        return -rate * diffusion + self._transport(self._omega, one)
 
-    def L1(self, p: float) -> csr_matrix:
+    def L1(self, p: float) -> KroneckerSum:
         """L₁ = ξ(h₁∂φ + p q₁)."""
         return self._transport(h1, self._xi) + p * self._reaction(q1, self._xi)
 
-    def L2(self, p: float) -> csr_matrix:
+    def L2(self, p: float) -> KroneckerSum:
         """L₂ = h₂∂φ + p q₂ between impacts."""
         return self._transport(self.oscillator.h2, one) + p * self._reaction(self.oscillator.q2, one)
 
-    def impact(self, p: float) -> csr_matrix:
+    def impact(self, p: float) -> KroneckerSum:
         """The impacts' point load beyond continuity, (R^p − 1) ω w(φ⁻) T(φ⁺)."""
-        return math.expm1(p * self.oscillator.log_impact_factor) * self._impact_load
+        return math.expm1(p * self.oscillator.log_impact_factor) * self._impact_load()
 
     @cached_property
     def mass(self) -> csc_matrix:
@@ -65,17 +72,28 @@ class TiltedGenerator:
 
     def at(self, p: float) -> csc_matrix:
         """The matrix of L(p)."""
-        return csc_matrix(self._even_part + p * self._linear_part + self.impact(p))
+        return self.shifted(p, 0.0)
+
+    def shifted(self, p: float, shift: float) -> csc_matrix:
+        """The matrix of L(p) − shift."""
+        return self._matrix(1.0, p, math.expm1(p * self.oscillator.log_impact_factor), 1.0, -shift)
+
+    def forcing(self, p: float) -> csc_matrix:
+        """The matrix of ε L₁ + ε² L₂ and the impacts: L(p) without L₀."""
+        return self._matrix(1.0, p, math.expm1(p * self.oscillator.log_impact_factor))
 
     def derivative(self, p: float) -> csc_matrix:
         """The matrix of dL/dp = ε q₁ξ + ε² q₂ + ln R · R^p · (impact load)."""
-        log_factor = self.oscillator.log_impact_factor
-        return csc_matrix(self._linear_part + log_factor * self.oscillator.impact_factor(p) * self._impact_load)
+        return self._matrix(0.0, 1.0, self.oscillator.log_impact_factor * self.oscillator.impact_factor(p))
 
     def second_derivative(self, p: float) -> csc_matrix:
         """The matrix of d²L/dp², all of it from the impacts."""
-        log_factor = self.oscillator.log_impact_factor
-        return csc_matrix(log_factor**2 * self.oscillator.impact_factor(p) * self._impact_load)
+        return self._matrix(0.0, 0.0, self.oscillator.log_impact_factor**2 * self.oscillator.impact_factor(p))
+
+    def release(self) -> None:
+        """Give the memory of the assembled parts free; they are assembled again when they are needed."""
+        for name in ("_parts", "mass"):
+            self.__dict__.pop(name, None)
 
     def upper_bound(self, p: float) -> float:
         """A number right of Λ(p): the supremum of p(ε q₁ξ + ε² q₂), and of the impacts spread evenly over φ."""
@@ -85,55 +103,55 @@ class TiltedGenerator:
         speed = self.oscillator.omega + 0.5 * np.max(np.abs(eps * xi + eps**2 * c1))
         return growth + max(0.0, p * self.oscillator.log_impact_factor) * speed / math.pi
 
-    @cached_property
-    def _even_part(self) -> csr_matrix:
-        eps = self.oscillator.epsilon
-        return self.L0() + eps * self.L1(0.0) + eps**2 * self.L2(0.0)
+    def _matrix(self, *coefficients: float) -> csc_matrix:
+        """ε L₁(0) + ε² L₂(0), what is linear in p, the impacts, L₀ and the mass, each with its coefficient."""
+        pattern, parts = self._parts
+        return pattern.matrix(np.array(coefficients) @ parts[: len(coefficients)])
 
     @cached_property
-    def _linear_part(self) -> csr_matrix:
+    def _parts(self) -> tuple[KroneckerPattern, FloatArray]:
         eps = self.oscillator.epsilon
-        return eps * self._reaction(q1, self._xi) + eps**2 * self._reaction(self.oscillator.q2, one)
+        linear = eps * self._reaction(q1, self._xi) + eps**2 * self._reaction(self.oscillator.q2, one)
+        mass = KroneckerSum.of(self.space.phase.mass(), self.space.noise.mass())
+        turning = eps * self.L1(0.0) + eps**2 * self.L2(0.0)
+        sums = (turning, linear, self._impact_load(), self.L0(), mass)
+        pattern = KroneckerPattern(sums)
+        return pattern, np.stack([pattern.entries(total) for total in sums])
 
-    @cached_property
-    def _impact_load(self) -> csr_matrix:
+    def _impact_load(self) -> KroneckerSum:
         at = self.space.mesh.impact_vertices
         load = self.oscillator.omega * self.space.left_trace[at].T @ self.space.right_trace[at]
-        return csr_matrix(kron(csr_matrix(load), self.space.noise.mass()))
+        return KroneckerSum.of(load, self.space.noise.mass())
 
-    def _omega(self, phi: FloatArray) -> FloatArray:
-        return np.full_like(phi, self.oscillator.omega)
-
-    def _xi(self, z: FloatArray) -> FloatArray:
-        return self.noise.standard_deviation * z
-
-    def _reaction(self, f: Coefficient, g: Coefficient) -> csr_matrix:
+    def _reaction(self, f: Coefficient, g: Coefficient) -> KroneckerSum:
         """∫ P_s f(φ) g(z) w T."""
-        return csr_matrix(kron(self.space.phase.mass(f), self.space.noise.mass(g)))
+        return KroneckerSum.of(self.space.phase.mass(f), self.space.noise.mass(g))
 
-    def _transport(self, f: Coefficient, g: Coefficient) -> csr_matrix:
+    def _transport(self, f: Coefficient, g: Coefficient) -> KroneckerSum:
         """∫ P_s f(φ) g(z) w T_φ and its upwind point loads at the φ-vertices."""
         phase, noise, vertices = self.space.phase, self.space.noise, self.space.mesh.phi_lines[:-1]
         jumps = f(vertices)[:, None] * (self.space.right_trace - self.space.left_trace)
         forward = ~self._reversals
-        total = kron(phase.convection(f) + csr_matrix(self.space.left_trace[forward].T @ jumps[forward]), noise.mass(g))
+        along = phase.convection(f) + csr_matrix(self.space.left_trace[forward].T @ jumps[forward])
+        total = KroneckerSum.of(along, noise.mass(g))
         for j in np.flatnonzero(self._reversals):
             for trace, direction in ((self.space.left_trace[j], 1), (self.space.right_trace[j], -1)):
-                load = csr_matrix(np.outer(trace, jumps[j]))
-                total = total + kron(load, noise.mass(self._upwind(g, vertices[j], direction)))
-        return csr_matrix(total)
+                load = np.outer(trace, jumps[j])
+                total += KroneckerSum.of(load, noise.mass(self._upwind(g, vertices[j], direction)))
+        return total
 
     @cached_property
     def _reversals(self) -> Any:
         """At which φ-vertices the phase speed is negative for some ξ of the interval, boolean."""
-        ends = self.space.mesh.z_lines[[0, -1], None]
-        return np.any(self._phase_speed(self.space.mesh.phi_lines[:-1], ends) < 0, axis=0)
-
-    def _phase_speed(self, phi: ArrayLike, z: FloatArray) -> FloatArray:
-        """ω + ε h₁ξ + ε² h₂."""
-        eps = self.oscillator.epsilon
-        return self.oscillator.omega + eps * h1(phi) * self._xi(z) + eps**2 * self.oscillator.h2(phi)
+        xi = self._xi(self.space.mesh.z_lines[[0, -1], None])
+        return np.any(_phase_speed(self.oscillator, self.space.mesh.phi_lines[:-1], xi) < 0, axis=0)
 
     def _upwind(self, g: Coefficient, phi: float, direction: int) -> Coefficient:
         """g(z) where the phase speed at φ has the asked direction, 1 or −1; 0 elsewhere."""
-        return lambda z: g(z) * ((self._phase_speed(phi, z) >= 0) == (direction > 0))
+        oscillator, to_xi = self.oscillator, self._xi
+        return lambda z: g(z) * ((_phase_speed(oscillator, phi, to_xi(z)) >= 0) == (direction > 0))
+
+
+def _phase_speed(oscillator: VibroImpactOscillator, phi: ArrayLike, xi: FloatArray) -> FloatArray:
+    """ω + ε h₁ξ + ε² h₂."""
+    return oscillator.omega + oscillator.epsilon * h1(phi) * xi + oscillator.epsilon**2 * oscillator.h2(phi)

@@ -22,6 +22,7 @@ MARKERS = {"domain": 0, "impact": 1, "seam": 2, "truncation": 3}
 """Cell data `marker` of a .vtu; the physical groups of a .msh have the same names, and numbers greater by 1."""
 FORMATS = {".vtu": "vtu", ".msh": "gmsh22"}
 _TOLERANCE = 1e-9
+_NO_ZERO = "the noise interval [{:g}, {:g}] must contain 0 inside, where the noise lives; choose xi_min < 0 < xi_max"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class CylinderMesh:
         phi_lines: increasing φ, shape (m + 1,); they span π (a half circle, as everything in Eq. (19) is
             π-periodic) or 2π, the first and the last being one line, the seam. Every impact phase
             π/2 + kπ in the span is a line.
-        z_lines: increasing z, shape (n + 1,), with 0 strictly inside.
+        z_lines: increasing z, shape (n + 1,).
         phi_degree: degree of the discontinuous elements in φ.
         xi_degree: degree of the continuous elements in ξ.
 
@@ -58,11 +59,6 @@ class CylinderMesh:
             degree = getattr(self, name)
             if not isinstance(degree, int | np.integer) or not 1 <= degree <= MAX_DEGREE:
                 raise MeshError(f"{name} is {degree!r}; it must be a whole number from 1 to {MAX_DEGREE}")
-        if not self.z_lines[0] < 0 < self.z_lines[-1]:
-            raise MeshError(
-                f"the noise interval [{self.z_lines[0]:g}, {self.z_lines[-1]:g}] must contain 0 inside, "
-                "where the noise lives; choose xi_min < 0 < xi_max"
-            )
         self._check_circle()
 
     def _check_circle(self) -> None:
@@ -111,7 +107,7 @@ class CylinderMesh:
         above = upper + steps * max((widening - 1) * upper, 1)
         beyond = np.concatenate([below[::-1], self.z_lines, above])
         phi_lines, phi_degree = _raised(self.phi_lines, self.phi_degree, 2)
-        z_lines, xi_degree = _raised(beyond, self.xi_degree, 1)
+        z_lines, xi_degree = _raised(beyond, self.xi_degree, 2)
         return CylinderMesh(phi_lines, z_lines, phi_degree, xi_degree)
 
 
@@ -156,6 +152,8 @@ def make_mesh(
         phi = np.concatenate([quarter, half, 2 * np.pi - quarter[::-1]])
     else:
         phi = np.linspace(np.pi / 2, 3 * np.pi / 2, phi_cells + 1)
+    if not xi_min < 0 < xi_max:
+        raise MeshError(_NO_ZERO.format(xi_min, xi_max))
     middle = np.abs(np.linspace(-1, 1, 2 * xi_cells + 1)[1::2])
     sizes = grading ** ((middle - middle.min()) / max(np.ptp(middle), 1e-300))
     z = xi_min + (xi_max - xi_min) * np.concatenate([[0], np.cumsum(sizes)]) / np.sum(sizes)
@@ -211,7 +209,9 @@ def read_mesh(path: str | Path) -> CylinderMesh:
         phi, z = (_grid_lines(content.points[:, k]) for k in (0, 1))
         _check_tensor_grid(np.stack([phi[1], z[1]]), quads, (phi[0].size - 1, z[0].size - 1))
         degrees = {name: _degree(content, name) for name in ("phi_degree", "xi_degree")}
-        return replace(make_mesh(), phi_lines=phi[0], z_lines=z[0], **degrees)
+        if not z[0][0] < 0 < z[0][-1]:
+            raise MeshError(_NO_ZERO.format(z[0][0], z[0][-1]))
+        return CylinderMesh(phi[0], z[0], **degrees)
     except MeshError as failure:
         raise MeshError(f"{path}: {failure}") from failure
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
-from scipy.special import beta, xlog1py
+from scipy.special import betaln, xlog1py
 
 from fpsolve.errors import NoSuchExponent
 
@@ -41,8 +41,8 @@ class Noise(Protocol):
     def end_exponent(self) -> float:
         """a in P_s ~ (half_width − |ξ|)^a at the ends of a bounded support; 0 on the whole line."""
 
-    def density(self, xi: ArrayLike) -> FloatArray:
-        """Stationary density P_s(ξ)."""
+    def log_density(self, xi: ArrayLike) -> FloatArray:
+        """ln P_s(ξ) of the stationary density; −∞ outside the support."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -81,10 +81,14 @@ class OrnsteinUhlenbeck:
         """−α₀ ξ."""
         return -self.alpha * np.asarray(xi, dtype=float)
 
+    def log_density(self, xi: ArrayLike) -> FloatArray:
+        """Logarithm of the Gaussian density with variance σ₀²/(2α₀)."""
+        z = np.asarray(xi, dtype=float) / self.standard_deviation
+        return -0.5 * z**2 - math.log(math.sqrt(2 * math.pi) * self.standard_deviation)
+
     def density(self, xi: ArrayLike) -> FloatArray:
         """Gaussian density with variance σ₀²/(2α₀)."""
-        z = np.asarray(xi, dtype=float) / self.standard_deviation
-        return np.exp(-0.5 * z**2) / (math.sqrt(2 * math.pi) * self.standard_deviation)
+        return np.exp(self.log_density(xi))
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) = σ₀²/(α₀² + ω²), Eq. (16)."""
@@ -151,21 +155,25 @@ class NonGaussianNoise:
         xi = np.asarray(xi, dtype=float)
         return -xi / self.tau0 / (1 + self._curvature * xi**2)
 
-    def density(self, xi: ArrayLike) -> FloatArray:
-        """P_s(ξ) of Eq. (9) with the exponent −1/(r₀ − 1), normalised in closed form; 0 outside the support."""
+    def log_density(self, xi: ArrayLike) -> FloatArray:
+        """ln P_s(ξ) of Eq. (9) with the exponent −1/(r₀ − 1), normalised in closed form; −∞ outside the support."""
         xi = np.asarray(xi, dtype=float)
         if self.r0 == 1:
-            return self.ou_reduction().density(xi)
+            return self.ou_reduction().log_density(xi)
         bracket = self._curvature * xi**2
         with np.errstate(invalid="ignore", divide="ignore"):
-            power = np.exp(xlog1py(-1 / (self.r0 - 1), bracket))
-        return np.where(bracket > -1, power, 0.0) / self._normalisation
+            power = xlog1py(-1 / (self.r0 - 1), bracket)
+        return np.where(bracket > -1, power, -math.inf) - self._log_normalisation
+
+    def density(self, xi: ArrayLike) -> FloatArray:
+        """P_s(ξ) of Eq. (9); 0 outside the support."""
+        return np.exp(self.log_density(xi))
 
     @property
-    def _normalisation(self) -> float:
-        """Z of Eq. (9): B(a + 1, ½)/√|b| for r₀ < 1 and B(a − ½, ½)/√b for r₀ > 1, with a = 1/|r₀ − 1|."""
+    def _log_normalisation(self) -> float:
+        """ln Z of Eq. (9): Z = B(a + 1, ½)/√|b| for r₀ < 1 and B(a − ½, ½)/√b for r₀ > 1, with a = 1/|r₀ − 1|."""
         a = 1 / abs(self.r0 - 1)
-        return float(beta(a + 1 if self.r0 < 1 else a - 0.5, 0.5)) / math.sqrt(abs(self._curvature))
+        return float(betaln(a + 1 if self.r0 < 1 else a - 0.5, 0.5)) - 0.5 * math.log(abs(self._curvature))
 
     def ou_reduction(self) -> OrnsteinUhlenbeck:
         """The Ornstein-Uhlenbeck process of Eqs. (12)-(14): α₀ = 1/τ₁, σ₀ = √(2D₀)/τ₀.

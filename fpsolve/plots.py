@@ -85,6 +85,8 @@ def write_figure(
         _add_legend(axes, EQUATIONS[y] + (", reduced noise" if is_reduced else ""))
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         axes.margins(x=0.03)
+        figure.draw_without_rendering()  # lays it out, once for all formats
+        figure.set_layout_engine("none")
         for path in paths:
             with atomic(path) as temporary:
                 figure.savefig(temporary, metadata={"CreationDate": None} if path.suffix == ".pdf" else None)

@@ -68,9 +68,13 @@ class NoiseSection(Section):
     r0: Annotated[float, Field(lt=5 / 3)]
     treatment: Literal["ou-reduction", "exact"] = "ou-reduction"
 
+    def original(self) -> NonGaussianNoise:
+        """The noise of Eq. (7), whatever the treatment."""
+        return NonGaussianNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
+
     def process(self) -> OrnsteinUhlenbeck | NonGaussianNoise:
-        noise = NonGaussianNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
-        return noise if self.treatment == "exact" else noise.ou_reduction()
+        """The noise that is solved for."""
+        return self.original() if self.treatment == "exact" else self.original().ou_reduction()
 
 
 class Sweep(Section):

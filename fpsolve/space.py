@@ -9,13 +9,16 @@ alone, and the mass matrix is well conditioned.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 import skfem
-from scipy.linalg import qr, solve_triangular
+from numpy.polynomial.legendre import legvander
+from scipy.linalg import solve
 from scipy.sparse import csr_matrix, diags
 from scipy.special import beta, roots_jacobi, roots_legendre
 
@@ -24,6 +27,7 @@ from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import FloatArray, Noise
 
 Coefficient = Callable[[FloatArray], FloatArray]
+_SAMPLES = 2001
 _EXTRA_POINTS = 12
 """Quadrature points beyond what the mass matrix without its weight needs: for sin 2φ, cos 2φ and P_s."""
 
@@ -35,18 +39,18 @@ def one(x: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Rule:
-    """A quadrature rule on [0, 1] for some cells of a line."""
+    """A quadrature rule on [0, 1]."""
 
-    cells: Sequence[int]
     points: FloatArray
     weights: FloatArray
 
 
-def _gauss_rule(cells: Sequence[int], count: int, left: float = 0.0, right: float = 0.0) -> _Rule:
+@lru_cache(maxsize=512)
+def _gauss_rule(count: int, left: float = 0.0, right: float = 0.0) -> _Rule:
     """Gauss-Jacobi rule for integrands like x^left (1 − x)^right times a polynomial; Gauss-Legendre without powers."""
     y, w = roots_jacobi(count, right, left) if left or right else roots_legendre(count)
     x = 0.5 * (1 + y)
-    return _Rule(cells, x, w / w.sum() * beta(left + 1, right + 1) / (x**left * (1 - x) ** right))
+    return _Rule(x, w / w.sum() * beta(left + 1, right + 1) / (x**left * (1 - x) ** right))
 
 
 class LineSpace:
@@ -63,7 +67,8 @@ class LineSpace:
         size: number of unknowns.
         points: points of the quadrature rules, increasing, shape (n,).
         weights: their weights, without w.
-        values: matrix of the basis functions at the points, shape (n, size).
+        cells: for each unknown the cell that it belongs to, -1 for one shared by two, shape (size,).
+        modes: for each unknown the degree of its polynomial, 1 for vertex functions, shape (size,).
 
     Raises:
         MeshError: a cell's polynomials cannot be told apart under the weight.
@@ -78,39 +83,56 @@ class LineSpace:
         discontinuous: bool = False,
         end_exponents: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        self.lines, self.degree, self._discontinuous = lines, degree, discontinuous
-        self._mesh = skfem.MeshLine(lines)
-        bases = [self._basis(rule) for rule in self._rules(end_exponents)]
-        self.size = int(bases[0].N)
-        self.points = np.concatenate([_points(basis) for basis in bases])
-        self.weights = np.concatenate([np.ravel(basis.dx) for basis in bases])
-        self._measure = self.weights * weight(self.points)
-        self._vertices = np.unique(np.concatenate([basis.element_dofs[:2] for basis in bases], axis=None))
-        self._transform = self._orthogonalise(bases)
-        values = self._matrix(bases, np.asarray)
-        self._norms = np.sqrt(values.power(2).T @ self._measure)
-        self._transform = self._transform @ diags(1 / self._norms)
-        self.values = values @ diags(1 / self._norms)
-        self._slopes = self._matrix(bases, lambda function: function.grad[0])
+        self.lines, self.degree, self._sizes = lines, degree, np.diff(lines)
+        element = _element(degree)
+        dofs = skfem.Dofs(skfem.MeshLine(lines), skfem.ElementDG(element) if discontinuous else element)
+        self._dofs, self.size = dofs.element_dofs.T, int(dofs.N)
+        self.cells, self.modes = self._hierarchy()
+        rules = self._rules(end_exponents)
+        local = np.stack([rule.points for rule in rules])
+        points, weights = self._global(local), np.stack([rule.weights for rule in rules]) * self._sizes[:, None]
+        self.points, self.weights = points.ravel(), weights.ravel()
+        self._measure = weights * weight(points)
+        tables = [_reference(degree, rule.points.tobytes()) for rule in rules]
+        values = np.stack([table[0] for table in tables])
+        slopes = np.stack([table[1] for table in tables]) / self._sizes[:, None, None]
+        self._transform = self._orthogonalised(slopes)
+        squares = np.einsum("cq,cqi->ci", self._measure, (values @ self._transform) ** 2)
+        self._norms = np.sqrt(np.bincount(self._dofs.ravel(), squares.ravel(), minlength=self.size))
+        self._transform /= self._norms[self._dofs][:, None, :]
+        self._values, self._slopes = values @ self._transform, slopes @ self._transform
+        self._forms: dict[Hashable, csr_matrix] = {}
         self._evaluations: dict[bytes, tuple[FloatArray, csr_matrix]] = {}
+
+    @cached_property
+    def values(self) -> csr_matrix:
+        """The basis functions at the points, shape (n, size)."""
+        return self._scattered(self._values)
+
+    @cached_property
+    def traces(self) -> tuple[FloatArray, FloatArray]:
+        """The basis functions at the lower and at the upper end of each cell, from inside it: twice (m, size)."""
+        lower, upper = np.zeros((2, self.lines.size - 1, self.size))
+        for end, dofs in ((lower, self._dofs[:, 0]), (upper, self._dofs[:, 1])):
+            end[np.arange(dofs.size), dofs] = 1 / self._norms[dofs]
+        return lower, upper
 
     def constant(self) -> FloatArray:
         """Coefficients of the function 1, shape (size,): the vertex functions add up to it."""
-        coefficients = np.zeros(self.size)
-        coefficients[self._vertices] = self._norms[self._vertices]
-        return coefficients
+        return np.where(self.modes == 1, self._norms, 0.0)
 
     def mass(self, f: Coefficient = one) -> csr_matrix:
         """∫ w f u v."""
-        return self._form(self.values, f, self.values)
+        return self._form("mass", self._values, f, self._values)
 
     def convection(self, f: Coefficient = one) -> csr_matrix:
         """∫ w f u′ v, cell by cell."""
-        return self._form(self.values, f, self._slopes)
+        return self._form("convection", self._values, f, self._slopes)
 
-    def stiffness(self) -> csr_matrix:
-        """∫ w u′ v′."""
-        return self._form(self._slopes, one, self._slopes)
+    def stiffness(self, tilt: float = 0.0) -> csr_matrix:
+        """∫ w (u′ + s u)(v′ + s v), s being the tilt."""
+        slopes = self._slopes + tilt * self._values
+        return self._form(f"stiffness {tilt}", slopes, one, slopes)
 
     def evaluation(self, local: FloatArray) -> tuple[FloatArray, csr_matrix]:
         """Points and values in every cell at local coordinates in [0, 1]: x, and E with u(x) = E @ coefficients.
@@ -120,130 +142,186 @@ class LineSpace:
         """
         key = np.asarray(local, dtype=float).tobytes()
         if key not in self._evaluations:
-            points = np.frombuffer(key)
-            basis = self._basis(_Rule(range(self.lines.size - 1), points, np.zeros_like(points)))
-            self._evaluations[key] = _points(basis), self._matrix([basis], np.asarray)
+            values = _reference(self.degree, key)[0] @ self._transform
+            self._evaluations[key] = self._global(np.frombuffer(key)[None]).ravel(), self._scattered(values)
         return self._evaluations[key]
 
-    def _form(self, left: csr_matrix, f: Coefficient, right: csr_matrix) -> csr_matrix:
-        """∫ w f (right) (left), without what is zero but for rounding."""
-        matrix = (left.T @ diags(self._measure * f(self.points)) @ right).tocsr()
-        matrix.data[np.abs(matrix.data) < 1e-16 * np.max(np.abs(matrix.data), initial=0.0)] = 0
-        matrix.eliminate_zeros()
-        return matrix
+    def _global(self, local: FloatArray) -> FloatArray:
+        """Points of the cells at local coordinates, shape (m, n)."""
+        return self.lines[:-1, None] + self._sizes[:, None] * local
 
-    def _orthogonalise(self, bases: Sequence[Any]) -> csr_matrix:
-        """Coefficients of new functions in the elements' own, so that in every cell ∫ w u′v′ is diagonal.
+    def at(self, x: FloatArray, inside: FloatArray | None = None) -> csr_matrix:
+        """Values at any points, as rows of E with u(x) = E @ coefficients, shape (len(x), size).
+
+        Beyond the ends the values there are taken. A point on a line between cells is seen from the cell that holds
+        its entry of `inside`, without it from the cell above.
+        """
+        count = self.lines.size - 1
+        cell = np.clip(np.searchsorted(self.lines, x if inside is None else inside, side="right") - 1, 0, count - 1)
+        local = np.clip((x - self.lines[cell]) / self._sizes[cell], 0, 1)
+        nodes = _gauss_rule(self.degree + 1).points
+        known, wanted = (legvander(2 * t - 1, self.degree).T for t in (nodes, local))
+        column = cell[:, None] * nodes.size + np.arange(nodes.size)
+        rows = np.repeat(np.arange(x.size), nodes.size)
+        interpolation = np.linalg.solve(known, wanted).T.ravel()
+        matrix = csr_matrix((interpolation, (rows, column.ravel())), shape=(x.size, count * nodes.size))
+        return matrix @ self.evaluation(nodes)[1]
+
+    def projection(self, other: LineSpace, factor: Coefficient = one) -> FloatArray:
+        """The matrix that takes a function u of another space to the projection of factor·u, shape (size, other.size).
+
+        Orthogonal in the weight of this space.
+        """
+        scaled = diags(self._measure.ravel() * factor(self.points)) @ other.at(self.points)
+        return np.asarray(solve(self.mass().toarray(), (self.values.T @ scaled).toarray(), assume_a="pos"), dtype=float)
+
+    def _hierarchy(self) -> tuple[Any, Any]:
+        """`cells` and `modes`: skfem numbers two vertex functions, then bubbles of rising degree, in each cell."""
+        cells, modes = np.full(self.size, -2), np.ones(self.size, dtype=int)
+        for j, dofs in enumerate(self._dofs):
+            cells[dofs] = np.where(cells[dofs] == -2, j, -1)
+            modes[dofs[2:]] = np.arange(2, dofs.size)
+        return cells, modes
+
+    def _form(self, name: str, left: FloatArray, f: Coefficient, right: FloatArray) -> csr_matrix:
+        """∫ w f (right) (left), without what is zero but for rounding; kept for the next time."""
+        if (name, f) not in self._forms:
+            measure = self._measure * f(self.points).reshape(self._measure.shape)
+            blocks = (left * measure[..., None]).transpose(0, 2, 1) @ right
+            blocks[np.abs(blocks) < 1e-16 * np.max(np.abs(blocks))] = 0
+            rows, columns = np.broadcast_arrays(self._dofs[:, :, None], self._dofs[:, None, :])
+            entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
+            matrix = csr_matrix(entries, shape=(self.size, self.size))
+            matrix.eliminate_zeros()
+            self._forms[name, f] = matrix
+        return self._forms[name, f]
+
+    def _orthogonalised(self, slopes: FloatArray) -> FloatArray:
+        """New functions in the elements' own, shape (m, k + 1, k + 1), so that in every cell ∫ w u′v′ is diagonal.
 
         The bubbles are orthonormalised by QR, and the vertex functions are made orthogonal to them. All functions
         keep their values at the vertices: bubbles have no trace.
         """
-        entries = [(np.ones(self._vertices.size), self._vertices, self._vertices)]
-        for dofs, slopes in self._weighted_slopes(bases):
-            scale = np.linalg.norm(slopes, axis=0)
-            if not np.all(scale > 1e-150):
-                raise MeshError("P_s underflows in a cell of the noise; use a narrower interval")
-            q, r = qr(slopes[:, 2:] / scale[2:], mode="economic")
-            if np.min(np.abs(np.diag(r)), initial=1.0) < 1e-14:
-                raise MeshError(
-                    f"elements of degree {self.degree} are linearly dependent to rounding, as P_s falls too far within "
-                    "a cell of the noise; use more or lower-degree cells, or a narrower interval"
-                )
-            inverse = solve_triangular(r, np.eye(len(r))) / scale[2:, None]
-            entries.append(_block(dofs[2:], dofs[2:], inverse))
-            entries.append(_block(dofs[2:], dofs[:2], -inverse @ (q.T @ slopes[:, :2])))
-        data, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
-        return csr_matrix((data, (row, column)), shape=(self.size, self.size))
-
-    def _weighted_slopes(self, bases: Sequence[Any]) -> Iterator[tuple[Any, FloatArray]]:
-        """For each cell its unknowns and √w u′ of the elements' own functions, shape (points, unknowns)."""
-        measures = np.split(self._measure, np.cumsum([basis.dx.size for basis in bases])[:-1])
-        for basis, measure in zip(bases, measures, strict=True):
-            slopes = np.stack([function[0].grad[0] for function in basis.basis], axis=-1)
-            yield from zip(
-                basis.element_dofs.T, np.sqrt(measure.reshape(basis.dx.shape))[..., None] * slopes, strict=True
+        slopes = np.sqrt(self._measure)[..., None] * slopes
+        scale = np.linalg.norm(slopes, axis=1)
+        if not np.all(scale > 1e-150):
+            raise MeshError("P_s underflows in a cell of the noise; use a narrower interval")
+        q, r = np.linalg.qr(slopes[:, :, 2:] / scale[:, None, 2:])
+        if np.min(np.abs(np.diagonal(r, axis1=1, axis2=2)), initial=1.0) < 1e-14:
+            raise MeshError(
+                f"elements of degree {self.degree} are linearly dependent to rounding, as P_s falls too far within "
+                "a cell of the noise; use more or lower-degree cells, or a narrower interval"
             )
+        inverse = np.linalg.solve(r, np.broadcast_to(np.eye(r.shape[1]), r.shape)) / scale[:, 2:, None]
+        transform = np.broadcast_to(np.eye(slopes.shape[2]), (len(slopes), *2 * slopes.shape[2:])).copy()
+        transform[:, 2:, 2:] = inverse
+        transform[:, 2:, :2] = -inverse @ (q.transpose(0, 2, 1) @ slopes[:, :, :2])
+        return transform
 
-    def _matrix(self, bases: Sequence[Any], take: Callable[[Any], FloatArray]) -> csr_matrix:
-        """Values or derivatives of the orthonormal functions at the points of some bases."""
-        entries, start = [], 0
-        for basis in bases:
-            rows = start + np.arange(basis.dx.size).reshape(basis.dx.shape)
-            for function, dofs in zip(basis.basis, basis.element_dofs, strict=True):
-                entries.append((take(function[0]), rows, np.broadcast_to(dofs[:, None], rows.shape)))
-            start += basis.dx.size
-        data, row, column = (np.concatenate([np.ravel(part) for part in parts]) for parts in zip(*entries, strict=True))
-        return csr_matrix((data, (row, column)), shape=(start, self.size)) @ self._transform
-
-    def _element(self) -> Any:
-        """Hierarchical (integrated Legendre) element; a new one each time, as `ElementLinePp` remembers its points."""
-        fixed = {1: skfem.ElementLineP1, 2: skfem.ElementLineP2}
-        element = fixed[self.degree]() if self.degree in fixed else skfem.ElementLinePp(self.degree)
-        return skfem.ElementDG(element) if self._discontinuous else element
+    def _scattered(self, values: FloatArray) -> csr_matrix:
+        """Values of each cell's functions, shape (m, n, k + 1), as a matrix of shape (m·n, size)."""
+        m, n, k = values.shape
+        columns = np.broadcast_to(self._dofs[:, None, :], values.shape)
+        return csr_matrix((values.ravel(), columns.ravel(), np.arange(0, m * n * k + 1, k)), shape=(m * n, self.size))
 
     def _rules(self, end_exponents: tuple[float, float]) -> list[_Rule]:
-        cells, count, (left, right) = range(self.lines.size - 1), self.degree + _EXTRA_POINTS, end_exponents
-        if len(cells) == 1 or not (left or right):
-            return [_gauss_rule(cells, count, left, right)]
-        inner = [_gauss_rule(cells[1:-1], count)] if len(cells) > 2 else []
-        return [_gauss_rule(cells[:1], count, left=left), *inner, _gauss_rule(cells[-1:], count, right=right)]
-
-    def _basis(self, rule: _Rule) -> Any:
-        cells, quadrature = np.array(rule.cells), (rule.points[None], rule.weights)
-        return skfem.CellBasis(self._mesh, self._element(), elements=cells, quadrature=quadrature)
+        """The quadrature rule of each cell."""
+        count, last, (left, right) = self.degree + _EXTRA_POINTS, self.lines.size - 2, end_exponents
+        return [_gauss_rule(count, left * (j == 0), right * (j == last)) for j in range(last + 1)]
 
 
-def _points(basis: Any) -> FloatArray:
-    return np.ravel(np.asarray(basis.global_coordinates())[0])
+def _element(degree: int) -> Any:
+    """Hierarchical (integrated Legendre) element."""
+    fixed = {1: skfem.ElementLineP1, 2: skfem.ElementLineP2}
+    return fixed[degree]() if degree in fixed else skfem.ElementLinePp(degree)
 
 
-def _block(rows: Any, columns: Any, block: FloatArray) -> tuple[FloatArray, Any, Any]:
-    """Entries of a dense block: data, rows, columns."""
-    return block.ravel(), np.repeat(rows, len(columns)), np.tile(columns, len(rows))
+@lru_cache(maxsize=512)
+def _reference(degree: int, points: bytes) -> tuple[FloatArray, FloatArray]:
+    """Values and slopes of the elements' own functions on the cell [0, 1] at some points, shape (n, degree + 1)."""
+    x = np.frombuffer(points)
+    basis = skfem.CellBasis(skfem.MeshLine([0.0, 1.0]), _element(degree), quadrature=(x[None], np.zeros_like(x)))
+    functions = [function[0] for function in basis.basis]
+    values = np.stack([np.ravel(np.asarray(function)) for function in functions], axis=-1)
+    return values, np.stack([np.ravel(function.grad[0]) for function in functions], axis=-1)
 
 
 class CylinderSpace:
     """The 1-D spaces on φ and on z = ξ/std that span the trial and test functions.
 
+    With a tilt s every function carries the factor exp(s (z − c)): where T ~ exp(s z) the polynomials stand for what
+    is left of it. The products of two functions are then weighted by P_s exp(2s z), which for Ornstein-Uhlenbeck
+    noise is P_s moved to 2s, however far that is.
+
+    Args:
+        mesh: the mesh; it is cut off at the end of the noise's support.
+        noise: the noise.
+        tilt: s.
+
     Attributes:
         mesh: the mesh, cut off at the end of the noise's support.
         phase: discontinuous elements in φ.
-        noise: continuous elements in z, weighted by the stationary density of z.
-        density: the stationary density of z, P_s(ξ)·std.
+        noise: continuous elements in z, in the weight `weight`.
+        tilt: s; its factor is 1 at z = c, `center`, where the weight is largest.
         left_trace, right_trace: T(φⱼ⁻) and T(φⱼ⁺) at the vertices phi_lines[:-1], shape (m, phase.size); the
             left trace at the seam comes from the last cell.
 
     Raises:
-        MeshError: a cell's polynomials in the noise cannot be told apart under P_s.
+        MeshError: a cell's polynomials in the noise cannot be told apart under the weight.
     """
 
-    def __init__(self, mesh: CylinderMesh, noise: Noise) -> None:
-        unit = noise.standard_deviation
-        end = noise.half_width / unit
+    def __init__(self, mesh: CylinderMesh, noise: Noise, tilt: float = 0.0) -> None:
+        self._unit = noise.standard_deviation
+        self._log_density = noise.log_density
+        end = noise.half_width / self._unit
         self.mesh = mesh.within(end)
         z = self.mesh.z_lines
+        self.tilt, self.center, self._log_weight = tilt, 0.0, -math.log(self._unit)
+        if tilt:
+            inside = np.linspace(z[0], z[-1], _SAMPLES)[1:-1]
+            sizes = self._log_density(self._unit * inside) + 2 * tilt * inside
+            self.center, self._log_weight = float(inside[sizes.argmax()]), float(sizes.max())
         exponent = noise.end_exponent
         self.phase = LineSpace(self.mesh.phi_lines, self.mesh.phi_degree, discontinuous=True)
-        self.density: Coefficient = lambda x: unit * noise.density(unit * x)
         self.noise = LineSpace(
             z,
             self.mesh.xi_degree,
-            self.density,
+            self.weight,
             end_exponents=(exponent * (z[0] <= -end), exponent * (z[-1] >= end)),
         )
-        traces = self.phase.evaluation(np.array([0.0, 1.0]))[1].toarray()
-        self.right_trace, self.left_trace = traces[0::2], np.roll(traces[1::2], 1, axis=0)
+        self._carriers: dict[CylinderSpace, tuple[FloatArray, FloatArray]] = {}
+        self.right_trace, upper = self.phase.traces
+        self.left_trace = np.roll(upper, 1, axis=0)
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
         return self.phase.size * self.noise.size
 
+    def weight(self, z: FloatArray) -> FloatArray:
+        """P_s exp(2s z): without a tilt the stationary density of z, otherwise with its largest value, at c, made 1."""
+        return np.exp(self._log_density(self._unit * z) + 2 * self.tilt * z - self._log_weight)
+
+    def factor(self, z: FloatArray, other: CylinderSpace | None = None) -> FloatArray:
+        """exp(s (z − c)), which every function carries, over that of another space; kept within e^±600."""
+        exponent = self.tilt * (z - self.center)
+        if other is not None:
+            exponent = exponent - other.tilt * (z - other.center)
+        return np.exp(np.clip(exponent, -600, 600))
+
     def constant(self) -> FloatArray:
-        """Coefficients of the function 1, shape (size,)."""
+        """Coefficients of the function 1, times the factor where there is a tilt, shape (size,)."""
         return np.asarray(np.kron(self.phase.constant(), self.noise.constant()), dtype=float)
 
+    def carry(self, coefficients: FloatArray, old: CylinderSpace) -> FloatArray:
+        """A function of another space, factor and all, projected on this one."""
+        if old not in self._carriers:
+            noise = self.noise.projection(old.noise, lambda z: old.factor(z, self))
+            self._carriers[old] = self.phase.projection(old.phase), noise
+        phase, noise = self._carriers[old]
+        return np.ravel(phase @ coefficients.reshape(old.phase.size, -1) @ noise.T)
+
     def values(self, coefficients: FloatArray, local_phi: FloatArray, local_z: FloatArray) -> FloatArray:
-        """A function at local coordinates of every cell, as `LineSpace.evaluation` orders them: shape (φ, z)."""
+        """A function without its factor at local coordinates of every cell, as `LineSpace.evaluation` orders them."""
         table = coefficients.reshape(self.phase.size, self.noise.size)
         return self.phase.evaluation(local_phi)[1] @ (self.noise.evaluation(local_z)[1] @ table.T).T

@@ -16,13 +16,12 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from scipy.sparse import csr_matrix, vstack
+from scipy.sparse import csr_matrix
 
 from fpsolve.eigen import PrincipalPair
 from fpsolve.files import atomic
 from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import FloatArray
-from fpsolve.space import LineSpace
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals written; elements of a higher degree are cut into several of them."""
@@ -35,7 +34,8 @@ def write_eigenfunctions(
     """Write `<stem>.pvd`, a time series over p, and `<stem>/p….vtu`, one file for each p.
 
     Point data: `T`; `T_adjoint`, T*; `tilted_density`, T T*; `stationary_density`, T* at p = 0; `z` = ξ/std.
-    T has mean 1 over P_s(ξ)/2π and ∫T T* dφ dξ = 1. Field data: `p` and `Lambda`, Λ(p).
+    T has mean 1 over P_s(ξ)/2π, or where its factor exp(s z) is large, over what that makes of P_s, and is cut off
+    beyond e^±600; ∫T T* dφ dξ = 1. Field data: `p` and `Lambda`, Λ(p).
 
     Args:
         directory: the folder, made where it is missing.
@@ -126,13 +126,13 @@ class _Grid:
         """Values of the φ-elements at the nodes, shape (φ-nodes, φ-unknowns)."""
         mesh, inside = pair.generator.space.mesh, _inward(self.phi)
         turned = mesh.span * np.floor((inside - mesh.phi_lines[0]) / mesh.span)
-        return _table(pair.generator.space.phase, self.phi - turned, inside - turned)
+        return pair.generator.space.phase.at((self.phi - turned).ravel(), (inside - turned).ravel())
 
     def noise_table(self, pair: PrincipalPair) -> csr_matrix:
         """Values of the ξ-elements at the nodes, shape (ξ-nodes, ξ-unknowns)."""
         cells, nodes = self.z_cells.shape
         once = np.append(np.arange(cells * nodes).reshape(cells, nodes)[:, :-1], cells * nodes - 1)
-        return _table(pair.generator.space.noise, self.z_cells, _inward(self.z_cells))[once]
+        return pair.generator.space.noise.at(self.z_cells.ravel(), _inward(self.z_cells).ravel())[once]
 
     def points(self) -> FloatArray:
         """(φ, ξ, 0), φ slowest, shape (points, 3)."""
@@ -172,19 +172,6 @@ def _inward(x: FloatArray) -> FloatArray:
     return x + 1e-6 * (x.mean(axis=1, keepdims=True) - x)
 
 
-def _table(line: LineSpace, x: FloatArray, inside: FloatArray) -> csr_matrix:
-    """Values at x, shape (m, n), as rows of E: each x in the cell that holds its neighbour of `inside`."""
-    cells = np.clip(np.searchsorted(line.lines, inside) - 1, 0, line.lines.size - 2)
-    start, size = line.lines[cells], np.diff(line.lines)[cells]
-    local = np.clip(np.round((x - start) / size, 12), 0, 1)  # rounded, so that few different ones are evaluated
-    rows = []
-    for c, t in zip(cells, local, strict=True):
-        for part in np.split(np.arange(t.size), np.flatnonzero(np.diff(c)) + 1):
-            first = c[part[0]] * part.size
-            rows.append(line.evaluation(t[part])[1][first : first + part.size])
-    return csr_matrix(vstack(rows))
-
-
 def _vtk_order(k: int) -> list[tuple[int, int]]:
     """Nodes (i, j) of VTK's Lagrange quadrilateral of degree k: corners, edges, interior."""
     inner = range(1, k)
@@ -198,13 +185,14 @@ def _eigenfunction_data(
 ) -> tuple[_Grid, dict[str, FloatArray], dict[str, float]]:
     """Grid, point data and field data of one p."""
     grid = _Grid.of(pair)
-    weight = pair.generator.noise.density(grid.xi)
-    right, adjoint = grid.values(pair, pair.right), grid.values(pair, pair.left) * weight
+    space = pair.generator.space
+    factor, weight = space.factor(grid.z), space.weight(grid.z) / grid.unit
+    right, left = grid.values(pair, pair.right), grid.values(pair, pair.left)
     data = {
-        "T": right,
-        "T_adjoint": adjoint,
-        "tilted_density": right * adjoint,
-        "stationary_density": grid.values(stationary, stationary.left) * weight,
+        "T": right * factor,
+        "T_adjoint": left * weight / factor,
+        "tilted_density": right * left * weight,
+        "stationary_density": grid.values(stationary, stationary.left) * stationary.generator.noise.density(grid.xi),
         "z": grid.z,
     }
     return grid, data, {"p": pair.p, "Lambda": pair.value}

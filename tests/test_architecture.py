@@ -6,8 +6,9 @@ from pathlib import Path
 import fpsolve
 
 ORDER = [
-    "errors", "files", "noise", "oscillator", "perturbation", "mesh", "space", "generator", "eigen", "exponent",
-    "density", "vtk", "plots", "document", "messages", "schema", "case", "report", "cli",
+    "errors", "files", "noise", "oscillator", "perturbation", "validity", "mesh", "space", "kronecker", "generator",
+    "eigen", "estimate", "adapt", "exponent", "function", "density", "vtk", "plots", "document", "messages", "schema",
+    "case", "curves", "report", "cli",
 ]  # fmt: skip
 SOURCES = sorted(Path(fpsolve.__file__).parent.glob("*.py"))
 

@@ -54,6 +54,9 @@ value = 0.01416
 rtol = 1e-3
 source = "Eq. (37)"
 where = { "noise.D0" = 0.1 }
+[budget]
+unknowns = 60000
+seconds = 60.0
 """
 
 BIG = "1" + "0" * 400
@@ -139,6 +142,10 @@ VALUES = [  # key, its bad line, what the message says
     ("moments.p.step", "p = { start = 0, stop = 2, num = 3, step = 1 }", "unknown key|start, stop"),
     ("moments.rtol", "rtol = 1e-14", "got 1e-14|> 1e-13 and < 1|rtol = 1e-8"),
     ("moments.rtol", "rtol = 1", "got 1;|> 1e-13 and < 1"),
+    ("budget.seconds", "seconds = 0", "got 0|> 0|time for one p|seconds = 60.0"),
+    ("budget.seconds", "seconds = inf", "got inf|finite number > 0"),
+    ("budget.unknowns", "unknowns = 99", "got 99|whole number >= 100|unknowns = 60000"),
+    ("budget.unknowns", "unknowns = 1e4", "got 10000.0|whole number >= 100"),
     ('vary."noise.D0"', '"noise.D0" = []', "got []|non-empty list|> 0|[0.1, 0.5, 1.0]"),
     ('vary."noise.D0"', '"noise.D0" = 0.1', "got 0.1|non-empty list|> 0"),
     ('vary."noise.D0"', '"noise.D0" = {}', "got {} (a table)|non-empty list"),
@@ -514,7 +521,7 @@ def test_value_that_is_also_a_table(tmp_path: Path) -> None:
         (GOOD.encode("utf-16"), ": is binary or UTF-16|save it as UTF-8"),
         (b"\x7fELF\x02\x01\x00\x00", ": is binary|name a TOML file"),
         (GOOD.replace("good", "gööd").encode("latin-1"), ":1: is not UTF-8|0xf6|save it as UTF-8"),
-        (GOOD.encode() + b"# \xff", ":36: is not UTF-8|0xff|save it as UTF-8"),
+        (GOOD.encode() + b"# \xff", ":39: is not UTF-8|0xff|save it as UTF-8"),
     ],
     ids=["empty", "blank", "mark", "utf-16", "binary", "latin-1", "byte"],
 )

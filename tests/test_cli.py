@@ -3,11 +3,14 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, NOT_CONVERGED, digits, main
 from tests.test_report import HOPELESS, TEXT, files
+
+CASES = Path(__file__).parents[1] / "cases"
 
 
 @pytest.fixture
@@ -192,3 +195,36 @@ def test_version(capsys):
 )
 def test_digits_are_those_that_the_error_leaves(value, error, text):
     assert digits(value, error) == text
+
+
+IMPOSSIBLE = [
+    "oscillator.epsilon=1.0", "noise.D0=1.0", "moments.p=[2.0]", "moments.rtol=1e-12", "budget.unknowns=6000",
+]  # fmt: skip
+
+
+def test_an_exhausted_budget_exits_3_with_the_best_value(tmp_path, capsys):
+    sets = [word for text in IMPOSSIBLE for word in ("--set", text)]
+    assert (
+        main(["run", str(CASES / "minimal.toml"), "--set", "expect=[]", *sets, "--out", str(tmp_path)]) == NOT_CONVERGED
+    )
+    err = capsys.readouterr().err
+    assert "not converged: minimal: Λ(2) did not converge: the next mesh has" in err
+    assert "more than budget.unknowns = 6000; best value 3.4291" in err
+    assert "an estimated error of" in err
+
+
+def test_theories_outside_their_range_are_noted(tmp_path, capsys):
+    sets = [
+        "--set",
+        "oscillator.epsilon=1.0",
+        "--set",
+        "noise.r0=0.7",
+        "--set",
+        "noise.D0=1.0",
+        "--set",
+        "moments.rtol=1e-6",
+    ]
+    assert main(["run", str(CASES / "minimal.toml"), *sets, "--out", str(tmp_path)]) == 0
+    err = capsys.readouterr().err
+    assert "note: minimal: the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = 0.3 > 0.1" in err
+    assert "note: minimal: Eq. (37) is for weak noise" in err

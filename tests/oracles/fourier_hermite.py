@@ -178,6 +178,9 @@ def _principal(
     |f| ≤ F; its largest eigenvalue bounds Λ from above.  To a real shift there Λ is the nearest eigenvalue,
     as the disc about the shift that touches Λ lies to the right of Λ.  The shifted matrix has a definite
     symmetric part: elimination is stable without pivoting, which would fill the factors and cost digits.
+
+    In the end Λ is read off the row of the constant function, Λ x₀ = Σ L̃_0j x_j: the noise and the derivative in φ
+    have no part in that row, so no large numbers cancel.
     """
     matrix = _generator(noise, 2 * np.arange(-harmonics, harmonics + 1), omega, epsilon, c1, log_R, p)
     size = matrix.shape[0]
@@ -186,15 +189,21 @@ def _principal(
     noisy = la.eigvalsh(L_xi + epsilon * F * xi)[-1]
     shift = p * omega * log_R / np.pi + noisy + epsilon**2 * abs(c1) * F + 0.01 * omega
     if size <= _DENSE_SIZE:
-        values = la.eigvals(matrix.toarray())
-        value = values[np.abs(values - shift).argmin()]
+        values, vectors = la.eig(matrix.toarray())
+        nearest = np.abs(values - shift).argmin()
+        value, vector = values[nearest], vectors[:, nearest]
     else:
         shifted = (matrix - shift * sp.eye_array(size)).tocsc()
         no_pivoting = {"diag_pivot_thresh": 0, "options": {"SymmetricMode": True}}
         factors = spla.splu(shifted, permc_spec="MMD_AT_PLUS_A", **no_pivoting)
         inverse = spla.LinearOperator(matrix.shape, factors.solve, dtype=float)
         start = np.random.default_rng(0).standard_normal(size)
-        value = spla.eigs(matrix, 1, sigma=shift, OPinv=inverse, v0=start, return_eigenvectors=False)[0]
+        values, vectors = spla.eigs(matrix, 1, sigma=shift, OPinv=inverse, v0=start)
+        value, vector = values[0], vectors[:, 0]
     if abs(value.imag) > 1e-8 * (omega + abs(value)):
         raise ValueError(f"the rightmost eigenvalue {value} is not real: raise the number of basis functions")
-    return float(value.real)
+    constant = harmonics  # of the noise the first, of the phases k = −2·harmonics … 2·harmonics the middle one
+    x = (vector / vector[np.abs(vector).argmax()]).real
+    if abs(x[constant]) < 0.1:  # a strong tilt leaves little of the constant function
+        return float(value.real)
+    return float((matrix[[constant]] @ x)[0] / x[constant])
