@@ -20,15 +20,12 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from fpsolve.eigen import PrincipalPair, principal_pair
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.estimate import Solution, Spread, Stage, noise_marginal, spread, truncation
+from fpsolve.frozen import growth_without_turning, likely_center, rival
 from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import STRICT, AnyNoise, FloatArray, Positive, finite_moments
 from fpsolve.oscillator import VibroImpactOscillator
-from fpsolve.perturbation import reduced
 
 MAX_PHI_DEGREE, MAX_XI_DEGREE = 14, 10
-_SAMPLES = 1001
-RIVAL = 0.6
-"""How fast, of Λ, paths that hold the noise elsewhere must grow to be looked at."""
 MAX_STAGES, MOST_CANCELLED = 40, 30.0
 REMEDY = "use a larger rtol or a larger [budget]"
 LEAST_TILT = 2.5
@@ -60,7 +57,7 @@ class Budget:
 def fits(stage: Stage, oscillator: VibroImpactOscillator, noise: AnyNoise, old: float, new: float) -> bool:
     """Whether a stage that serves one p is likely to reach where the tilted density of another lies."""
     tilt = stage.coarse.space.tilt
-    way = abs(_likely_center(oscillator, noise, new) - _likely_center(oscillator, noise, old))
+    way = abs(likely_center(oscillator, noise, new) - likely_center(oscillator, noise, old))
     return way <= 3.0 and (new != 0 or tilt == 0)
 
 
@@ -85,17 +82,12 @@ def resolve(
             `Solution`, or None.
     """
     meter = _Meter(p, budget)
-    found = _search(oscillator, noise, _likely_center(oscillator, noise, p), tolerance, rtol, meter)
-    rival = _rival(oscillator, noise, found[1].pair)
-    if rival is not None:
-        other = _search(oscillator, noise, rival, tolerance, rtol, meter)
+    found = _search(oscillator, noise, likely_center(oscillator, noise, p), tolerance, rtol, meter)
+    elsewhere = rival(oscillator, noise, found[1].pair)
+    if elsewhere is not None:
+        other = _search(oscillator, noise, elsewhere, tolerance, rtol, meter)
         found = max(found, other, key=lambda item: item[1].pair.value)
     return found
-
-
-def is_beaten(oscillator: VibroImpactOscillator, noise: AnyNoise, pair: PrincipalPair) -> bool:
-    """Whether the noise may carry the p-th moment elsewhere than where the tilted density of a pair is."""
-    return _rival(oscillator, noise, pair) is not None
 
 
 def _search(
@@ -109,7 +101,7 @@ def _search(
     """What `resolve` promises, with the tilted density sought around some z."""
     p, start = meter.p, None
     mesh_and_tilt = _affordable(oscillator, noise, center, rtol, meter.budget)
-    guess = _frozen_growth(oscillator, noise, p, center)
+    guess = growth_without_turning(oscillator, noise, p, center)
     while True:
         mesh, tilt = mesh_and_tilt
         meter.check(mesh, noise)
@@ -244,55 +236,6 @@ def _initial(
         xi_degree=min(max(degree - 4, 3), MAX_XI_DEGREE),
     )
     return mesh, _tilt(center)
-
-
-def _frozen(oscillator: VibroImpactOscillator, noise: AnyNoise, p: float) -> tuple[FloatArray, FloatArray]:
-    """z on the side to which p tilts, and the growth rate of ‖x‖^p on paths that hold the noise there.
-
-    F = p G(ξ) − ⅛σ²((ln P_s)′)². G is the growth rate of ln ‖x‖ with ξ frozen: εξ/2 while the oscillator oscillates,
-    |εξ| < 2ω, the rate of the faster of the two real modes beyond. For p < −1 the paths that stay on the other real
-    mode carry more: (p + 1)·fast − slow. The second term is what holding ξ costs. Slow noise has its tilted density
-    where F is largest, and more than one such place.
-    """
-    unit, eps = noise.standard_deviation, oscillator.epsilon
-    furthest = 2.5 * abs(p) * 2 * unit * eps / reduced(noise).alpha
-    z = math.copysign(min(max(furthest, 1e-3), 0.999 * noise.half_width / unit), p) * np.linspace(0, 1, _SAMPLES)
-    push = eps * unit * z + eps**2 * oscillator.c1
-    root = np.sqrt(np.maximum(push**2 - 4 * oscillator.omega**2, 0))
-    faster, slower = 0.5 * (push + root), 0.5 * (push - root)
-    growth = p * faster
-    if p < -1:
-        growth = np.where(root > 0, np.maximum(growth, (p + 1) * slower - faster), growth)
-    holding = 0.125 * (noise.diffusion / unit * np.gradient(noise.log_density(unit * z), z)) ** 2
-    return z, growth - holding
-
-
-def _likely_center(oscillator: VibroImpactOscillator, noise: AnyNoise, p: float) -> float:
-    """About the mean z of the tilted density."""
-    z, rate = _frozen(oscillator, noise, p)
-    return float(z[np.argmax(rate)])
-
-
-def _frozen_growth(oscillator: VibroImpactOscillator, noise: AnyNoise, p: float, center: float) -> float | None:
-    """About Λ(p), where the noise stays so far out that the oscillator does not turn; else None."""
-    z, rate = _frozen(oscillator, noise, p)
-    turns = abs(oscillator.epsilon * noise.standard_deviation * center) <= 2 * oscillator.omega
-    return None if turns else float(rate[np.argmin(np.abs(z - center))])
-
-
-def _rival(oscillator: VibroImpactOscillator, noise: AnyNoise, pair: PrincipalPair) -> float | None:
-    """Another z, far from the tilted density of a pair, where paths that hold the noise grow about as fast, or None.
-
-    Between two such places slow noise hardly ever passes: each has its own pair with T > 0 as far as that can be
-    told, and only the larger eigenvalue is Λ.
-    """
-    z, rate = _frozen(oscillator, noise, pair.p)
-    at, density = noise_marginal(pair)
-    mean = float(at @ density / density.sum())
-    spread = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
-    peaks = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
-    peaks = peaks[(np.abs(z[peaks] - mean) > 3 * spread + 2) & (rate[peaks] > RIVAL * abs(pair.value))]
-    return float(z[peaks[np.argmax(rate[peaks])]]) if peaks.size else None
 
 
 def _tilt(center: float) -> float:

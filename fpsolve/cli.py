@@ -23,7 +23,7 @@ from fpsolve.errors import FpsolveError, NotConverged
 if TYPE_CHECKING:
     from fpsolve.case import Case
     from fpsolve.curves import Comparison, CurveResult
-    from fpsolve.exponent import Estimate
+    from fpsolve.estimate import Estimate
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 

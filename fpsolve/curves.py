@@ -13,7 +13,8 @@ from fpsolve import perturbation, validity
 from fpsolve.case import Case, Curve
 from fpsolve.eigen import POSITIVE, PrincipalPair
 from fpsolve.errors import MeshError, NotConverged
-from fpsolve.exponent import MESH_REMEDY, Estimate, ExponentSolver, MomentLyapunov
+from fpsolve.estimate import MESH_REMEDY, Estimate
+from fpsolve.exponent import ExponentSolver, MomentLyapunov
 from fpsolve.function import FEW_MOMENTS, SEARCH_INTERVAL, solve_moments, stability_index
 from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import FloatArray, finite_moments

@@ -8,6 +8,7 @@ changes by exactly ⟨Q T*, (L − Λ) Q T⟩/⟨T*, T⟩, Q being the projectio
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,10 +16,44 @@ from functools import cached_property
 import numpy as np
 
 from fpsolve.eigen import PrincipalPair, principal_pair
+from fpsolve.errors import NotConverged
 from fpsolve.generator import TiltedGenerator
 from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import AnyNoise, FloatArray
 from fpsolve.oscillator import VibroImpactOscillator
+
+MEANINGLESS = 1e-2
+"""An estimated error above this share of the scale of Λ(p) is no result."""
+MESH_REMEDY = "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number, the estimate of its error, and what both are measured by.
+
+    Attributes:
+        scale: size of the terms that the number is the sum of, where they may cancel.
+    """
+
+    value: float
+    error_estimate: float
+    scale: float
+
+    @property
+    def relative_error(self) -> float:
+        """The error over the larger of |value| and the scale."""
+        return self.error_estimate / max(abs(self.value), self.scale, sys.float_info.min)
+
+
+def checked(name: str, estimate: Estimate) -> Estimate:
+    """An estimate whose error leaves it a meaning. Raises `NotConverged`."""
+    if not estimate.relative_error <= MEANINGLESS:
+        raise NotConverged(
+            f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "
+            f"mean anything; {MESH_REMEDY}",
+            estimate,
+        )
+    return estimate
 
 
 @dataclass(frozen=True, eq=False)

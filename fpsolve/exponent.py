@@ -1,9 +1,8 @@
-"""The moment Lyapunov exponent Λ(p) at single p, each with an error estimate: `ExponentSolver`, `moment_lyapunov`."""
+"""The moment Lyapunov exponent Λ(p) at single p, each with an error estimate."""
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cache
@@ -14,42 +13,22 @@ from numpy.typing import ArrayLike
 from threadpoolctl import ThreadpoolController
 
 from fpsolve import perturbation
-from fpsolve.adapt import REMEDY, SAFETY, Budget, fits, is_beaten, resolve
+from fpsolve.adapt import REMEDY, SAFETY, Budget, fits, resolve
 from fpsolve.eigen import PrincipalPair, second_derivative
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.estimate import Solution, Stage
+from fpsolve.estimate import MESH_REMEDY, Estimate, Solution, Stage, checked
+from fpsolve.frozen import rival
 from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import AnyNoise, FloatArray, check_existence, finite_moments
 from fpsolve.oscillator import VibroImpactOscillator
 from fpsolve.space import CylinderSpace
 
-MEANINGLESS = 1e-2
-"""An estimated error above this share of the scale of Λ(p) is no result."""
 SMALL_P = 1e-2
 """Below it the discretisation is chosen at this p, as Λ and its error go to zero together."""
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 NEIGHBOURS = 6
 """How many known eigenfunctions those of another p are interpolated from."""
-MESH_REMEDY = "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]"
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A number, the estimate of its error, and what both are measured by.
-
-    Attributes:
-        scale: size of the terms that the number is the sum of, where they may cancel.
-    """
-
-    value: float
-    error_estimate: float
-    scale: float
-
-    @property
-    def relative_error(self) -> float:
-        """The error over the larger of |value| and the scale."""
-        return self.error_estimate / max(abs(self.value), self.scale, sys.float_info.min)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +228,7 @@ class ExponentSolver:
                 if (
                     tried is not None
                     and self._suffices(tried[1])
-                    and not is_beaten(self.oscillator, self.noise, tried[1].pair)
+                    and rival(self.oscillator, self.noise, tried[1].pair) is None
                 ):
                     return tried
         q = p if abs(p) >= SMALL_P else math.copysign(SMALL_P, p if p else sum(self._directions()))
@@ -296,7 +275,7 @@ class ExponentSolver:
             error_estimate=errors,
             residual=np.array([pair.residual for pair in pairs]),
             pairs=pairs,
-            warnings=self.missed(p, value, errors),
+            warnings=(*self.missed(p, value, errors), *self.misplaced(pairs)),
         )
 
     def missed(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[str, ...]:
@@ -310,6 +289,19 @@ class ExponentSolver:
         return (
             f"rtol = {self.rtol:g} is not met at {np.count_nonzero(shares > self.rtol)} of {p.size} moments, worst at "
             f"p = {p[worst]:g} with an estimated relative error of {shares[worst]:.1e}; {remedy}, or use a larger rtol",
+        )
+
+    def misplaced(self, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
+        """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
+        if self.mesh is None:  # then both places have been looked at
+            return ()
+        found = ((pair, rival(self.oscillator, self.noise, pair)) for pair in pairs)
+        pair, z = next(((pair, z) for pair, z in found if z is not None), (None, None))
+        if pair is None:
+            return ()
+        return (
+            f"Λ({pair.p:g}) may be larger: slow noise may carry the moment near {z:.3g} standard deviations; use "
+            "a [mesh] that reaches there, or no [mesh]",
         )
 
 
@@ -332,14 +324,3 @@ def checked_moments(p: ArrayLike, noise: AnyNoise) -> FloatArray:
     for point in points:
         check_existence(noise, float(point))
     return points
-
-
-def checked(name: str, estimate: Estimate) -> Estimate:
-    """An estimate whose error leaves it a meaning. Raises `NotConverged`."""
-    if not estimate.relative_error <= MEANINGLESS:
-        raise NotConverged(
-            f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "
-            f"mean anything; {MESH_REMEDY}",
-            estimate,
-        )
-    return estimate

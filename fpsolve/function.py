@@ -14,7 +14,8 @@ from fpsolve import perturbation
 from fpsolve.adapt import Budget
 from fpsolve.eigen import PrincipalPair
 from fpsolve.errors import NotConverged
-from fpsolve.exponent import Estimate, ExponentSolver, MomentLyapunov, best_order, checked, checked_moments
+from fpsolve.estimate import Estimate, checked
+from fpsolve.exponent import ExponentSolver, MomentLyapunov, best_order, checked_moments
 from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import AnyNoise, FloatArray, finite_moments
 from fpsolve.oscillator import VibroImpactOscillator
@@ -83,7 +84,8 @@ class MomentLyapunovFunction:
             self._interpolate(count, advance)
             if self.is_converged or self._nodes_needed(last) > most:
                 break
-        _check_convexity([self.solver.pair(float(p)) for p in self.nodes], np.abs(self.nodes) * self._errors)
+        self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
+        _check_convexity(self._pairs, np.abs(self.nodes) * self._errors)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
         """Λ(p), per unit time, of the shape of p. Raises `ValueError` outside the interval."""
@@ -121,9 +123,9 @@ class MomentLyapunovFunction:
             value=value,
             derivative=self.derivative(points),
             error_estimate=error,
-            residual=np.full(points.size, max(self.solver.pair(float(node)).residual for node in self.nodes)),
+            residual=np.full(points.size, max(pair.residual for pair in self._pairs)),
             pairs=(),
-            warnings=self.solver.missed(points, value, error),
+            warnings=(*self.solver.missed(points, value, error), *self.solver.misplaced(self._pairs)),
         )
 
     def root(self) -> float | None:

@@ -17,7 +17,7 @@ from fpsolve import perturbation
 from fpsolve.case import Case
 from fpsolve.curves import Advance, CurveResult, solve
 from fpsolve.errors import NotConverged, OutputError
-from fpsolve.exponent import Estimate
+from fpsolve.estimate import Estimate
 from fpsolve.files import atomic
 from fpsolve.function import SEARCH_INTERVAL
 from fpsolve.plots import Series, write_figure

@@ -144,6 +144,16 @@ def test_of_two_places_that_slow_noise_may_hold_the_faster_counts(tau0, p, D0, v
     assert along.value[-1] == pytest.approx(value, rel=3e-7)
 
 
+def test_a_mesh_that_leaves_the_faster_place_out_is_warned_of():
+    oscillator = VibroImpactOscillator(**NO_LOSS, epsilon=math.sqrt(0.1))
+    noise = NonGaussianNoise(D0=1.3, tau0=20.0, r0=1.0).ou_reduction()
+    mesh = make_mesh(phi_cells=4, phi_degree=10, xi_cells=12, xi_degree=12, xi_min=-6, xi_max=18)
+    result = moment_lyapunov(oscillator, noise, 9.0, mesh=mesh)
+    assert result.value[0] < 3
+    assert any("Λ(9) may be larger: slow noise may carry the moment near 3" in text for text in result.warnings)
+    assert moment_lyapunov(oscillator, noise, 9.0).warnings == ()
+
+
 def test_wide_cells_of_algebraic_tails_can_be_extended():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5)
     noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.4)

@@ -7,8 +7,8 @@ import fpsolve
 
 ORDER = [
     "errors", "files", "noise", "oscillator", "perturbation", "validity", "mesh", "space", "kronecker", "generator",
-    "eigen", "estimate", "adapt", "exponent", "function", "density", "vtk", "plots", "document", "messages", "schema",
-    "case", "curves", "report", "cli",
+    "eigen", "estimate", "frozen", "adapt", "exponent", "function", "density", "vtk", "plots", "document", "messages",
+    "schema", "case", "curves", "report", "cli",
 ]  # fmt: skip
 SOURCES = sorted(Path(fpsolve.__file__).parent.glob("*.py"))
 
