@@ -11,7 +11,7 @@ import numpy as np
 
 from fpsolve import perturbation, validity
 from fpsolve.case import Case, Curve
-from fpsolve.eigen import POSITIVE, PrincipalPair
+from fpsolve.eigen import PrincipalPair
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.estimate import MESH_REMEDY, Estimate
 from fpsolve.exponent import ExponentSolver, MomentLyapunov
@@ -21,6 +21,8 @@ from fpsolve.noise import FloatArray, finite_moments
 from fpsolve.schema import Expectation
 from fpsolve.space import CylinderSpace
 
+UNRESOLVED = 0.1
+"""The share of an eigenfunction with the wrong sign from which on its picture misleads."""
 Advance = Callable[[], None]
 Found = TypeVar("Found")
 
@@ -175,7 +177,7 @@ def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
         "effect on Λ, but do not read its picture"
         for pair in pairs
         for name, defect in zip(("T", "T_adjoint"), pair.sign_defects, strict=True)
-        if defect > POSITIVE
+        if defect > UNRESOLVED
     ]
 
 

@@ -243,3 +243,23 @@ source = "wrong on purpose"
     case = write(tmp_path, TEXT + expect)
     comparisons = curves.compare(case, list(curves.solve(case)))
     assert [(item.varied["noise.D0"], item.met) for item in comparisons] == [(1.0, True), (0.1, False), (1.0, False)]
+
+
+def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
+    sets = [
+        "oscillator.epsilon=1.0",
+        "oscillator.restitution=1.0",
+        "oscillator.c1=0.0",
+        "noise.tau0=1.0",
+        "noise.r0=1.0",
+    ]
+    case = write(
+        tmp_path,
+        TEXT,
+        [*sets, "moments.p=[4.0]", "output.eigenfunctions=[4.0]", "moments.rtol=1e-5", 'vary={"noise.D0"=[0.5]}'],
+    )
+    (result,) = curves.solve(case)
+    pair = result.eigenpairs[0]
+    told = [text for text in result.warnings if "do not read its picture" in text]
+    assert len(told) == sum(defect > curves.UNRESOLVED for defect in pair.sign_defects) == 1
+    assert min(pair.sign_defects) < 1e-4
