@@ -14,7 +14,7 @@ from fpsolve.perturbation import reduced
 
 SAMPLES = 1001
 RIVAL = 0.6
-"""How fast, of Λ, paths that hold the noise elsewhere must grow to be looked at."""
+"""Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
 
 
 def rate_of_frozen_noise(oscillator: VibroImpactOscillator, noise: AnyNoise, p: float) -> tuple[FloatArray, FloatArray]:
@@ -62,5 +62,6 @@ def rival(oscillator: VibroImpactOscillator, noise: AnyNoise, pair: PrincipalPai
     mean = float(at @ density / density.sum())
     spread = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
     peaks = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
-    peaks = peaks[(np.abs(z[peaks] - mean) > 3 * spread + 2) & (rate[peaks] > RIVAL * abs(pair.value))]
+    enough = pair.value - (1 - RIVAL) * abs(pair.value)
+    peaks = peaks[(np.abs(z[peaks] - mean) > 3 * spread + 2) & (rate[peaks] > enough)]
     return float(z[peaks[np.argmax(rate[peaks])]]) if peaks.size else None
