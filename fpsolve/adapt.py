@@ -21,8 +21,8 @@ from fpsolve.eigen import PrincipalPair, principal_pair
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.estimate import Solution, Spread, Stage, noise_marginal, spread, truncation
 from fpsolve.frozen import growth_without_turning, likely_center, rival
-from fpsolve.mesh import CylinderMesh
-from fpsolve.noise import STRICT, AnyNoise, FloatArray, Positive, finite_moments
+from fpsolve.mesh import CylinderMesh, halved
+from fpsolve.noise import STRICT, AnyNoise, FloatArray, Positive, has_algebraic_tails
 from fpsolve.oscillator import VibroImpactOscillator
 
 MAX_PHI_DEGREE, MAX_XI_DEGREE = 14, 10
@@ -197,8 +197,7 @@ def _size(mesh: CylinderMesh) -> int:
 
 def _halved(mesh: CylinderMesh) -> CylinderMesh:
     """Twice the cells each way, where nothing is known yet."""
-    phi, z = (np.sort(np.concatenate([line, 0.5 * (line[1:] + line[:-1])])) for line in (mesh.phi_lines, mesh.z_lines))
-    return replace(mesh, phi_lines=phi, z_lines=z)
+    return replace(mesh, phi_lines=halved(mesh.phi_lines), z_lines=halved(mesh.z_lines))
 
 
 def _affordable(
@@ -218,11 +217,9 @@ def _initial(
 ) -> tuple[CylinderMesh, float]:
     """A first mesh and tilt for a tilted density around some z."""
     unit, reach = noise.standard_deviation, math.sqrt(2 * math.log(1e5 / rtol))
-    lower, upper = (center - reach, center + reach) if abs(center) > LEAST_TILT else (-reach, reach)
-    if abs(center) <= LEAST_TILT:
-        lower, upper = lower + min(center, 0), upper + max(center, 0)
+    lower, upper = (center, center) if abs(center) > LEAST_TILT else (min(center, 0.0), max(center, 0.0))
     end = noise.half_width / unit
-    lower, upper = max(lower, -end), min(upper, end)
+    lower, upper = max(lower - reach, -end), min(upper + reach, end)
     if not upper - lower > 0.1:  # the center lies beyond the support
         lower, upper = (end - 1, end) if center > 0 else (-end, 1 - end)
     turns_back = oscillator.epsilon * unit * max(-lower, upper) > 2 * oscillator.omega
@@ -231,7 +228,7 @@ def _initial(
     degree = round(3 - math.log10(rtol))
     mesh = CylinderMesh(
         phi,
-        _xi_lines(lower, upper, finite_moments(noise)[1] == 0),
+        _xi_lines(lower, upper, has_algebraic_tails(noise)),
         phi_degree=min(max(degree - 2, 4), MAX_PHI_DEGREE),
         xi_degree=min(max(degree - 4, 3), MAX_XI_DEGREE),
     )
@@ -279,7 +276,7 @@ def _moved(pair: PrincipalPair, tolerance: float) -> tuple[CylinderMesh, float] 
     """A mesh whose ends, and a tilt, follow the tilted density; None where they already do."""
     space, noise = pair.generator.space, pair.generator.noise
     mesh, end = space.mesh, noise.half_width / noise.standard_deviation
-    effects, is_algebraic = truncation(pair), finite_moments(noise)[1] == 0
+    effects, is_algebraic = truncation(pair), has_algebraic_tails(noise)
     z, density = noise_marginal(pair)
     ends = []
     for sign, line, effect in zip((-1, 1), mesh.z_lines[[0, -1]], effects, strict=True):

@@ -15,7 +15,7 @@ from fpsolve.eigen import PrincipalPair
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.estimate import MESH_REMEDY, Estimate
 from fpsolve.exponent import ExponentSolver, MomentLyapunov
-from fpsolve.function import FEW_MOMENTS, SEARCH_INTERVAL, solve_moments, stability_index
+from fpsolve.function import SEARCH_INTERVAL, solve_moments, stability_index
 from fpsolve.mesh import CylinderMesh
 from fpsolve.noise import FloatArray, finite_moments
 from fpsolve.schema import Expectation
@@ -100,11 +100,8 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
 
 
 def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: Advance) -> CurveResult:
-    solver = ExponentSolver(
-        curve.oscillator, curve.noise, mesh, rtol=case.rtol, budget=case.budget, uniform=case.p.size > FEW_MOMENTS
-    )
+    solver = ExponentSolver(curve.oscillator, curve.noise, mesh, rtol=case.rtol, budget=case.budget)
     moments, root, failures = _solve_moments(solver, case.p, advance)
-    solver = solver.relaxed()
     warnings = list(moments.warnings)
     index, obstacle = _attempt(lambda: stability_index(solver, guess=root))
     if index is None and not obstacle:
@@ -116,8 +113,9 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: A
     warnings += [f"no stability index: {obstacle}"] * bool(obstacle) + [no_exponent] * bool(no_exponent)
     warnings += [no_rate] * bool(no_rate)
     warnings += _imprecise({"λ": exponent, "δ_p": index, "Λ″(0)": rate}, case.rtol, mesh is None)
-    pairs = [_attempt(partial(solver.pair, float(p)))[0] for p in case.shown if np.any(moments.p == p)]
-    warnings += _unresolved([pair for pair in pairs if pair is not None])
+    attempts = (_attempt(partial(solver.pair, float(p)))[0] for p in case.shown if np.any(moments.p == p))
+    pairs = tuple(pair for pair in attempts if pair is not None)
+    warnings += _unresolved(pairs)
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -125,7 +123,7 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: A
         lyapunov_exponent=exponent,
         stability_index=index,
         variance_rate=rate,
-        eigenpairs=tuple(pair for pair in pairs if pair is not None),
+        eigenpairs=pairs,
         stationary=stationary,
         mesh=None if (space := solver.largest()) is None else _mesh(space),
         warnings=(*warnings, *(line for failure in failures for line in failure.splitlines())),

@@ -86,11 +86,12 @@ def principal_pair(
     """
     one = generator.space.constant()  # T₀ and T₀*/P_s of weak noise, Eqs. (26) and (28)
     pairs = [start] if isinstance(start, PrincipalPair) else start
-    searches: tuple[Callable[[], tuple[FloatArray, FloatArray]], ...] = (
+    searches: list[Callable[[], tuple[FloatArray, FloatArray]]] = [
         lambda: _carried(pairs, p, generator.space) if pairs else (one, one),
         lambda: _from_the_right(generator, p),
-        lambda: (one, one) if guess is None else _most_positive(generator, p, guess),
-    )
+    ]
+    if guess is not None:
+        searches.append(lambda: _most_positive(generator, p, guess))
     found: list[PrincipalPair] = []
     for search in searches:
         try:

@@ -161,10 +161,9 @@ def spread(pair: PrincipalPair, axis: int) -> Spread:
     degrees = np.arange(line.degree - 1.0, max(line.degree - 5, 0), -1)
     effects = []
     for degree in degrees:
-        dropped = (line.modes > degree).astype(float)
-        mask = np.broadcast_to(dropped[:, None] if axis == 0 else dropped, shape).ravel()
-        products = ((pair.left * mask) * (operator @ (pair.right * mask))).reshape(shape).sum(axis=1 - axis)
         inside = line.modes > degree
+        mask = np.broadcast_to(inside[:, None] if axis == 0 else inside, shape).ravel()
+        products = ((pair.left * mask) * (operator @ (pair.right * mask))).reshape(shape).sum(axis=1 - axis)
         effects.append(np.bincount(line.cells[inside], np.abs(products[inside]), minlength=line.lines.size - 1))
     return Spread(degrees, np.stack(effects, axis=-1) / abs(norm))
 

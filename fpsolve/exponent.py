@@ -19,7 +19,7 @@ from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.estimate import MESH_REMEDY, Estimate, Solution, Stage, checked
 from fpsolve.frozen import rival
 from fpsolve.mesh import CylinderMesh
-from fpsolve.noise import AnyNoise, FloatArray, check_existence, finite_moments
+from fpsolve.noise import AnyNoise, FloatArray, check_existence, has_algebraic_tails
 from fpsolve.oscillator import VibroImpactOscillator
 from fpsolve.space import CylinderSpace
 
@@ -91,7 +91,7 @@ class ExponentSolver:
         if not (math.isfinite(self.rtol) and self.rtol > 0):
             raise ValueError(f"rtol is {self.rtol!r}; it must be a positive number such as 1e-8")
         if self.mesh is not None:
-            widening = 1.15 if math.isinf(finite_moments(self.noise)[1]) else 2.0  # 2 sees algebraic tails
+            widening = 2.0 if has_algebraic_tails(self.noise) else 1.15
             self._stages.append(Stage.on(self.oscillator, self.noise, self.mesh, widening=widening))
 
     def pair(self, p: float) -> PrincipalPair:
@@ -138,10 +138,10 @@ class ExponentSolver:
             return self.rtol * abs(p) * perturbation.lyapunov_scale(self.oscillator, self.noise)
         return self.rtol * max(abs(value), self.scale(p))
 
-    def relaxed(self) -> ExponentSolver:
-        """The same solver without `uniform`, and with all that is known already."""
-        other = replace(self, uniform=False)
-        for name in ("_known", "_failed", "_stages"):
+    def uniformly(self) -> ExponentSolver:
+        """The same solver, but `uniform`; what either solves is known to both."""
+        other = replace(self, uniform=True)
+        for name in ("_known", "_stages"):
             object.__setattr__(other, name, getattr(self, name))
         return other
 
@@ -231,7 +231,8 @@ class ExponentSolver:
                     and rival(self.oscillator, self.noise, tried[1].pair) is None
                 ):
                     return tried
-        q = p if abs(p) >= SMALL_P else math.copysign(SMALL_P, p if p else sum(self._directions()))
+        side = p or (-1.0 if has_algebraic_tails(self.noise) else 1.0)  # where Λ is finite
+        q = p if abs(p) >= SMALL_P else math.copysign(SMALL_P, side)
         for rtol in self.rtol * 10.0 ** -np.arange(4):
             share = rtol / self.rtol
             new = resolve(
@@ -249,10 +250,6 @@ class ExponentSolver:
             if self._suffices(tried[1]):
                 return tried
         raise NotConverged(f"Λ({p:g}) did not converge on the meshes for p = {q:g}; {REMEDY}")
-
-    def _directions(self) -> tuple[float, float]:
-        low, high = finite_moments(self.noise)
-        return (-1.0 if low < 0 else 0.0, 2.0 if high > 0 else 0.0)
 
     def _suffices(self, solution: Solution) -> bool:
         """Whether Λ(p), and at p = 0 its derivative, meets rtol; for tiny p apart from rounding."""

@@ -41,7 +41,7 @@ class MomentLyapunovFunction:
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a mesh may cost for one p; None for the default one.
         most: the largest number of nodes.
-        solver: a `uniform` one of the same problem, to go on with; it decides the mesh, rtol and the budget.
+        solver: one of the same problem, to go on with; it decides the mesh, rtol and the budget.
         advance: called after each solve.
 
     Attributes:
@@ -75,9 +75,8 @@ class MomentLyapunovFunction:
         if not low < high:
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
-        self.solver = solver or ExponentSolver(
-            oscillator, noise, mesh, rtol=rtol, budget=budget or Budget(), uniform=True
-        )
+        given = solver or ExponentSolver(oscillator, noise, mesh, rtol=rtol, budget=budget or Budget())
+        self.solver = given.uniformly()
         self.interpolation_error = math.inf
         for count in LEVELS:
             last = self.interpolation_error
@@ -161,8 +160,7 @@ class MomentLyapunovFunction:
         if not math.isfinite(last) or self.is_converged:
             return 2 * count - 1
         rate = math.log(max(last / self.interpolation_error, 1.1)) / (count // 2)
-        allowed = 0.4 * self.solver.rtol * perturbation.lyapunov_scale(self.solver.oscillator, self.solver.noise)
-        return max(2 * count - 1, count + math.log(self.interpolation_error / allowed) / rate)
+        return max(2 * count - 1, count + math.log(self.interpolation_error / self._allowed) / rate)
 
     def _interpolate(self, count: int, advance: Callable[[], None]) -> None:
         """Solve at so many Chebyshev points, the outermost first, and interpolate."""
@@ -187,9 +185,13 @@ class MomentLyapunovFunction:
     @property
     def is_converged(self) -> bool:
         """Whether more nodes would add nothing that rtol, or the errors of the nodes, leave visible."""
-        scale = perturbation.lyapunov_scale(self.solver.oscillator, self.solver.noise)
         at_nodes = np.max(self._errors) if self.solver.mesh is None else np.min(self._errors)
-        return self.interpolation_error <= max(0.4 * self.solver.rtol * scale, float(at_nodes))
+        return self.interpolation_error <= max(self._allowed, float(at_nodes))
+
+    @property
+    def _allowed(self) -> float:
+        """The share of the tolerance of Λ(p)/p that is left to the interpolation."""
+        return 0.4 * self.solver.rtol * perturbation.lyapunov_scale(self.solver.oscillator, self.solver.noise)
 
 
 def _check_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> None:
@@ -268,10 +270,7 @@ def moment_lyapunov(
         NoSuchExponent: Λ(p) is infinite.
         NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
     """
-    solver = ExponentSolver(
-        oscillator, noise, mesh, rtol=rtol, budget=budget or Budget(), uniform=np.size(p) > FEW_MOMENTS
-    )
-    return solve_moments(solver, p)[0]
+    return solve_moments(ExponentSolver(oscillator, noise, mesh, rtol=rtol, budget=budget or Budget()), p)[0]
 
 
 def solve_moments(
@@ -294,7 +293,7 @@ def solve_moments(
                 return function.moments(points), function.root()
         except NotConverged:
             pass  # then each p for itself
-    result = solver.relaxed().moments(points, advance=advance)
+    result = solver.moments(points, advance=advance)
     try:
         _check_convexity(result.pairs, result.error_estimate)
     except NotConverged as failure:

@@ -114,7 +114,12 @@ class CylinderMesh:
 def _raised(lines: FloatArray, degree: int, by: int) -> tuple[FloatArray, int]:
     if degree + by <= MAX_DEGREE:
         return lines, degree + by
-    return np.sort(np.concatenate([lines, 0.5 * (lines[:-1] + lines[1:])])), degree
+    return halved(lines), degree
+
+
+def halved(lines: FloatArray) -> FloatArray:
+    """The lines, and one in the middle between any two."""
+    return np.sort(np.concatenate([lines, 0.5 * (lines[:-1] + lines[1:])]))
 
 
 def make_mesh(

@@ -193,9 +193,14 @@ class NonGaussianNoise:
 AnyNoise = OrnsteinUhlenbeck | NonGaussianNoise
 
 
+def has_algebraic_tails(noise: AnyNoise) -> bool:
+    """Whether P_s falls like a power of ξ only: r₀ > 1."""
+    return isinstance(noise, NonGaussianNoise) and noise.r0 > 1
+
+
 def finite_moments(noise: AnyNoise) -> tuple[float, float]:
     """The p for which Λ(p) is finite, as a closed interval: [−1, 0] for the algebraic tails of r₀ > 1, else all."""
-    if isinstance(noise, NonGaussianNoise) and noise.r0 > 1:
+    if has_algebraic_tails(noise):
         return -1.0, 0.0
     return -math.inf, math.inf
 

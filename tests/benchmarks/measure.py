@@ -87,7 +87,7 @@ def measure(method: str, case: str, size: Any = None, timeout: float | None = No
 
 def fpsolve_curve(case: Case) -> tuple[FloatArray, int]:
     """Λ at the p of the case by fpsolve, and the unknowns of its largest mesh but for error estimates."""
-    solver = ExponentSolver(case.oscillator, case.noise, rtol=case.rtol, uniform=True)
+    solver = ExponentSolver(case.oscillator, case.noise, rtol=case.rtol)
     result, _ = solve_moments(solver, case.p)
     return result.value, solver.largest().size
 
