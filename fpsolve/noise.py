@@ -193,6 +193,11 @@ class NonGaussianNoise:
 AnyNoise = OrnsteinUhlenbeck | NonGaussianNoise
 
 
+def relaxation_time(noise: AnyNoise) -> float:
+    """2⟨ξ²⟩/σ², the time in which ξ forgets its value: 1/α₀ for the Ornstein-Uhlenbeck process."""
+    return 2 * (noise.standard_deviation / noise.diffusion) ** 2
+
+
 def has_algebraic_tails(noise: AnyNoise) -> bool:
     """Whether P_s falls like a power of ξ only: r₀ > 1."""
     return isinstance(noise, NonGaussianNoise) and noise.r0 > 1

@@ -1,0 +1,307 @@
+"""Moment Lyapunov exponents by Monte Carlo simulation of the system (3), with errors from independent batches.
+
+All estimates start in the stationary law of phase and noise. The linear system is simulated, c₂ = c₃ = 0.
+
+Direct (W.-C. Xie, J. Appl. Mech. 72, 2005): M(t) = E‖x(t)‖^p over paths that are normalised again and again, and
+Λ(p) = (ln M(2t) − ln M(t))/t. One set of paths serves all p and all t = 2ʲ × transient; each p takes the longest t
+after which many paths still carry the mean, and λ is the time average of the growth.
+
+Population dynamics (P. Del Moral, Feynman-Kac Formulae, 2004): for each p the paths of a batch carry weights ‖x‖^p;
+when these differ too much, paths are drawn anew in proportion to them. The product Z of the mean weights has
+E Z = E‖x‖^p, and its logarithm is normal for many paths (J. Bérard, P. Del Moral, A. Doucet, Electron. J. Probab. 19,
+2014), so that Λ(p) = (E ln Z + ½ Var ln Z)/time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+from scipy.special import logsumexp
+
+from fpsolve.batches import BATCHES, PlainBatch, Plan, Population, advance_all, standard_error
+from fpsolve.errors import NotConverged
+from fpsolve.noise import AnyNoise, FloatArray, check_existence, relaxation_time
+from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.simulation import largest_step, motion, noise_step
+
+Estimator = Literal["direct", "population"]
+PATHS, TRANSIENTS = 32_768, 64
+"""Defaults: how many paths, and how many transients long they are."""
+FEW = 200
+"""With fewer effective paths there is no estimate."""
+DRIFT = 4.0
+"""Standard errors by which two halves of the same estimate may differ."""
+_KEPT = 0.3
+"""The share of effective paths that the window of the direct estimator must leave."""
+_LEVELS = 12
+_SETTLING = 9
+"""Slices in which a population finds its law."""
+
+
+@dataclass(frozen=True)
+class MomentEstimate:
+    """Λ(p) by simulation.
+
+    Attributes:
+        p: order of the moment.
+        value, standard_error: Λ(p) and the standard deviation of this estimate; None where too few paths carry it.
+        estimator: "direct" or "population".
+        effective_paths: how many paths carry the mean. Direct: (Σw)²/Σw² over all windows with the weights w = ‖x‖^p
+            at their ends. Population: the same for the paths of a transient ago with the weights of their descendants.
+    """
+
+    p: float
+    value: float | None
+    standard_error: float | None
+    estimator: Estimator
+    effective_paths: float
+
+
+@dataclass(frozen=True)
+class MonteCarlo:
+    """What a simulation of one parameter set found.
+
+    Attributes:
+        estimates: Λ(p), in the order of p.
+        value, standard_error: the largest Lyapunov exponent λ.
+        paths, time, step, seed: how many paths, their length after the transient, the time step, the seed.
+        impacts: how many bounces there were.
+        warnings: what limits these numbers, each with its criterion.
+        interrupted: whether the simulation was stopped early.
+    """
+
+    estimates: tuple[MomentEstimate, ...]
+    value: float
+    standard_error: float
+    paths: int
+    time: float
+    step: float
+    seed: int
+    impacts: int
+    warnings: tuple[str, ...]
+    interrupted: bool = False
+
+
+def transient(oscillator: VibroImpactOscillator, noise: AnyNoise) -> float:
+    """The time after which ln E‖x‖^p grows like Λ(p) t: whole half-turns π/ω, at least two and eight correlation times.
+
+    In whole half-turns the oscillation cancels that the start from the stationary law leaves in weak noise.
+    """
+    half_turn = math.pi / oscillator.omega
+    return half_turn * max(2, math.ceil(8 * relaxation_time(noise) / half_turn))
+
+
+def default_step(oscillator: VibroImpactOscillator, noise: AnyNoise) -> float:
+    """Half the largest step, or less, so that a half-turn π/ω is a whole number of steps."""
+    half_turn = math.pi / oscillator.omega
+    return half_turn / math.ceil(half_turn / (0.5 * largest_step(oscillator, noise)[0]))
+
+
+def simulate(
+    oscillator: VibroImpactOscillator,
+    noise: AnyNoise,
+    p: Sequence[float],
+    *,
+    estimator: Estimator = "direct",
+    paths: int = PATHS,
+    time: float | None = None,
+    step: float | None = None,
+    seed: int = 0,
+    tick: Callable[[], None] = lambda: None,
+) -> MonteCarlo:
+    """Simulate paths of the linear system and estimate λ and Λ(p) from them.
+
+    The result depends on the seed only, not on the number of processors. An interrupt (Ctrl-C) ends the simulation
+    early and gives the estimates of what is done, marked as `interrupted`.
+
+    Args:
+        oscillator, noise: the parameter set; c₂ and c₃ are not used.
+        p: orders of the moments.
+        estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
+        paths: how many; a multiple of 32 is used.
+        time: length of the paths after the transient; 64 transients if None. Whole transients are used.
+        step: time step; None chooses one.
+        seed: ≥ 0.
+        tick: called 100 times in all, as progress.
+
+    Raises:
+        ValueError: an argument is out of its range, or the step is too large; the text names the largest good one.
+        NoSuchExponent: some Λ(p) is infinite.
+    """
+    check_settings(oscillator, noise, estimator=estimator, paths=paths, time=time, step=step, seed=seed)
+    for order in p:
+        check_existence(noise, order)
+    plan, wanted = _plan(oscillator, noise, p, estimator, paths, time, step)
+    plain, populations = _start(plan, estimator, seed)
+    batches = [*plain, *populations]
+    interrupted = advance_all(batches, wanted + plan.settling, plan.slice_seconds, tick)
+    slices = plain[0].slices
+    if slices < 2:
+        raise KeyboardInterrupt
+    growth = np.array([batch.growth() for batch in plain]) / (slices * plan.length)
+    if not np.all(np.isfinite(growth)):
+        raise NotConverged("the simulation overflowed: some ξ is too large for this step; use a smaller step")
+    if estimator == "direct":
+        estimates, warnings = direct_estimates(plan, plain)
+    else:
+        estimates, warnings = population_estimates(plan, populations)
+    if interrupted:
+        warnings.append(f"stopped early, after {slices / wanted:.0%} of the time")
+    return MonteCarlo(
+        estimates=tuple(estimates),
+        value=float(growth.mean()),
+        standard_error=standard_error(growth),
+        paths=plan.paths * BATCHES,
+        time=slices * plan.length,
+        step=plan.step,
+        seed=seed,
+        impacts=sum(batch.impacts for batch in batches),
+        warnings=tuple(warnings),
+        interrupted=interrupted,
+    )
+
+
+def _plan(
+    oscillator: VibroImpactOscillator,
+    noise: AnyNoise,
+    p: Sequence[float],
+    estimator: Estimator,
+    paths: int,
+    time: float | None,
+    step: float | None,
+) -> tuple[Plan, int]:
+    """What the batches need, and how many slices they shall do."""
+    h = default_step(oscillator, noise) if step is None else step
+    settling = transient(oscillator, noise)
+    wanted = TRANSIENTS if time is None else max(2, round(time / settling))
+    plan = Plan(
+        noise=noise,
+        motion=motion(replace(oscillator, c2=0.0, c3=0.0)),
+        noise_step=noise_step(noise, h),
+        step=h,
+        p=np.array(p, dtype=float),
+        paths=math.ceil(paths / BATCHES),
+        slice_steps=round(settling / h),
+        settling=1 if estimator == "direct" else _SETTLING,
+        levels=min(_LEVELS, wanted.bit_length()) if estimator == "direct" else 0,
+    )
+    return plan, wanted
+
+
+def _start(plan: Plan, estimator: Estimator, seed: int) -> tuple[list[PlainBatch], list[Population]]:
+    """The batches, each with a stream of random numbers of its own."""
+    seeds = [each.spawn(1 + plan.p.size) for each in np.random.SeedSequence(seed).spawn(BATCHES)]
+    orders = plan.p if estimator == "population" else ()
+    plain = [PlainBatch(plan, each[0]) for each in seeds]
+    return plain, [Population(plan, each[1 + k], float(p)) for each in seeds for k, p in enumerate(orders)]
+
+
+def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[MomentEstimate], list[str]]:
+    """Λ(p) by the slope of ln M between t and 2t; its error by the jackknife over batches; and warnings."""
+    windows = np.array([batches[0].slices >> j for j in range(plan.levels)])
+    levels = np.count_nonzero(windows)
+    log_sums = np.array([batch.log_sums[:levels] for batch in batches])
+    total, squares = logsumexp(log_sums, axis=0), logsumexp([batch.log_squares[:levels] for batch in batches], axis=0)
+    effective = np.exp(2 * total - squares)
+    share = effective / (windows[:levels, None] * plan.paths * len(batches))
+    times = plan.length * 2.0 ** np.arange(levels - 1)[:, None]
+    # Leaving out a batch changes the number of windows in all levels alike, so that slopes need no means.
+    slopes = np.diff(total - np.log(windows[:levels, None]), axis=0) / times
+    log_rest = total + np.log(-np.expm1(np.minimum(log_sums - total, -1e-15)))
+    rests = np.diff(log_rest - np.log(windows[:levels, None]), axis=1) / times
+    estimates: list[MomentEstimate] = []
+    warnings: list[str] = []
+    for k, p in enumerate(plan.p):
+        usable = np.flatnonzero(share[1:, k] >= _KEPT)
+        j = int(usable[-1]) if usable.size else 0
+        value, error = _jackknife(slopes[j, k], rests[:, j, k])
+        estimates.append(_estimate(p, value, error, "direct", float(effective[j + 1, k]), warnings))
+        if j > 0:
+            change, uncertainty = _jackknife(slopes[j, k] - slopes[j - 1, k], rests[:, j, k] - rests[:, j - 1, k])
+            _warn_of_drift(p, change, uncertainty, "a longer window", warnings)
+    return estimates, warnings
+
+
+def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple[list[MomentEstimate], list[str]]:
+    """Λ(p) by the mean growth of ln Z, corrected by half its variance; its error by batches; and warnings."""
+    shape = -1, plan.p.size
+    tallies = np.array([each.tallies for each in populations]).reshape(*shape, 8)
+    expected = np.array([each.expected for each in populations]).reshape(shape)
+    count, excess, squares, products, moments, effective, first, last = np.moveaxis(tallies, 2, 0)
+    mean = excess / count
+    variance = squares / count - mean**2
+    covariance = (products - mean * (2 * excess - first - last)) / (count - 1) + mean**2
+    rate = np.maximum((variance + 2 * covariance).mean(axis=0), 0) / plan.length
+    growth = (expected + mean) / plan.length
+    trends = moments - (count - 1) / 2 * excess
+    estimates: list[MomentEstimate] = []
+    warnings: list[str] = []
+    for k, p in enumerate(plan.p):
+        value, error = float(growth[:, k].mean() + rate[k] / 2), standard_error(growth[:, k])
+        carrying = float(effective[:, k].sum() / count[0, k])
+        estimates.append(_estimate(p, value, error, "population", carrying, warnings))
+        _warn_of_drift(p, float(trends[:, k].mean()), standard_error(trends[:, k]), "more time", warnings)
+    return estimates, warnings
+
+
+def _estimate(
+    p: float, value: float, error: float, estimator: Estimator, effective: float, warnings: list[str]
+) -> MomentEstimate:
+    """An estimate, or none and a warning where too few paths carry the mean."""
+    if effective >= FEW:
+        return MomentEstimate(float(p), value, error, estimator, effective)
+    remedy = 'use estimator = "population"' if estimator == "direct" else "use more paths"
+    warnings.append(
+        f"no estimate of Λ({p:g}): only {effective:.3g} effective paths carry the mean, fewer than {FEW}; {remedy}"
+    )
+    return MomentEstimate(float(p), None, None, estimator, effective)
+
+
+def _warn_of_drift(p: float, change: float, error: float, remedy: str, warnings: list[str]) -> None:
+    if abs(change) > DRIFT * error:
+        warnings.append(
+            f"Λ({p:g}) still drifts: over the simulation it changes by {abs(change) / error:.1f} standard errors, more "
+            f"than {DRIFT:g}, which its standard error does not cover; use {remedy}"
+        )
+
+
+def _jackknife(value: float, rests: FloatArray) -> tuple[float, float]:
+    """A statistic of all batches, freed of its bias of first order, and its standard error, from those without one."""
+    count, mean = rests.size, rests.mean()
+    error = math.sqrt((count - 1) / count * np.sum((rests - mean) ** 2))
+    return float(count * value - (count - 1) * mean), float(error)
+
+
+def check_settings(
+    oscillator: VibroImpactOscillator,
+    noise: AnyNoise,
+    *,
+    estimator: str = "direct",
+    paths: int = PATHS,
+    time: float | None = None,
+    step: float | None = None,
+    seed: int = 0,
+) -> None:
+    """Refuse a simulation that would not be right for this parameter set.
+
+    Raises:
+        ValueError: with the argument, its value, its range and the remedy.
+    """
+    if estimator not in get_args(Estimator):
+        raise ValueError(f'estimator = "{estimator}" must be one of {", ".join(get_args(Estimator))}')
+    if paths < BATCHES or seed < 0:
+        raise ValueError(f"paths = {paths} must be at least {BATCHES}, seed = {seed} at least 0")
+    largest, reason = largest_step(oscillator, noise)
+    if step is not None and not 0 < step <= largest * (1 + 1e-12):
+        raise ValueError(
+            f"step = {step:g} is too large for {reason}; must be > 0 and <= {largest:.4g}; leave it out, or reduce it"
+        )
+    shortest = 2 * transient(oscillator, noise)
+    if time is not None and not shortest * (1 - 1e-12) <= time < math.inf:
+        raise ValueError(
+            f"time = {time:g} must be >= {shortest:.4g}, two transients; growth is measured after one; increase it"
+        )

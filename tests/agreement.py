@@ -1,0 +1,76 @@
+"""Simulation against finite elements over weak and strong noise: `python -m tests.agreement` prints the table.
+
+90 combinations: ε = 0.1, 0.5, 1; r = 0.6, 0.8, 1; p = −1, ½, 1, 2, 4; the exact noise with r₀ = 0.9 and its reduction;
+each by both estimators. The other parameters are those of Fig. 1 with D₀ = 0.5; the law of impact is that of Eq. (3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count, product
+
+from rich.console import Console
+from rich.table import Table
+
+from fpsolve.function import moment_lyapunov
+from fpsolve.montecarlo import MomentEstimate, simulate
+from fpsolve.noise import NonGaussianNoise
+from fpsolve.oscillator import VibroImpactOscillator
+
+ORDERS = (-1.0, 0.5, 1.0, 2.0, 4.0)
+NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9)
+NOISES = {"reduced": NOISE.ou_reduction(), "exact": NOISE}
+PATHS = 8192
+
+
+@dataclass(frozen=True)
+class Row:
+    """One p of one parameter set: Λ(p) by finite elements and by simulation."""
+
+    epsilon: float
+    restitution: float
+    noise: str
+    p: float
+    finite_elements: float
+    simulated: MomentEstimate
+
+    @property
+    def deviation(self) -> float:
+        """In standard errors; NaN where the estimator says that it has no estimate."""
+        found = self.simulated
+        if found.value is None or found.standard_error is None:
+            return float("nan")
+        return (found.value - self.finite_elements) / found.standard_error
+
+
+def rows(paths: int = PATHS, first_seed: int = 0) -> Iterator[Row]:
+    """All combinations by both estimators, each simulation with a seed of its own."""
+    seeds = count(first_seed)
+    for epsilon, restitution, (name, noise) in product((0.1, 0.5, 1.0), (0.6, 0.8, 1.0), NOISES.items()):
+        oscillator = VibroImpactOscillator(
+            omega=1.0, restitution=restitution, c1=0.1, epsilon=epsilon, impact="restitution"
+        )
+        exact = moment_lyapunov(oscillator, noise, ORDERS, rtol=1e-7).value
+        for estimator in ("direct", "population"):
+            found = simulate(oscillator, noise, ORDERS, estimator=estimator, paths=paths, seed=next(seeds))
+            for p, value, estimate in zip(ORDERS, exact, found.estimates, strict=True):
+                yield Row(epsilon, restitution, name, p, float(value), estimate)
+
+
+def main() -> None:
+    table = Table("ε", "r", "noise", "p", "estimator", "finite elements", "simulation", "± s.e.", "deviation", "paths")
+    for row in rows():
+        found = row.simulated
+        numbers = ("none", "", "") if found.value is None else (
+            f"{found.value:.6g}", f"{found.standard_error:.1e}", f"{row.deviation:+.1f}"
+        )  # fmt: skip
+        table.add_row(
+            f"{row.epsilon:g}", f"{row.restitution:g}", row.noise, f"{row.p:g}", found.estimator,
+            f"{row.finite_elements:.7g}", *numbers, f"{found.effective_paths:.3g}",
+        )  # fmt: skip
+    Console(width=120).print(table)
+
+
+if __name__ == "__main__":
+    main()
