@@ -15,8 +15,6 @@ from numpy.random import SeedSequence, default_rng
 from fpsolve.noise import AnyNoise, FloatArray, has_algebraic_tails
 from fpsolve.simulation import Motion, NoiseStep, advance, compiled, noise_step, stationary_noise
 
-BATCHES = 32
-"""Independent sets of paths, from whose differences the errors are read."""
 TICKS = 100
 """How many times `advance_all` reports progress."""
 _PORTION_SECONDS, _STEP_SECONDS = 0.1, 2e-8

@@ -20,11 +20,13 @@ from fpsolve.mesh import CylinderMesh
 from fpsolve.messages import Refusal, explain, nearest, refuse, shown
 from fpsolve.noise import AnyNoise, FloatArray, NonGaussianNoise, check_existence
 from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.sampling import obstacles
 from fpsolve.schema import (
     Expectation,
     FigureSection,
     MeshSection,
     Moments,
+    MonteCarloSection,
     NoiseSection,
     OutputSection,
     Section,
@@ -76,6 +78,7 @@ class Case(Section):
     budget: Annotated[Budget, BeforeValidator(_budget)] = Field(default_factory=Budget)
     vary: Vary = Field(default_factory=dict)
     mesh: MeshSection = MeshSection()
+    monte_carlo: MonteCarloSection = MonteCarloSection()
     figure: FigureSection = FigureSection()
     output: OutputSection = OutputSection()
     expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
@@ -105,8 +108,14 @@ class Case(Section):
         if self.output.eigenfunctions is not None:
             wanted = np.array(self.output.eigenfunctions)
             return self.p[[int(np.argmin(np.abs(self.p - each))) for each in wanted]] if wanted.size else wanted
-        count = self.p.size
-        return np.sort(self.p)[np.unique(np.linspace(0, count - 1, min(count, 9)).round().astype(int))]
+        return _spread(self.p)
+
+    @property
+    def simulated(self) -> FloatArray:
+        """The p that are simulated: those of [monte_carlo], or else all, or of populations at most nine."""
+        if self.monte_carlo.p is not None:
+            return np.array(self.monte_carlo.p)
+        return self.p if self.monte_carlo.estimator == "direct" else _spread(self.p)
 
     @property
     def is_exact(self) -> bool:
@@ -156,6 +165,13 @@ class Case(Section):
             text = f"got {shown(mesh.file)}; {error}" if mesh.file else str(error)
             refuse([(("file",) if mesh.file else (), mesh.file, text)])
         return mesh
+
+    @field_validator("monte_carlo")
+    @classmethod
+    def _can_be_simulated(cls, section: MonteCarloSection, info: ValidationInfo) -> MonteCarloSection:
+        if {"oscillator", "noise", "vary"} <= info.data.keys():
+            refuse(_simulation_refusals(info.data, section))
+        return section
 
     @field_validator("figure")
     @classmethod
@@ -281,6 +297,28 @@ def _infinite(noise: AnyNoise, p: FloatArray) -> str:
     except NoSuchExponent as error:
         return str(error)
     return ""
+
+
+def _simulation_refusals(valid: Mapping[str, Any], section: MonteCarloSection) -> Iterator[Refusal]:
+    """The first parameter set for which the time, the step or a p of the simulation is not right."""
+    for varied in _combinations(valid["vary"]):
+        curve = _curve(valid["oscillator"], valid["noise"], varied)
+        setting = ", ".join(f"{key} = {value}" for key, value in varied.items())
+        prefix = f"with {setting}: " if varied else ""
+        faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
+        for name, text in faults.items():
+            if getattr(section, name) is not None:
+                yield (name,), getattr(section, name), prefix + text
+        infinite = _infinite(curve.noise, np.array(section.p)) if section.p else ""
+        if infinite:
+            yield ("p",), section.p, prefix + infinite
+        if faults or infinite:
+            return
+
+
+def _spread(p: FloatArray) -> FloatArray:
+    """At most nine of the p, evenly."""
+    return np.sort(p)[np.unique(np.linspace(0, p.size - 1, min(p.size, 9)).round().astype(int))]
 
 
 _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"

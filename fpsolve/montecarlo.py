@@ -15,24 +15,32 @@ E Z = E‖x‖^p, and its logarithm is normal for many paths (J. Bérard, P. Del
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 from scipy.special import logsumexp
 
-from fpsolve.batches import BATCHES, PlainBatch, Plan, Population, advance_all, standard_error
+from fpsolve.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.errors import NotConverged
-from fpsolve.noise import AnyNoise, FloatArray, check_existence, relaxation_time
+from fpsolve.noise import AnyNoise, FloatArray, check_existence
 from fpsolve.oscillator import VibroImpactOscillator
-from fpsolve.simulation import largest_step, motion, noise_step
+from fpsolve.sampling import (
+    BATCHES,
+    MAX_PATHS,
+    PATHS,
+    TRANSIENTS,
+    Estimator,
+    default_step,
+    obstacles,
+    transient,
+)
+from fpsolve.simulation import motion, noise_step
 
-Estimator = Literal["direct", "population"]
-PATHS, TRANSIENTS = 32_768, 64
-"""Defaults: how many paths, and how many transients long they are."""
-FEW = 200
-"""With fewer effective paths there is no estimate."""
+FEW: Mapping[Estimator, int] = {"direct": 1000, "population": 200}
+"""With fewer effective paths there is no estimate. Direct runs that miss the rare large ‖x‖^p have both more effective
+paths and a smaller mean, so that estimates near a lower bound would be too small."""
 DRIFT = 4.0
 """Standard errors by which two halves of the same estimate may differ."""
 _KEPT = 0.3
@@ -86,21 +94,6 @@ class MonteCarlo:
     interrupted: bool = False
 
 
-def transient(oscillator: VibroImpactOscillator, noise: AnyNoise) -> float:
-    """The time after which ln E‖x‖^p grows like Λ(p) t: whole half-turns π/ω, at least two and eight correlation times.
-
-    In whole half-turns the oscillation cancels that the start from the stationary law leaves in weak noise.
-    """
-    half_turn = math.pi / oscillator.omega
-    return half_turn * max(2, math.ceil(8 * relaxation_time(noise) / half_turn))
-
-
-def default_step(oscillator: VibroImpactOscillator, noise: AnyNoise) -> float:
-    """Half the largest step, or less, so that a half-turn π/ω is a whole number of steps."""
-    half_turn = math.pi / oscillator.omega
-    return half_turn / math.ceil(half_turn / (0.5 * largest_step(oscillator, noise)[0]))
-
-
 def simulate(
     oscillator: VibroImpactOscillator,
     noise: AnyNoise,
@@ -132,7 +125,13 @@ def simulate(
         ValueError: an argument is out of its range, or the step is too large; the text names the largest good one.
         NoSuchExponent: some Λ(p) is infinite.
     """
-    check_settings(oscillator, noise, estimator=estimator, paths=paths, time=time, step=step, seed=seed)
+    for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
+        raise ValueError(f"{name}: {sentence}")
+    if estimator not in get_args(Estimator) or not BATCHES <= paths <= MAX_PATHS or seed < 0:
+        raise ValueError(
+            f"got estimator = {estimator!r}, paths = {paths}, seed = {seed}; must be one of "
+            f"{', '.join(get_args(Estimator))}, {BATCHES} to {MAX_PATHS}, and >= 0"
+        )
     for order in p:
         check_existence(noise, order)
     plan, wanted = _plan(oscillator, noise, p, estimator, paths, time, step)
@@ -252,17 +251,16 @@ def _estimate(
     p: float, value: float, error: float, estimator: Estimator, effective: float, warnings: list[str]
 ) -> MomentEstimate:
     """An estimate, or none and a warning where too few paths carry the mean."""
-    if effective >= FEW:
+    if effective >= FEW[estimator]:
         return MomentEstimate(float(p), value, error, estimator, effective)
     remedy = 'use estimator = "population"' if estimator == "direct" else "use more paths"
-    warnings.append(
-        f"no estimate of Λ({p:g}): only {effective:.3g} effective paths carry the mean, fewer than {FEW}; {remedy}"
-    )
+    criterion = f"only {effective:.3g} effective paths carry the mean, fewer than {FEW[estimator]}"
+    warnings.append(f"no estimate of Λ({p:g}): {criterion}; {remedy}")
     return MomentEstimate(float(p), None, None, estimator, effective)
 
 
 def _warn_of_drift(p: float, change: float, error: float, remedy: str, warnings: list[str]) -> None:
-    if abs(change) > DRIFT * error:
+    if abs(change) > DRIFT * error > 0:
         warnings.append(
             f"Λ({p:g}) still drifts: over the simulation it changes by {abs(change) / error:.1f} standard errors, more "
             f"than {DRIFT:g}, which its standard error does not cover; use {remedy}"
@@ -274,34 +272,3 @@ def _jackknife(value: float, rests: FloatArray) -> tuple[float, float]:
     count, mean = rests.size, rests.mean()
     error = math.sqrt((count - 1) / count * np.sum((rests - mean) ** 2))
     return float(count * value - (count - 1) * mean), float(error)
-
-
-def check_settings(
-    oscillator: VibroImpactOscillator,
-    noise: AnyNoise,
-    *,
-    estimator: str = "direct",
-    paths: int = PATHS,
-    time: float | None = None,
-    step: float | None = None,
-    seed: int = 0,
-) -> None:
-    """Refuse a simulation that would not be right for this parameter set.
-
-    Raises:
-        ValueError: with the argument, its value, its range and the remedy.
-    """
-    if estimator not in get_args(Estimator):
-        raise ValueError(f'estimator = "{estimator}" must be one of {", ".join(get_args(Estimator))}')
-    if paths < BATCHES or seed < 0:
-        raise ValueError(f"paths = {paths} must be at least {BATCHES}, seed = {seed} at least 0")
-    largest, reason = largest_step(oscillator, noise)
-    if step is not None and not 0 < step <= largest * (1 + 1e-12):
-        raise ValueError(
-            f"step = {step:g} is too large for {reason}; must be > 0 and <= {largest:.4g}; leave it out, or reduce it"
-        )
-    shortest = 2 * transient(oscillator, noise)
-    if time is not None and not shortest * (1 - 1e-12) <= time < math.inf:
-        raise ValueError(
-            f"time = {time:g} must be >= {shortest:.4g}, two transients; growth is measured after one; increase it"
-        )

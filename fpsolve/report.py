@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import csv
-import json
-import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,9 +16,13 @@ from fpsolve.case import Case
 from fpsolve.curves import Advance, CurveResult, solve
 from fpsolve.errors import NotConverged, OutputError
 from fpsolve.estimate import Estimate
-from fpsolve.files import atomic
+from fpsolve.files import atomic, prepare_folder, write_json
 from fpsolve.function import SEARCH_INTERVAL
 from fpsolve.plots import Series, write_figure
+from fpsolve.simulated import SimulatedCurve
+
+if TYPE_CHECKING:
+    from fpsolve.montecarlo import MonteCarlo
 
 
 def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: None) -> tuple[CurveResult, ...]:
@@ -38,7 +40,7 @@ def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: N
         NotConverged: some p failed; everything else is written, and `partial` holds it.
     """
     folder = Path(out) / case.name
-    _prepare(folder)
+    prepare_folder(folder)
     try:
         results = _solve_and_write(case, folder, advance)
     except OSError as failure:
@@ -56,20 +58,16 @@ def _solve_and_write(case: Case, folder: Path, advance: Advance) -> tuple[CurveR
         written |= _write_paraview(case, result, number, folder)
         results.append(result.without_pairs())
         _write_tables(case, results, folder)
-    write_figure(
-        _series(case, results), case.figure.x, case.figure.y, case.title, _pictures(folder), is_reduced=case.is_exact
-    )
+    draw(case, results, folder)
     _remove_stale(folder, written)
     return tuple(results)
 
 
-def _prepare(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as failure:
-        raise OutputError(f"{folder} cannot be made: {failure.strerror}; choose another --out") from failure
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder} cannot be written to; choose another --out")
+def draw(case: Case, results: Sequence[CurveResult], folder: Path, simulated: Sequence[SimulatedCurve] = ()) -> None:
+    """Draw the figure of a case into its folder, with the simulated curves as crosses."""
+    pictures = [folder / "figure.png", folder / "figure.pdf"]
+    series = _series(case, results, simulated)
+    write_figure(series, case.figure.x, case.figure.y, case.title, pictures, is_reduced=case.is_exact)
 
 
 def _write_tables(case: Case, results: Sequence[CurveResult], folder: Path) -> None:
@@ -80,8 +78,7 @@ def _write_tables(case: Case, results: Sequence[CurveResult], folder: Path) -> N
         "fpsolve_version": version("fpsolve"),
         "curves": [_summary(result) for result in results],
     }
-    with atomic(folder / "summary.json") as path:
-        path.write_text(json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_json(folder / "summary.json", summary)
     with atomic(folder / "moments.csv") as path, path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow([*case.vary, "p", "value", "derivative", "perturbation", "error_estimate", "residual"])
@@ -149,29 +146,33 @@ def _remove_stale(folder: Path, written: set[Path]) -> None:
                 path.parent.rmdir()
 
 
-def _pictures(folder: Path) -> list[Path]:
-    return [folder / "figure.png", folder / "figure.pdf"]
-
-
-def _series(case: Case, results: Sequence[CurveResult]) -> list[Series]:
+def _series(case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve]) -> list[Series]:
     """The curves of the case's figure: one for each parameter set, or over x one for each set of the other keys."""
+    samples = {tuple(each.curve.varied.items()): each.result for each in simulated}
     if case.figure.x == "p":
-        return [_moment_series(result) for result in results]
+        return [_moment_series(result, samples.get(tuple(result.curve.varied.items()))) for result in results]
     groups: dict[tuple[tuple[str, float], ...], list[CurveResult]] = {}
     for result in results:
         others = tuple((key, value) for key, value in result.curve.varied.items() if key != case.figure.x)
         groups.setdefault(others, []).append(result)
-    return [_parameter_series(case, dict(others), group) for others, group in groups.items()]
+    return [_parameter_series(case, dict(others), group, samples) for others, group in groups.items()]
 
 
-def _moment_series(result: CurveResult) -> Series:
+def _moment_series(result: CurveResult, sample: MonteCarlo | None) -> Series:
     moments = result.moments
     line = np.linspace(moments.p.min(), moments.p.max(), 200) if moments.p.size else moments.p
     theory = perturbation.moment_exponent(result.curve.oscillator, result.curve.noise, line)
-    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory)
+    found = [(e.p, e.value, e.standard_error) for e in sample.estimates if e.value is not None] if sample else []
+    crosses = np.array(found, dtype=float).T if found else None
+    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, crosses)
 
 
-def _parameter_series(case: Case, others: dict[str, float], group: Sequence[CurveResult]) -> Series:
+def _parameter_series(
+    case: Case,
+    others: dict[str, float],
+    group: Sequence[CurveResult],
+    samples: Mapping[tuple[tuple[str, float], ...], MonteCarlo],
+) -> Series:
     x = np.array([result.curve.varied[case.figure.x] for result in group])
     estimates = [getattr(result, case.figure.y) for result in group]
     y = np.array([np.nan if estimate is None else estimate.value for estimate in estimates])
@@ -181,4 +182,7 @@ def _parameter_series(case: Case, others: dict[str, float], group: Sequence[Curv
     line_y = np.array([theory(curve.oscillator, curve.noise) for curve in curves])
     if case.figure.y == "stability_index":  # it has poles, and is sought in this interval only
         line_y[(line_y < SEARCH_INTERVAL[0]) | (line_y > SEARCH_INTERVAL[1])] = np.nan
-    return Series(others, x, y, line, line_y)
+        return Series(others, x, y, line, line_y)
+    found = [(each, samples.get(tuple(result.curve.varied.items()))) for each, result in zip(x, group, strict=True)]
+    crosses = [(each, sample.value, sample.standard_error) for each, sample in found if sample]
+    return Series(others, x, y, line, line_y, np.array(crosses).T if crosses else None)

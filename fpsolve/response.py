@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.batches import BATCHES, advance_all, standard_error
+from fpsolve.batches import advance_all, standard_error
 from fpsolve.noise import AnyNoise, FloatArray
 from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.sampling import BATCHES
 from fpsolve.simulation import advance, compiled, motion, noise_step, stationary_noise
 
 BINS = 100

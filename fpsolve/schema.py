@@ -27,6 +27,7 @@ from fpsolve.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_me
 from fpsolve.messages import LIST, TABLE, Refusal, nearest, refuse
 from fpsolve.noise import STRICT, FloatArray, NonGaussianNoise, OrnsteinUhlenbeck, Positive
 from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.sampling import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
 _SAME = 1e-12
@@ -154,6 +155,17 @@ class MeshSection(Section):
             text = f"a mesh must be either a file or made from numbers; remove file, or remove {numbers}"
             refuse([(("file",), self.file, text)])
         return self
+
+
+class MonteCarloSection(Section):
+    """[monte_carlo]: how the system is simulated; time and step are chosen where they are not stated."""
+
+    paths: Annotated[int, Field(ge=BATCHES, le=MAX_PATHS)] = PATHS
+    time: Annotated[float | None, Field(gt=0)] = None
+    step: Annotated[float | None, Field(gt=0)] = None
+    seed: Annotated[int, Field(ge=0)] = 0
+    estimator: Estimator = "direct"
+    p: NonEmpty | None = None
 
 
 class FigureSection(Section):

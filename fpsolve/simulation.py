@@ -109,29 +109,6 @@ def noise_step(noise: AnyNoise, h: float, tilt: float = 0.0) -> NoiseStep:
     )
 
 
-def largest_step(oscillator: VibroImpactOscillator, noise: AnyNoise) -> tuple[float, str]:
-    """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
-
-    ω h ≤ ½, ε std(ξ) h ≤ ⅛, α₀ h ≤ ½. For Eq. (7) instead of the last h ≤ τ₀/20; and near the ends of a bounded
-    support, where P_s ~ d^a with a = 1/(1 − r₀), the scheme has the order (a + 1)/2 only, which for a < 3 asks for
-    less.
-    """
-    limits = {
-        "the frequency": 0.5 / oscillator.omega,
-        "the strength of the noise": 0.125 / (oscillator.epsilon * noise.standard_deviation),
-    }
-    if isinstance(noise, NonGaussianNoise):
-        share = 0.5 if noise.r0 == 1 else 0.05
-        if noise.r0 < 1:
-            a = noise.end_exponent
-            share = min(share, max(2e-3 * min(a, 1.0) ** 2, a * 1.25e-3 ** (2 / (a + 1))))
-        limits["the correlation time of the noise"] = share * noise.tau0
-    else:
-        limits["the correlation time of the noise"] = 0.5 / noise.alpha
-    reason = min(limits, key=lambda name: limits[name])
-    return limits[reason], reason
-
-
 def stationary_noise(noise: AnyNoise, size: int, rng: np.random.Generator) -> FloatArray:
     """Independent values of ξ from the stationary density: Gaussian, or Eq. (9) as a beta or a Student variable."""
     if not isinstance(noise, NonGaussianNoise) or noise.r0 == 1:
@@ -230,7 +207,7 @@ def _flight(m, x, u, xi, rise, h):  # type: ignore[no-untyped-def]
     t, impacts = 0.0, 0
     longest = h
     if m.bounce < 0 and x == 0 and u < 0:  # on the wall and about to cross it
-        u *= m.bounce
+        u, impacts = m.bounce * u, 1
     while t < h:
         gain = max(abs(_gain(m, xi - rise, x, u)), abs(_gain(m, xi + rise, x, u)))
         s = min(h - t, longest, _ANGLE / m.omega, _GROWTH / (gain + 1e-300))

@@ -75,6 +75,27 @@ def write_density(path: Path, stationary: PrincipalPair) -> Path:
     return path
 
 
+def write_response(path: Path, x_edges: FloatArray, v_edges: FloatArray, density: FloatArray) -> Path:
+    """Write the joint density of x and ẋ on a uniform grid of cells to a `.vti` file, as the cell data `density`.
+
+    Args:
+        path: the file.
+        x_edges, v_edges: uniform, shapes (n + 1,) and (m + 1,).
+        density: shape (n, m).
+    """
+    import pyvista
+
+    grid = pyvista.ImageData(
+        dimensions=(x_edges.size, v_edges.size, 1),
+        spacing=(x_edges[1] - x_edges[0], v_edges[1] - v_edges[0], 1.0),
+        origin=(x_edges[0], v_edges[0], 0.0),
+    )
+    grid.cell_data["density"] = density.ravel(order="F")
+    with atomic(path) as temporary:
+        grid.save(temporary)
+    return path
+
+
 def copy_show_script(directory: Path) -> Path:
     """Put `show.py`, which draws the collection in ParaView, into the folder; it remembers which one that was."""
     target, text = directory / _SHOW, files("fpsolve").joinpath(_SHOW).read_text(encoding="utf-8")

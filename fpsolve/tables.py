@@ -1,0 +1,203 @@
+"""Results as tables on the terminal; what limits them goes to the standard error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from fpsolve import perturbation
+from fpsolve.case import Case, Curve
+from fpsolve.curves import Comparison, CurveResult
+from fpsolve.estimate import Estimate
+from fpsolve.simulated import SimulatedCurve
+
+
+def print_results(case: Case, results: Sequence[CurveResult]) -> None:
+    """Λ(p), or λ and δ_p over a parameter, beside perturbation theory."""
+    console = Console()
+    if case.figure.x == "p":
+        for result in results:
+            console.print(_moment_table(case, result))
+            console.print(_indices(result), highlight=False)
+    else:
+        console.print(_curve_table(case, results))
+    print_warnings(case, results)
+
+
+def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
+    """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
+    for result in results:
+        failures = {line for failure in result.failures for line in failure.splitlines()}
+        place = _place(case, result.curve)
+        kinds = [
+            ("not converged", "bold red") if text in failures else ("warning", "yellow") for text in result.warnings
+        ]
+        for (kind, style), text in zip(kinds, result.warnings, strict=True):
+            Console(stderr=True).print(Text(f"{kind}: {place}: {text}"), style=style, soft_wrap=True)
+        for text in result.notes:
+            Console(stderr=True).print(Text(f"note: {place}: {text}"), style="cyan", soft_wrap=True)
+
+
+def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:
+    """Λ(p) and λ by simulation, with the finite elements beside them where these have been solved."""
+    console = Console()
+    solved = {tuple(result.curve.varied.items()): result for result in results}
+    for each in simulated:
+        result = solved.get(tuple(each.curve.varied.items()))
+        console.print(_simulation_table(case, each, result))
+        found = each.result
+        text = f"λ = {digits(found.value, found.standard_error)} ± {found.standard_error:.1e}"
+        if result and result.lyapunov_exponent:
+            exact = result.lyapunov_exponent.value
+            text += f"   finite elements {exact:.6g}   {_deviation(found.value, found.standard_error, exact)} s.e."
+        console.print(f"{text}\n{found.paths} paths of {found.time:.4g} in steps of {found.step:.4g}", highlight=False)
+        if each.response:
+            means = (f"{name} = {value:.4g} ± {error:.0e}" for name, (value, error) in each.response.means.items())
+            console.print("stationary means: " + "   ".join(means), highlight=False)
+        console.print()
+        for warning in each.warnings:
+            line = Text(f"warning: {_place(case, each.curve)}: {warning}")
+            Console(stderr=True).print(line, style="yellow", soft_wrap=True)
+
+
+def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Table:
+    """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
+    table = Table(
+        "p", "Λ(p)", "± s.e.", *(("finite elements", "s.e. away") if result else ()), "effective paths",
+        title=Text(_heading(case, simulated.curve)), title_justify="left",
+    )  # fmt: skip
+    _align(table)
+    exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
+    for estimate in simulated.result.estimates:
+        value, error = estimate.value, estimate.standard_error
+        row = ["none", ""] if value is None or error is None else [digits(value, error), f"{error:.1e}"]
+        if result:
+            known = exact.get(estimate.p)
+            row += ["" if known is None else f"{known + 0.0:.6g}"]
+            row += ["" if known is None or value is None or not error else _deviation(value, error, known)]
+        table.add_row(f"{estimate.p:g}", *row, f"{estimate.effective_paths:.3g}")
+    return table
+
+
+def _deviation(value: float, error: float, exact: float) -> str:
+    return f"{(value - exact) / error:+.1f}"
+
+
+def _place(case: Case, curve: Curve) -> str:
+    return ", ".join([case.name, *(f"{key} = {value:g}" for key, value in curve.varied.items())])
+
+
+def _moment_table(case: Case, result: CurveResult) -> Table:
+    """p, Λ(p), Eq. (37) and the difference."""
+    table = Table(
+        "p",
+        "Λ(p)",
+        "± error",
+        _theory(case, "(37)"),
+        "difference",
+        title=Text(_heading(case, result.curve)),
+        title_justify="left",
+    )
+    _align(table)
+    _explain_star(table, case)
+    moments = result.moments
+    for p, value, error, theory in zip(
+        moments.p, moments.value, moments.error_estimate, result.moments_perturbation, strict=True
+    ):
+        table.add_row(f"{p:g}", digits(value, error), f"{error:.0e}", f"{theory + 0.0:.6g}", f"{value - theory:.2e}")
+    return table
+
+
+def _indices(result: CurveResult) -> str:
+    """λ, δ_p and Λ″(0) in a line."""
+    parts = []
+    for name, estimate in (
+        ("λ", result.lyapunov_exponent),
+        ("δ_p", result.stability_index),
+        ("Λ″(0)", result.variance_rate),
+    ):
+        error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
+        parts.append(f"{name} = {_digits_of(estimate, most=9)}{error}")
+    return "   ".join(parts) + "\n"
+
+
+def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
+    """One row for each parameter set: λ, Eq. (39), δ_p and Eq. (38)."""
+    names = (key.partition(".")[2] for key in case.vary)
+    table = Table(
+        *names, "λ", _theory(case, "(39)"), "δ_p", _theory(case, "(38)"), title=Text(case.title), title_justify="left"
+    )
+    _align(table)
+    _explain_star(table, case)
+    for result in results:
+        curve = result.curve
+        table.add_row(
+            *(f"{value:g}" for value in curve.varied.values()),
+            _digits_of(result.lyapunov_exponent, most=7),
+            f"{perturbation.lyapunov_exponent(curve.oscillator, curve.noise):.6g}",
+            _digits_of(result.stability_index, most=7),
+            f"{perturbation.stability_index(curve.oscillator, curve.noise):.6g}",
+        )
+    return table
+
+
+def _theory(case: Case, equation: str) -> str:
+    """Heading of a column of perturbation theory, starred where it has another noise than the solution."""
+    return f"Eq. {equation}*" if case.is_exact else f"Eq. {equation}"
+
+
+def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
+    """What a case expects beside what was computed."""
+    console = Console()
+    if not comparisons:
+        console.print(f"{case.name}: nothing is expected; add [[expect]] to the case", markup=False)
+        return
+    table = Table("quantity", "expected", "computed", "difference", "", title=Text(f"{case.name}: {case.title}"))
+    table.title_justify = "left"
+    _align(table)
+    table.columns[0].justify, table.columns[0].no_wrap, table.columns[0].overflow = "left", False, "fold"
+    for item in comparisons:
+        expectation = item.expectation
+        name = expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
+        where = "".join(f"\n{key} = {value:g}" for key, value in item.varied.items())
+        table.add_row(
+            f"{name}{where}\n[dim]{escape(expectation.source)}[/dim]",
+            f"{expectation.value:.12g}\n± {item.tolerance:.0e}",
+            "none" if item.value is None else f"{item.value:.12g}",
+            "" if item.value is None else f"{item.value - expectation.value:.1e}",
+            "[green]ok[/green]" if item.met else "[bold red]differs[/bold red]",
+        )
+    console.print(table)
+    console.print(f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok")
+
+
+def _heading(case: Case, curve: Curve) -> str:
+    varied = ", ".join(f"{key} = {value:g}" for key, value in curve.varied.items())
+    return f"{case.title}: {varied}" if varied else case.title
+
+
+def _align(table: Table) -> None:
+    for column in table.columns:
+        column.justify, column.no_wrap = "right", True
+
+
+def _explain_star(table: Table, case: Case) -> None:
+    if case.is_exact:
+        table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
+
+
+def _digits_of(estimate: Estimate | None, most: int) -> str:
+    return digits(estimate.value, estimate.error_estimate, most) if estimate else "none found"
+
+
+def digits(value: float, error: float, most: int = 13) -> str:
+    """A number with the digits that its error leaves, at most so many significant ones; 0 where it leaves none."""
+    if abs(value) <= error:
+        return "0"
+    count = most if error <= 0 else math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
+    return f"{value:#.{min(max(count, 1), most)}g}".rstrip(".")
