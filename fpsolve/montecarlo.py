@@ -44,7 +44,7 @@ paths and a smaller mean, so that estimates near a lower bound would be too smal
 DRIFT = 4.0
 """Standard errors by which two halves of the same estimate may differ."""
 _KEPT = 0.3
-"""The share of effective paths that the window of the direct estimator must leave."""
+"""The share of effective paths that a long window of the direct estimator must leave."""
 _LEVELS = 12
 _SETTLING = 9
 """Slices in which a population finds its law."""
@@ -215,7 +215,7 @@ def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[Mo
     estimates: list[MomentEstimate] = []
     warnings: list[str] = []
     for k, p in enumerate(plan.p):
-        usable = np.flatnonzero(share[1:, k] >= _KEPT)
+        usable = np.flatnonzero((share[1:, k] >= _KEPT) & (effective[1:, k] >= FEW["direct"]))
         j = int(usable[-1]) if usable.size else 0
         value, error = _jackknife(slopes[j, k], rests[:, j, k])
         estimates.append(_estimate(p, value, error, "direct", float(effective[j + 1, k]), warnings))

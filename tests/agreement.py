@@ -17,6 +17,7 @@ from fpsolve.function import moment_lyapunov
 from fpsolve.montecarlo import MomentEstimate, simulate
 from fpsolve.noise import NonGaussianNoise
 from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.sampling import TRANSIENTS, transient
 
 ORDERS = (-1.0, 0.5, 1.0, 2.0, 4.0)
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9)
@@ -44,7 +45,7 @@ class Row:
         return (found.value - self.finite_elements) / found.standard_error
 
 
-def rows(paths: int = PATHS, first_seed: int = 0) -> Iterator[Row]:
+def rows(paths: int = PATHS, transients: int = TRANSIENTS, first_seed: int = 0) -> Iterator[Row]:
     """All combinations by both estimators, each simulation with a seed of its own."""
     seeds = count(first_seed)
     for epsilon, restitution, (name, noise) in product((0.1, 0.5, 1.0), (0.6, 0.8, 1.0), NOISES.items()):
@@ -52,8 +53,9 @@ def rows(paths: int = PATHS, first_seed: int = 0) -> Iterator[Row]:
             omega=1.0, restitution=restitution, c1=0.1, epsilon=epsilon, impact="restitution"
         )
         exact = moment_lyapunov(oscillator, noise, ORDERS, rtol=1e-7).value
+        time = transients * transient(oscillator, noise)
         for estimator in ("direct", "population"):
-            found = simulate(oscillator, noise, ORDERS, estimator=estimator, paths=paths, seed=next(seeds))
+            found = simulate(oscillator, noise, ORDERS, estimator=estimator, paths=paths, time=time, seed=next(seeds))
             for p, value, estimate in zip(ORDERS, exact, found.estimates, strict=True):
                 yield Row(epsilon, restitution, name, p, float(value), estimate)
 

@@ -6,9 +6,10 @@ from pathlib import Path
 import fpsolve
 
 ORDER = [
-    "errors", "files", "noise", "oscillator", "perturbation", "validity", "mesh", "space", "kronecker", "generator",
-    "eigen", "estimate", "frozen", "adapt", "exponent", "function", "density", "vtk", "plots", "document", "messages",
-    "schema", "case", "curves", "report", "cli",
+    "errors", "files", "noise", "oscillator", "perturbation", "validity", "sampling", "simulation", "batches",
+    "montecarlo", "response", "mesh", "space", "kronecker", "generator", "eigen", "estimate", "frozen", "adapt",
+    "exponent", "function", "density", "vtk", "plots", "document", "messages", "schema", "case", "curves", "simulated",
+    "report", "tables", "cli",
 ]  # fmt: skip
 SOURCES = sorted(Path(fpsolve.__file__).parent.glob("*.py"))
 
@@ -29,6 +30,16 @@ def test_imports_only_point_down():
             continue
         below = ORDER[: ORDER.index(path.stem)]
         assert set(imported(path)) <= set(below), f"{path.name} imports {set(imported(path)) - set(below)}"
+
+
+def test_the_simulation_shares_nothing_with_the_generator():
+    """Below it stand the parameters of noise and oscillator only, so that it is a witness of its own."""
+    names = {"sampling", "simulation", "batches", "montecarlo", "response"}
+    for path in SOURCES:
+        if path.stem in names:
+            assert set(imported(path)) <= names | {"errors", "noise", "oscillator"}
+            text = path.read_text(encoding="utf-8")
+            assert not any(name in text for name in ("h1(", "q1(", ".h2(", ".q2("))
 
 
 def test_every_module_has_a_place_and_a_docstring():
