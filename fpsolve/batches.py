@@ -12,18 +12,15 @@ from typing import Protocol
 import numpy as np
 from numpy.random import SeedSequence, default_rng
 
+from fpsolve.kernels import RENORMALISED, advance, advance_population, advance_windows
 from fpsolve.noise import AnyNoise, FloatArray, has_algebraic_tails
-from fpsolve.simulation import Motion, NoiseStep, advance, compiled, noise_step, stationary_noise
+from fpsolve.simulation import Motion, NoiseStep, noise_step, stationary_noise
 
 TICKS = 100
 """How many times `advance_all` reports progress."""
 _PORTION_SECONDS, _STEP_SECONDS = 0.1, 2e-8
-RENORMALISED = 4
-"""Steps after which a path has the norm 1 again."""
 _EXPONENT = 0.5
 """Between two looks at the weights of a population, p times the growth that the noise brings about typically."""
-_RESAMPLED = 0.5
-"""The share of effective paths at which a population is drawn anew."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +122,7 @@ class PlainBatch(_Paths):
 
     def _run(self, slices: int) -> None:
         plan = self.plan
-        self.impacts += _advance_windows(
+        self.impacts += advance_windows(
             plan.motion, plan.noise_step, plan.step, *self.state, self.starts, self.slices, slices, plan.slice_steps,
             plan.p, self.log_sums, self.log_squares, self.rng,
         )  # fmt: skip
@@ -165,7 +162,7 @@ class Population(_Paths):
         plan = self.plan
         bonus = 0.5 * (plan.noise.diffusion * self.tilt) ** 2 * plan.step
         expected = self.expected if self.slices >= 0 else 0.0
-        self.impacts += _advance_population(
+        self.impacts += advance_population(
             plan.motion, noise_step(plan.noise, plan.step, self.tilt), plan.step, *self.state, self._log_weights,
             self._ancestors, (self.p, self.tilt, bonus), plan.slice_steps, self._interval, slices, self._log_z,
             expected, self.tallies, self.rng,
@@ -220,101 +217,3 @@ def advance_all(batches: Sequence[Batch], wanted: int, seconds: float, tick: Cal
 def standard_error(values: FloatArray) -> float:
     """Of the mean of independent values, one from each batch."""
     return float(np.std(values, ddof=1) / math.sqrt(values.size))
-
-
-@compiled
-def _advance_windows(  # type: ignore[no-untyped-def]
-    m, noise, h, x, u, xi, log_norm, push, starts, first, slices, steps, p, log_sums, log_squares, rng
-):
-    """Advance a plain batch by some slices, and add the windows that end on the way to its sums."""
-    impacts = 0
-    for number in range(first + 1, first + slices + 1):
-        impacts += advance(m, noise, h, x, u, xi, log_norm, push, steps, RENORMALISED, rng)
-        for j in range(starts.shape[0]):
-            if number % (1 << j) == 0:
-                for k in range(p.size):
-                    _add_powers(log_norm, starts[j], p[k], log_sums[j], log_squares[j], k)
-                starts[j] = log_norm
-    return impacts
-
-
-@compiled
-def _add_powers(log_norm, start, p, log_sums, log_squares, k):  # type: ignore[no-untyped-def]
-    """Add Σ exp(p growth) and the sum of the squares to two sums that are kept as logarithms."""
-    largest = -np.inf
-    for i in range(start.size):
-        largest = max(largest, p * (log_norm[i] - start[i]))
-    total, square = 0.0, 0.0
-    for i in range(start.size):
-        w = math.exp(p * (log_norm[i] - start[i]) - largest)
-        total += w
-        square += w * w
-    log_sums[k] = np.logaddexp(log_sums[k], largest + math.log(total))
-    log_squares[k] = np.logaddexp(log_squares[k], 2 * largest + math.log(square))
-
-
-@compiled
-def _advance_population(  # type: ignore[no-untyped-def]
-    m, noise, h, x, u, xi, log_norm, push, log_weights, ancestors, exponents, steps, interval, slices, log_z, expected,
-    tallies, rng,
-):  # fmt: skip
-    """Advance a population by some slices; the weights are looked at after every `interval` steps."""
-    impacts, n = 0, x.size
-    p, tilt, bonus = exponents
-    shares = np.empty(n)
-    for _ in range(slices):
-        ancestors[:] = np.arange(n)
-        done = 0
-        while done < steps:
-            count = min(interval, steps - done)
-            log_norm[:], push[:] = 0, 0
-            impacts += advance(m, noise, h, x, u, xi, log_norm, push, count, RENORMALISED, rng)
-            log_weights += p * log_norm + tilt * push + bonus * count
-            log_z[0] += _resample(x, u, xi, log_weights, ancestors, rng)
-            done += count
-        largest = log_weights.max()
-        shares[:] = 0
-        for i in range(n):
-            shares[ancestors[i]] += math.exp(log_weights[i] - largest)
-        now = log_z[0] + largest + math.log(shares.sum() / n)
-        _tally(tallies, now - log_z[1] - expected, shares.sum() ** 2 / (shares * shares).sum())
-        log_z[1] = now
-    return impacts
-
-
-@compiled
-def _tally(tallies, excess, effective):  # type: ignore[no-untyped-def]
-    """Add a slice to the tallies of a population."""
-    if tallies[0] == 0:
-        tallies[6] = excess
-    else:
-        tallies[3] += excess * tallies[7]
-    tallies[4] += excess * tallies[0]
-    tallies[0] += 1
-    tallies[1] += excess
-    tallies[2] += excess * excess
-    tallies[5] += effective
-    tallies[7] = excess
-
-
-@compiled
-def _resample(x, u, xi, log_weights, ancestors, rng):  # type: ignore[no-untyped-def]
-    """Draw the paths anew if their weights differ too much, systematically; returns ln of the mean weight."""
-    n = x.size
-    largest = log_weights.max()
-    weights = np.exp(log_weights - largest)
-    total = weights.sum()
-    if total * total >= _RESAMPLED * n * (weights * weights).sum():
-        return 0.0
-    chosen = np.empty(n, np.int64)
-    spacing = total / n
-    mark, reached, k = rng.random() * spacing, weights[0], 0
-    for i in range(n):
-        while reached < mark and k < n - 1:
-            k += 1
-            reached += weights[k]
-        chosen[i] = k
-        mark += spacing
-    x[:], u[:], xi[:], ancestors[:] = x[chosen], u[chosen], xi[chosen], ancestors[chosen]
-    log_weights[:] = 0
-    return largest + math.log(spacing)

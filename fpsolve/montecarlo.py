@@ -250,8 +250,8 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
 def _estimate(
     p: float, value: float, error: float, estimator: Estimator, effective: float, warnings: list[str]
 ) -> MomentEstimate:
-    """An estimate, or none and a warning where too few paths carry the mean."""
-    if effective >= FEW[estimator]:
+    """An estimate, or none and a warning where too few paths carry the mean; Λ(0) = 0 needs none of them."""
+    if p == 0 or (effective >= FEW[estimator] and math.isfinite(value)):
         return MomentEstimate(float(p), value, error, estimator, effective)
     remedy = 'use estimator = "population"' if estimator == "direct" else "use more paths"
     criterion = f"only {effective:.3g} effective paths carry the mean, fewer than {FEW[estimator]}"

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from fpsolve.batches import advance_all, standard_error
+from fpsolve.kernels import advance_and_count
 from fpsolve.noise import AnyNoise, FloatArray
 from fpsolve.oscillator import VibroImpactOscillator
 from fpsolve.sampling import BATCHES
-from fpsolve.simulation import advance, compiled, motion, noise_step, stationary_noise
+from fpsolve.simulation import motion, noise_step, stationary_noise
 
 BINS = 100
 MEANS = ("x", "x_squared", "v_squared", "amplitude", "energy")
@@ -67,7 +68,7 @@ class _Batch:
     def advance(self, looks: int) -> None:
         """Go on for some looks; with reach > 0 count the states up to this amplitude."""
         s = self.setting
-        self.impacts += _advance_and_count(
+        self.impacts += advance_and_count(
             s.motion, s.noise_step, s.step, self.x, self.u, self.xi, self.spare, s.steps, looks, self.reach, self.plane,
             self.radial, self.sums, self.rng,
         )  # fmt: skip
@@ -158,28 +159,3 @@ def _collect(
         time=time,
         interrupted=interrupted,
     )
-
-
-@compiled
-def _advance_and_count(  # type: ignore[no-untyped-def]
-    m, noise, h, x, u, xi, spare, steps, looks, reach, plane, radial, sums, rng
-):
-    """Advance paths, and after every `steps` steps count the states with an amplitude below `reach`, if that is > 0."""
-    impacts = 0
-    bins = radial.size
-    for _ in range(looks):
-        impacts += advance(m, noise, h, x, u, xi, spare[0], spare[1], steps, 0, rng)
-        if reach <= 0:
-            continue
-        for i in range(x.size):
-            amplitude = math.sqrt(x[i] * x[i] + u[i] * u[i])
-            sums[0] += x[i]
-            sums[1] += x[i] * x[i]
-            sums[2] += u[i] * u[i]
-            sums[3] += amplitude
-            sums[4] += 1
-            if amplitude < reach:
-                scale = bins / reach
-                radial[int(amplitude * scale)] += 1
-                plane[int(x[i] * scale), int((u[i] + reach) * scale)] += 1
-    return impacts

@@ -6,10 +6,10 @@ from pathlib import Path
 import fpsolve
 
 ORDER = [
-    "errors", "files", "noise", "oscillator", "perturbation", "validity", "sampling", "simulation", "batches",
-    "montecarlo", "response", "mesh", "space", "kronecker", "generator", "eigen", "estimate", "frozen", "adapt",
-    "exponent", "function", "density", "vtk", "plots", "document", "messages", "schema", "case", "curves", "simulated",
-    "report", "tables", "cli",
+    "errors", "files", "noise", "oscillator", "perturbation", "validity", "sampling", "kernels", "simulation",
+    "batches", "montecarlo", "response", "mesh", "space", "kronecker", "generator", "eigen", "estimate", "frozen",
+    "adapt", "exponent", "function", "density", "vtk", "plots", "document", "messages", "schema", "case", "curves",
+    "simulated", "report", "tables", "cli",
 ]  # fmt: skip
 SOURCES = sorted(Path(fpsolve.__file__).parent.glob("*.py"))
 
@@ -34,7 +34,7 @@ def test_imports_only_point_down():
 
 def test_the_simulation_shares_nothing_with_the_generator():
     """Below it stand the parameters of noise and oscillator only, so that it is a witness of its own."""
-    names = {"sampling", "simulation", "batches", "montecarlo", "response"}
+    names = {"sampling", "kernels", "simulation", "batches", "montecarlo", "response"}
     for path in SOURCES:
         if path.stem in names:
             assert set(imported(path)) <= names | {"errors", "noise", "oscillator"}

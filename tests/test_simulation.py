@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from scipy.integrate import quad_vec
 from scipy.stats import kstest
 
+from fpsolve.kernels import advance, draw, move
 from fpsolve.noise import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.oscillator import VibroImpactOscillator
 from fpsolve.sampling import default_step, largest_step
-from fpsolve.simulation import Motion, advance, draw, motion, move, noise_step, stationary_noise
+from fpsolve.simulation import Motion, motion, noise_step, stationary_noise
 from tests.conftest import FIG1_NOISE, UNIT_NOISE
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.7, c1=0.2, epsilon=1.0, impact="restitution")
