@@ -75,7 +75,7 @@ class MonteCarlo:
 
     Attributes:
         estimates: Λ(p), in the order of p.
-        value, standard_error: the largest Lyapunov exponent λ.
+        lyapunov_exponent, lyapunov_exponent_error: λ and its standard error.
         paths, time, step, seed: how many paths, their length after the transient, the time step, the seed.
         impacts: how many bounces there were.
         warnings: what limits these numbers, each with its criterion.
@@ -83,8 +83,8 @@ class MonteCarlo:
     """
 
     estimates: tuple[MomentEstimate, ...]
-    value: float
-    standard_error: float
+    lyapunov_exponent: float
+    lyapunov_exponent_error: float
     paths: int
     time: float
     step: float
@@ -152,8 +152,8 @@ def simulate(
         warnings.append(f"stopped early, after {slices / wanted:.0%} of the time")
     return MonteCarlo(
         estimates=tuple(estimates),
-        value=float(growth.mean()),
-        standard_error=standard_error(growth),
+        lyapunov_exponent=float(growth.mean()),
+        lyapunov_exponent_error=standard_error(growth),
         paths=plan.paths * BATCHES,
         time=slices * plan.length,
         step=plan.step,
@@ -253,7 +253,7 @@ def _estimate(
     """An estimate, or none and a warning where too few paths carry the mean; Λ(0) = 0 needs none of them."""
     if p == 0 or (effective >= FEW[estimator] and math.isfinite(value)):
         return MomentEstimate(float(p), value, error, estimator, effective)
-    remedy = 'use estimator = "population"' if estimator == "direct" else "use more paths"
+    remedy = 'use more paths, or estimator = "population"' if estimator == "direct" else "use more paths"
     criterion = f"only {effective:.3g} effective paths carry the mean, fewer than {FEW[estimator]}"
     warnings.append(f"no estimate of Λ({p:g}): {criterion}; {remedy}")
     return MomentEstimate(float(p), None, None, estimator, effective)

@@ -184,5 +184,5 @@ def _parameter_series(
         line_y[(line_y < SEARCH_INTERVAL[0]) | (line_y > SEARCH_INTERVAL[1])] = np.nan
         return Series(others, x, y, line, line_y)
     found = [(each, samples.get(tuple(result.curve.varied.items()))) for each, result in zip(x, group, strict=True)]
-    crosses = [(each, sample.value, sample.standard_error) for each, sample in found if sample]
+    crosses = [(each, sample.lyapunov_exponent, sample.lyapunov_exponent_error) for each, sample in found if sample]
     return Series(others, x, y, line, line_y, np.array(crosses).T if crosses else None)

@@ -111,17 +111,18 @@ def _respond(case: Case, curve: Curve, result: MonteCarlo, tick: Tick) -> tuple[
     """The stationary response, or why there is none."""
     from fpsolve.response import stationary_response
 
-    if result.value <= SIGNIFICANT * result.standard_error:
+    value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
+    if value <= SIGNIFICANT * error:
         for _ in range(100):
             tick()
-        reason = "is not positive" if result.value <= 0 else f"is not {SIGNIFICANT:g} standard errors above 0"
+        reason = "is not positive" if value <= 0 else f"is not {SIGNIFICANT:g} standard errors above 0"
         return None, [
-            f"no stationary response: λ = {result.value:.3g} ± {result.standard_error:.1e} {reason}, "
+            f"no stationary response: λ = {value:.3g} ± {error:.1e} {reason}, "
             "and with λ < 0 almost every path comes to rest"
         ]
     try:
         response = stationary_response(
-            curve.oscillator, curve.noise, result.value, paths=max(result.paths // 8, 32), time=result.time,
+            curve.oscillator, curve.noise, value, paths=max(result.paths // 8, 32), time=result.time,
             step=result.step, seed=result.seed, tick=tick,
         )  # fmt: skip
     except KeyboardInterrupt:
@@ -144,7 +145,10 @@ def _write(case: Case, simulated: SimulatedCurve, suffix: str, folder: Path) -> 
         "parameters": dict(simulated.curve.parameters),
         "varied": dict(simulated.curve.varied),
         "estimates": [asdict(estimate) for estimate in result.estimates],
-        "lyapunov_exponent": {"value": result.value, "standard_error": result.standard_error},
+        "lyapunov_exponent": {
+            "value": result.lyapunov_exponent,
+            "standard_error": result.lyapunov_exponent_error,
+        },
         "paths": result.paths,
         "time": result.time,
         "step": result.step,

@@ -51,10 +51,11 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
         result = solved.get(tuple(each.curve.varied.items()))
         console.print(_simulation_table(case, each, result))
         found = each.result
-        text = f"λ = {digits(found.value, found.standard_error)} ± {found.standard_error:.1e}"
+        value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
+        text = f"λ = {digits(value, error)} ± {error:.1e}"
         if result and result.lyapunov_exponent:
             exact = result.lyapunov_exponent.value
-            text += f"   finite elements {exact:.6g}   {_deviation(found.value, found.standard_error, exact)} s.e."
+            text += f"   finite elements {exact:.6g}   {_deviation(value, error, exact)} s.e."
         console.print(f"{text}\n{found.paths} paths of {found.time:.4g} in steps of {found.step:.4g}", highlight=False)
         if each.response:
             means = (f"{name} = {value:.4g} ± {error:.0e}" for name, (value, error) in each.response.means.items())

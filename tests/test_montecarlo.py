@@ -50,7 +50,7 @@ def test_standard_errors_are_honest(estimator, paths):
         for seed in range(200)
     ]
     exponent = ExponentSolver(MODERATE, REDUCED).lyapunov_exponent().value
-    check_spread([(run.value, run.standard_error) for run in runs], exponent)
+    check_spread([(run.lyapunov_exponent, run.lyapunov_exponent_error) for run in runs], exponent)
     for k, value in enumerate(reference):
         check_spread([(run.estimates[k].value, run.estimates[k].standard_error) for run in runs], value)
 
@@ -163,7 +163,7 @@ def test_one_run_serves_all_orders():
     """The direct estimate of one p does not depend on which others are asked for; nor does λ."""
     alone, together = small(3, orders=(1.0,)), small(3, orders=(-1.0, 1.0, 2.0))
     assert alone.estimates[0] == together.estimates[1]
-    assert alone.value == together.value
+    assert alone.lyapunov_exponent == together.lyapunov_exponent
 
 
 def test_memory_does_not_grow_with_time():
