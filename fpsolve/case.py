@@ -309,7 +309,8 @@ def _simulation_refusals(valid: Mapping[str, Any], section: MonteCarloSection) -
         for name, text in faults.items():
             if getattr(section, name) is not None:
                 yield (name,), getattr(section, name), prefix + text
-        infinite = _infinite(curve.noise, np.array(section.p)) if section.p else ""
+        p = np.array(section.p or (0.0,))
+        infinite = _obstacle(valid["oscillator"], valid["noise"], varied, p) or _infinite(curve.noise, p)
         if infinite:
             yield ("p",), section.p, prefix + infinite
         if faults or infinite:

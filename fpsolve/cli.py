@@ -53,7 +53,9 @@ def run(
     cases: Cases,
     *,
     out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("results"),
-    monte_carlo: Annotated[bool, Parameter(help="Simulate too, and draw both.", negative="")] = False,
+    monte_carlo: Annotated[
+        bool, Parameter(help="Simulate too, as [monte_carlo] of the case says, and draw both.", negative="")
+    ] = False,
     overrides: Overrides = None,
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
@@ -78,6 +80,10 @@ def run(
         print_results(case, results)
         if monte_carlo:
             simulated, is_interrupted = _simulate(case, out, results)
+            if case.figure.y == "stability_index":
+                _stderr().print(
+                    "note: a simulation gives no stability index, so that the figure has no dots", style="cyan"
+                )
             report.draw(case, results, out / case.name, simulated)
         print(f"written: {out / case.name}")
         if monte_carlo and is_interrupted:
@@ -90,10 +96,13 @@ def simulate(
     cases: Cases,
     *,
     out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("results"),
-    paths: Annotated[Count | None, Parameter(help="How many paths.")] = None,
-    time: Annotated[float | None, Parameter(help="Length of the paths.")] = None,
-    seed: Annotated[Count | None, Parameter(help="Seed of the random numbers.")] = None,
-    estimator: Annotated[str | None, Parameter(help="direct or population.")] = None,
+    paths: Annotated[Count | None, Parameter(help="How many paths; 32768 if nothing is stated.")] = None,
+    time: Annotated[float | None, Parameter(help="Length of the paths; 64 transients if nothing is stated.")] = None,
+    seed: Annotated[Count | None, Parameter(help="Seed of the random numbers; 0 if nothing is stated.")] = None,
+    estimator: Annotated[
+        str | None,
+        Parameter(help="direct (if nothing is stated), or population for strong noise or large |p|."),
+    ] = None,
     overrides: Overrides = None,
 ) -> int:
     """Simulate the system with its impacts and estimate the exponents; write monte_carlo.json into OUT/<case>/.
@@ -230,9 +239,8 @@ def _simulate(case: Case, out: Path, results: Sequence[CurveResult] = ()) -> tup
     from fpsolve.tables import print_simulation
 
     with _progress(f"{case.name}, simulation", simulation_work(case)) as tick:
-        simulated = simulate_case(case, out, tick=tick)
+        simulated, is_interrupted = simulate_case(case, out, tick=tick)
     print_simulation(case, simulated, results)
-    is_interrupted = bool(simulated) and simulated[-1].interrupted
     if is_interrupted:
         _print_error("interrupted; what was done is kept")
     return simulated, is_interrupted

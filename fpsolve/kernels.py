@@ -25,6 +25,7 @@ _CHUNK = 256
 """Paths that are advanced together, so that they stay in the cache and the processor can take several at once."""
 _ANGLE, _GROWTH = 0.5, 0.125
 """A step with a larger ω h or |g| h is taken in parts: the first could hide impacts, the second costs accuracy."""
+_MOST_PARTS = 10_000
 _NEWTON_STEPS = 5
 RENORMALISED = 4
 """Steps after which a path has the norm 1 again."""
@@ -124,13 +125,14 @@ def _flight(m, x, u, xi, rise, h):  # type: ignore[no-untyped-def]
         u, impacts = m.bounce * u, 1
     while t < h:
         gain = max(abs(_gain(m, xi - rise, x, u)), abs(_gain(m, xi + rise, x, u)))
-        s = min(h - t, longest, _ANGLE / m.omega, _GROWTH / (gain + 1e-300))
+        s = max(min(longest, _ANGLE / m.omega, _GROWTH / (gain + 1e-300)), h / _MOST_PARTS)
+        s = min(s, h - t)
         side = 1.0 if x > 0 or (x == 0 and u > 0) else -1.0
         x1, u1 = _part(m, x, u, xi, rise, h, t, s)
         if side * x1 < 0:
             s, u1 = _impact(m, x, u, xi, rise, h, t, s, x1)
             x1, u1, impacts = 0.0, m.bounce * u1, impacts + 1
-        elif side * u < 0 and side * u1 > 0 and s > 1e-9 * h:  # turned round without an impact: it was overlooked
+        elif side * u < 0 and side * u1 > 0 and s > h / _MOST_PARTS:  # turned round: an impact was overlooked
             longest = 0.5 * s
             continue
         x, u, t = x1, u1, t + s
@@ -218,19 +220,13 @@ def advance(m, noise, h, x, u, xi, log_norm, push, steps, interval, rng):  # typ
 
 
 @_compiled
-def advance_windows(  # type: ignore[no-untyped-def]
-    m, noise, h, x, u, xi, log_norm, push, starts, first, slices, steps, p, log_sums, log_squares, rng
-):
-    """Advance a plain batch by some slices, and add the windows that end on the way to its sums."""
-    impacts = 0
-    for number in range(first + 1, first + slices + 1):
-        impacts += advance(m, noise, h, x, u, xi, log_norm, push, steps, RENORMALISED, rng)
-        for j in range(starts.shape[0]):
-            if number % (1 << j) == 0:
-                for k in range(p.size):
-                    _add_powers(log_norm, starts[j], p[k], log_sums[j], log_squares[j], k)
-                starts[j] = log_norm
-    return impacts
+def add_windows(log_norm, starts, number, p, log_sums, log_squares):  # type: ignore[no-untyped-def]
+    """Add the windows of 2ʲ slices that end with this number of slices to the sums of a batch."""
+    for j in range(starts.shape[0]):
+        if number % (1 << j) == 0:
+            for k in range(p.size):
+                _add_powers(log_norm, starts[j], p[k], log_sums[j], log_squares[j], k)
+            starts[j] = log_norm
 
 
 @_compiled
@@ -250,31 +246,35 @@ def _add_powers(log_norm, start, p, log_sums, log_squares, k):  # type: ignore[n
 
 @_compiled
 def advance_population(  # type: ignore[no-untyped-def]
-    m, noise, h, x, u, xi, log_norm, push, log_weights, ancestors, exponents, steps, interval, slices, log_z, expected,
-    tallies, rng,
-):  # fmt: skip
-    """Advance a population by some slices; the weights are looked at after every `interval` steps."""
-    impacts, n = 0, x.size
+    m, noise, h, x, u, xi, log_norm, push, log_weights, ancestors, exponents, steps, interval, log_z, rng
+):
+    """Advance a population by some steps; the weights are looked at after every `interval` steps."""
+    impacts, done = 0, 0
     p, tilt, bonus = exponents
-    shares = np.empty(n)
-    for _ in range(slices):
-        ancestors[:] = np.arange(n)
-        done = 0
-        while done < steps:
-            count = min(interval, steps - done)
-            log_norm[:], push[:] = 0, 0
-            impacts += advance(m, noise, h, x, u, xi, log_norm, push, count, RENORMALISED, rng)
-            log_weights += p * log_norm + tilt * push + bonus * count
-            log_z[0] += _resample(x, u, xi, log_weights, ancestors, rng)
-            done += count
-        largest = log_weights.max()
-        shares[:] = 0
-        for i in range(n):
-            shares[ancestors[i]] += math.exp(log_weights[i] - largest)
-        now = log_z[0] + largest + math.log(shares.sum() / n)
-        _tally(tallies, now - log_z[1] - expected, shares.sum() ** 2 / (shares * shares).sum())
-        log_z[1] = now
+    while done < steps:
+        count = min(interval, steps - done)
+        log_norm[:], push[:] = 0, 0
+        impacts += advance(m, noise, h, x, u, xi, log_norm, push, count, RENORMALISED, rng)
+        log_weights += p * log_norm + tilt * push + bonus * count
+        log_z[0] += _resample(x, u, xi, log_weights, ancestors, rng)
+        done += count
     return impacts
+
+
+@_compiled
+def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: ignore[no-untyped-def]
+    """Tally a slice of a population, and begin the next one; returns the growth of ln Z in it."""
+    n = log_weights.size
+    largest = log_weights.max()
+    shares = np.zeros(n)
+    for i in range(n):
+        shares[ancestors[i]] += math.exp(log_weights[i] - largest)
+    now = log_z[0] + largest + math.log(shares.sum() / n)
+    growth = now - log_z[1]
+    _tally(tallies, growth - expected, shares.sum() ** 2 / (shares * shares).sum())
+    log_z[1] = now
+    ancestors[:] = np.arange(n)
+    return growth
 
 
 @_compiled

@@ -110,14 +110,14 @@ def write_response_figure(
     with _canvas(paths, width=10.5) as figure:
         figure.suptitle(fill(title, 100), fontsize=12, parse_math=False)
         plane, radial = figure.subplots(1, 2)
-        scale = LogNorm(density.max() * 1e-4, density.max())
-        picture = plane.pcolormesh(x_edges, v_edges, density.T, cmap="viridis", norm=scale, rasterized=True)
-        plane.set_facecolor(picture.cmap(0.0))
+        scale = LogNorm(max(density[density > 0].min(), density.max() * 1e-4), density.max())
+        visited = np.ma.masked_equal(density.T, 0)
+        picture = plane.pcolormesh(x_edges, v_edges, visited, cmap="viridis", norm=scale, rasterized=True)
         share = np.cumsum(amplitude_density * np.diff(amplitude_edges))
         seen = float(amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
         velocity = seen * v_edges[-1] / x_edges[-1]
         plane.set(xlabel="$x$", ylabel=r"$\dot{x}$ (1/time)", xlim=(0, seen), ylim=(-velocity, velocity))
-        figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$", extend="min")
+        figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$")
         middle = (amplitude_edges[1:] + amplitude_edges[:-1]) / 2
         low, high = amplitude_density - 2 * amplitude_error, amplitude_density + 2 * amplitude_error
         radial.fill_between(middle, low, high, color=_COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from threading import Event
 from typing import Any
 
 import numpy as np
 
-from fpsolve.batches import advance_all, standard_error
+from fpsolve.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.kernels import advance_and_count
 from fpsolve.noise import AnyNoise, FloatArray
 from fpsolve.oscillator import VibroImpactOscillator
@@ -65,8 +66,10 @@ class _Batch:
         self.sums = np.zeros(len(MEANS))
         self.impacts, self.reach = 0, 0.0
 
-    def advance(self, looks: int) -> None:
+    def advance(self, looks: int, stop: Event) -> None:
         """Go on for some looks; with reach > 0 count the states up to this amplitude."""
+        if stop.is_set():
+            return
         s = self.setting
         self.impacts += advance_and_count(
             s.motion, s.noise_step, s.step, self.x, self.u, self.xi, self.spare, s.steps, looks, self.reach, self.plane,
@@ -89,6 +92,7 @@ def stationary_response(
     oscillator: VibroImpactOscillator,
     noise: AnyNoise,
     exponent: float,
+    variance_rate: float,
     *,
     paths: int,
     time: float,
@@ -100,9 +104,10 @@ def stationary_response(
 
     Args:
         oscillator, noise: with c₂ or c₃ > 0.
-        exponent: the largest Lyapunov exponent λ > 0 of the linear system: the response forgets its start in 1/λ.
-        paths, time, step, seed: as for `montecarlo.simulate`; the time is at least 20/λ.
-        tick: called 100 times in all, as progress.
+        exponent, variance_rate: λ > 0 and Λ″(0) of the linear system. ln A forgets its start in 1/λ, or, where it
+            wanders more than it drifts, in 2Λ″(0)/λ².
+        paths, time, step, seed: as for `montecarlo.simulate`; the time is at least 20 times that.
+        tick: called 200 times in all, as progress.
 
     Raises:
         KeyboardInterrupt: before the response was stationary.
@@ -114,10 +119,11 @@ def stationary_response(
         math.sqrt(exponent / damping),
     )  # fmt: skip
     between = looks_in_half_turn * step
-    settling, looks = math.ceil(5 / exponent / between), math.ceil(max(time, 20 / exponent) / between)
+    memory = max(1 / exponent, 2 * variance_rate / exponent**2)
+    settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
     batches = [_Batch(setting, each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
-    seconds = 2e-8 * setting.paths * setting.steps
-    if advance_all(batches, settling, seconds, lambda: None):
+    seconds = STEP_SECONDS * setting.paths * setting.steps
+    if advance_all(batches, settling, seconds, tick):
         raise KeyboardInterrupt
     reach = _MARGIN * max(float(np.max(np.hypot(batch.x, batch.u))) for batch in batches)
     for batch in batches:
@@ -130,7 +136,7 @@ def _collect(
     oscillator: VibroImpactOscillator, batches: list[_Batch], between: float, reach: float, interrupted: bool
 ) -> Response:
     count = np.array([batch.sums[-1] for batch in batches])
-    time = float(count[0] / batches[0].x.size * between)
+    time = float(count.mean() / batches[0].x.size * between)
     paths = sum(batch.x.size for batch in batches)
     sums = np.array([batch.sums[:-1] for batch in batches]) / count[:, None]
     x, xx, uu, amplitude = sums.T

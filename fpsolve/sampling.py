@@ -21,12 +21,13 @@ _LONGEST = 1_000_000
 def largest_step(oscillator: VibroImpactOscillator, noise: AnyNoise) -> tuple[float, str]:
     """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
 
-    ω h ≤ ½, ε std(ξ) h ≤ ⅛, α₀ h ≤ ½. For Eq. (7) instead of the last h ≤ τ₀/20; and near the ends of a bounded
-    support, where P_s ~ d^a with a = 1/(1 − r₀), the scheme has the order (a + 1)/2 only, which for a < 3 asks for
-    less.
+    ω h ≤ ½, ε² |c₁| h ≤ ⅛, ε std(ξ) h ≤ ⅛, α₀ h ≤ ½. For Eq. (7) instead of the last h ≤ τ₀/20; and near the ends of
+    a bounded support, where P_s ~ d^a with a = 1/(1 − r₀), the scheme has the order (a + 1)/2 only, which for a < 3
+    asks for less.
     """
     limits = {
         "the frequency": 0.5 / oscillator.omega,
+        "the damping": 0.125 / (oscillator.epsilon**2 * abs(oscillator.c1)) if oscillator.c1 else math.inf,
         "the strength of the noise": 0.125 / (oscillator.epsilon * noise.standard_deviation),
     }
     if isinstance(noise, NonGaussianNoise):

@@ -49,16 +49,22 @@ class SimulatedCurve:
 
 def simulation_work(case: Case) -> int:
     """How often `simulate_case` reports progress."""
-    return 100 * sum(1 + _is_nonlinear(curve) for curve in case.curves())
+    return 100 * sum(3 if _is_nonlinear(curve) else 1 for curve in case.curves())
 
 
-def simulate_case(case: Case, out: str | Path = "results", *, tick: Tick = lambda: None) -> tuple[SimulatedCurve, ...]:
+def simulate_case(
+    case: Case, out: str | Path = "results", *, tick: Tick = lambda: None
+) -> tuple[tuple[SimulatedCurve, ...], bool]:
     """Simulate a case and write monte_carlo.json into `out`/<name of the case>/; further curves have a number.
 
     With c₂ or c₃ > 0 the stationary response is written too. An interrupt (Ctrl-C) ends the simulation, and what is
     done is estimated and written.
 
+    Returns:
+        The curves that were simulated, and whether an interrupt ended it.
+
     Raises:
+        KeyboardInterrupt: nothing was done yet.
         FpsolveError: a curve cannot be simulated; nothing is written.
         OutputError: the folder cannot be made or written to.
     """
@@ -67,17 +73,23 @@ def simulate_case(case: Case, out: str | Path = "results", *, tick: Tick = lambd
     prepare_folder(folder)
     results: list[SimulatedCurve] = []
     written: set[Path] = set()
+    is_interrupted = False
     try:
         for number, curve in enumerate(case.curves(), start=1):
-            results.append(_simulate_curve(case, curve, tick))
-            written |= _write(case, results[-1], "" if number == 1 else f"-{number}", folder)
-            if results[-1].interrupted:
+            try:
+                results.append(_simulate_curve(case, curve, tick))
+            except KeyboardInterrupt:
+                if not results:
+                    raise
+                is_interrupted = True
                 break
-        else:
-            _remove_stale(folder, written)
+            written |= _write(case, results[-1], "" if number == 1 else f"-{number}", folder)
+            if is_interrupted := results[-1].interrupted:
+                break
+        _remove_stale(folder, written)
     except OSError as failure:
         raise OutputError(f"{failure.filename or folder} cannot be written: {failure.strerror}") from failure
-    return tuple(results)
+    return tuple(results), is_interrupted
 
 
 def refuse_obstacles(case: Case) -> None:
@@ -113,7 +125,7 @@ def _respond(case: Case, curve: Curve, result: MonteCarlo, tick: Tick) -> tuple[
 
     value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
     if value <= SIGNIFICANT * error:
-        for _ in range(100):
+        for _ in range(200):
             tick()
         reason = "is not positive" if value <= 0 else f"is not {SIGNIFICANT:g} standard errors above 0"
         return None, [
@@ -122,8 +134,8 @@ def _respond(case: Case, curve: Curve, result: MonteCarlo, tick: Tick) -> tuple[
         ]
     try:
         response = stationary_response(
-            curve.oscillator, curve.noise, value, paths=max(result.paths // 8, 32), time=result.time,
-            step=result.step, seed=result.seed, tick=tick,
+            curve.oscillator, curve.noise, value, result.variance_rate, paths=max(result.paths // 8, 32),
+            time=result.time, step=result.step, seed=result.seed, tick=tick,
         )  # fmt: skip
     except KeyboardInterrupt:
         return None, ["no stationary response: stopped before it was reached"]
@@ -149,6 +161,7 @@ def _write(case: Case, simulated: SimulatedCurve, suffix: str, folder: Path) -> 
             "value": result.lyapunov_exponent,
             "standard_error": result.lyapunov_exponent_error,
         },
+        "variance_rate": {"value": result.variance_rate, "standard_error": result.variance_rate_error},
         "paths": result.paths,
         "time": result.time,
         "step": result.step,

@@ -47,23 +47,37 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
     """Λ(p) and λ by simulation, with the finite elements beside them where these have been solved."""
     console = Console()
     solved = {tuple(result.curve.varied.items()): result for result in results}
+    pairs = [(each, solved.get(tuple(each.curve.varied.items()))) for each in simulated]
+    if case.figure.x == "p":
+        for each, result in pairs:
+            console.print(_simulation_table(case, each, result))
+            console.print(_simulation_line(each, result), highlight=False, soft_wrap=True)
+    else:
+        console.print(_exponent_table(case, pairs))
     for each in simulated:
-        result = solved.get(tuple(each.curve.varied.items()))
-        console.print(_simulation_table(case, each, result))
-        found = each.result
-        value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
-        text = f"λ = {digits(value, error)} ± {error:.1e}"
-        if result and result.lyapunov_exponent:
-            exact = result.lyapunov_exponent.value
-            text += f"   finite elements {exact:.6g}   {_deviation(value, error, exact)} s.e."
-        console.print(f"{text}\n{found.paths} paths of {found.time:.4g} in steps of {found.step:.4g}", highlight=False)
         if each.response:
-            means = (f"{name} = {value:.4g} ± {error:.0e}" for name, (value, error) in each.response.means.items())
-            console.print("stationary means: " + "   ".join(means), highlight=False)
-        console.print()
+            means = "   ".join(
+                f"{name} = {sampled(value, error)} ± {error:.1e}"
+                for name, (value, error) in each.response.means.items()
+            )
+            text = f"{_place(case, each.curve)}: stationary means: {means}\n"
+            console.print(text, highlight=False, soft_wrap=True)
         for warning in each.warnings:
             line = Text(f"warning: {_place(case, each.curve)}: {warning}")
             Console(stderr=True).print(line, style="yellow", soft_wrap=True)
+
+
+def _simulation_line(simulated: SimulatedCurve, result: CurveResult | None) -> str:
+    """λ, Λ″(0) and the size of the simulation."""
+    found = simulated.result
+    value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
+    text = f"λ = {sampled(value, error)} ± {error:.1e}"
+    if result and result.lyapunov_exponent:
+        exact = result.lyapunov_exponent.value
+        text += f" (finite elements {exact:.6g}, {_deviation(value, error, exact)} s.e. away)"
+    rate, rate_error = found.variance_rate, found.variance_rate_error
+    text += f"   Λ″(0) = {sampled(rate, rate_error)} ± {rate_error:.1e}"
+    return f"{text}\n{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}\n"
 
 
 def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Table:
@@ -76,13 +90,35 @@ def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult
     exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
     for estimate in simulated.result.estimates:
         value, error = estimate.value, estimate.standard_error
-        row = ["none", ""] if value is None or error is None else [digits(value, error), f"{error:.1e}"]
+        row = ["none", ""] if value is None or error is None else [sampled(value, error), f"{error:.1e}"]
         if result:
-            known = exact.get(estimate.p)
-            row += ["" if known is None else f"{known + 0.0:.6g}"]
+            known = exact.get(estimate.p) if estimate.p else 0.0
+            row += ["" if known is None else f"{known:.6g}"]
             row += ["" if known is None or value is None or not error else _deviation(value, error, known)]
-        table.add_row(f"{estimate.p:g}", *row, f"{estimate.effective_paths:.3g}")
+        table.add_row(f"{estimate.p:g}", *row, f"{estimate.effective_paths:.0f}")
     return table
+
+
+def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Table:
+    """One row for each parameter set: λ by simulation and by finite elements."""
+    names = (key.partition(".")[2] for key in case.vary)
+    table = Table(*names, "λ", "± s.e.", "finite elements", "s.e. away", title=Text(case.title), title_justify="left")
+    _align(table)
+    for each, result in pairs:
+        value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
+        known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
+        exact = ("", "") if known is None else (f"{known:.6g}", _deviation(value, error, known))
+        varied = (f"{number:g}" for number in each.curve.varied.values())
+        table.add_row(*varied, sampled(value, error), f"{error:.1e}", *exact)
+    return table
+
+
+def sampled(value: float, error: float) -> str:
+    """A number with as many decimals as two digits of its standard error have."""
+    if error <= 0:
+        return f"{value:g}"
+    decimals = 1 - math.floor(math.log10(error))
+    return f"{value:.{decimals}f}" if 0 <= decimals <= 9 else f"{value:.3g}"
 
 
 def _deviation(value: float, error: float, exact: float) -> str:

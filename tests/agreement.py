@@ -11,18 +11,19 @@ from dataclasses import dataclass
 from itertools import count, product
 
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 
 from fpsolve.function import moment_lyapunov
 from fpsolve.montecarlo import MomentEstimate, simulate
 from fpsolve.noise import NonGaussianNoise
 from fpsolve.oscillator import VibroImpactOscillator
-from fpsolve.sampling import TRANSIENTS, transient
+from fpsolve.sampling import transient
 
 ORDERS = (-1.0, 0.5, 1.0, 2.0, 4.0)
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9)
 NOISES = {"reduced": NOISE.ou_reduction(), "exact": NOISE}
-PATHS = 8192
+PATHS, LENGTH = 32_768, 16
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Row:
         return (found.value - self.finite_elements) / found.standard_error
 
 
-def rows(paths: int = PATHS, transients: int = TRANSIENTS, first_seed: int = 0) -> Iterator[Row]:
+def rows(paths: int = PATHS, transients: int = LENGTH, first_seed: int = 0) -> Iterator[Row]:
     """All combinations by both estimators, each simulation with a seed of its own."""
     seeds = count(first_seed)
     for epsilon, restitution, (name, noise) in product((0.1, 0.5, 1.0), (0.6, 0.8, 1.0), NOISES.items()):
@@ -62,7 +63,7 @@ def rows(paths: int = PATHS, transients: int = TRANSIENTS, first_seed: int = 0) 
 
 def main() -> None:
     table = Table("ε", "r", "noise", "p", "estimator", "finite elements", "simulation", "± s.e.", "deviation", "paths")
-    for row in rows():
+    for row in track(rows(), total=180, console=Console(stderr=True)):
         found = row.simulated
         numbers = ("none", "", "") if found.value is None else (
             f"{found.value:.6g}", f"{found.standard_error:.1e}", f"{row.deviation:+.1f}"

@@ -30,17 +30,17 @@ def exact(oscillator, noise, p):
 
 def test_agrees_with_finite_elements():
     """90 combinations by both estimators, see tests/agreement.py; those without an estimate say so themselves."""
-    table = list(rows(paths=4096, transients=16))
+    table = list(rows(paths=8192, transients=8))
     assert len(table) == 180
     given = [row for row in table if row.simulated.value is not None]
-    assert all(row.simulated.value is not None for row in table if row.simulated.estimator == "population")
-    assert len(given) >= 150
+    assert sum(row.simulated.estimator == "population" for row in given) >= 78
+    assert sum(row.simulated.estimator == "direct" for row in given) >= 50
     deviations = np.abs([row.deviation for row in given])
     assert np.mean(deviations <= 3) >= 0.95
     assert np.max(deviations) <= 5
 
 
-@pytest.mark.parametrize(("estimator", "paths"), [("direct", 1024), ("population", 2048)])
+@pytest.mark.parametrize(("estimator", "paths"), [("direct", 2048), ("population", 3072)])
 def test_standard_errors_are_honest(estimator, paths):
     """Over 200 seeds the spread of the estimates is their standard error, within 20 %, and their mean is Λ(p)."""
     orders = [1.0] if estimator == "population" else [-1.0, 0.5, 1.0]
@@ -67,7 +67,7 @@ def test_population_succeeds_where_the_direct_estimator_fails():
     reference = exact(STRONG, REDUCED, [4.0])[0]
     direct = simulate(STRONG, REDUCED, [4.0], paths=8192, seed=1)
     assert direct.estimates[0].value is None
-    assert any("no estimate of Λ(4)" in text and "fewer than 1000" in text for text in direct.warnings)
+    assert any("no estimate of Λ(p) at p = 4:" in text and "of the 5000" in text for text in direct.warnings)
     population = simulate(STRONG, REDUCED, [4.0], estimator="population", paths=8192, seed=1)
     assert not population.warnings
     assert population.estimates[0].value == pytest.approx(reference, rel=1e-2)
@@ -96,10 +96,10 @@ def biases(monkeypatch, oscillator, noise, p, steps, paths):
 def test_weak_order_of_the_exact_noise(monkeypatch):
     """Halving the step divides the bias by 4; the steps are four and two times the largest that is allowed."""
     noise = NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
-    (coarse, error), (fine, fine_error) = biases(monkeypatch, STRONG, noise, 4.0, (0.2, 0.1), 8192)
+    (coarse, error), (fine, fine_error) = biases(monkeypatch, STRONG, noise, 4.0, (0.2, 0.1), 28672)
     assert abs(coarse) > 20 * error
     assert abs(fine) > 5 * fine_error
-    assert coarse / fine > 4 - 0.25 - 4 * fine_error / fine
+    assert coarse / fine == pytest.approx(4, abs=0.3 + 4 * (coarse / fine) * fine_error / fine)
 
 
 def test_weak_order_of_ornstein_uhlenbeck_noise(monkeypatch):
@@ -124,11 +124,31 @@ def test_gap_between_the_reduced_and_the_real_noise():
 def test_algebraic_tails():
     noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1)
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=0.5)
+    reference = exact(oscillator, noise, [-0.4])[0]
     for estimator in ("direct", "population"):
-        found = simulate(oscillator, noise, [-0.9, -0.5], estimator=estimator, paths=8192, seed=6)
-        assert found.estimates[0].value == pytest.approx(0.0328459, abs=4 * found.estimates[0].standard_error)
+        found = simulate(oscillator, noise, [-0.9, -0.4], estimator=estimator, paths=8192, seed=6)
+        assert found.estimates[0].value is None
+        assert any("no estimate of Λ(p) at p = -0.9: ‖x‖^p has no variance" in text for text in found.warnings)
+        assert found.estimates[1].value == pytest.approx(reference, abs=4 * found.estimates[1].standard_error)
     with pytest.raises(NoSuchExponent, match="infinite"):
         simulate(oscillator, noise, [1.0])
+
+
+def test_slow_noise_carries_a_moment_in_two_places():
+    """Λ(2) = 1.129 where the oscillator does not turn, 0.496 where it does: no population passes between them."""
+    noise = NonGaussianNoise(D0=0.5, tau0=20.0, r0=1.0)
+    found = simulate(STRONG, noise, [2.0], estimator="population", paths=8192, time=330.0, seed=1)
+    estimate = found.estimates[0]
+    assert estimate.value == pytest.approx(exact(STRONG, noise, [2.0])[0], abs=4 * estimate.standard_error)
+    assert estimate.standard_error < 1e-3
+    assert any("start in two places differ by 0.6" in text for text in found.warnings)
+
+
+def test_variance_rate():
+    """Λ″(0) from the variance of ln‖x‖."""
+    found = simulate(MODERATE, REDUCED, [], paths=8192, seed=2)
+    reference = ExponentSolver(MODERATE, REDUCED).variance_rate().value
+    assert found.variance_rate == pytest.approx(reference, abs=4 * found.variance_rate_error + 0.02 * reference)
 
 
 def test_identity_without_impact():
@@ -187,8 +207,8 @@ def test_an_interrupt_keeps_what_is_done(estimator):
         if len(calls) == 50:
             raise KeyboardInterrupt
 
-    found = simulate(MODERATE, REDUCED, [1.0], estimator=estimator, paths=1024, time=400.0, seed=1, tick=tick)
-    whole = simulate(MODERATE, REDUCED, [1.0], estimator=estimator, paths=1024, time=400.0, seed=1)
+    found = simulate(MODERATE, REDUCED, [1.0], estimator=estimator, paths=4096, time=400.0, seed=1, tick=tick)
+    whole = simulate(MODERATE, REDUCED, [1.0], estimator=estimator, paths=4096, time=400.0, seed=1)
     assert found.interrupted
     assert 100 < found.time < 300
     assert "stopped early" in found.warnings[-1]
@@ -225,11 +245,13 @@ def test_drift_is_noticed(monkeypatch):
         ({"paths": 10}, "32 to"),
         ({"seed": -1}, "seed = -1"),
         ({"estimator": "exact"}, "direct, population"),
+        ({"p": [math.nan]}, "must be finite"),
+        ({"noise": NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.8)}, "must be finite"),
     ],
 )
 def test_bad_settings_are_refused(change, words):
     with pytest.raises(ValueError, match=words):
-        simulate(MODERATE, NOISE, [1.0], **change)
+        simulate(**({"oscillator": MODERATE, "noise": NOISE, "p": [1.0]} | change))
 
 
 def test_the_largest_good_step_is_named_and_good():

@@ -3,6 +3,10 @@
 import csv
 import json
 import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +30,7 @@ r0 = 0.95
 [moments]
 p = [-1.0, 1.0]
 [monte_carlo]
-paths = 1600
+paths = 6400
 time = 40.0
 seed = 7
 """
@@ -61,14 +65,14 @@ def test_monte_carlo_json(case, out, capsys):
         assert estimate.keys() == {"p", "value", "standard_error", "estimator", "effective_paths"}
         assert estimate["estimator"] == "direct"
     assert found["lyapunov_exponent"].keys() == {"value", "standard_error"}
-    assert (found["paths"], found["seed"]) == (1600, 7)
+    assert (found["paths"], found["seed"]) == (6400, 7)
     assert found["time"] == pytest.approx(40, rel=0.1)
     assert found["step"] > 0
-    assert found["impacts"] == pytest.approx(1600 * found["time"] / np.pi, rel=0.1)
+    assert found["impacts"] == pytest.approx(6400 * found["time"] / np.pi, rel=0.1)
     assert found["warnings"] == [text for text in found["warnings"] if "no estimate" in text]
     assert found["response"] is None
     printed = capsys.readouterr()
-    assert "1600 paths" in printed.out
+    assert "6400 paths" in printed.out
     assert "λ =" in printed.out
     assert sorted(path.name for path in (out / "quick").iterdir()) == ["monte_carlo.json"]
 
@@ -156,6 +160,39 @@ def test_run_adds_markers_over_a_parameter(case, out):
     assert (out / "quick/monte_carlo-2.json").exists()
 
 
+def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
+    """What is finished stays, and the message says so."""
+    original = simulated._simulate_curve
+
+    def interrupted(case, curve, tick):
+        if curve.varied["noise.D0"] == 0.2:
+            raise KeyboardInterrupt
+        return original(case, curve, tick)
+
+    monkeypatch.setattr(simulated, "_simulate_curve", interrupted)
+    assert simulate(case, "--out", out, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]') == 130
+    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+    printed = capsys.readouterr()
+    assert "what was done is kept" in printed.err
+    assert "64 paths" in printed.out
+
+
+def test_a_real_interrupt(case, out):
+    """SIGINT in the middle of a long slice ends the process soon, with the exit code 130 and a whole file."""
+    command = [sys.executable, "-m", "fpsolve.cli", "simulate", str(case), "--out", str(out), "--paths", "64"]
+    subprocess.run(command, check=True, capture_output=True)  # compiles
+    command[-1] = "400000"
+    with subprocess.Popen([*command, "--time", "4000"], stderr=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        time.sleep(12)
+        begun = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        assert process.returncode == 130
+        assert time.monotonic() - begun < 20
+    found = read(out / "quick/monte_carlo.json")
+    assert found["paths"] in (64, 400_000)
+
+
 def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
     """An interrupt in the second of three curves: the first is whole, the second is marked, the third is not begun."""
     original, calls = simulated._simulate_curve, []
@@ -171,12 +208,14 @@ def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
 
     monkeypatch.setattr(simulated, "_simulate_curve", interrupted_later)
     vary = ["--set", 'vary."noise.D0"=[0.1, 0.2, 0.3]', "--time", "200"]
+    (out / "quick").mkdir(parents=True)
+    (out / "quick/monte_carlo-3.json").write_text("{}", encoding="utf-8")
     assert simulate(case, "--out", out, *vary) == 130
     first, second = (read(out / f"quick/{name}") for name in ("monte_carlo.json", "monte_carlo-2.json"))
     assert not any("stopped early" in text for text in first["warnings"])
     assert any("stopped early" in text for text in second["warnings"])
     assert second["time"] < 0.7 * first["time"]
-    assert len(list((out / "quick").iterdir())) == 2
+    assert len(list((out / "quick").iterdir())) == 2  # an earlier third one is gone
     assert "what was done is kept" in capsys.readouterr().err
 
 
@@ -196,6 +235,8 @@ def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
         (["--set", "monte_carlo.p=[]"], "non-empty"),
         (["--set", 'monte_carlo.p="x"'], "monte_carlo.p"),
         (["--set", "monte_carlo.p=[inf]"], "finite"),
+        (["--set", "monte_carlo.p=[1e308]"], "overflow"),
+        (["--set", "oscillator.c1=-1000.0", "--set", "monte_carlo.step=0.1"], "too large for the damping"),
         (["--set", "monte_carlo.pahts=64"], "unknown key"),
         (["--set", "noise.r0=1.1", "--set", "noise.treatment=exact"], "is infinite"),
         (["--set", 'vary."noise.tau0"=[0.5, 0.001]', "--set", "monte_carlo.step=0.1"], "with noise.tau0 = 0.001: got"),
