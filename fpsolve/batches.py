@@ -15,10 +15,9 @@ from numpy.random import SeedSequence, default_rng
 
 from fpsolve.kernels import RENORMALISED, add_windows, advance, advance_population, close_slice
 from fpsolve.noise import AnyNoise, FloatArray, has_algebraic_tails, relaxation_time
-from fpsolve.simulation import Motion, NoiseStep, noise_step, stationary_noise
+from fpsolve.sampling import TICKS
+from fpsolve.simulation import Motion, NoiseStep, noise_step, starting_state
 
-TICKS = 100
-"""How many times `advance_all` reports progress."""
 _PORTION_SECONDS = 0.1
 STEP_SECONDS = 2e-8
 """For one step of one path, about."""
@@ -64,7 +63,8 @@ class Plan:
     def pieces(self) -> list[int]:
         """The steps of a slice in pieces, between which a batch looks whether it shall stop."""
         count = min(self.slice_steps, math.ceil(self.slice_seconds / _PORTION_SECONDS))
-        return [len(piece) for piece in np.array_split(np.arange(self.slice_steps), count)]
+        size, longer = divmod(self.slice_steps, count)
+        return [size + 1] * longer + [size] * (count - longer)
 
 
 class _Paths:
@@ -76,9 +76,7 @@ class _Paths:
 
     def __init__(self, plan: Plan, seed: SeedSequence) -> None:
         self.plan, self.rng = plan, default_rng(seed)
-        phase = self.rng.uniform(0, math.pi, plan.paths)
-        self.x, self.u = np.sin(phase), np.cos(phase)
-        self.xi = stationary_noise(plan.noise, plan.paths, self.rng)
+        self.x, self.u, self.xi = starting_state(plan.noise, plan.paths, self.rng)
         self.log_norm, self.push = np.zeros((2, plan.paths))
         self.slices = -plan.settling
 

@@ -55,6 +55,16 @@ class Curve:
     parameters: Mapping[str, float | str]
     varied: Mapping[str, float]
 
+    @property
+    def key(self) -> tuple[tuple[str, float], ...]:
+        """What tells it from the other curves of its case."""
+        return tuple(self.varied.items())
+
+    @property
+    def label(self) -> str:
+        """The same for the eye: "noise.D0 = 0.1, noise.r0 = 0.9"."""
+        return ", ".join(f"{key} = {value:g}" for key, value in self.varied.items())
+
 
 def _oscillator(value: Any) -> Any:
     return VibroImpactOscillator(**value) if isinstance(value, dict) else value
@@ -129,6 +139,10 @@ class Case(Section):
     def curve(self, varied: Mapping[str, float]) -> Curve:
         """The case's parameter set with some parameters replaced, by their dotted keys."""
         return _curve(self.oscillator, self.noise, varied)
+
+    def heading(self, curve: Curve) -> str:
+        """The title, and which of the curves."""
+        return f"{self.title}: {curve.label}" if curve.varied else self.title
 
     def original_noise(self, curve: Curve) -> NonGaussianNoise:
         """The noise of Eq. (7) behind a curve, whatever its treatment."""
@@ -264,9 +278,13 @@ def _curve_refusals(
         if not reason and with_existence:
             reason = _infinite(_curve(valid["oscillator"], valid["noise"], varied).noise, p)
         if reason:
-            setting = ", ".join(f"{key} = {value}" for key, value in varied.items())
-            yield (), varied, f"with {setting}: {reason}" if varied else reason
+            yield (), varied, _with(varied) + reason
             return
+
+
+def _with(varied: Mapping[str, float]) -> str:
+    """Beginning of a sentence on one of several curves."""
+    return f"with {', '.join(f'{key} = {value}' for key, value in varied.items())}: " if varied else ""
 
 
 def _obstacle(
@@ -303,16 +321,14 @@ def _simulation_refusals(valid: Mapping[str, Any], section: MonteCarloSection) -
     """The first parameter set for which the time, the step or a p of the simulation is not right."""
     for varied in _combinations(valid["vary"]):
         curve = _curve(valid["oscillator"], valid["noise"], varied)
-        setting = ", ".join(f"{key} = {value}" for key, value in varied.items())
-        prefix = f"with {setting}: " if varied else ""
         faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
         for name, text in faults.items():
             if getattr(section, name) is not None:
-                yield (name,), getattr(section, name), prefix + text
+                yield (name,), getattr(section, name), _with(varied) + text
         p = np.array(section.p or (0.0,))
         infinite = _obstacle(valid["oscillator"], valid["noise"], varied, p) or _infinite(curve.noise, p)
         if infinite:
-            yield ("p",), section.p, prefix + infinite
+            yield ("p",), section.p, _with(varied) + infinite
         if faults or infinite:
             return
 

@@ -249,16 +249,15 @@ def advance_population(  # type: ignore[no-untyped-def]
     m, noise, h, x, u, xi, log_norm, push, log_weights, ancestors, exponents, steps, interval, log_z, rng
 ):
     """Advance a population by some steps; the weights are looked at after every `interval` steps."""
-    impacts, done = 0, 0
+    done = 0
     p, tilt, bonus = exponents
     while done < steps:
         count = min(interval, steps - done)
         log_norm[:], push[:] = 0, 0
-        impacts += advance(m, noise, h, x, u, xi, log_norm, push, count, RENORMALISED, rng)
+        advance(m, noise, h, x, u, xi, log_norm, push, count, RENORMALISED, rng)
         log_weights += p * log_norm + tilt * push + bonus * count
         log_z[0] += _resample(x, u, xi, log_weights, ancestors, rng)
         done += count
-    return impacts
 
 
 @_compiled

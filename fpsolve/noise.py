@@ -115,7 +115,7 @@ class NonGaussianNoise:
     r0: Annotated[float, Field(lt=3)]
 
     @property
-    def _curvature(self) -> float:
+    def curvature(self) -> float:
         """b in 1 + b ξ², the bracket of Eqs. (8)-(9): b = τ₀(r₀ − 1)/(2D₀)."""
         return self.tau0 * (self.r0 - 1) / (2 * self.D0)
 
@@ -136,7 +136,7 @@ class NonGaussianNoise:
     @property
     def half_width(self) -> float:
         """√(2D₀/(τ₀(1 − r₀))) for r₀ < 1, otherwise ∞."""
-        return 1 / math.sqrt(-self._curvature) if self.r0 < 1 else math.inf
+        return 1 / math.sqrt(-self.curvature) if self.r0 < 1 else math.inf
 
     @property
     def end_exponent(self) -> float:
@@ -148,19 +148,19 @@ class NonGaussianNoise:
         if self.r0 == 1:
             return square / 2
         with np.errstate(invalid="ignore", divide="ignore"):
-            return self.D0 / (self.tau0 * (self.r0 - 1)) * np.log1p(self._curvature * square)
+            return self.D0 / (self.tau0 * (self.r0 - 1)) * np.log1p(self.curvature * square)
 
     def drift(self, xi: ArrayLike) -> FloatArray:
         """−V′(ξ)/τ₀ = −(ξ/τ₀)/(1 + τ₀(r₀ − 1)ξ²/(2D₀)), Eq. (11) before its approximation."""
         xi = np.asarray(xi, dtype=float)
-        return -xi / self.tau0 / (1 + self._curvature * xi**2)
+        return -xi / self.tau0 / (1 + self.curvature * xi**2)
 
     def log_density(self, xi: ArrayLike) -> FloatArray:
         """ln P_s(ξ) of Eq. (9) with the exponent −1/(r₀ − 1), normalised in closed form; −∞ outside the support."""
         xi = np.asarray(xi, dtype=float)
         if self.r0 == 1:
             return self.ou_reduction().log_density(xi)
-        bracket = self._curvature * xi**2
+        bracket = self.curvature * xi**2
         with np.errstate(invalid="ignore", divide="ignore"):
             power = xlog1py(-1 / (self.r0 - 1), bracket)
         return np.where(bracket > -1, power, -math.inf) - self._log_normalisation
@@ -173,7 +173,7 @@ class NonGaussianNoise:
     def _log_normalisation(self) -> float:
         """ln Z of Eq. (9): Z = B(a + 1, ½)/√|b| for r₀ < 1 and B(a − ½, ½)/√b for r₀ > 1, with a = 1/|r₀ − 1|."""
         a = 1 / abs(self.r0 - 1)
-        return float(betaln(a + 1 if self.r0 < 1 else a - 0.5, 0.5)) - 0.5 * math.log(abs(self._curvature))
+        return float(betaln(a + 1 if self.r0 < 1 else a - 0.5, 0.5)) - 0.5 * math.log(abs(self.curvature))
 
     def ou_reduction(self) -> OrnsteinUhlenbeck:
         """The Ornstein-Uhlenbeck process of Eqs. (12)-(14): α₀ = 1/τ₁, σ₀ = √(2D₀)/τ₀.

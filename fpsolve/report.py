@@ -64,7 +64,7 @@ def _solve_and_write(case: Case, folder: Path, advance: Advance) -> tuple[CurveR
 
 
 def draw(case: Case, results: Sequence[CurveResult], folder: Path, simulated: Sequence[SimulatedCurve] = ()) -> None:
-    """Draw the figure of a case into its folder, with the simulated curves as crosses."""
+    """Draw the figure of a case into its folder, with the simulated curves as dots."""
     pictures = [folder / "figure.png", folder / "figure.pdf"]
     series = _series(case, results, simulated)
     write_figure(series, case.figure.x, case.figure.y, case.title, pictures, is_reduced=case.is_exact)
@@ -148,9 +148,9 @@ def _remove_stale(folder: Path, written: set[Path]) -> None:
 
 def _series(case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve]) -> list[Series]:
     """The curves of the case's figure: one for each parameter set, or over x one for each set of the other keys."""
-    samples = {tuple(each.curve.varied.items()): each.result for each in simulated}
+    samples = {each.curve.key: each.result for each in simulated}
     if case.figure.x == "p":
-        return [_moment_series(result, samples.get(tuple(result.curve.varied.items()))) for result in results]
+        return [_moment_series(result, samples.get(result.curve.key)) for result in results]
     groups: dict[tuple[tuple[str, float], ...], list[CurveResult]] = {}
     for result in results:
         others = tuple((key, value) for key, value in result.curve.varied.items() if key != case.figure.x)
@@ -163,8 +163,8 @@ def _moment_series(result: CurveResult, sample: MonteCarlo | None) -> Series:
     line = np.linspace(moments.p.min(), moments.p.max(), 200) if moments.p.size else moments.p
     theory = perturbation.moment_exponent(result.curve.oscillator, result.curve.noise, line)
     found = [(e.p, e.value, e.standard_error) for e in sample.estimates if e.value is not None] if sample else []
-    crosses = np.array(found, dtype=float).T if found else None
-    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, crosses)
+    dots = np.array(found, dtype=float).T if found else None
+    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, dots)
 
 
 def _parameter_series(
@@ -183,6 +183,6 @@ def _parameter_series(
     if case.figure.y == "stability_index":  # it has poles, and is sought in this interval only
         line_y[(line_y < SEARCH_INTERVAL[0]) | (line_y > SEARCH_INTERVAL[1])] = np.nan
         return Series(others, x, y, line, line_y)
-    found = [(each, samples.get(tuple(result.curve.varied.items()))) for each, result in zip(x, group, strict=True)]
-    crosses = [(each, sample.lyapunov_exponent, sample.lyapunov_exponent_error) for each, sample in found if sample]
-    return Series(others, x, y, line, line_y, np.array(crosses).T if crosses else None)
+    found = [(each, samples.get(result.curve.key)) for each, result in zip(x, group, strict=True)]
+    dots = [(each, sample.lyapunov_exponent, sample.lyapunov_exponent_error) for each, sample in found if sample]
+    return Series(others, x, y, line, line_y, np.array(dots).T if dots else None)

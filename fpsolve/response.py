@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from fpsolve.kernels import advance_and_count
 from fpsolve.noise import AnyNoise, FloatArray
 from fpsolve.oscillator import VibroImpactOscillator
 from fpsolve.sampling import BATCHES
-from fpsolve.simulation import motion, noise_step, stationary_noise
+from fpsolve.simulation import Motion, NoiseStep, motion, noise_step, starting_state
 
 BINS = 100
 MEANS = ("x", "x_squared", "v_squared", "amplitude", "energy")
@@ -58,9 +57,7 @@ class _Batch:
 
     def __init__(self, setting: _Setting, seed: np.random.SeedSequence) -> None:
         self.setting, self.rng = setting, np.random.default_rng(seed)
-        phase = self.rng.uniform(0, math.pi, setting.paths)
-        self.x, self.u = setting.amplitude * np.sin(phase), setting.amplitude * np.cos(phase)
-        self.xi = stationary_noise(setting.noise, setting.paths, self.rng)
+        self.x, self.u, self.xi = starting_state(setting.noise, setting.paths, self.rng, setting.amplitude)
         self.spare = np.zeros((2, setting.paths))
         self.plane, self.radial = np.zeros((BINS, 2 * BINS)), np.zeros(BINS)
         self.sums = np.zeros(len(MEANS))
@@ -80,8 +77,8 @@ class _Batch:
 @dataclass(frozen=True, eq=False)
 class _Setting:
     noise: AnyNoise
-    motion: Any
-    noise_step: Any
+    motion: Motion
+    noise_step: NoiseStep
     step: float
     steps: int
     paths: int
@@ -112,13 +109,13 @@ def stationary_response(
     Raises:
         KeyboardInterrupt: before the response was stationary.
     """
-    looks_in_half_turn = max(1, round(math.pi / (oscillator.omega * step * _LOOKS)))
+    steps = max(1, round(math.pi / (oscillator.omega * step * _LOOKS)))
     damping = oscillator.epsilon**2 * (oscillator.c2 + 3 * oscillator.omega**2 * oscillator.c3) / 8
     setting = _Setting(
-        noise, motion(oscillator), noise_step(noise, step), step, looks_in_half_turn, math.ceil(paths / BATCHES),
+        noise, motion(oscillator), noise_step(noise, step), step, steps, math.ceil(paths / BATCHES),
         math.sqrt(exponent / damping),
     )  # fmt: skip
-    between = looks_in_half_turn * step
+    between = steps * step
     memory = max(1 / exponent, 2 * variance_rate / exponent**2)
     settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
     batches = [_Batch(setting, each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]

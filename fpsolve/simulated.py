@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -14,7 +14,7 @@ from fpsolve.case import Case, Curve
 from fpsolve.errors import FpsolveError, OutputError
 from fpsolve.files import atomic, prepare_folder, write_json
 from fpsolve.plots import write_response_figure
-from fpsolve.sampling import obstacles
+from fpsolve.sampling import TICKS, obstacles
 
 if TYPE_CHECKING:  # numba takes half a second to import
     from fpsolve.montecarlo import MonteCarlo
@@ -49,7 +49,7 @@ class SimulatedCurve:
 
 def simulation_work(case: Case) -> int:
     """How often `simulate_case` reports progress."""
-    return 100 * sum(3 if _is_nonlinear(curve) else 1 for curve in case.curves())
+    return TICKS * sum(3 if _is_nonlinear(curve) else 1 for curve in case.curves())
 
 
 def simulate_case(
@@ -101,7 +101,7 @@ def refuse_obstacles(case: Case) -> None:
     for curve in case.curves():
         found = obstacles(curve.oscillator, curve.noise, time=case.monte_carlo.time, step=case.monte_carlo.step)
         for name, sentence in found.items():
-            place = "".join(f"with {key} = {value:g}: " for key, value in curve.varied.items())
+            place = f"with {curve.label}: " if curve.varied else ""
             raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
 
 
@@ -125,7 +125,7 @@ def _respond(case: Case, curve: Curve, result: MonteCarlo, tick: Tick) -> tuple[
 
     value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
     if value <= SIGNIFICANT * error:
-        for _ in range(200):
+        for _ in range(2 * TICKS):
             tick()
         reason = "is not positive" if value <= 0 else f"is not {SIGNIFICANT:g} standard errors above 0"
         return None, [
@@ -201,17 +201,16 @@ def _write_response(case: Case, simulated: SimulatedCurve, response: Response, s
             for row in zip(edges, edges[1:], response.amplitude_density, response.amplitude_error, strict=False)
         )
     write_response(grid, response.x_edges, response.v_edges, response.density)
-    varied = ", ".join(f"{key} = {value:g}" for key, value in simulated.curve.varied.items())
     write_response_figure(
         response.x_edges, response.v_edges, response.density, response.amplitude_edges, response.amplitude_density,
-        response.amplitude_error, f"{case.title}: {varied}" if varied else case.title, pictures,
+        response.amplitude_error, case.heading(simulated.curve), pictures,
     )  # fmt: skip
     return [table, grid, *pictures]
 
 
-def _remove_stale(folder: Path, written: Sequence[Path] | set[Path]) -> None:
+def _remove_stale(folder: Path, written: set[Path]) -> None:
     """What an earlier simulation left for curves that are no more."""
     ours = re.compile(r"(monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf))")
-    for path in set(folder.iterdir()) - set(written):
+    for path in set(folder.iterdir()) - written:
         if ours.fullmatch(path.name):
             path.unlink()

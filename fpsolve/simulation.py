@@ -63,8 +63,8 @@ def noise_step(noise: AnyNoise, h: float, tilt: float = 0.0) -> NoiseStep:
     """The coefficients of one step of length h; `tilt` is b, which adds σ² b to the drift."""
     force = noise.diffusion**2 * tilt
     if isinstance(noise, NonGaussianNoise) and noise.r0 != 1:
-        kick, curvature = noise.diffusion * math.sqrt(h), noise.tau0 * (noise.r0 - 1) / (2 * noise.D0)
-        return NoiseStep(0.0, 0.0, kick, force * h, 0.0, 0.0, 0.0, 0.0, h / (2 * noise.tau0), curvature)
+        kick = noise.diffusion * math.sqrt(h)
+        return NoiseStep(0.0, 0.0, kick, force * h, 0.0, 0.0, 0.0, 0.0, h / (2 * noise.tau0), noise.curvature)
     alpha = 1 / noise.tau0 if isinstance(noise, NonGaussianNoise) else noise.alpha
     std, a = noise.standard_deviation, alpha * h
     decay, mean = math.exp(-a), -math.expm1(-a) / a
@@ -88,6 +88,14 @@ def noise_step(noise: AnyNoise, h: float, tilt: float = 0.0) -> NoiseStep:
         pull=0.0,
         curvature=0.0,
     )
+
+
+def starting_state(
+    noise: AnyNoise, paths: int, rng: np.random.Generator, amplitude: float = 1.0
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """x, u and ξ of paths of one amplitude, with uniform phases in front of the wall and stationary noise."""
+    phase = rng.uniform(0, math.pi, paths)
+    return amplitude * np.sin(phase), amplitude * np.cos(phase), stationary_noise(noise, paths, rng)
 
 
 def stationary_noise(noise: AnyNoise, size: int, rng: np.random.Generator) -> FloatArray:

@@ -46,8 +46,8 @@ def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
 def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:
     """Λ(p) and λ by simulation, with the finite elements beside them where these have been solved."""
     console = Console()
-    solved = {tuple(result.curve.varied.items()): result for result in results}
-    pairs = [(each, solved.get(tuple(each.curve.varied.items()))) for each in simulated]
+    solved = {result.curve.key: result for result in results}
+    pairs = [(each, solved.get(each.curve.key)) for each in simulated]
     if case.figure.x == "p":
         for each, result in pairs:
             console.print(_simulation_table(case, each, result))
@@ -84,7 +84,7 @@ def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult
     """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
     table = Table(
         "p", "Λ(p)", "± s.e.", *(("finite elements", "s.e. away") if result else ()), "effective paths",
-        title=Text(_heading(case, simulated.curve)), title_justify="left",
+        title=Text(case.heading(simulated.curve)), title_justify="left",
     )  # fmt: skip
     _align(table)
     exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
@@ -126,7 +126,7 @@ def _deviation(value: float, error: float, exact: float) -> str:
 
 
 def _place(case: Case, curve: Curve) -> str:
-    return ", ".join([case.name, *(f"{key} = {value:g}" for key, value in curve.varied.items())])
+    return f"{case.name}, {curve.label}" if curve.varied else case.name
 
 
 def _moment_table(case: Case, result: CurveResult) -> Table:
@@ -137,7 +137,7 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
         "± error",
         _theory(case, "(37)"),
         "difference",
-        title=Text(_heading(case, result.curve)),
+        title=Text(case.heading(result.curve)),
         title_justify="left",
     )
     _align(table)
@@ -211,11 +211,6 @@ def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
         )
     console.print(table)
     console.print(f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok")
-
-
-def _heading(case: Case, curve: Curve) -> str:
-    varied = ", ".join(f"{key} = {value:g}" for key, value in curve.varied.items())
-    return f"{case.title}: {varied}" if varied else case.title
 
 
 def _align(table: Table) -> None:
