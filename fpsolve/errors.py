@@ -51,6 +51,9 @@ class CaseError(FpsolveError):
         self.file, self.faults = file, tuple(faults)
         super().__init__("\n".join(self._line(fault) for fault in self.faults))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.file, self.faults)
+
     def _line(self, fault: Fault) -> str:
         place = self.file if fault.line is None else f"{self.file}:{fault.line}"
         return f"{place}: {fault.key}: {fault.sentence}" if fault.key else f"{place}: {fault.sentence}"

@@ -43,9 +43,12 @@ class TiltedGenerator:
     ) -> None:
         self.oscillator, self.noise = oscillator, noise
         self.space = CylinderSpace(mesh, noise, tilt)
-        # functions that do not hold this object, as the space keeps them with the forms that it has made
         self._omega: Coefficient = partial(np.full_like, fill_value=oscillator.omega)
         self._xi: Coefficient = partial(np.multiply, noise.standard_deviation)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What it is made of; the matrices are assembled again when they are needed."""
+        return type(self), (self.oscillator, self.noise, self.space.mesh, self.space.tilt)
 
     def L0(self) -> KroneckerSum:
         """L₀ = ½σ²∂ξξ + b(ξ)∂ξ + ω∂φ."""

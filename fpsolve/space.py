@@ -10,10 +10,11 @@ alone, and the mass matrix is well conditioned.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import skfem
@@ -101,7 +102,6 @@ class LineSpace:
         self._norms = np.sqrt(np.bincount(self._dofs.ravel(), squares.ravel(), minlength=self.size))
         self._transform /= self._norms[self._dofs][:, None, :]
         self._values, self._slopes = values @ self._transform, slopes @ self._transform
-        self._forms: dict[Hashable, csr_matrix] = {}
         self._evaluations: dict[bytes, tuple[FloatArray, csr_matrix]] = {}
 
     @cached_property
@@ -123,16 +123,20 @@ class LineSpace:
 
     def mass(self, f: Coefficient = one) -> csr_matrix:
         """∫ w f u v."""
-        return self._form("mass", self._values, f, self._values)
+        return self._mass if f is one else self._form(self._values, f, self._values)
+
+    @cached_property
+    def _mass(self) -> csr_matrix:
+        return self._form(self._values, one, self._values)
 
     def convection(self, f: Coefficient = one) -> csr_matrix:
         """∫ w f u′ v, cell by cell."""
-        return self._form("convection", self._values, f, self._slopes)
+        return self._form(self._values, f, self._slopes)
 
     def stiffness(self, tilt: float = 0.0) -> csr_matrix:
         """∫ w (u′ + s u)(v′ + s v), s being the tilt."""
         slopes = self._slopes + tilt * self._values
-        return self._form(f"stiffness {tilt}", slopes, one, slopes)
+        return self._form(slopes, one, slopes)
 
     def evaluation(self, local: FloatArray) -> tuple[FloatArray, csr_matrix]:
         """Points and values in every cell at local coordinates in [0, 1]: x, and E with u(x) = E @ coefficients.
@@ -183,18 +187,16 @@ class LineSpace:
             modes[dofs[2:]] = np.arange(2, dofs.size)
         return cells, modes
 
-    def _form(self, name: str, left: FloatArray, f: Coefficient, right: FloatArray) -> csr_matrix:
-        """∫ w f (right) (left), without what is zero but for rounding; kept for the next time."""
-        if (name, f) not in self._forms:
-            measure = self._measure * f(self.points).reshape(self._measure.shape)
-            blocks = (left * measure[..., None]).transpose(0, 2, 1) @ right
-            blocks[np.abs(blocks) < 1e-16 * np.max(np.abs(blocks))] = 0
-            rows, columns = np.broadcast_arrays(self._dofs[:, :, None], self._dofs[:, None, :])
-            entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
-            matrix = csr_matrix(entries, shape=(self.size, self.size))
-            matrix.eliminate_zeros()
-            self._forms[name, f] = matrix
-        return self._forms[name, f]
+    def _form(self, left: FloatArray, f: Coefficient, right: FloatArray) -> csr_matrix:
+        """∫ w f (right) (left), without what is zero but for rounding."""
+        measure = self._measure * f(self.points).reshape(self._measure.shape)
+        blocks = (left * measure[..., None]).transpose(0, 2, 1) @ right
+        blocks[np.abs(blocks) < 1e-16 * np.max(np.abs(blocks))] = 0
+        rows, columns = np.broadcast_arrays(self._dofs[:, :, None], self._dofs[:, None, :])
+        entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
+        matrix = csr_matrix(entries, shape=(self.size, self.size))
+        matrix.eliminate_zeros()
+        return matrix
 
     def _orthogonalised(self, slopes: FloatArray) -> FloatArray:
         """New functions in the elements' own, shape (m, k + 1, k + 1), so that in every cell ∫ w u′v′ is diagonal.
@@ -289,7 +291,7 @@ class CylinderSpace:
             self.weight,
             end_exponents=(exponent * (z[0] <= -end), exponent * (z[-1] >= end)),
         )
-        self._carriers: dict[CylinderSpace, tuple[FloatArray, FloatArray]] = {}
+        self._carriers: WeakKeyDictionary[CylinderSpace, tuple[FloatArray, FloatArray]] = WeakKeyDictionary()
         self.right_trace, upper = self.phase.traces
         self.left_trace = np.roll(upper, 1, axis=0)
 
