@@ -6,8 +6,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from fpsolve.errors import CaseError, Fault, NotConverged
 from fpsolve.eigen import principal_pair
+from fpsolve.errors import CaseError, Fault, NotConverged
 from fpsolve.exponent import ExponentSolver
 from fpsolve.function import MomentLyapunovFunction, moment_lyapunov
 from fpsolve.generator import TiltedGenerator
