@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,12 +14,13 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from fpsolve import __version__
 from fpsolve.errors import FpsolveError, NotConverged
 
 if TYPE_CHECKING:
-    from fpsolve.case import Case
-    from fpsolve.curves import CurveResult
-    from fpsolve.simulated import SimulatedCurve
+    from fpsolve.case.case import Case
+    from fpsolve.study.simulate import SimulatedCurve
+    from fpsolve.study.solve import CurveResult
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 
@@ -29,7 +29,7 @@ app = App(
     help="""Moment Lyapunov exponents of a vibro-impact oscillator under coloured noise, by finite elements.
 
     Example: fpsolve run cases/fig1.toml""",
-    version=lambda: f"fpsolve {version('fpsolve')}",
+    version=lambda: f"fpsolve {__version__}",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
 )
@@ -62,9 +62,10 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
-    from fpsolve import curves, report
-    from fpsolve.simulated import refuse_obstacles
-    from fpsolve.tables import print_results
+    from fpsolve.output import report
+    from fpsolve.output.terminal import print_results
+    from fpsolve.study import solve as curves
+    from fpsolve.study.simulate import refuse_obstacles
 
     loaded = _load(cases, overrides)
     _refuse_namesakes(loaded)
@@ -111,7 +112,7 @@ def simulate(
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
-    from fpsolve.simulated import refuse_obstacles
+    from fpsolve.study.simulate import refuse_obstacles
 
     options = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
     stated = [f"monte_carlo.{name}={value}" for name, value in options.items() if value is not None]
@@ -133,8 +134,8 @@ def check(cases: Cases, *, overrides: Overrides = None) -> int:
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
-    from fpsolve import curves
-    from fpsolve.tables import print_comparisons, print_warnings
+    from fpsolve.output.terminal import print_comparisons, print_warnings
+    from fpsolve.study import solve as curves
 
     code = 0
     for case in _load(cases, overrides):
@@ -169,7 +170,8 @@ def mesh(
 
     Example: fpsolve mesh meshes/graded.vtu --phi-cells 3 --xi-cells 8 --grading 2
     """
-    from fpsolve.mesh import make_mesh, write_mesh
+    from fpsolve.fem.mesh import make_mesh
+    from fpsolve.fem.mesh_file import write_mesh
 
     made = make_mesh(
         phi_cells=phi_cells,
@@ -219,7 +221,7 @@ def _print_error(text: str) -> None:
 
 def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
     """All cases, or one error that lists the faults of all of them."""
-    from fpsolve.case import load_case
+    from fpsolve.case.case import load_case
     from fpsolve.errors import CaseError
 
     cases, errors = [], []
@@ -235,8 +237,8 @@ def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
 
 def _simulate(case: Case, out: Path, results: Sequence[CurveResult] = ()) -> tuple[Sequence[SimulatedCurve], bool]:
     """Simulate a case, write it, print it; and whether an interrupt ended it."""
-    from fpsolve.simulated import simulate_case, simulation_work
-    from fpsolve.tables import print_simulation
+    from fpsolve.output.terminal import print_simulation
+    from fpsolve.study.simulate import simulate_case, simulation_work
 
     with _progress(f"{case.name}, simulation", simulation_work(case)) as tick:
         simulated, is_interrupted = simulate_case(case, out, tick=tick)

@@ -15,6 +15,10 @@ class NoSuchExponent(FpsolveError):
     """Λ(p) does not exist for this noise and this p: it is infinite."""
 
 
+class NoPerturbationTheory(FpsolveError):
+    """Second-order perturbation theory does not apply to this motion or this noise."""
+
+
 class MeshError(FpsolveError):
     """A mesh that cannot carry the problem: not a tensor grid, or no line at an impact."""
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fpsolve.exponent import ExponentSolver
-from fpsolve.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.vibro_impact import VibroImpactOscillator
 
 FIG1 = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 FIG1_NOISE = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)

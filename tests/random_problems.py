@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fpsolve.eigen import principal_pair
 from fpsolve.errors import NotConverged
-from fpsolve.exponent import ExponentSolver
-from fpsolve.generator import TiltedGenerator
-from fpsolve.noise import AnyNoise, NonGaussianNoise
-from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.model.noise import ColouredNoise, NonGaussianNoise
+from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.oracles import fourier_hermite
 
 RTOL = 1e-8
@@ -30,7 +30,7 @@ class Problem:
     """One parameter set."""
 
     oscillator: VibroImpactOscillator
-    noise: AnyNoise
+    noise: ColouredNoise
     p: float
 
 

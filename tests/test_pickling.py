@@ -6,13 +6,13 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from fpsolve.eigen import principal_pair
 from fpsolve.errors import CaseError, Fault, NotConverged
-from fpsolve.exponent import ExponentSolver
-from fpsolve.function import MomentLyapunovFunction, moment_lyapunov
-from fpsolve.generator import TiltedGenerator
-from fpsolve.mesh import make_mesh
-from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.fem.mesh import make_mesh
+from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.9, c1=0.0, epsilon=1.5)

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.exponent import ExponentSolver
-from fpsolve.function import solve_moments
+from fpsolve.exponent.function import solve_moments
+from fpsolve.exponent.solver import ExponentSolver
 from tests.benchmarks import ngsolve_code
 from tests.benchmarks.finite_volume import FiniteVolume
 from tests.benchmarks.fourier_hermite import FourierHermite

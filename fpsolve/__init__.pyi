@@ -1,0 +1,23 @@
+from .analysis.density import adjoint_density as adjoint_density
+from .analysis.density import furstenberg_khasminskii as furstenberg_khasminskii
+from .analysis.density import stationary_density as stationary_density
+from .analysis.density import tilted_density as tilted_density
+from .case.case import load_case as load_case
+from .errors import CaseError as CaseError
+from .errors import FpsolveError as FpsolveError
+from .errors import NotConverged as NotConverged
+from .exponent.eigen import principal_pair as principal_pair
+from .exponent.eigen import spectrum as spectrum
+from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
+from .exponent.function import moment_lyapunov as moment_lyapunov
+from .exponent.solver import ExponentSolver as ExponentSolver
+from .fem.generator import TiltedGenerator as TiltedGenerator
+from .fem.mesh import CylinderMesh as CylinderMesh
+from .fem.mesh import make_mesh as make_mesh
+from .model.noise import NonGaussianNoise as NonGaussianNoise
+from .model.noise import OrnsteinUhlenbeck as OrnsteinUhlenbeck
+from .model.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
+from .output.report import run as run
+from .simulation.estimators import simulate as simulate
+
+__version__: str

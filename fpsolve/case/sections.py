@@ -1,0 +1,275 @@
+"""The sections of a case file, each with the rules that it can check by itself.
+
+The ranges of the oscillator are those of `VibroImpactOscillator`; the others stand here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.messages import LIST, TABLE, Refusal, nearest, refuse
+from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh
+from fpsolve.fem.mesh_file import read_mesh
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.parameters import STRICT, Positive
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
+
+MAX_MOMENTS = 100_000
+_SAME = 1e-12
+"""p that differ by no more are one p; values of a varied key, relative to their size."""
+
+Values = tuple[float, ...]
+NonEmpty = Annotated[Values, Field(strict=False, min_length=1)]
+Text = Annotated[str, Field(min_length=1)]
+Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
+Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
+Tolerance = Annotated[float | None, Field(gt=0)]
+
+
+def flat(value: Any) -> Any:
+    """Nested tables as one: noise.D0 = 1.0 means the same as "noise.D0" = 1.0."""
+    if not isinstance(value, dict):
+        return value
+    result: dict[str, Any] = {}
+    for key, item in value.items():
+        is_nested = isinstance(item, dict) and item
+        entries = {f"{key}.{name}": entry for name, entry in flat(item).items()} if is_nested else {key: item}
+        for name in entries.keys() & result.keys():
+            raise ValueError(f"{name} stands twice, once with quotes and once without; remove one of them")
+        result |= entries
+    return result
+
+
+class Section(BaseModel):
+    """A table of a case file: immutable, no unknown keys, no conversions, finite numbers only."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class NoiseSection(Section):
+    """[noise]: the parameters of Eqs. (7)-(8), and whether the paper's reduction (12)-(14) replaces them."""
+
+    D0: Positive
+    tau0: Positive
+    r0: Annotated[float, Field(lt=5 / 3)]
+    treatment: Literal["ou-reduction", "exact"] = "ou-reduction"
+
+    def original(self) -> NonGaussianNoise:
+        """The noise of Eq. (7), whatever the treatment."""
+        return NonGaussianNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
+
+    def process(self) -> OrnsteinUhlenbeck | NonGaussianNoise:
+        """The noise that is solved for."""
+        return self.original() if self.treatment == "exact" else self.original().ou_reduction()
+
+
+class Sweep(Section):
+    """{ start, stop, num }: equidistant numbers, both ends included."""
+
+    start: float
+    stop: float
+    num: Annotated[int, Field(ge=2, le=MAX_MOMENTS)]
+
+    @model_validator(mode="after")
+    def _increases(self) -> Self:
+        if not 0 < self.stop - self.start < math.inf:
+            raise ValueError(
+                f"got start = {self.start}, stop = {self.stop}; must be start < stop, a finite way apart; "
+                "exchange the two, or list a single p as in p = [2.0]"
+            )
+        return self
+
+
+def _list_or_table(value: Any) -> str | None:
+    return LIST if isinstance(value, list | tuple) else TABLE if isinstance(value, dict | Sweep) else None
+
+
+class Moments(Section):
+    """[moments]: the orders p, and the relative error wanted of Λ(p)."""
+
+    p: Annotated[
+        Annotated[NonEmpty, Tag(LIST)] | Annotated[Sweep, Tag(TABLE)],
+        Discriminator(_list_or_table),
+    ]
+    rtol: Annotated[float, Field(gt=1e-13, lt=1)] = 1e-8
+
+    @property
+    def values(self) -> FloatArray:
+        """All p, in the file's order."""
+        if isinstance(self.p, Sweep):
+            return np.linspace(self.p.start, self.p.stop, self.p.num)
+        return np.array(self.p)
+
+    def has(self, p: float) -> bool:
+        with np.errstate(over="ignore"):
+            return bool(np.any(np.abs(self.values - p) <= _SAME))
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Self:
+        values = np.sort(self.values)
+        with np.errstate(over="ignore"):
+            close = values[1:][np.diff(values) <= _SAME]
+        if close.size:
+            text = f"{close[0]} stands twice; p must differ by more than {_SAME:g}; remove one of them"
+            refuse([(("p",), self.p, text)])
+        return self
+
+
+class MeshSection(Section):
+    """[mesh]: a mesh file, or some of the numbers that make one; ξ in noise units."""
+
+    file: Annotated[str | None, Field(min_length=1)] = None
+    phi_cells: Cells = None
+    phi_degree: Degree = None
+    xi_cells: Cells = None
+    xi_degree: Degree = None
+    xi_min: Annotated[float | None, Field(lt=0)] = None
+    xi_max: Annotated[float | None, Field(gt=0)] = None
+
+    def mesh(self, folder: Path) -> CylinderMesh | None:
+        """The mesh, its file sought from `folder`; None where nothing is stated."""
+        stated = self.model_dump(exclude_none=True)
+        if "file" in stated:
+            return read_mesh(folder / stated["file"])
+        return make_mesh(**stated) if stated else None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        numbers = ", ".join(self.model_dump(exclude_none=True, exclude={"file"}))
+        if self.file is not None and numbers:
+            text = f"a mesh must be either a file or made from numbers; remove file, or remove {numbers}"
+            refuse([(("file",), self.file, text)])
+        return self
+
+
+class MonteCarloSection(Section):
+    """[monte_carlo]: how the system is simulated; time and step are chosen where they are not stated."""
+
+    paths: Annotated[int, Field(ge=BATCHES, le=MAX_PATHS)] = PATHS
+    time: Annotated[float | None, Field(gt=0)] = None
+    step: Annotated[float | None, Field(gt=0)] = None
+    seed: Annotated[int, Field(ge=0)] = 0
+    estimator: Estimator = "direct"
+    p: NonEmpty | None = None
+
+
+class FigureSection(Section):
+    """[figure]: the axes; x is "p" or a varied key."""
+
+    x: Text = "p"
+    y: Literal["moment", "lyapunov_exponent", "stability_index"] = "moment"
+
+    @model_validator(mode="after")
+    def _y_fits_x(self) -> Self:
+        if self.x == "p" and self.y != "moment":
+            remedy = 'must be "moment" where x = "p"; write y = "moment", or set x to a key of [vary]'
+        elif self.x != "p" and self.y == "moment":
+            remedy = 'must be "lyapunov_exponent" or "stability_index" where x is not "p"; write one of these'
+        else:
+            return self
+        refuse([(("y",), self.y, f'got "{self.y}"; {remedy}')])
+        return self
+
+
+class OutputSection(Section):
+    """[output]: the p whose eigenfunctions are written; None is all of them."""
+
+    eigenfunctions: Annotated[Values | None, Field(strict=False)] = None
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Self:
+        wanted = self.eigenfunctions or ()
+        twice = ((i, p) for i, p in enumerate(wanted) if p in wanted[:i])
+        refuse((("eigenfunctions", i), p, f"got {p} twice; values must be distinct; remove one") for i, p in twice)
+        return self
+
+
+class Expectation(Section):
+    """[[expect]]: a value that the result must have, on the curves that `where` selects."""
+
+    quantity: Literal["moment", "lyapunov_exponent", "stability_index", "variance_rate"]
+    p: float | None = None
+    value: float
+    rtol: Tolerance = None
+    atol: Tolerance = None
+    source: Text
+    where: Annotated[dict[str, float], BeforeValidator(flat)] = Field(default_factory=dict)
+
+    def selects(self, varied: Mapping[str, float]) -> bool:
+        """Whether this is about the curve with these varied values; without `where`, about all curves."""
+        return all(same(varied[key], value) for key, value in self.where.items())
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        refusals: list[Refusal] = []
+        if self.quantity == "moment" and self.p is None:
+            refusals.append((("p",), None, "missing; a moment needs its order; add, for example, p = 2.0"))
+        if self.quantity != "moment" and self.p is not None:
+            text = f"got {self.p}; {self.quantity} does not depend on p; remove p, or check the moment"
+            refusals.append((("p",), self.p, text))
+        if self.rtol is None and self.atol is None:
+            refusals.append((("rtol",), None, "missing, and so is atol; add, for example, rtol = 1e-3"))
+        refuse(refusals)
+        return self
+
+
+def same(value: float, other: float) -> bool:
+    """Whether two values of a varied key are one."""
+    return math.isclose(value, other, rel_tol=_SAME)
+
+
+_VARIED_SECTIONS: Mapping[str, Any] = {"oscillator": VibroImpactOscillator, "noise": NoiseSection}
+VARIABLE: Mapping[str, TypeAdapter[Values]] = {
+    f"{section}.{name}": TypeAdapter(
+        Annotated[tuple[Annotated[float, Field(), *field.metadata], ...], Field(strict=False, min_length=1)],
+        config=STRICT,
+    )
+    for section, model in _VARIED_SECTIONS.items()
+    for name, field in model.__pydantic_fields__.items()
+    if field.annotation is float
+}
+"""The keys that [vary] may name, each with what its values may be."""
+
+
+def _vary(value: Any) -> Any:
+    """[vary] with its keys made flat, checked value by value against the ranges of the keys."""
+    table = flat(value)
+    if isinstance(table, dict):
+        refuse(refusal for key, values in table.items() for refusal in _varied_refusals(key, values))
+    return table
+
+
+def _varied_refusals(key: str, values: Any) -> Iterator[Refusal]:
+    if key not in VARIABLE:
+        guess = nearest(key, VARIABLE)
+        yield (key,), values, f"cannot be varied;{guess} known keys: {', '.join(VARIABLE)}; rename or remove it"
+        return
+    try:
+        numbers = VARIABLE[key].validate_python(values)
+    except ValidationError as error:
+        yield from (((key, *detail["loc"]), detail["input"], "") for detail in error.errors())
+        return
+    for i, number in enumerate(numbers):
+        if any(same(number, other) for other in numbers[:i]):
+            yield (key, i), number, f"got {number} twice; values must be distinct; remove one of them"
+
+
+Vary = Annotated[dict[str, NonEmpty], BeforeValidator(_vary)]

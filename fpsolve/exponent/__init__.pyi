@@ -1,0 +1,10 @@
+from .adapt import Budget as Budget
+from .eigen import PrincipalPair as PrincipalPair
+from .eigen import principal_pair as principal_pair
+from .eigen import second_derivative as second_derivative
+from .eigen import spectrum as spectrum
+from .error import Estimate as Estimate
+from .function import MomentLyapunovFunction as MomentLyapunovFunction
+from .function import moment_lyapunov as moment_lyapunov
+from .solver import ExponentSolver as ExponentSolver
+from .solver import MomentLyapunov as MomentLyapunov

@@ -1,0 +1,173 @@
+"""Figures for print: finite-element results as markers, perturbation theory as lines, as in the paper."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.files import atomic
+
+SYMBOLS = {
+    "p": "$p$",
+    "oscillator.epsilon": r"$\varepsilon$",
+    "oscillator.omega": r"$\omega$",
+    "oscillator.restitution": "$r$",
+    "oscillator.c1": "$c_1$",
+    "oscillator.c2": "$c_2$",
+    "oscillator.c3": "$c_3$",
+    "noise.D0": "$D_0$",
+    "noise.tau0": r"$\tau_0$",
+    "noise.r0": "$r_0$",
+}
+TITLES = {
+    "p": "order of the moment $p$",
+    "oscillator.omega": r"natural frequency $\omega$ (rad/time)",
+    "oscillator.restitution": "coefficient of restitution $r$",
+    "oscillator.c1": "damping coefficient $c_1$ (1/time)",
+    "noise.D0": "noise intensity $D_0$",
+    "noise.tau0": r"correlation time $\tau_0$ (time)",
+    "noise.r0": "departure from Gaussian noise $r_0$",
+    "moment": r"moment Lyapunov exponent $\Lambda(p)$ (1/time)",
+    "lyapunov_exponent": r"largest Lyapunov exponent $\lambda$ (1/time)",
+    "stability_index": r"stability index $\delta_p$",
+}
+EQUATIONS = {"moment": "(37)", "lyapunov_exponent": "(39)", "stability_index": "(38)"}
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
+_DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
+_MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One curve of a figure: markers at (x, y), a line through (line_x, line_y).
+
+    Attributes:
+        varied: the parameters that tell it from the others, for the legend.
+        simulated: x, y and the standard errors of y from a simulation, shape (3, n).
+    """
+
+    varied: dict[str, float]
+    x: FloatArray
+    y: FloatArray
+    line_x: FloatArray
+    line_y: FloatArray
+    simulated: FloatArray | None = None
+
+
+def write_figure(
+    series: Sequence[Series], x: str, y: str, title: str, paths: Sequence[Path], *, is_reduced: bool = False
+) -> None:
+    """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
+
+    Args:
+        series: the curves.
+        x: "p" or the dotted key of a parameter.
+        y: "moment", "lyapunov_exponent" or "stability_index".
+        title: stands above the axes.
+        paths: .png, .pdf or what else matplotlib writes.
+        is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
+    """
+    with _canvas(paths) as figure:
+        axes = figure.add_subplot(xlabel=TITLES.get(x, SYMBOLS.get(x, x)), ylabel=TITLES[y])
+        axes.set_title(fill(title, 80), parse_math=False)
+        axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+        for i, item in enumerate(series):
+            _draw(axes, item, i)
+        is_simulated = any(item.simulated is not None for item in series)
+        _add_legend(axes, EQUATIONS[y] + (", reduced noise" if is_reduced else ""), is_simulated)
+        axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+        axes.margins(x=0.03)
+
+
+def write_response_figure(
+    x_edges: FloatArray,
+    v_edges: FloatArray,
+    density: FloatArray,
+    amplitude_edges: FloatArray,
+    amplitude_density: FloatArray,
+    amplitude_error: FloatArray,
+    title: str,
+    paths: Sequence[Path],
+) -> None:
+    """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors.
+
+    Args:
+        x_edges, v_edges, density: shapes (n + 1,), (m + 1,) and (n, m).
+        amplitude_edges, amplitude_density, amplitude_error: shapes (k + 1,), (k,) and (k,).
+        title: stands above.
+        paths: .png, .pdf or what else matplotlib writes.
+    """
+    from matplotlib.colors import LogNorm
+
+    with _canvas(paths, width=10.5) as figure:
+        figure.suptitle(fill(title, 100), fontsize=12, parse_math=False)
+        plane, radial = figure.subplots(1, 2)
+        scale = LogNorm(max(density[density > 0].min(), density.max() * 1e-4), density.max())
+        visited = np.ma.masked_equal(density.T, 0)
+        picture = plane.pcolormesh(x_edges, v_edges, visited, cmap="viridis", norm=scale, rasterized=True)
+        share = np.cumsum(amplitude_density * np.diff(amplitude_edges))
+        seen = float(amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
+        velocity = seen * v_edges[-1] / x_edges[-1]
+        plane.set(xlabel="$x$", ylabel=r"$\dot{x}$ (1/time)", xlim=(0, seen), ylim=(-velocity, velocity))
+        figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$")
+        middle = (amplitude_edges[1:] + amplitude_edges[:-1]) / 2
+        low, high = amplitude_density - 2 * amplitude_error, amplitude_density + 2 * amplitude_error
+        radial.fill_between(middle, low, high, color=_COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")
+        radial.plot(middle, amplitude_density, color=_COLOURS[0], linewidth=1.6, label="simulation")
+        radial.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", ylabel="density of $A$", xlim=(0, seen))
+        radial.set_ylim(0, 1.25 * high.max())
+        radial.legend(frameon=False, fontsize=11, loc="upper right")
+
+
+@contextmanager
+def _canvas(paths: Sequence[Path], width: float = 7.2) -> Iterator[Any]:
+    """An empty figure in the house style, which is written to the paths in the end."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
+    with rc_context({"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12, "pdf.fonttype": 42}):
+        figure = Figure(figsize=(width, 5.0), dpi=160, layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+        figure.draw_without_rendering()  # lays it out, once for all formats
+        figure.set_layout_engine("none")
+        for path in paths:
+            with atomic(path) as temporary:
+                figure.savefig(temporary, metadata={"CreationDate": None} if path.suffix == ".pdf" else None)
+
+
+def _draw(axes: Any, item: Series, i: int) -> None:
+    colour, marker = _COLOURS[i % len(_COLOURS)], _MARKERS[i % len(_MARKERS)]
+    every = max(1, item.x.size // 25)
+    label = ", ".join(f"{SYMBOLS.get(key, key)} = {value:g}" for key, value in item.varied.items())
+    axes.plot(item.line_x, item.line_y, color=colour, linewidth=1.6)
+    axes.plot(
+        item.x, item.y, marker, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6,
+        markevery=every, label=label or None,
+    )  # fmt: skip
+    if item.simulated is not None:
+        x, y, error = item.simulated[:, :: max(1, item.simulated.shape[1] // 16)]
+        axes.errorbar(x, y, 2 * error, **_DOT)
+
+
+def _add_legend(axes: Any, equation: str, is_simulated: bool) -> None:
+    """Colours tell the curves apart; two or three grey entries tell the method."""
+    handles, labels = axes.get_legend_handles_labels()
+    grey = {"color": "0.35"}
+    methods = {
+        "finite elements": axes.plot([], [], "o", markersize=7, markerfacecolor="none", markeredgewidth=1.6, **grey)[0],
+        f"perturbation, Eq. {equation}": axes.plot([], [], "-", linewidth=1.6, **grey)[0],
+    }
+    if is_simulated:
+        methods["Monte Carlo ± 2 standard errors"] = axes.errorbar([], [], [], **_DOT)
+    axes.legend([*handles, *methods.values()], [*labels, *methods], frameon=False, fontsize=11)

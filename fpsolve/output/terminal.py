@@ -1,0 +1,235 @@
+"""Results as tables on the terminal; what limits them goes to the standard error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from fpsolve.case.case import Case, Curve
+from fpsolve.exponent.error import Estimate
+from fpsolve.study.simulate import SimulatedCurve
+from fpsolve.study.solve import Comparison, CurveResult
+from fpsolve.theory import perturbation
+
+
+def print_results(case: Case, results: Sequence[CurveResult]) -> None:
+    """Λ(p), or λ and δ_p over a parameter, beside perturbation theory."""
+    console = Console()
+    if case.figure.x == "p":
+        for result in results:
+            console.print(_moment_table(case, result))
+            console.print(_indices(result), highlight=False)
+    else:
+        console.print(_curve_table(case, results))
+    print_warnings(case, results)
+
+
+def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
+    """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
+    for result in results:
+        failures = {line for failure in result.failures for line in failure.splitlines()}
+        place = _place(case, result.curve)
+        kinds = [
+            ("not converged", "bold red") if text in failures else ("warning", "yellow") for text in result.warnings
+        ]
+        for (kind, style), text in zip(kinds, result.warnings, strict=True):
+            Console(stderr=True).print(Text(f"{kind}: {place}: {text}"), style=style, soft_wrap=True)
+        for text in result.notes:
+            Console(stderr=True).print(Text(f"note: {place}: {text}"), style="cyan", soft_wrap=True)
+
+
+def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:
+    """Λ(p) and λ by simulation, with the finite elements beside them where these have been solved."""
+    console = Console()
+    solved = {result.curve.key: result for result in results}
+    pairs = [(each, solved.get(each.curve.key)) for each in simulated]
+    if case.figure.x == "p":
+        for each, result in pairs:
+            console.print(_simulation_table(case, each, result))
+            console.print(_simulation_line(each, result), highlight=False, soft_wrap=True)
+    else:
+        console.print(_exponent_table(case, pairs))
+    for each in simulated:
+        if each.response:
+            means = "   ".join(
+                f"{name} = {sampled(value, error)} ± {error:.1e}"
+                for name, (value, error) in each.response.means.items()
+            )
+            text = f"{_place(case, each.curve)}: stationary means: {means}\n"
+            console.print(text, highlight=False, soft_wrap=True)
+        for warning in each.warnings:
+            line = Text(f"warning: {_place(case, each.curve)}: {warning}")
+            Console(stderr=True).print(line, style="yellow", soft_wrap=True)
+
+
+def _simulation_line(simulated: SimulatedCurve, result: CurveResult | None) -> str:
+    """λ, Λ″(0) and the size of the simulation."""
+    found = simulated.result
+    value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
+    text = f"λ = {sampled(value, error)} ± {error:.1e}"
+    if result and result.lyapunov_exponent:
+        exact = result.lyapunov_exponent.value
+        text += f" (finite elements {exact:.6g}, {_deviation(value, error, exact)} s.e. away)"
+    rate, rate_error = found.variance_rate, found.variance_rate_error
+    text += f"   Λ″(0) = {sampled(rate, rate_error)} ± {rate_error:.1e}"
+    return f"{text}\n{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}\n"
+
+
+def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Table:
+    """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
+    table = Table(
+        "p", "Λ(p)", "± s.e.", *(("finite elements", "s.e. away") if result else ()), "effective paths",
+        title=Text(case.heading(simulated.curve)), title_justify="left",
+    )  # fmt: skip
+    _align(table)
+    exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
+    for estimate in simulated.result.estimates:
+        value, error = estimate.value, estimate.standard_error
+        row = ["none", ""] if value is None or error is None else [sampled(value, error), f"{error:.1e}"]
+        if result:
+            known = exact.get(estimate.p) if estimate.p else 0.0
+            row += ["" if known is None else f"{known:.6g}"]
+            row += ["" if known is None or value is None or not error else _deviation(value, error, known)]
+        table.add_row(f"{estimate.p:g}", *row, f"{estimate.effective_paths:.0f}")
+    return table
+
+
+def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Table:
+    """One row for each parameter set: λ by simulation and by finite elements."""
+    names = (key.partition(".")[2] for key in case.vary)
+    table = Table(*names, "λ", "± s.e.", "finite elements", "s.e. away", title=Text(case.title), title_justify="left")
+    _align(table)
+    for each, result in pairs:
+        value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
+        known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
+        exact = ("", "") if known is None else (f"{known:.6g}", _deviation(value, error, known))
+        varied = (f"{number:g}" for number in each.curve.varied.values())
+        table.add_row(*varied, sampled(value, error), f"{error:.1e}", *exact)
+    return table
+
+
+def sampled(value: float, error: float) -> str:
+    """A number with as many decimals as two digits of its standard error have."""
+    if error <= 0:
+        return f"{value:g}"
+    decimals = 1 - math.floor(math.log10(error))
+    return f"{value:.{decimals}f}" if 0 <= decimals <= 9 else f"{value:.3g}"
+
+
+def _deviation(value: float, error: float, exact: float) -> str:
+    return f"{(value - exact) / error:+.1f}"
+
+
+def _place(case: Case, curve: Curve) -> str:
+    return f"{case.name}, {curve.label}" if curve.varied else case.name
+
+
+def _moment_table(case: Case, result: CurveResult) -> Table:
+    """p, Λ(p), Eq. (37) and the difference."""
+    table = Table(
+        "p",
+        "Λ(p)",
+        "± error",
+        _theory(case, "(37)"),
+        "difference",
+        title=Text(case.heading(result.curve)),
+        title_justify="left",
+    )
+    _align(table)
+    _explain_star(table, case)
+    moments = result.moments
+    for p, value, error, theory in zip(
+        moments.p, moments.value, moments.error_estimate, result.moments_perturbation, strict=True
+    ):
+        table.add_row(f"{p:g}", digits(value, error), f"{error:.0e}", f"{theory + 0.0:.6g}", f"{value - theory:.2e}")
+    return table
+
+
+def _indices(result: CurveResult) -> str:
+    """λ, δ_p and Λ″(0) in a line."""
+    parts = []
+    for name, estimate in (
+        ("λ", result.lyapunov_exponent),
+        ("δ_p", result.stability_index),
+        ("Λ″(0)", result.variance_rate),
+    ):
+        error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
+        parts.append(f"{name} = {_digits_of(estimate, most=9)}{error}")
+    return "   ".join(parts) + "\n"
+
+
+def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
+    """One row for each parameter set: λ, Eq. (39), δ_p and Eq. (38)."""
+    names = (key.partition(".")[2] for key in case.vary)
+    table = Table(
+        *names, "λ", _theory(case, "(39)"), "δ_p", _theory(case, "(38)"), title=Text(case.title), title_justify="left"
+    )
+    _align(table)
+    _explain_star(table, case)
+    for result in results:
+        curve = result.curve
+        table.add_row(
+            *(f"{value:g}" for value in curve.varied.values()),
+            _digits_of(result.lyapunov_exponent, most=7),
+            f"{perturbation.lyapunov_exponent(curve.oscillator, curve.noise):.6g}",
+            _digits_of(result.stability_index, most=7),
+            f"{perturbation.stability_index(curve.oscillator, curve.noise):.6g}",
+        )
+    return table
+
+
+def _theory(case: Case, equation: str) -> str:
+    """Heading of a column of perturbation theory, starred where it has another noise than the solution."""
+    return f"Eq. {equation}*" if case.is_exact else f"Eq. {equation}"
+
+
+def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
+    """What a case expects beside what was computed."""
+    console = Console()
+    if not comparisons:
+        console.print(f"{case.name}: nothing is expected; add [[expect]] to the case", markup=False)
+        return
+    table = Table("quantity", "expected", "computed", "difference", "", title=Text(f"{case.name}: {case.title}"))
+    table.title_justify = "left"
+    _align(table)
+    table.columns[0].justify, table.columns[0].no_wrap, table.columns[0].overflow = "left", False, "fold"
+    for item in comparisons:
+        expectation = item.expectation
+        name = expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
+        where = "".join(f"\n{key} = {value:g}" for key, value in item.varied.items())
+        table.add_row(
+            f"{name}{where}\n[dim]{escape(expectation.source)}[/dim]",
+            f"{expectation.value:.12g}\n± {item.tolerance:.0e}",
+            "none" if item.value is None else f"{item.value:.12g}",
+            "" if item.value is None else f"{item.value - expectation.value:.1e}",
+            "[green]ok[/green]" if item.met else "[bold red]differs[/bold red]",
+        )
+    console.print(table)
+    console.print(f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok")
+
+
+def _align(table: Table) -> None:
+    for column in table.columns:
+        column.justify, column.no_wrap = "right", True
+
+
+def _explain_star(table: Table, case: Case) -> None:
+    if case.is_exact:
+        table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
+
+
+def _digits_of(estimate: Estimate | None, most: int) -> str:
+    return digits(estimate.value, estimate.error_estimate, most) if estimate else "none found"
+
+
+def digits(value: float, error: float, most: int = 13) -> str:
+    """A number with the digits that its error leaves, at most so many significant ones; 0 where it leaves none."""
+    if abs(value) <= error:
+        return "0"
+    count = most if error <= 0 else math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
+    return f"{value:#.{min(max(count, 1), most)}g}".rstrip(".")

@@ -1,0 +1,224 @@
+"""Solving the curves of a case, and comparing them with what it expects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import Expectation
+from fpsolve.errors import MeshError, NotConverged
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.error import MESH_REMEDY, Estimate
+from fpsolve.exponent.function import SEARCH_INTERVAL, solve_moments, stability_index
+from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.space import CylinderSpace
+from fpsolve.model.noise 
+from fpsolve.theory import perturbation, validity
+
+UNRESOLVED = 0.1
+"""The share of an eigenfunction with the wrong sign from which on its picture misleads."""
+Advance = Callable[[], None]
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True, eq=False)
+class CurveResult:
+    """What was computed for one parameter set.
+
+    Attributes:
+        curve: the parameters, the oscillator and the noise.
+        moments: Λ(p); where some p failed, of the others.
+        moments_perturbation: Eq. (37) at the same p.
+        lyapunov_exponent, variance_rate: λ and Λ″(0); None where p = 0 did not converge.
+        stability_index: δ_p; None where there is none in the interval searched, or it did not converge.
+        eigenpairs: those whose eigenfunctions are written; none once they are no longer needed.
+        stationary: the eigenpair at p = 0; None once it is no longer needed.
+        mesh: what was used for the p of the largest size, ξ in noise units; None where no p was solved.
+        warnings: what limits these numbers.
+        notes: where the theories compared with are not valid.
+        failures: why some p are missing.
+    """
+
+    curve: Curve
+    moments: MomentLyapunov
+    moments_perturbation: FloatArray
+    lyapunov_exponent: Estimate | None
+    stability_index: Estimate | None
+    variance_rate: Estimate | None
+    eigenpairs: tuple[PrincipalPair, ...]
+    stationary: PrincipalPair | None
+    mesh: dict[str, Any] | None
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    failures: tuple[str, ...] = ()
+
+    def without_pairs(self) -> CurveResult:
+        """The numbers without the eigenpairs, whose matrices take some 20 MB a curve."""
+        return replace(self, moments=replace(self.moments, pairs=()), eigenpairs=(), stationary=None)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One expectation of a case and what was computed; `met` says whether they agree."""
+
+    expectation: Expectation
+    varied: dict[str, float]
+    value: float | None
+    tolerance: float
+    met: bool
+
+
+def work(case: Case) -> int:
+    """How many moments a case has in all its curves."""
+    return len(case.curves()) * case.p.size
+
+
+def solve(case: Case, *, advance: Advance = lambda: None) -> Iterator[CurveResult]:
+    """Solve the curves of a case one after the other; what did not converge is in their `failures`."""
+    mesh = case.cylinder_mesh()
+    for curve in case.curves():
+        try:
+            yield _solve_curve(case, curve, mesh, advance)
+        except MeshError as failure:
+            raise MeshError(f"{case.path}: mesh, or the finer one that measures its error: {failure}") from failure
+
+
+def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
+    """Every expectation of a case against every curve that it selects."""
+    return [
+        _comparison(expectation, result)
+        for expectation in case.expect
+        for result in results
+        if expectation.selects(result.curve.varied)
+    ]
+
+
+def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: Advance) -> CurveResult:
+    solver = ExponentSolver(curve.oscillator, curve.noise, mesh, rtol=case.rtol, budget=case.budget)
+    moments, root, failures = _solve_moments(solver, case.p, advance)
+    warnings = list(moments.warnings)
+    index, obstacle = _attempt(lambda: stability_index(solver, guess=root))
+    if index is None and not obstacle:
+        low, high = np.clip(SEARCH_INTERVAL, *curve.noise.moments)
+        warnings.append(f"no stability index: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]")
+    exponent, no_exponent = _attempt(solver.lyapunov_exponent)
+    rate, no_rate = _attempt(solver.variance_rate)
+    stationary, _ = _attempt(lambda: solver.pair(0.0))
+    warnings += [f"no stability index: {obstacle}"] * bool(obstacle) + [no_exponent] * bool(no_exponent)
+    warnings += [no_rate] * bool(no_rate)
+    warnings += _imprecise({"λ": exponent, "δ_p": index, "Λ″(0)": rate}, case.rtol, mesh is None)
+    attempts = (_attempt(partial(solver.pair, float(p)))[0] for p in case.shown if np.any(moments.p == p))
+    pairs = tuple(pair for pair in attempts if pair is not None)
+    warnings += _unresolved(pairs)
+    return CurveResult(
+        curve=curve,
+        moments=moments,
+        moments_perturbation=perturbation.moment_exponent(curve.oscillator, curve.noise, moments.p),
+        lyapunov_exponent=exponent,
+        stability_index=index,
+        variance_rate=rate,
+        eigenpairs=pairs,
+        stationary=stationary,
+        mesh=None if (space := solver.largest()) is None else _mesh(space),
+        warnings=(*warnings, *(line for failure in failures for line in failure.splitlines())),
+        notes=_notes(case, curve, moments),
+        failures=failures,
+    )
+
+
+def _solve_moments(
+    solver: ExponentSolver, p: FloatArray, advance: Advance
+) -> tuple[MomentLyapunov, float | None, tuple[str, ...]]:
+    """Λ at all p; its root other than 0, where that is known; and why some p failed.
+
+    `advance` is called once for each p, whatever the number of solves.
+    """
+    left = p.size
+
+    def step() -> None:
+        nonlocal left
+        if left:
+            left -= 1
+            advance()
+
+    root: float | None = None
+    failures: tuple[str, ...] = ()
+    try:
+        moments, root = solve_moments(solver, p, advance=step)
+    except NotConverged as failure:
+        moments, failures = failure.partial, (str(failure),)
+    for _ in range(left):
+        step()
+    return moments, root, failures
+
+
+def _notes(case: Case, curve: Curve, moments: MomentLyapunov) -> tuple[str, ...]:
+    """Where the reduction of the noise, the impact law or Eq. (37) is not valid."""
+    notes = [
+        None if case.is_exact else validity.reduction_note(case.original_noise(curve)),
+        validity.impact_note(curve.oscillator),
+        validity.weak_noise_note(curve.oscillator, curve.noise, moments.p, moments.value),
+    ]
+    return tuple(note for note in notes if note)
+
+
+def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
+    """Which eigenfunctions are not positive, as layers of slow or strong noise are thinner than the cells."""
+    return [
+        f"{name} at p = {pair.p:g} is not resolved, {defect:.0%} of it has the wrong sign; its errors have next to no "
+        "effect on Λ, but do not read its picture"
+        for pair in pairs
+        for name, defect in zip(("T", "T_adjoint"), pair.sign_defects, strict=True)
+        if defect > UNRESOLVED
+    ]
+
+
+def _imprecise(estimates: dict[str, Estimate | None], rtol: float, is_adaptive: bool) -> list[str]:
+    """Which of some named numbers miss rtol."""
+    return [
+        f"rtol = {rtol:g} is not met by {name}: {estimate.value:.6g} has an estimated error of "
+        f"{estimate.error_estimate:.1e}; {'' if is_adaptive else MESH_REMEDY + ', or '}use a larger rtol"
+        for name, estimate in estimates.items()
+        if estimate and estimate.relative_error > rtol
+    ]
+
+
+def _attempt(compute: Callable[[], Found]) -> tuple[Found | None, str]:
+    """What is computed, or why it did not converge."""
+    try:
+        return compute(), ""
+    except NotConverged as failure:
+        return None, str(failure)
+
+
+def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
+    if expectation.p is not None:
+        found = np.isclose(result.moments.p, expectation.p, rtol=0, atol=1e-12)
+        value = float(result.moments.value[found][0]) if np.any(found) else None
+    else:
+        estimate = getattr(result, expectation.quantity)
+        value = None if estimate is None else estimate.value
+    tolerance = max(expectation.atol or 0.0, (expectation.rtol or 0.0) * abs(expectation.value))
+    met = value is not None and abs(value - expectation.value) <= tolerance
+    return Comparison(expectation, dict(result.curve.varied), value, tolerance, met)
+
+
+def _mesh(space: CylinderSpace) -> dict[str, Any]:
+    mesh = space.mesh
+    return {
+        "full_circle": mesh.is_full_circle,
+        "phi_cells": mesh.phi_lines.size - 1,
+        "phi_degree": mesh.phi_degree,
+        "xi_cells": mesh.z_lines.size - 1,
+        "xi_degree": mesh.xi_degree,
+        "xi_min": float(mesh.z_lines[0]),
+        "xi_max": float(mesh.z_lines[-1]),
+        "unknowns": space.size,
+    }
