@@ -11,11 +11,12 @@ from .exponent.eigen import spectrum as spectrum
 from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
 from .exponent.function import moment_lyapunov as moment_lyapunov
 from .exponent.solver import ExponentSolver as ExponentSolver
-from .fem.generator import TiltedGenerator as TiltedGenerator
 from .fem.mesh import CylinderMesh as CylinderMesh
 from .fem.mesh import make_mesh as make_mesh
 from .model.noise import NonGaussianNoise as NonGaussianNoise
 from .model.noise import OrnsteinUhlenbeck as OrnsteinUhlenbeck
+from .model.plane import PlaneSystem as PlaneSystem
+from .model.problem import Problem as Problem
 from .model.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
 from .output.report import run as run
 from .simulation.estimators import simulate as simulate

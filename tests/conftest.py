@@ -7,6 +7,7 @@ import pytest
 
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 
 FIG1 = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
@@ -16,7 +17,7 @@ UNIT_NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
 
 @pytest.fixture(scope="session")
 def fig1_solver() -> ExponentSolver:
-    return ExponentSolver(FIG1, FIG1_NOISE.ou_reduction())
+    return ExponentSolver(Problem(FIG1, FIG1_NOISE.ou_reduction()))
 
 
 @pytest.fixture

@@ -10,11 +10,11 @@ import fpsolve
 
 ROOMS = {
     "": ["errors", "arrays", "files"],
-    "model": ["parameters", "plane", "noise", "vibro_impact", "problem"],
+    "model": ["parameters", "plane", "noise", "markov_chain", "vibro_impact", "problem"],
     "theory": ["second_order", "frozen", "validity"],
-    "fem": ["line", "mesh", "mesh_file", "space", "kronecker", "generator"],
+    "fem": ["line", "mesh", "mesh_file", "noise_space", "space", "kronecker", "terms", "generator"],
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
-    "exponent": ["eigen", "error", "rival", "adapt", "solver", "function"],
+    "exponent": ["eigen", "fields", "error", "rival", "adapt", "solver", "function"],
     "analysis": ["density"],
     "case": ["toml", "messages", "sections", "case"],
     "study": ["solve", "simulate"],

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.model.vibro_impact import q1
+from fpsolve.exponent.fields import fields
+from fpsolve.model.plane import growth_rate, phase_speed
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,41 +63,40 @@ def stationary_density(pair: PrincipalPair) -> Density:
 
 def adjoint_density(pair: PrincipalPair) -> Density:
     """T*(φ, ξ; p) normalised to 1."""
-    return _density(pair, lambda right, left, factor: left / factor)
+    return _density(pair, "adjoint")
 
 
 def tilted_density(pair: PrincipalPair) -> Density:
     """T T*: how phase and noise are distributed along the paths that carry the p-th moment."""
-    return _density(pair, lambda right, left, factor: right * left)
+    return _density(pair, "product")
 
 
 def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     """λ = ∫(ε q₁ξ + ε² q₂) ρ dφ dξ + ω ln R ∫[ρ(π/2, ξ) + ρ(3π/2, ξ)] dξ, with ρ from the pair at p = 0.
 
-    ω ρ is the probability flux through an impact, where the log-amplitude jumps by ln R; it is taken at φ⁻,
-    from where the impact is met.
+    ω ρ, or |dφ/dt| ρ where the noise moves the phase there, is the probability flux through an impact, where the
+    log-amplitude jumps by ln R; it is taken on the side from where the impact is met.
     """
-    generator, space = pair.generator, pair.generator.space
-    oscillator, density = generator.oscillator, stationary_density(pair)
-    eps = oscillator.epsilon
-    growth = density.mean(lambda phi, xi: eps * xi * q1(phi) + eps**2 * oscillator.q2(phi))
-    before = space.left_trace[space.mesh.impact_vertices] @ pair.left.reshape(space.phase.size, -1)
-    at_impacts = before @ (space.noise.mass() @ space.noise.constant()) * 2 * math.pi / space.mesh.span
-    return growth + oscillator.omega * oscillator.log_impact_factor * float(np.sum(at_impacts))
+    space, system = pair.generator.space, pair.generator.problem.system
+    growth = stationary_density(pair).mean(lambda phi, xi: growth_rate(system, xi)(phi))
+    turns, table = 2 * math.pi / space.mesh.span, space.table(pair.left)
+    for kick in system.kicks:
+        at = space.mesh.vertices_at(kick.phase)
+        for traces, direction in ((space.left_trace[at], 1), (space.right_trace[at], -1)):
+
+            def flux(xi: Any, phi: float = kick.phase, sign: int = direction) -> Any:
+                return np.maximum(sign * phase_speed(system, xi)(phi), 0)
+
+            density = np.sum(traces @ table, axis=0)
+            growth += turns * kick.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant()))
+    return growth
 
 
-def _density(pair: PrincipalPair, combine: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]) -> Density:
-    """The weight times a combination of both eigenfunctions, normalised, repeated from a half circle to the full one.
-
-    The eigenfunctions come without the factor that the space gives them; it is the third argument of `combine`.
-    """
-    space, unit = pair.generator.space, pair.generator.noise.standard_deviation
-    phi, phi_weights, phi_values = space.phase.points, space.phase.weights, space.phase.values
-    z, z_weights, z_values = space.noise.points, space.noise.weights, space.noise.values
-    right, left = (phi_values @ (z_values @ v.reshape(space.phase.size, -1).T).T for v in (pair.right, pair.left))
+def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Density:
+    """One of the `Fields`, normalised, repeated from a half circle to the full one."""
+    space, at = pair.generator.space, pair.generator.space.xi.samples()
     turns = round(2 * math.pi / space.mesh.span)
-    values = np.tile(combine(right, left, space.factor(z)) * space.weight(z) / unit, (turns, 1))
-    phi = np.concatenate([phi + k * space.mesh.span for k in range(turns)])
-    phi_weights = np.tile(phi_weights, turns)
-    total = phi_weights @ values @ (z_weights * unit)
-    return Density(phi, unit * z, phi_weights, unit * z_weights, values / total)
+    values = np.tile(getattr(fields(pair, space.phi.values, at), name), (turns, 1))
+    phi = np.concatenate([space.phi.points + k * space.mesh.span for k in range(turns)])
+    phi_weights = np.tile(space.phi.weights, turns)
+    return Density(phi, at.xi, phi_weights, at.measure, values / (phi_weights @ values @ at.measure))

@@ -34,9 +34,10 @@ from fpsolve.errors import CaseError, Fault, MeshError, NoSuchExponent
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import ColouredNoise, NonGaussianNoise, check_existence
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.setup import obstacles
-from fpsolve.theory import perturbation
+from fpsolve.theory.second_order import second_order
 
 MAX_CURVES = 10_000
 
@@ -55,6 +56,11 @@ class Curve:
     noise: ColouredNoise
     parameters: Mapping[str, float | str]
     varied: Mapping[str, float]
+
+    @property
+    def problem(self) -> Problem:
+        """What is solved."""
+        return Problem(self.oscillator, self.noise)
 
     @property
     def key(self) -> tuple[tuple[str, float], ...]:
@@ -295,10 +301,11 @@ def _obstacle(
     try:
         curve = _curve(oscillator, noise, varied)
         with np.errstate(all="ignore"):
+            theory = second_order(curve.problem)
             factors = [curve.oscillator.impact_factor(float(extreme)) for extreme in (p.max(), p.min())]
             sizes = np.append(
-                perturbation.moment_scale(curve.oscillator, curve.noise, p),
-                [perturbation.stability_index(curve.oscillator, curve.noise), *factors],
+                theory.scale.moment(p),
+                [theory.stability_index, *factors],
             )
     except ValidationError as error:
         context = error.errors()[0].get("ctx", {})

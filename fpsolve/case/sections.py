@@ -25,6 +25,7 @@ from pydantic import (
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.messages import LIST, TABLE, Refusal, nearest, refuse
+from fpsolve.errors import MeshError
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh
 from fpsolve.fem.mesh_file import read_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
@@ -147,9 +148,14 @@ class MeshSection(Section):
     def mesh(self, folder: Path) -> CylinderMesh | None:
         """The mesh, its file sought from `folder`; None where nothing is stated."""
         stated = self.model_dump(exclude_none=True)
-        if "file" in stated:
-            return read_mesh(folder / stated["file"])
-        return make_mesh(**stated) if stated else None
+        if "file" not in stated:
+            return make_mesh(**stated) if stated else None
+        mesh, path = read_mesh(folder / stated["file"]), folder / stated["file"]
+        try:
+            mesh.vertices_at(math.pi / 2)
+        except MeshError as failure:
+            raise MeshError(f"{path}: {failure}") from failure
+        return mesh
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:

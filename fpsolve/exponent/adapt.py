@@ -20,12 +20,14 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.error import Solution, Spread, Stage, noise_marginal, spread, truncation
+from fpsolve.exponent.error import ModeEffects, Solution, Stage, mode_effects, noise_marginal, truncation
 from fpsolve.exponent.rival import rival
 from fpsolve.fem.mesh import CylinderMesh, halved
-from fpsolve.model.noise import ColouredNoise, has_algebraic_tails
+from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noise import Diffusion, Noise, has_algebraic_tails
 from fpsolve.model.parameters import STRICT, Positive
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.plane import System, phase_speed
+from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import growth_without_turning, likely_center
 
 MAX_PHI_DEGREE, MAX_XI_DEGREE = 14, 10
@@ -57,16 +59,15 @@ class Budget:
     seconds: Positive = 60.0
 
 
-def fits(stage: Stage, oscillator: VibroImpactOscillator, noise: ColouredNoise, old: float, new: float) -> bool:
+def fits(stage: Stage, problem: Problem, old: float, new: float) -> bool:
     """Whether a stage that serves one p is likely to reach where the tilted density of another lies."""
-    tilt = stage.coarse.space.tilt
-    way = abs(likely_center(oscillator, noise, new) - likely_center(oscillator, noise, old))
+    tilt = stage.coarse.space.xi.tilt
+    way = abs(likely_center(problem, new) - likely_center(problem, old))
     return way <= 3.0 and (new != 0 or tilt == 0)
 
 
 def resolve(
-    oscillator: VibroImpactOscillator,
-    noise: ColouredNoise,
+    problem: Problem,
     p: float,
     *,
     tolerance: Callable[[float], float],
@@ -84,18 +85,17 @@ def resolve(
         NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
             `Solution`, or None.
     """
-    meter = _Meter(p, budget)
-    found = _search(oscillator, noise, likely_center(oscillator, noise, p), tolerance, rtol, meter)
-    elsewhere = rival(oscillator, noise, found[1].pair)
+    meter = _Meter(problem.noise, p, budget)
+    found = _search(problem, likely_center(problem, p), tolerance, rtol, meter)
+    elsewhere = rival(found[1].pair)
     if elsewhere is not None:
-        other = _search(oscillator, noise, elsewhere, tolerance, rtol, meter)
+        other = _search(problem, elsewhere, tolerance, rtol, meter)
         found = max(found, other, key=lambda item: item[1].pair.value)
     return found
 
 
 def _search(
-    oscillator: VibroImpactOscillator,
-    noise: ColouredNoise,
+    problem: Problem,
     center: float,
     tolerance: Callable[[float], float],
     rtol: float,
@@ -103,17 +103,17 @@ def _search(
 ) -> tuple[Stage, Solution]:
     """What `resolve` promises, with the tilted density sought around some z."""
     p, start = meter.p, None
-    mesh_and_tilt = _affordable(oscillator, noise, center, rtol, meter.budget)
-    guess = growth_without_turning(oscillator, noise, p, center)
+    mesh_and_tilt = _affordable(problem, center, rtol, meter.budget)
+    guess = growth_without_turning(problem, p, center)
     while True:
         mesh, tilt = mesh_and_tilt
-        meter.check(mesh, noise)
+        meter.check(mesh)
         try:
-            stage = Stage.on(oscillator, noise, mesh, tilt)
+            stage = Stage.on(problem, mesh, tilt)
             pair = principal_pair(stage.coarse, p, start=start, guess=guess)
             allowed = tolerance(pair.value)
             moved = _moved(pair, TRUNCATION_SHARE * allowed)
-            if moved is not None and meter.obstacle(moved[0], noise) is None:
+            if moved is not None and meter.obstacle(moved[0]) is None:
                 mesh_and_tilt, start = moved, pair
                 continue
             solution = Solution(pair, principal_pair(stage.fine, p, start=pair, guess=guess))
@@ -131,9 +131,10 @@ def _search(
 class _Meter:
     """What a search for a discretisation has cost, and the best it has found."""
 
+    noise: Noise
     p: float
     budget: Budget
-    started: float = field(default_factory=time.perf_counter)
+    started: float = field(default_factory=time.thread_time)
     stages: int = 0
     best: Solution | None = None
     share: float = math.inf
@@ -141,18 +142,18 @@ class _Meter:
     cost: float = SECONDS_PER_UNKNOWN
     last: tuple[float, int] = (0.0, 0)
 
-    def check(self, mesh: CylinderMesh, noise: ColouredNoise) -> None:
+    def check(self, mesh: CylinderMesh) -> None:
         """Refuse a stage beyond the budget, and count it."""
         if self.last[1]:
             self.cost = max(SECONDS_PER_UNKNOWN, (self.elapsed - self.last[0]) / self.last[1] ** 1.5)
-        obstacle = self.obstacle(mesh, noise)
+        obstacle = self.obstacle(mesh)
         if obstacle:
             self.stop(obstacle)
-        self.last, self.stages = (self.elapsed, _finer_size(mesh, noise)), self.stages + 1
+        self.last, self.stages = (self.elapsed, _finer_size(mesh, self.noise)), self.stages + 1
 
-    def obstacle(self, mesh: CylinderMesh, noise: ColouredNoise) -> str | None:
+    def obstacle(self, mesh: CylinderMesh) -> str | None:
         """Why the budget does not suffice for a stage, or None."""
-        size = _finer_size(mesh, noise)
+        size = _finer_size(mesh, self.noise)
         seconds = self.elapsed + self.cost * size**1.5
         if size > self.budget.unknowns:
             return f"the next mesh has {size} unknowns, more than budget.unknowns = {self.budget.unknowns}"
@@ -162,7 +163,7 @@ class _Meter:
 
     @property
     def elapsed(self) -> float:
-        return time.perf_counter() - self.started
+        return time.thread_time() - self.started
 
     def note(self, solution: Solution, allowed: float) -> None:
         """Keep the best solution; stop where only rounding is left."""
@@ -187,55 +188,72 @@ class _Meter:
         )
 
 
-def _finer_size(mesh: CylinderMesh, noise: ColouredNoise) -> int:
+def _finer_size(mesh: CylinderMesh, noise: Noise) -> int:
     """Number of unknowns on the finer mesh of a stage."""
-    return _size(mesh.enriched(1.0).within(noise.half_width / noise.standard_deviation))
+    finer = mesh.enriched(1.0)
+    if isinstance(noise, Diffusion):
+        finer = finer.within(noise.half_width / noise.standard_deviation)
+    return _size(finer, noise)
 
 
-def _size(mesh: CylinderMesh) -> int:
+def _size(mesh: CylinderMesh, noise: Noise) -> int:
     """Number of unknowns."""
-    phi, z = mesh.phi_lines.size - 1, mesh.z_lines.size - 1
-    return phi * (mesh.phi_degree + 1) * (z * mesh.xi_degree + 1)
+    across = len(noise.states) if isinstance(noise, MarkovChain) else (mesh.z_lines.size - 1) * mesh.xi_degree + 1
+    return (mesh.phi_lines.size - 1) * (mesh.phi_degree + 1) * across
 
 
 def _halved(mesh: CylinderMesh) -> CylinderMesh:
     """Twice the cells each way, where nothing is known yet."""
-    return replace(mesh, phi_lines=halved(mesh.phi_lines), z_lines=halved(mesh.z_lines))
+    return replace(
+        mesh, phi_lines=halved(mesh.phi_lines), z_lines=halved(mesh.z_lines) if mesh.z_lines.size else mesh.z_lines
+    )
 
 
-def _affordable(
-    oscillator: VibroImpactOscillator, noise: ColouredNoise, center: float, rtol: float, budget: Budget
-) -> tuple[CylinderMesh, float]:
+def _affordable(problem: Problem, center: float, rtol: float, budget: Budget) -> tuple[CylinderMesh, float]:
     """The first mesh and tilt, for a larger rtol where the budget allows no more: it gives at least a partial value."""
     most = min(budget.unknowns, (budget.seconds / SECONDS_PER_UNKNOWN) ** (2 / 3))
     while True:
-        mesh, tilt = _initial(oscillator, noise, center, rtol)
-        if _size(mesh.enriched(1.0)) <= most or rtol > 1e-3:
+        mesh, tilt = _initial(problem, center, rtol)
+        if _size(mesh.enriched(1.0), problem.noise) <= most or rtol > 1e-3:
             return mesh, tilt
         rtol *= 10
 
 
-def _initial(
-    oscillator: VibroImpactOscillator, noise: ColouredNoise, center: float, rtol: float
-) -> tuple[CylinderMesh, float]:
+def _initial(problem: Problem, center: float, rtol: float) -> tuple[CylinderMesh, float]:
     """A first mesh and tilt for a tilted density around some z."""
+    noise, degree = problem.noise, round(3 - math.log10(rtol))
+    phi_degree, xi_degree = min(max(degree - 2, 4), MAX_PHI_DEGREE), min(max(degree - 4, 3), MAX_XI_DEGREE)
+    if not isinstance(noise, Diffusion):
+        ends = np.array(noise.states) if isinstance(noise, MarkovChain) else np.zeros(1)
+        cells = _phi_cells(problem.system, ends, ends)
+        return CylinderMesh(_phi_lines(problem.system, cells), np.zeros(0), phi_degree, xi_degree), 0.0
     unit, reach = noise.standard_deviation, math.sqrt(2 * math.log(1e5 / rtol))
     lower, upper = (center, center) if abs(center) > LEAST_TILT else (min(center, 0.0), max(center, 0.0))
     end = noise.half_width / unit
     lower, upper = max(lower - reach, -end), min(upper + reach, end)
     if not upper - lower > 0.1:  # the center lies beyond the support
         lower, upper = (end - 1, end) if center > 0 else (-end, 1 - end)
-    turns_back = oscillator.epsilon * unit * max(-lower, upper) > 2 * oscillator.omega
-    phi_cells = 6 if turns_back else 2 if oscillator.epsilon * unit * reach > 0.5 * oscillator.omega else 1
-    phi = np.linspace(math.pi / 2, 3 * math.pi / 2, phi_cells + 1)
-    degree = round(3 - math.log10(rtol))
-    mesh = CylinderMesh(
-        phi,
-        _xi_lines(lower, upper, has_algebraic_tails(noise)),
-        phi_degree=min(max(degree - 2, 4), MAX_PHI_DEGREE),
-        xi_degree=min(max(degree - 4, 3), MAX_XI_DEGREE),
+    cells = _phi_cells(problem.system, unit * np.array([lower, upper]), unit * reach * np.array([-1.0, 1.0]))
+    z_lines = _xi_lines(lower, upper, has_algebraic_tails(noise))
+    return CylinderMesh(_phi_lines(problem.system, cells), z_lines, phi_degree, xi_degree), _tilt(center)
+
+
+def _phi_cells(system: System, ends: FloatArray, reach: FloatArray) -> int:
+    """More where the phase turns back for a ξ at one of the ends, or its speed changes much within the reach of ξ."""
+    widest, usual = (
+        float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
+        for speed in (phase_speed(system, ends), phase_speed(system, reach))
     )
-    return mesh, _tilt(center)
+    return 6 if widest > 1 else 2 if usual > 0.25 else 1
+
+
+def _phi_lines(system: System, cells: int) -> FloatArray:
+    """Equal cells on a half circle from one kick to where it comes again, and a line at every other kick."""
+    rays = [kick.phase for kick in system.kicks] or [math.pi / 2]
+    lines = rays[0] + np.linspace(0, math.pi, cells + 1)
+    others = rays[0] + np.mod(np.array(rays[1:]) - rays[0], math.pi)
+    near = np.min(np.abs(lines[1:-1, None] - others[None]), axis=1, initial=math.inf) < 0.3 * math.pi / cells
+    return np.sort(np.concatenate([lines[:1], lines[1:-1][~near], lines[-1:], others]))
 
 
 def _tilt(center: float) -> float:
@@ -257,18 +275,22 @@ def _refined(solution: Solution, tolerance: float) -> CylinderMesh:
     The effects are calibrated by the error measured, as their parts cancel, or what a cell lacks harms others.
     """
     mesh = solution.pair.generator.space.mesh
-    phase, noise = (spread(solution.finer, axis) for axis in (0, 1))
-    seen = phase.above(mesh.phi_degree) + noise.above(mesh.xi_degree)
+    phase = mode_effects(solution.finer, 0)
+    seen, noise, z_lines, xi_degree = phase.above(mesh.phi_degree), None, mesh.z_lines, mesh.xi_degree
+    if z_lines.size:
+        noise = mode_effects(solution.finer, 1)
+        seen += noise.above(xi_degree)
     share = DIRECTION_SHARE * tolerance * min(MOST_CANCELLED, seen / solution.error)
     phi_lines, phi_degree = _split(mesh.phi_lines, MAX_PHI_DEGREE, phase, share)
-    z_lines, xi_degree = _split(mesh.z_lines, MAX_XI_DEGREE, noise, share)
-    new = CylinderMesh(phi_lines, z_lines, phi_degree, xi_degree)
-    return new if _size(new) > _size(mesh) else mesh.enriched(1.0)
+    if noise:
+        z_lines, xi_degree = _split(z_lines, MAX_XI_DEGREE, noise, share)
+    new, process = CylinderMesh(phi_lines, z_lines, phi_degree, xi_degree), solution.pair.generator.problem.noise
+    return new if _size(new, process) > _size(mesh, process) else mesh.enriched(1.0)
 
 
-def _split(lines: FloatArray, most: int, spread: Spread, tolerance: float) -> tuple[FloatArray, int]:
+def _split(lines: FloatArray, most: int, effects: ModeEffects, tolerance: float) -> tuple[FloatArray, int]:
     """Lines and a degree, at most `most`, with which every cell's effect should meet the tolerance."""
-    needed = spread.needed(max(tolerance, 1e-290) / math.sqrt(lines.size - 1))
+    needed = effects.needed(max(tolerance, 1e-290) / math.sqrt(lines.size - 1))
     parts = np.where(needed > 3 * most, 3, np.where(needed > most, 2, 1))
     new = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(lines[:-1], lines[1:], parts, strict=True)]
     wanted = math.ceil(np.max(needed / parts + (parts > 1)) + 0.3)  # parts of a cell need about as much less
@@ -277,7 +299,9 @@ def _split(lines: FloatArray, most: int, spread: Spread, tolerance: float) -> tu
 
 def _moved(pair: PrincipalPair, tolerance: float) -> tuple[CylinderMesh, float] | None:
     """A mesh whose ends, and a tilt, follow the tilted density; None where they already do."""
-    space, noise = pair.generator.space, pair.generator.noise
+    space, noise = pair.generator.space, pair.generator.problem.noise
+    if not isinstance(noise, Diffusion):
+        return None
     mesh, end = space.mesh, noise.half_width / noise.standard_deviation
     effects, is_algebraic = truncation(pair), has_algebraic_tails(noise)
     z, density = noise_marginal(pair)
@@ -287,14 +311,14 @@ def _moved(pair: PrincipalPair, tolerance: float) -> tuple[CylinderMesh, float] 
         way = _extension(sign * (z - line), density, effect / tolerance, abs(line) * is_algebraic) if is_short else 0.0
         ends.append(float(np.clip(line + sign * way, -end, end)))
     tilt = _tilt(float(z @ density / density.sum()))
-    if abs(tilt - space.tilt) <= 1.0:
-        tilt = space.tilt
-    if tilt == space.tilt and ends == [*mesh.z_lines[[0, -1]]]:
+    if abs(tilt - space.xi.tilt) <= 1.0:
+        tilt = space.xi.tilt
+    if tilt == space.xi.tilt and ends == [*mesh.z_lines[[0, -1]]]:
         return None
     new = _xi_lines(ends[0], ends[1], is_algebraic)
     step = 0.3 * np.min(np.diff(new))
     kept = mesh.z_lines[(mesh.z_lines > ends[0] + step) & (mesh.z_lines < ends[1] - step)]
-    if tilt == space.tilt and kept.size:
+    if tilt == space.xi.tilt and kept.size:
         outer = new[(new < kept[0] - step) | (new > kept[-1] + step)]
         new = np.sort(np.concatenate([kept, outer]))
     return replace(mesh, z_lines=new), tilt

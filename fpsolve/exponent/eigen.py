@@ -4,7 +4,8 @@ For a real shift σ > Λ the resolvent (σ − L)⁻¹ is a positive operator wh
 seen from the right, Λ is the nearest eigenvalue. From there, or quicker from the pair at a neighbouring p,
 two-sided Rayleigh quotient iteration converges cubically. That it found the principal pair is checked by the one
 property that no other pair has: T > 0 and T* > 0 (Perron-Frobenius; one of the two is enough), as far as a mesh can
-tell. It cannot where slow noise has two places between which it hardly ever passes; `adapt.resolve` looks at both.
+tell. It cannot where slow noise has two places between which it hardly ever passes; `adapt.resolve` looks at both, and
+for noise with states every search begins on the right.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
-from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import CylinderSpace
+from fpsolve.model.noise import Diffusion
 
 BACKWARD_ERROR_GOAL = 1e-14
 BACKWARD_ERROR_LIMIT = 1e-11
@@ -60,11 +62,11 @@ class PrincipalPair:
     residual: float
     rounding: float
     sign_defects: tuple[float, float]
-    generator: TiltedGenerator = field(repr=False)
+    generator: Generator = field(repr=False)
 
 
 def principal_pair(
-    generator: TiltedGenerator,
+    generator: Generator,
     p: float,
     *,
     start: PrincipalPair | Sequence[PrincipalPair] | None = None,
@@ -90,6 +92,8 @@ def principal_pair(
         lambda: _carried(pairs, p, generator.space) if pairs else (one, one),
         lambda: _from_the_right(generator, p),
     ]
+    if not isinstance(generator.problem.noise, Diffusion):  # states that hardly mix have a positive pair each
+        searches.reverse()
     if guess is not None:
         searches.append(lambda: _most_positive(generator, p, guess))
     found: list[PrincipalPair] = []
@@ -115,17 +119,17 @@ def principal_pair(
 def second_derivative(pair: PrincipalPair) -> float:
     """Λ″(p) = ⟨T*, L″T⟩ + 2⟨T*, (L′ − Λ′)T′⟩, T′ from the bordered system (L − Λ)T′ = −(L′ − Λ′)T, ⟨T*, T′⟩ = 0."""
     generator, x, y = pair.generator, pair.right, pair.left
-    mass, slope = generator.mass, generator.derivative(pair.p)
+    mass, slope = generator.mass, generator.matrix(pair.p, derivative=1)
     norm = y @ (mass @ x)
-    tilt = slope @ x - pair.derivative * (mass @ x)
-    singular = generator.shifted(pair.p, pair.value)
+    source = slope @ x - pair.derivative * (mass @ x)
+    singular = generator.matrix(pair.p, shift=pair.value)
     system = bmat([[singular, (mass @ x)[:, None]], [(y @ mass)[None], None]], format="csc")
-    change = _factor(system).solve(np.append(-tilt, 0.0))[:-1]
+    change = _factor(system).solve(np.append(-source, 0.0))[:-1]
     mixed = y @ (slope @ change) - pair.derivative * (y @ (mass @ change))
-    return float((y @ (generator.second_derivative(pair.p) @ x) + 2 * mixed) / norm)
+    return float((y @ (generator.matrix(pair.p, derivative=2) @ x) + 2 * mixed) / norm)
 
 
-def spectrum(generator: TiltedGenerator, p: float, k: int = 10) -> Any:
+def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
     """The k rightmost eigenvalues of L(p), by decreasing real part: complex, shape (k,).
 
     All eigenvalues of the dense matrix are computed (QR algorithm), so that none can be missed; use a
@@ -140,7 +144,7 @@ def spectrum(generator: TiltedGenerator, p: float, k: int = 10) -> Any:
     if not 1 <= k <= size:
         raise ValueError(f"k is {k}; it must be from 1 to the number of unknowns, {size}")
     root = scipy.linalg.cholesky(generator.mass.toarray(), lower=True)
-    half = scipy.linalg.solve_triangular(root, generator.at(p).toarray(), lower=True)
+    half = scipy.linalg.solve_triangular(root, generator.matrix(p).toarray(), lower=True)
     matrix = scipy.linalg.solve_triangular(root, half.T, lower=True).T
     values = scipy.linalg.eigvals(matrix, overwrite_a=True)
     return values[np.lexsort((values.imag, -values.real))][:k]
@@ -160,22 +164,22 @@ def _factor(matrix: Any) -> Any:
     return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01)
 
 
-def _from_the_right(generator: TiltedGenerator, p: float) -> tuple[FloatArray, FloatArray]:
+def _from_the_right(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
     """Right and left vectors near the principal ones, from shifts that start at an upper bound of Λ(p)."""
     mass = generator.mass
-    shift = generator.upper_bound(p) + 0.25 * generator.oscillator.omega
+    shift = generator.upper_bound(p) + 0.25 * generator.unit_rate
     right = left = generator.space.constant()
     for _ in range(2):
-        factor = _factor(generator.shifted(p, shift))
+        factor = _factor(generator.matrix(p, shift=shift))
         right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(mass @ v), right, p)
         left, _unused = _dominant(lambda v, lu=factor: -lu.solve(mass @ v, trans="T"), left, p)
         shift -= 0.95 / inverse_distance
     return right, left
 
 
-def _most_positive(generator: TiltedGenerator, p: float, guess: float) -> tuple[FloatArray, FloatArray]:
+def _most_positive(generator: Generator, p: float, guess: float) -> tuple[FloatArray, FloatArray]:
     """Right and left vectors of that real eigenvalue among the nearest to a guess whose T is the most positive."""
-    factor, mass, one = _factor(generator.shifted(p, guess)), generator.mass, generator.space.constant()
+    factor, mass, one = _factor(generator.matrix(p, shift=guess)), generator.mass, generator.space.constant()
     operator = LinearOperator(mass.shape, matvec=lambda v: factor.solve(mass @ v), dtype=float)
     try:
         inverse, vectors = eigs(operator, k=min(16, one.size - 2), v0=one, tol=1e-6, maxiter=200)
@@ -189,7 +193,7 @@ def _most_positive(generator: TiltedGenerator, p: float, guess: float) -> tuple[
     if not reals:
         return one, one
     value, right = min(reals, key=lambda item: _sign_defects(generator, item[1], one)[0])
-    nearby = _factor(generator.shifted(p, guess + 1 / value + 1e-8 * generator.oscillator.omega))
+    nearby = _factor(generator.matrix(p, shift=guess + 1 / value + 1e-8 * generator.unit_rate))
     left = nearby.solve(mass @ nearby.solve(mass @ one, trans="T"), trans="T")
     return right, left
 
@@ -206,9 +210,9 @@ def _dominant(apply: Any, start: FloatArray, p: float) -> tuple[FloatArray, floa
     return vectors[:, 0].real, float(values[0].real)
 
 
-def _rayleigh_iteration(generator: TiltedGenerator, p: float, x: FloatArray, y: FloatArray) -> PrincipalPair:
+def _rayleigh_iteration(generator: Generator, p: float, x: FloatArray, y: FloatArray) -> PrincipalPair:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
-    operator, mass = generator.at(p), generator.mass
+    operator, mass = generator.matrix(p), generator.mass
     size = np.max(abs(operator).sum(axis=0))
     best = (*_quotient(operator, mass, size, x, y), x, y)
     for step in range(MAX_ITERATIONS):
@@ -216,9 +220,9 @@ def _rayleigh_iteration(generator: TiltedGenerator, p: float, x: FloatArray, y: 
         if residual <= BACKWARD_ERROR_GOAL and step:  # the pair of a p very near by passes at once
             break
         try:
-            factor = _factor(generator.shifted(p, value))
+            factor = _factor(generator.matrix(p, shift=value))
         except RuntimeError:  # singular: the shift is the eigenvalue to the last bit
-            factor = _factor(generator.shifted(p, value + 1e-10 * generator.oscillator.omega))
+            factor = _factor(generator.matrix(p, shift=value + 1e-10 * generator.unit_rate))
         for _ in range(STEPS_PER_FACTOR):
             x, y = factor.solve(mass @ x), factor.solve(mass @ y, trans="T")
             x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
@@ -241,7 +245,7 @@ def _quotient(operator: Any, mass: Any, size: float, x: FloatArray, y: FloatArra
 
 
 def _pair(
-    generator: TiltedGenerator, p: float, operator: Any, value: float, residual: float, x: FloatArray, y: FloatArray
+    generator: Generator, p: float, operator: Any, value: float, residual: float, x: FloatArray, y: FloatArray
 ) -> PrincipalPair:
     """Normalise both vectors, judge their signs, and take Λ from the formula that rounding harms less."""
     mass, one = generator.mass, generator.space.constant()
@@ -249,8 +253,8 @@ def _pair(
     y = y / (y @ (mass @ x) * 2 * np.pi / generator.space.mesh.span)
     norm = y @ (mass @ x)
     rounding = _EPS * (abs(y) @ (abs(operator) @ abs(x))) / norm
-    if generator.space.tilt == 0:
-        forcing, total = generator.forcing(p), one @ (mass @ x)
+    if generator.space.xi.tilt == 0 and generator.keeps_constants:
+        forcing, total = generator.matrix(p, orders=slice(1, None)), one @ (mass @ x)
         bound = _EPS * (one @ (abs(forcing) @ abs(x))) / total
         if bound < rounding:
             value, rounding = one @ (forcing @ x) / total, bound
@@ -259,7 +263,7 @@ def _pair(
         value=float(value),
         right=x,
         left=y,
-        derivative=float(y @ (generator.derivative(p) @ x) / norm),
+        derivative=float(y @ (generator.matrix(p, derivative=1) @ x) / norm),
         residual=residual,
         rounding=float(rounding),
         sign_defects=_sign_defects(generator, x, y),
@@ -267,7 +271,7 @@ def _pair(
     )
 
 
-def _sign_defects(generator: TiltedGenerator, x: FloatArray, y: FloatArray) -> tuple[float, float]:
+def _sign_defects(generator: Generator, x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Shares of T and of T* that are not positive, by their own size or by |T T*|, whichever is larger.
 
     On seven points each way of a cell. T T* looks where the tilted density lives: a strong tilt hides the sign change
@@ -275,8 +279,9 @@ def _sign_defects(generator: TiltedGenerator, x: FloatArray, y: FloatArray) -> t
     """
     space = generator.space
     local = np.linspace(0.05, 0.95, 7)
-    right, left = space.values(x, local, local), space.values(y, local, local)
-    weight = space.weight(space.noise.evaluation(local)[0])
+    at_phi, samples = space.phi.evaluation(local)[1], space.xi.samples(local)
+    right, left = (space.evaluate(v, at_phi, samples.values) for v in (x, y))
+    weight = samples.weight
     tilted = np.abs(right * left) * weight
 
     def share(values: FloatArray) -> float:

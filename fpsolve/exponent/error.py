@@ -18,10 +18,11 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.exponent.fields import xi_marginal
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.model.noise import ColouredNoise
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.fem.noise_space import DiffusionSpace
+from fpsolve.model.problem import Problem
 
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
@@ -84,20 +85,19 @@ class Solution:
 class Stage:
     """A discretisation and the finer one that measures its error."""
 
-    coarse: TiltedGenerator
-    fine: TiltedGenerator
+    coarse: Generator
+    fine: Generator
 
     @classmethod
     def on(
         cls,
-        oscillator: VibroImpactOscillator,
-        noise: ColouredNoise,
+        problem: Problem,
         mesh: CylinderMesh,
         tilt: float = 0.0,
         widening: float = 1.0,
     ) -> Stage:
         """The stage of a mesh; its finer one has higher degrees, and an interval wider by a factor."""
-        coarse, fine = (TiltedGenerator(oscillator, noise, each, tilt) for each in (mesh, mesh.enriched(widening)))
+        coarse, fine = (Generator(problem, each, tilt) for each in (mesh, mesh.enriched(widening)))
         return cls(coarse, fine)
 
     def release(self) -> None:
@@ -113,26 +113,28 @@ class Stage:
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:
     """Bounds on what the two ends of the noise interval change in Λ: ½σ² ∫ P_s |T_z| T* dφ / ∫ T T* there."""
-    return _end_effect(pair, 0), _end_effect(pair, -1)
+    xi = pair.generator.space.xi
+    if not isinstance(xi, DiffusionSpace):
+        return 0.0, 0.0
+    return _end_effect(pair, xi, 0), _end_effect(pair, xi, -1)
 
 
-def _end_effect(pair: PrincipalPair, end: int) -> float:
+def _end_effect(pair: PrincipalPair, xi: DiffusionSpace, end: int) -> float:
     """½σ² P_s |∂T| T* at an end; the slope is the largest in the last cell, as no flux makes it 0 at the end itself."""
-    space, noise = pair.generator.space, pair.generator.noise
+    space = pair.generator.space
     local = np.linspace(0, 1, 9) if end else np.linspace(1, 0, 9)
-    points, values = space.noise.evaluation(local)
+    points, values = xi.line.evaluation(local)
     rows = slice(-9, None) if end else slice(0, 9)
-    right, left = (values[rows] @ v.reshape(space.phase.size, -1).T for v in (pair.right, pair.left))
-    weighed = space.phase.mass() @ left[-1]
+    right, left = (values[rows] @ space.table(v).T for v in (pair.right, pair.left))
+    weighed = space.phi.mass() @ left[-1]
     product = right @ weighed
-    slope = np.max(np.abs(np.diff(product) / np.diff(points[rows]))) + abs(space.tilt * product[-1])
-    rate = 0.5 * (noise.diffusion / noise.standard_deviation) ** 2
+    slope = np.max(np.abs(np.diff(product) / np.diff(points[rows]))) + abs(xi.tilt * product[-1])
     norm = pair.left @ (pair.generator.mass @ pair.right)
-    return float(rate * space.weight(points[rows][-1:])[0] * slope / abs(norm))
+    return float(xi.rate * xi.weight(points[rows][-1:])[0] * slope / abs(norm))
 
 
 @dataclass(frozen=True)
-class Spread:
+class ModeEffects:
     """How much of Λ each cell of one direction owes to its modes above degree k, for several k.
 
     Attributes:
@@ -154,11 +156,12 @@ class Spread:
         return self.degrees[0] + (logs[:, 0] - math.log(tolerance)) / rate
 
 
-def spread(pair: PrincipalPair, axis: int) -> Spread:
+def mode_effects(pair: PrincipalPair, axis: int) -> ModeEffects:
     """The effects along φ (axis 0) or ξ (axis 1) of a pair."""
-    generator, line = pair.generator, (pair.generator.space.phase, pair.generator.space.noise)[axis]
-    operator, norm = generator.shifted(pair.p, pair.value), pair.left @ (generator.mass @ pair.right)
-    shape = (generator.space.phase.size, generator.space.noise.size)
+    generator, space = pair.generator, pair.generator.space
+    line = space.xi.line if axis and isinstance(space.xi, DiffusionSpace) else space.phi
+    operator, norm = generator.matrix(pair.p, shift=pair.value), pair.left @ (generator.mass @ pair.right)
+    shape = (space.phi.size, space.xi.size)
     degrees = np.arange(line.degree - 1.0, max(line.degree - 5, 0), -1)
     effects = []
     for degree in degrees:
@@ -166,14 +169,10 @@ def spread(pair: PrincipalPair, axis: int) -> Spread:
         mask = np.broadcast_to(inside[:, None] if axis == 0 else inside, shape).ravel()
         products = ((pair.left * mask) * (operator @ (pair.right * mask))).reshape(shape).sum(axis=1 - axis)
         effects.append(np.bincount(line.cells[inside], np.abs(products[inside]), minlength=line.lines.size - 1))
-    return Spread(degrees, np.stack(effects, axis=-1) / abs(norm))
+    return ModeEffects(degrees, np.stack(effects, axis=-1) / abs(norm))
 
 
 def noise_marginal(pair: PrincipalPair) -> tuple[FloatArray, FloatArray]:
     """z and the ξ-marginal of the tilted density at points of each cell, times their distance."""
-    space = pair.generator.space
-    local = (np.arange(12) + 0.5) / 12
-    z, values = space.noise.evaluation(local)
-    right, left = (values @ v.reshape(space.phase.size, -1).T for v in (pair.right, pair.left))
-    steps = np.repeat(np.diff(space.noise.lines) / 12, 12)
-    return z, np.abs(np.einsum("zi,zi->z", right, left @ space.phase.mass())) * space.weight(z) * steps
+    at = pair.generator.space.xi.samples((np.arange(12) + 0.5) / 12)
+    return at.xi / pair.generator.problem.noise.standard_deviation, np.abs(xi_marginal(pair, at)) * at.measure

@@ -17,9 +17,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, checked
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, checked_moments
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.model.noise import ColouredNoise
-from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.theory import perturbation
+from fpsolve.model.problem import Problem, of_problem, of_problem_too
 
 SEARCH_INTERVAL = (-20.0, 20.0)
 FEW_MOMENTS = 9
@@ -35,8 +33,7 @@ class MomentLyapunovFunction:
     Λ′ = ⟨T*, L′T⟩. There are as many points as rtol needs: the last coefficients of the Chebyshev series are the error.
 
     Args:
-        oscillator: the vibro-impact oscillator.
-        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands.
+        problem: a motion and its noise, in one argument or two.
         interval: the smallest and the largest p.
         mesh: a mesh for all p; None chooses one for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
@@ -59,10 +56,10 @@ class MomentLyapunovFunction:
     nodes: FloatArray
     interpolation_error: float
 
+    @of_problem_too
     def __init__(
         self,
-        oscillator: VibroImpactOscillator,
-        noise: ColouredNoise,
+        problem: Problem,
         interval: tuple[float, float],
         mesh: CylinderMesh | None = None,
         *,
@@ -72,11 +69,11 @@ class MomentLyapunovFunction:
         solver: ExponentSolver | None = None,
         advance: Callable[[], None] = lambda: None,
     ) -> None:
-        low, high = (float(end) for end in checked_moments(list(interval), noise))
+        low, high = (float(end) for end in checked_moments(list(interval), problem.noise))
         if not low < high:
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
-        given = solver or ExponentSolver(oscillator, noise, mesh, rtol=rtol, budget=budget or Budget())
+        given = solver or ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
         self.solver = given.uniformly()
         self.interpolation_error = math.inf
         for count in LEVELS:
@@ -113,7 +110,7 @@ class MomentLyapunovFunction:
 
     def moments(self, p: ArrayLike) -> MomentLyapunov:
         """Λ(p) at several p; the residual is the largest of the nodes."""
-        points = checked_moments(p, self.solver.noise)
+        points = checked_moments(p, self.solver.problem.noise)
         value, error = self(points), self.error_estimate(points)
         for point, each, bound in zip(points, value, error, strict=True):
             if point != 0:
@@ -192,7 +189,7 @@ class MomentLyapunovFunction:
     @property
     def _allowed(self) -> float:
         """The share of the tolerance of Λ(p)/p that is left to the interpolation."""
-        return 0.4 * self.solver.rtol * perturbation.lyapunov_scale(self.solver.oscillator, self.solver.noise)
+        return 0.4 * self.solver.rtol * self.solver.scales.linear
 
 
 def _check_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> None:
@@ -223,7 +220,7 @@ def stability_index(
     Raises:
         NotConverged: some p on the way is not resolved.
     """
-    low, high = (float(end) for end in np.clip(interval, *solver.noise.moments))
+    low, high = (float(end) for end in np.clip(interval, *solver.problem.noise.moments))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)
         guess = -ratio / slope
@@ -245,9 +242,9 @@ def stability_index(
     raise NotConverged(f"the stability index did not settle, last near p = {p:g}; use a smaller rtol")
 
 
+@of_problem
 def moment_lyapunov(
-    oscillator: VibroImpactOscillator,
-    noise: ColouredNoise,
+    problem: Problem,
     p: ArrayLike,
     *,
     rtol: float = 1e-8,
@@ -257,8 +254,7 @@ def moment_lyapunov(
     """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
 
     Args:
-        oscillator: the vibro-impact oscillator.
-        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands.
+        problem: a motion and its noise, in one argument or two.
         p: one moment, or an array of shape (n,).
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
@@ -271,7 +267,7 @@ def moment_lyapunov(
         NoSuchExponent: Λ(p) is infinite.
         NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
     """
-    return solve_moments(ExponentSolver(oscillator, noise, mesh, rtol=rtol, budget=budget or Budget()), p)[0]
+    return solve_moments(ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()), p)[0]
 
 
 def solve_moments(
@@ -283,12 +279,12 @@ def solve_moments(
         NoSuchExponent: Λ(p) is infinite for one of the p.
         NotConverged: some p failed, or Λ(p) is not convex; `partial` is the `MomentLyapunov` of the others.
     """
-    points = checked_moments(p, solver.noise)
+    points = checked_moments(p, solver.problem.noise)
     if points.size > FEW_MOMENTS:
         ends = float(points.min()), float(points.max())
         try:
             function = MomentLyapunovFunction(
-                solver.oscillator, solver.noise, ends, solver=solver, most=points.size // 2, advance=advance
+                solver.problem, ends, solver=solver, most=points.size // 2, advance=advance
             )
             if function.is_converged:
                 return function.moments(points), function.root()

@@ -8,20 +8,19 @@ import numpy as np
 
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import noise_marginal
-from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_rate
 
 RIVAL = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
 
 
-def rival(problem: Problem, pair: PrincipalPair) -> float | None:
+def rival(pair: PrincipalPair) -> float | None:
     """Another z, far from the tilted density of a pair, where paths that hold the noise grow about as fast, or None.
 
     Between two such places slow noise hardly ever passes: each has its own pair with T > 0 as far as that can be
     told, and only the larger eigenvalue is Λ.
     """
-    found = frozen_rate(problem, pair.p)
+    found = frozen_rate(pair.generator.problem, pair.p)
     if found is None:
         return None
     z, rate = found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,9 @@ from fpsolve.exponent.error import MESH_REMEDY, Estimate, Solution, Stage, check
 from fpsolve.exponent.rival import rival
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
-from fpsolve.model.noise import ColouredNoise, check_existence, has_algebraic_tails
-from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.theory import perturbation
+from fpsolve.model.noise import Noise, check_existence, has_algebraic_tails
+from fpsolve.model.problem import Problem
+from fpsolve.theory.second_order import Scale, scale_of
 
 SMALL_P = 1e-2
 """Below it the discretisation is chosen at this p, as Λ and its error go to zero together."""
@@ -58,11 +58,10 @@ class MomentLyapunov:
 
 @dataclass(frozen=True, eq=False)
 class ExponentSolver:
-    """Λ(p) of one oscillator and one noise, each solve starting from the nearest p solved before.
+    """Λ(p) of one problem, each solve starting from the nearest p solved before.
 
     Args:
-        oscillator: the vibro-impact oscillator.
-        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands.
+        problem: a motion and its noise.
         mesh: a mesh for all p; None chooses one for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a mesh may cost.
@@ -73,8 +72,7 @@ class ExponentSolver:
         ValueError: rtol is not positive.
     """
 
-    oscillator: VibroImpactOscillator
-    noise: ColouredNoise
+    problem: Problem
     mesh: CylinderMesh | None = None
     _: KW_ONLY
     rtol: float = 1e-8
@@ -85,15 +83,15 @@ class ExponentSolver:
     _stages: list[Stage] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.noise.standard_deviation):
+        if not math.isfinite(self.problem.noise.standard_deviation):
             raise NoSuchExponent(
                 "the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"
             )
         if not (math.isfinite(self.rtol) and self.rtol > 0):
             raise ValueError(f"rtol is {self.rtol!r}; it must be a positive number such as 1e-8")
         if self.mesh is not None:
-            widening = 2.0 if has_algebraic_tails(self.noise) else 1.15
-            self._stages.append(Stage.on(self.oscillator, self.noise, self.mesh, widening=widening))
+            widening = 2.0 if has_algebraic_tails(self.problem.noise) else 1.15
+            self._stages.append(Stage.on(self.problem, self.mesh, widening=widening))
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
@@ -106,7 +104,7 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite.
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
         """
-        check_existence(self.noise, p)
+        check_existence(self.problem.noise, p)
         if p in self._failed:
             raise self._failed[p]
         if p not in self._known:
@@ -129,14 +127,19 @@ class ExponentSolver:
         """The space on which the p of the largest size was solved; None where none was."""
         return self._known[max(self._known, key=abs)][0].coarse.space if self._known else None
 
+    @cached_property
+    def scales(self) -> Scale:
+        """What errors are measured by: the sizes of the terms of Eq. (37) before they cancel."""
+        return scale_of(self.problem)
+
     def scale(self, p: float) -> float:
         """The sum of the absolute values of the terms of Eq. (37)."""
-        return float(perturbation.moment_scale(self.oscillator, self.noise, p))
+        return float(self.scales.moment(p))
 
     def tolerance(self, p: float, value: float) -> float:
         """The largest error allowed of a value of Λ(p)."""
         if self.uniform:
-            return self.rtol * abs(p) * perturbation.lyapunov_scale(self.oscillator, self.noise)
+            return self.rtol * abs(p) * self.scales.linear
         return self.rtol * max(abs(value), self.scale(p))
 
     def uniformly(self) -> ExponentSolver:
@@ -153,7 +156,7 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite for one of the p.
             NotConverged: some p failed; `partial` is the `MomentLyapunov` of the others.
         """
-        points = checked_moments(p, self.noise)
+        points = checked_moments(p, self.problem.noise)
         solutions, failures = {}, []
         for i in best_order(points):
             try:
@@ -175,12 +178,12 @@ class ExponentSolver:
 
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2). Raises `NotConverged`."""
-        scale = perturbation.lyapunov_scale(self.oscillator, self.noise)
+        scale = self.scales.linear
         return self._difference("λ", lambda pair: pair.derivative, scale)
 
     def variance_rate(self) -> Estimate:
         """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖. Raises `NotConverged`."""
-        scale = perturbation.variance_rate(self.oscillator, self.noise)
+        scale = 2 * self.scales.quadratic
         return self._difference("Λ″(0)", second_derivative, scale)
 
     def ratio(self, p: float) -> tuple[float, float, float]:
@@ -221,24 +224,19 @@ class ExponentSolver:
         nearest = min(self._known, key=lambda q: abs(q - p), default=None)
         if nearest is not None:
             stage = self._known[nearest][0]
-            if fits(stage, self.oscillator, self.noise, nearest, p):
+            if fits(stage, self.problem, nearest, p):
                 try:
                     tried = self._tried(stage, p)
                 except NotConverged:
                     tried = None
-                if (
-                    tried is not None
-                    and self._suffices(tried[1])
-                    and rival(self.oscillator, self.noise, tried[1].pair) is None
-                ):
+                if tried is not None and self._suffices(tried[1]) and rival(tried[1].pair) is None:
                     return tried
-        side = p or (-1.0 if has_algebraic_tails(self.noise) else 1.0)  # where Λ is finite
+        side = p or (-1.0 if has_algebraic_tails(self.problem.noise) else 1.0)  # where Λ is finite
         q = p if abs(p) >= SMALL_P else math.copysign(SMALL_P, side)
         for rtol in self.rtol * 10.0 ** -np.arange(4):
             share = rtol / self.rtol
             new = resolve(
-                self.oscillator,
-                self.noise,
+                self.problem,
                 q,
                 tolerance=lambda value, q=q, share=share: share * self.tolerance(q, value),  # type: ignore[misc]
                 rtol=rtol,
@@ -256,7 +254,7 @@ class ExponentSolver:
         """Whether Λ(p), and at p = 0 its derivative, meets rtol; for tiny p apart from rounding."""
         pair = solution.pair
         if abs(pair.p) < TINY_P:
-            scale = perturbation.lyapunov_scale(self.oscillator, self.noise)
+            scale = self.scales.linear
             error, allowed = abs(pair.derivative - solution.finer.derivative), self.rtol * scale
         else:
             error, allowed = solution.error, self.tolerance(pair.p, pair.value)
@@ -293,7 +291,7 @@ class ExponentSolver:
         """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
         if self.mesh is None:  # then both places have been looked at
             return ()
-        found = ((pair, rival(self.oscillator, self.noise, pair)) for pair in pairs)
+        found = ((pair, rival(pair)) for pair in pairs)
         pair, z = next(((pair, z) for pair, z in found if z is not None), (None, None))
         if pair is None:
             return ()
@@ -314,7 +312,7 @@ def best_order(p: FloatArray) -> Any:
     return np.lexsort((-np.abs(p), p < 0))
 
 
-def checked_moments(p: ArrayLike, noise: ColouredNoise) -> FloatArray:
+def checked_moments(p: ArrayLike, noise: Noise) -> FloatArray:
     """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
     points = np.atleast_1d(np.asarray(p, dtype=float))
     if points.ndim != 1 or points.size == 0 or not np.all(np.isfinite(points)):

@@ -26,9 +26,9 @@ class CylinderMesh:
 
     Attributes:
         phi_lines: increasing φ, shape (m + 1,); they span π (a half circle, as everything in Eq. (19) is
-            π-periodic) or 2π, the first and the last being one line, the seam. Every impact phase
-            π/2 + kπ in the span is a line.
-        z_lines: increasing z, shape (n + 1,).
+            π-periodic) or 2π, the first and the last being one line, the seam. Generators need a line at every
+            impact.
+        z_lines: increasing z, shape (n + 1,); none for noise with states.
         phi_degree: degree of the discontinuous elements in φ.
         xi_degree: degree of the continuous elements in ξ.
 
@@ -46,6 +46,8 @@ class CylinderMesh:
             lines = np.array(getattr(self, name), dtype=float)
             lines.flags.writeable = False
             object.__setattr__(self, name, lines)
+            if name == "z_lines" and lines.size == 0:
+                continue
             if lines.ndim != 1 or lines.size < 2 or not np.all(np.isfinite(lines)):
                 raise MeshError(f"{name} must be at least two finite numbers")
             if not np.all(np.diff(lines) > TOLERANCE * np.ptp(lines)):
@@ -54,18 +56,9 @@ class CylinderMesh:
             degree = getattr(self, name)
             if not isinstance(degree, int | np.integer) or not 1 <= degree <= MAX_DEGREE:
                 raise MeshError(f"{name} is {degree!r}; it must be a whole number from 1 to {MAX_DEGREE}")
-        self._check_circle()
-
-    def _check_circle(self) -> None:
         turns = self.span / math.pi
         if not (abs(turns - 1) < TOLERANCE or abs(turns - 2) < TOLERANCE):
             raise MeshError(f"the phase spans {self.span:.9g}; it must span the half circle, pi, or the circle, 2 pi")
-        found = np.count_nonzero(self.impact_vertices)
-        if found != round(turns):
-            raise MeshError(
-                f"{round(turns)} impact line(s) expected at phi = pi/2 + k pi, {found} found; "
-                "put a line of the mesh at each impact"
-            )
 
     @property
     def span(self) -> float:
@@ -76,13 +69,21 @@ class CylinderMesh:
     def is_full_circle(self) -> bool:
         return self.span > 1.5 * math.pi
 
-    @property
-    def impact_vertices(self) -> Any:
-        """Which of the φ-lines phi_lines[:-1] are impacts, boolean, shape (m,)."""
-        return np.abs(np.cos(self.phi_lines[:-1])) < TOLERANCE
+    def vertices_at(self, phase: float) -> Any:
+        """The indices of the φ-lines phi_lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
+        found = np.flatnonzero(np.abs(np.sin(self.phi_lines[:-1] - phase)) < TOLERANCE)
+        if found.size != round(self.span / math.pi):
+            name = "pi/2" if phase == math.pi / 2 else f"{phase:.6g}"
+            raise MeshError(
+                f"{round(self.span / math.pi)} impact line(s) expected at phi = {name} + k pi, {found.size} found; "
+                "put a line of the mesh at each impact"
+            )
+        return found
 
     def within(self, half_width: float) -> CylinderMesh:
         """This mesh cut off at |z| = half_width, the end of the noise's support, where it reaches beyond."""
+        if not self.z_lines.size:
+            return self
         lower, upper = max(self.z_lines[0], -half_width), min(self.z_lines[-1], half_width)
         if lower == self.z_lines[0] and upper == self.z_lines[-1]:
             return self
@@ -96,12 +97,14 @@ class CylinderMesh:
         The ends move out by the factor `widening`, by one noise unit at least. Where a degree cannot be raised, the
         cells are halved.
         """
+        phi_lines, phi_degree = _raised(self.phi_lines, self.phi_degree, 2)
+        if not self.z_lines.size:
+            return replace(self, phi_lines=phi_lines, phi_degree=phi_degree)
         lower, upper = self.z_lines[[0, -1]]
         steps = np.linspace(0, 1, math.ceil(math.log(widening, 1.5)) + 1)[1:]
         below = lower + steps * min((widening - 1) * lower, -1)
         above = upper + steps * max((widening - 1) * upper, 1)
         beyond = np.concatenate([below[::-1], self.z_lines, above])
-        phi_lines, phi_degree = _raised(self.phi_lines, self.phi_degree, 2)
         z_lines, xi_degree = _raised(beyond, self.xi_degree, 2)
         return CylinderMesh(phi_lines, z_lines, phi_degree, xi_degree)
 

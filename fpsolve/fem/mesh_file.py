@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,12 @@ MARKERS = {"domain": 0, "impact": 1, "seam": 2, "truncation": 3}
 FORMATS = {".vtu": "vtu", ".msh": "gmsh22"}
 
 
-def write_mesh(mesh: CylinderMesh, path: str | Path) -> None:
+def write_mesh(mesh: CylinderMesh, path: str | Path, impact: float = math.pi / 2) -> None:
     """Write quadrilaterals with points (φ, z, 0) to a .vtu or, for Gmsh, a .msh file, by its ending.
 
-    Line cells mark the impacts, the seam and the truncations (a seam at an impact has both), by the cell data
-    `marker` in a .vtu, see `MARKERS`, and by named physical groups in a .msh. The point data `phi_degree` and
-    `xi_degree` hold the degrees.
+    Line cells mark the impacts, at φ = `impact` mod π, the seam and the truncations (a seam at an impact has both), by
+    the cell data `marker` in a .vtu, see `MARKERS`, and by named physical groups in a .msh. The point data `phi_degree`
+    and `xi_degree` hold the degrees.
 
     Raises:
         MeshError: an unknown ending, or a folder that cannot be written to.
@@ -31,7 +32,7 @@ def write_mesh(mesh: CylinderMesh, path: str | Path) -> None:
     _check_format(path)
     try:
         with atomic(path) as temporary:
-            _as_meshio(mesh, path.suffix == ".msh").write(temporary, file_format=FORMATS[path.suffix])
+            _as_meshio(mesh, impact, path.suffix == ".msh").write(temporary, file_format=FORMATS[path.suffix])
     except OSError as failure:
         raise MeshError(f"{path} cannot be written: {failure.strerror}; choose another place") from failure
 
@@ -40,8 +41,8 @@ def read_mesh(path: str | Path) -> CylinderMesh:
     """Read a mesh that `write_mesh` or another program wrote; without degrees in it, those of `make_mesh`.
 
     Raises:
-        MeshError: the file is missing, unreadable, no full tensor grid of quadrilaterals in (φ, z), does not
-            cover the circle or half circle, or has no line at an impact.
+        MeshError: the file is missing, unreadable, no full tensor grid of quadrilaterals in (φ, z), or does
+            not cover the circle or half circle.
     """
     import meshio
 
@@ -78,14 +79,14 @@ def _check_format(path: Path) -> None:
         raise MeshError(f'{path} has the ending "{path.suffix}"; it must be one of {", ".join(FORMATS)}')
 
 
-def _as_meshio(mesh: CylinderMesh, gmsh: bool) -> Any:
+def _as_meshio(mesh: CylinderMesh, impact: float, gmsh: bool) -> Any:
     """The mesh with its marked lines, as meshio holds it."""
     import meshio
 
     m, n = mesh.phi_lines.size, mesh.z_lines.size
     node = np.arange(m * n).reshape(m, n)
     quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
-    impacts = [("impact", node[i]) for i in np.flatnonzero(np.abs(np.cos(mesh.phi_lines)) < TOLERANCE)]
+    impacts = [("impact", node[i]) for i in np.flatnonzero(np.abs(np.sin(mesh.phi_lines - impact)) < TOLERANCE)]
     edges = [*impacts, *(("seam", node[i]) for i in (0, -1)), *(("truncation", node[:, i]) for i in (0, -1))]
     lines = np.concatenate([np.stack([nodes[:-1], nodes[1:]], axis=1) for _, nodes in edges])
     tags = np.concatenate([np.full(nodes.size - 1, MARKERS[name]) for name, nodes in edges])

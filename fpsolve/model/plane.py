@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +22,8 @@ from fpsolve.arrays import Coefficient, FloatArray, one
 Matrix = Sequence[Sequence[float]]
 
 
-class Harmonics(NamedTuple):
+@dataclass(frozen=True)
+class Harmonics:
     """mean + cosine cos 2φ + sine sin 2φ."""
 
     mean: Any
@@ -37,6 +38,10 @@ class Harmonics(NamedTuple):
     def amplitude(self) -> Any:
         """Of the wave in 2φ."""
         return np.hypot(self.cosine, self.sine)
+
+    @property
+    def vanishes(self) -> bool:
+        return not np.any([self.mean, self.cosine, self.sine])
 
 
 def turning(a: FloatArray) -> Harmonics:
@@ -157,6 +162,9 @@ class PlaneSystem:
     def __post_init__(self) -> None:
         object.__setattr__(self, "drives", tuple(self.drives))
         object.__setattr__(self, "kicks", tuple(self.kicks))
+        rays = np.sort(np.mod([kick.phase for kick in self.kicks], math.pi))
+        if np.any(np.diff(np.append(rays, rays[:1] + math.pi)) < 1e-6) and rays.size > 1:
+            raise ValueError(f"got kicks at {[kick.phase for kick in self.kicks]}; their phases must differ modulo pi")
         if not self.drives or not (math.isfinite(self.epsilon) and self.epsilon > 0):
             raise ValueError(
                 f"got {len(self.drives)} drives and epsilon = {self.epsilon}; needs one at least, and a positive number"

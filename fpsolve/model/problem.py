@@ -47,6 +47,16 @@ def of_problem(function: Callable[Concatenate[Problem, P], R_co]) -> OfProblem[P
     return with_pair
 
 
+def of_problem_too(method: Callable[..., None]) -> Callable[..., None]:
+    """The same for a method, such as `__init__`."""
+
+    @wraps(method)
+    def with_pair(self: Any, *args: Any, **kwargs: Any) -> None:
+        method(self, *problem_first(args, kwargs), **kwargs)
+
+    return with_pair
+
+
 def problem_first(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[Any, ...]:
     """Arguments with the problem made of the first two, if it is not the first; keywords that were used are removed.
 

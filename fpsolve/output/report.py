@@ -19,7 +19,7 @@ from fpsolve.files import atomic, prepare_folder, write_json
 from fpsolve.output.plots import Series, write_figure
 from fpsolve.study.simulate import SimulatedCurve
 from fpsolve.study.solve import Advance, CurveResult, solve
-from fpsolve.theory import perturbation
+from fpsolve.theory.second_order import second_order
 
 if TYPE_CHECKING:
     from fpsolve.simulation.estimators import MonteCarlo
@@ -87,14 +87,14 @@ def _write_tables(case: Case, results: Sequence[CurveResult], folder: Path) -> N
 
 
 def _summary(result: CurveResult) -> dict[str, Any]:
-    oscillator, noise = result.curve.oscillator, result.curve.noise
+    theory = second_order(result.curve.problem)
     return {
         "parameters": dict(result.curve.parameters),
         "varied": dict(result.curve.varied),
         "moments": _rows(result),
-        "lyapunov_exponent": _estimate(result.lyapunov_exponent, perturbation.lyapunov_exponent(oscillator, noise)),
-        "stability_index": _estimate(result.stability_index, perturbation.stability_index(oscillator, noise)),
-        "variance_rate": _estimate(result.variance_rate, perturbation.variance_rate(oscillator, noise)),
+        "lyapunov_exponent": _estimate(result.lyapunov_exponent, theory.lyapunov_exponent),
+        "stability_index": _estimate(result.stability_index, theory.stability_index),
+        "variance_rate": _estimate(result.variance_rate, theory.variance_rate),
         "mesh": result.mesh,
         "warnings": list(result.warnings),
         "notes": list(result.notes),
@@ -161,7 +161,7 @@ def _series(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simu
 def _moment_series(result: CurveResult, sample: MonteCarlo | None) -> Series:
     moments = result.moments
     line = np.linspace(moments.p.min(), moments.p.max(), 200) if moments.p.size else moments.p
-    theory = perturbation.moment_exponent(result.curve.oscillator, result.curve.noise, line)
+    theory = second_order(result.curve.problem).moment_exponent(line)
     found = [(e.p, e.value, e.standard_error) for e in sample.estimates if e.value is not None] if sample else []
     dots = np.array(found, dtype=float).T if found else None
     return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, dots)
@@ -177,9 +177,8 @@ def _parameter_series(
     estimates = [getattr(result, case.figure.y) for result in group]
     y = np.array([np.nan if estimate is None else estimate.value for estimate in estimates])
     line = np.linspace(x.min(), x.max(), 200)
-    theory = getattr(perturbation, case.figure.y)
     curves = [case.curve({**others, case.figure.x: float(value)}) for value in line]
-    line_y = np.array([theory(curve.oscillator, curve.noise) for curve in curves])
+    line_y = np.array([getattr(second_order(curve.problem), case.figure.y) for curve in curves])
     if case.figure.y == "stability_index":  # it has poles, and is sought in this interval only
         line_y[(line_y < SEARCH_INTERVAL[0]) | (line_y > SEARCH_INTERVAL[1])] = np.nan
         return Series(others, x, y, line, line_y)

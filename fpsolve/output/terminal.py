@@ -14,7 +14,7 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.exponent.error import Estimate
 from fpsolve.study.simulate import SimulatedCurve
 from fpsolve.study.solve import Comparison, CurveResult
-from fpsolve.theory import perturbation
+from fpsolve.theory.second_order import second_order
 
 
 def print_results(case: Case, results: Sequence[CurveResult]) -> None:
@@ -176,9 +176,9 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
         table.add_row(
             *(f"{value:g}" for value in curve.varied.values()),
             _digits_of(result.lyapunov_exponent, most=7),
-            f"{perturbation.lyapunov_exponent(curve.oscillator, curve.noise):.6g}",
+            f"{second_order(curve.problem).lyapunov_exponent:.6g}",
             _digits_of(result.stability_index, most=7),
-            f"{perturbation.stability_index(curve.oscillator, curve.noise):.6g}",
+            f"{second_order(curve.problem).stability_index:.6g}",
         )
     return table
 

@@ -19,8 +19,11 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from fpsolve.arrays import FloatArray
+from fpsolve.errors import OutputError
 from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.fields import Fields, fields, xi_marginal
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.noise_space import DiffusionSpace, Samples
 from fpsolve.files import atomic
 
 MAX_ORDER = 4
@@ -60,15 +63,11 @@ def write_density(path: Path, stationary: PrincipalPair) -> Path:
     Point data: `stationary_density`, `phi_marginal`, `xi_marginal`, `z`. Field data: `lyapunov_exponent`, λ.
     """
     grid, space = _Grid.of(stationary), stationary.generator.space
-    table = stationary.left.reshape(space.phase.size, -1)
-    turns = 2 * math.pi / space.mesh.span
-    over_xi = table @ (space.noise.mass() @ space.noise.constant())
-    over_phi = turns * (space.phase.constant() @ space.phase.mass() @ table)
-    weight = stationary.generator.noise.density(grid.xi)
+    over_xi = space.table(stationary.left) @ (space.xi.mass() @ space.xi.constant())
     data = {
-        "stationary_density": grid.values(stationary, stationary.left) * weight,
+        "stationary_density": grid.fields(stationary).adjoint,
         "phi_marginal": grid.phase_table(stationary) @ over_xi[:, None],
-        "xi_marginal": (grid.noise_table(stationary) @ over_phi) * weight,
+        "xi_marginal": 2 * math.pi / space.mesh.span * xi_marginal(stationary, grid.samples(stationary)),
         "z": grid.z,
     }
     _write_grid(path, grid, data, {"lyapunov_exponent": stationary.derivative})
@@ -103,6 +102,14 @@ def copy_show_script(directory: Path) -> Path:
     return target
 
 
+def _line(pair: PrincipalPair) -> DiffusionSpace:
+    """The functions of ξ. Raises `OutputError` where the noise has states and no line of values."""
+    xi = pair.generator.space.xi
+    if not isinstance(xi, DiffusionSpace):
+        raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
+    return xi
+
+
 @dataclass(frozen=True, eq=False)
 class _Grid:
     """Nodes of the quadrilaterals: a block of them for each φ-cell or part of one, continuous in ξ.
@@ -127,7 +134,7 @@ class _Grid:
         tall = math.ceil(np.max(np.diff(mesh.z_lines)) - 1e-9)
         phi = _nodes(_phi_breaks(mesh), order, _parts(mesh.phi_degree, order))
         z = _nodes(mesh.z_lines, order, max(tall, _parts(mesh.xi_degree, order)))
-        return cls(phi, z, pair.generator.noise.standard_deviation, order)
+        return cls(phi, z, pair.generator.problem.noise.standard_deviation, order)
 
     @property
     def z(self) -> FloatArray:
@@ -138,22 +145,20 @@ class _Grid:
     def xi(self) -> FloatArray:
         return self.unit * self.z
 
-    def values(self, pair: PrincipalPair, coefficients: FloatArray) -> FloatArray:
-        """A function of a pair's space at the nodes, shape (φ-nodes, ξ-nodes)."""
-        table = coefficients.reshape(pair.generator.space.phase.size, -1)
-        return self.phase_table(pair) @ (self.noise_table(pair) @ table.T).T
+    def fields(self, pair: PrincipalPair) -> Fields:
+        """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
+        return fields(pair, self.phase_table(pair), self.samples(pair))
 
     def phase_table(self, pair: PrincipalPair) -> csr_matrix:
         """Values of the φ-elements at the nodes, shape (φ-nodes, φ-unknowns)."""
         mesh, inside = pair.generator.space.mesh, _inward(self.phi)
         turned = mesh.span * np.floor((inside - mesh.phi_lines[0]) / mesh.span)
-        return pair.generator.space.phase.at((self.phi - turned).ravel(), (inside - turned).ravel())
+        return pair.generator.space.phi.at((self.phi - turned).ravel(), (inside - turned).ravel())
 
-    def noise_table(self, pair: PrincipalPair) -> csr_matrix:
-        """Values of the ξ-elements at the nodes, shape (ξ-nodes, ξ-unknowns)."""
-        cells, nodes = self.z_cells.shape
-        once = np.append(np.arange(cells * nodes).reshape(cells, nodes)[:, :-1], cells * nodes - 1)
-        return pair.generator.space.noise.at(self.z_cells.ravel(), _inward(self.z_cells).ravel())[once]
+    def samples(self, pair: PrincipalPair) -> Samples:
+        """The functions of ξ at the nodes, each seen from inside its cell."""
+        inside = _inward(self.z_cells)
+        return _line(pair).at(self.z, np.append(inside[:, :-1], inside[-1, -1]))
 
     def points(self) -> FloatArray:
         """(φ, ξ, 0), φ slowest, shape (points, 3)."""
@@ -206,14 +211,12 @@ def _eigenfunction_data(
 ) -> tuple[_Grid, dict[str, FloatArray], dict[str, float]]:
     """Grid, point data and field data of one p."""
     grid = _Grid.of(pair)
-    space = pair.generator.space
-    factor, weight = space.factor(grid.z), space.weight(grid.z) / grid.unit
-    right, left = grid.values(pair, pair.right), grid.values(pair, pair.left)
+    found = grid.fields(pair)
     data = {
-        "T": right * factor,
-        "T_adjoint": left * weight / factor,
-        "tilted_density": right * left * weight,
-        "stationary_density": grid.values(stationary, stationary.left) * stationary.generator.noise.density(grid.xi),
+        "T": found.right,
+        "T_adjoint": found.adjoint,
+        "tilted_density": found.product,
+        "stationary_density": grid.fields(stationary).adjoint,
         "z": grid.z,
     }
     return grid, data, {"p": pair.p, "Lambda": pair.value}

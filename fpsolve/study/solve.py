@@ -19,8 +19,8 @@ from fpsolve.exponent.function import SEARCH_INTERVAL, solve_moments, stability_
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
-from fpsolve.model.noise 
-from fpsolve.theory import perturbation, validity
+from fpsolve.theory import validity
+from fpsolve.theory.second_order import second_order
 
 UNRESOLVED = 0.1
 """The share of an eigenfunction with the wrong sign from which on its picture misleads."""
@@ -101,7 +101,7 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
 
 
 def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: Advance) -> CurveResult:
-    solver = ExponentSolver(curve.oscillator, curve.noise, mesh, rtol=case.rtol, budget=case.budget)
+    solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
     moments, root, failures = _solve_moments(solver, case.p, advance)
     warnings = list(moments.warnings)
     index, obstacle = _attempt(lambda: stability_index(solver, guess=root))
@@ -120,7 +120,7 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: A
     return CurveResult(
         curve=curve,
         moments=moments,
-        moments_perturbation=perturbation.moment_exponent(curve.oscillator, curve.noise, moments.p),
+        moments_perturbation=second_order(curve.problem).moment_exponent(moments.p),
         lyapunov_exponent=exponent,
         stability_index=index,
         variance_rate=rate,
@@ -164,7 +164,7 @@ def _notes(case: Case, curve: Curve, moments: MomentLyapunov) -> tuple[str, ...]
     notes = [
         None if case.is_exact else validity.reduction_note(case.original_noise(curve)),
         validity.impact_note(curve.oscillator),
-        validity.weak_noise_note(curve.oscillator, curve.noise, moments.p, moments.value),
+        validity.weak_noise_note(curve.problem, moments.p, moments.value),
     ]
     return tuple(note for note in notes if note)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +16,7 @@ from fpsolve.model.problem import Problem
 SAMPLES = 1001
 
 
-def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, Any]:
     """Real parts of the eigenvalues of A(ξ), the larger one first, and whether they are complex: the phase turns."""
     a = matrix_at(problem.system, xi)
     trace = a[..., 0, 0] + a[..., 1, 1]
@@ -28,9 +29,9 @@ def frozen_rate(problem: Problem, p: float) -> tuple[FloatArray, FloatArray] | N
     """z on the side to which p tilts, and the growth rate of ‖x‖^p on paths that hold the noise there.
 
     F = p G(ξ) − ⅛σ²((ln P_s)′)². G is the growth rate of ln ‖x‖ with ξ frozen, the largest real part of an eigenvalue
-    of A(ξ): for the paper's oscillator εξ/2 while it oscillates, |εξ| < 2ω, the rate of the faster of the two real modes
-    beyond. For p < −1 the paths that stay on the other real mode carry more: (p + 1)·fast − slow. The second term is
-    what holding ξ costs. Slow noise has its tilted density where F is largest, and more than one such place.
+    of A(ξ): for the paper's oscillator εξ/2 while it oscillates, |εξ| < 2ω, the rate of the faster real mode beyond.
+    For p < −1 the paths that stay on the other real mode carry more: (p + 1)·fast − slow. The second term is what
+    holding ξ costs. Slow noise has its tilted density where F is largest, and more than one such place.
 
     None for noise that is no diffusion.
     """

@@ -1,4 +1,4 @@
-"""Second-order perturbation theory of weak noise, for any motion whose order 0 rotates; Eqs. (33)-(39) are its instance.
+"""Second-order perturbation theory of weak noise for any motion whose order 0 rotates; Eqs. (33)-(39) are an instance.
 
 In coordinates in which the order 0 is a rotation by ω, with order-1 noise ε ξ (h, q), mean q̄ and wave |q̂| of q, and
 S of Eq. (16),
@@ -62,7 +62,7 @@ class SecondOrder:
     @property
     def lyapunov_exponent(self) -> float:
         """λ = ε²Λ₂′(0), Eq. (39)."""
-        return math.fsum(self.linear_terms)
+        return sum(self.linear_terms)
 
     @property
     def stability_index(self) -> float:
@@ -77,7 +77,7 @@ class SecondOrder:
     @property
     def scale(self) -> Scale:
         """The sums of the absolute values of the terms."""
-        return Scale(math.fsum(map(abs, self.linear_terms)), self.quadratic)
+        return Scale(sum(map(abs, self.linear_terms)), self.quadratic)
 
 
 def second_order(problem: Problem) -> SecondOrder:
@@ -153,7 +153,7 @@ def _rough_scale(problem: Problem) -> Scale:
 
 def _growth(matrix: Any, frame: FloatArray) -> Harmonics:
     """q of a matrix in the coordinates in which the order 0 rotates."""
-    return stretching(np.linalg.solve(frame, np.asarray(matrix) @ frame))
+    return stretching(np.linalg.inv(frame) @ np.asarray(matrix) @ frame)
 
 
 def _rotating_frame(system: System) -> tuple[FloatArray, float]:
@@ -163,7 +163,7 @@ def _rotating_frame(system: System) -> tuple[FloatArray, float]:
     square = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0] - half**2
     if not square > 0:
         raise NoPerturbationTheory(
-            "perturbation theory is for motions that rotate without noise, but this one does not"
+            "perturbation theory is for motions that rotate without noise, which this one does not"
         )
     omega = math.sqrt(square)
     if a[0, 1] == -a[1, 0] and a[0, 0] == a[1, 1]:

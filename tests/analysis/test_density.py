@@ -7,6 +7,7 @@ from fpsolve.analysis.density import adjoint_density, furstenberg_khasminskii, s
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE
 
@@ -30,7 +31,7 @@ PROBLEMS = {
 @pytest.fixture(params=PROBLEMS, scope="module")
 def solver(request):
     oscillator, noise, mesh = PROBLEMS[request.param]
-    return ExponentSolver(oscillator, noise, make_mesh(**mesh))
+    return ExponentSolver(Problem(oscillator, noise), make_mesh(**mesh))
 
 
 def test_stationary_density_integrates_to_1(solver):
@@ -79,7 +80,7 @@ def test_tilted_mean_of_the_derivative_of_the_generator_is_the_slope(fig1_solver
     from fpsolve.model.vibro_impact import q1
 
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.1, epsilon=0.2)
-    pair = ExponentSolver(oscillator, FIG1_NOISE.ou_reduction()).pair(p)
+    pair = ExponentSolver(Problem(oscillator, FIG1_NOISE.ou_reduction())).pair(p)
     density = tilted_density(pair)
     eps = oscillator.epsilon
     slope = density.mean(lambda phi, xi: eps * xi * q1(phi) + eps**2 * oscillator.q2(phi))

@@ -12,9 +12,10 @@ from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import truncation
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite, perturbation
@@ -103,7 +104,7 @@ def test_the_tilt_changes_nothing_but_the_cost(tilt):
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.8, c1=0.1, epsilon=0.1)
     noise = NonGaussianNoise(D0=1.0, tau0=20.0, r0=0.95).ou_reduction()
     phi = make_mesh(phi_cells=2).phi_lines
-    generator = TiltedGenerator(oscillator, noise, CylinderMesh(phi, np.linspace(-4, 20, 8), 12, 10), tilt)
+    generator = Generator(Problem(oscillator, noise), CylinderMesh(phi, np.linspace(-4, 20, 8), 12, 10), tilt)
     oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(oscillator, noise), p=15.0, harmonics=8, hermite=200)
     assert principal_pair(generator, 15.0).value == pytest.approx(oracle, rel=1e-9)
 
@@ -179,14 +180,16 @@ def test_truncation_bounds_what_a_cut_changes():
     full = moment_lyapunov(oscillator, WEAK_NOISE, 3.0, rtol=1e-12).value[0]
     for upper in (4.0, 5.0, 6.0):
         mesh = make_mesh(phi_cells=2, phi_degree=14, xi_cells=6, xi_degree=12, xi_min=-8.0, xi_max=upper)
-        pair = principal_pair(TiltedGenerator(oscillator, WEAK_NOISE, mesh), 3.0)
+        pair = principal_pair(Generator(Problem(oscillator, WEAK_NOISE), mesh), 3.0)
         error = abs(pair.value - full)
         assert 1e-10 < error <= 3 * truncation(pair)[1] <= 1e3 * error
 
 
 @pytest.mark.parametrize("budget", [Budget(unknowns=1500), Budget(unknowns=5000), Budget(seconds=0.2)])
 def test_a_budget_ends_the_search_with_the_best_value(budget):
-    solver = ExponentSolver(VibroImpactOscillator(**NO_LOSS, epsilon=1.0), UNIT_NOISE, rtol=1e-12, budget=budget)
+    solver = ExponentSolver(
+        Problem(VibroImpactOscillator(**NO_LOSS, epsilon=1.0), UNIT_NOISE), rtol=1e-12, budget=budget
+    )
     started = time.perf_counter()
     with pytest.raises(NotConverged, match=r"Λ\(2\) did not converge: the next mesh .* more than budget\.") as caught:
         solver.solution(2.0)

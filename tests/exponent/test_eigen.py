@@ -5,9 +5,10 @@ import pytest
 
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.eigen import principal_pair, spectrum
-from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.model.noise import OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite
@@ -27,7 +28,7 @@ def test_nothing_lies_right_of_the_principal_eigenvalue_on_100_random_meshes(rng
     while len(parities) < 100:
         mesh = random_mesh(rng)
         noise = FIG1_NOISE if rng.random() < 0.3 else FIG1_NOISE.ou_reduction()
-        generator = TiltedGenerator(FIG1, noise, mesh)
+        generator = Generator(Problem(FIG1, noise), mesh)
         if generator.space.size > 350:
             continue
         p = rng.uniform(-2, 6)
@@ -44,7 +45,7 @@ def test_nothing_lies_right_of_the_principal_eigenvalue_on_100_random_meshes(rng
 def test_nothing_lies_right_of_the_principal_eigenvalue_in_strong_noise(epsilon, p):
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=epsilon)
     mesh = make_mesh(phi_cells=4, phi_degree=6, xi_cells=5, xi_degree=6, xi_min=-6, xi_max=7)
-    generator = TiltedGenerator(oscillator, UNIT_NOISE, mesh)
+    generator = Generator(Problem(oscillator, UNIT_NOISE), mesh)
     rightmost = spectrum(generator, p, 1)[0]
     assert rightmost.real == pytest.approx(principal_pair(generator, p).value, abs=1e-10)
     assert abs(rightmost.imag) < 1e-10
@@ -55,7 +56,7 @@ def test_spectrum_of_the_full_circle_against_fourier_hermite(p):
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
     noise = OrnsteinUhlenbeck(alpha=1.2, sigma=0.9)
     mesh = make_mesh(full_circle=True, phi_degree=11, xi_cells=2, xi_degree=11)
-    values = spectrum(TiltedGenerator(oscillator, noise, mesh), p, 7)
+    values = spectrum(Generator(Problem(oscillator, noise), mesh), p, 7)
     oracle = fourier_hermite.spectrum(**oracle_arguments(oscillator, noise), p=p, harmonics=20, hermite=14)[:7]
     np.testing.assert_allclose(np.sort_complex(values), np.sort_complex(oracle), atol=1e-8)
     assert np.all(np.diff(values.real) < 1e-10)
@@ -63,7 +64,7 @@ def test_spectrum_of_the_full_circle_against_fourier_hermite(p):
 
 def test_pair_solves_both_eigenproblems_and_is_normalised(fig1_solver):
     pair = fig1_solver.pair(2.0)
-    operator, mass = pair.generator.at(2.0), pair.generator.mass
+    operator, mass = pair.generator.matrix(2.0), pair.generator.mass
     assert np.linalg.norm(operator @ pair.right - pair.value * (mass @ pair.right)) < 1e-12
     assert np.linalg.norm(operator.T @ pair.left - pair.value * (mass @ pair.left)) < 1e-12
     assert pair.left @ (mass @ pair.right) * 2 == pytest.approx(1, rel=1e-13)  # twice the half circle
@@ -73,7 +74,7 @@ def test_pair_solves_both_eigenproblems_and_is_normalised(fig1_solver):
 
 
 def test_repeated_solves_are_identical():
-    generator = TiltedGenerator(FIG1, FIG1_NOISE.ou_reduction(), make_mesh())
+    generator = Generator(Problem(FIG1, FIG1_NOISE.ou_reduction()), make_mesh())
     first, second = (principal_pair(generator, 3.0) for _ in range(2))
     np.testing.assert_array_equal(first.right, second.right)
     assert first.value == second.value
@@ -82,10 +83,10 @@ def test_repeated_solves_are_identical():
 def test_the_generator_is_the_sum_of_its_terms():
     """L(p) = L₀ + ε L₁(p) + ε² L₂(p) + impact(p), Eq. (19), and its derivative in p."""
     oscillator = VibroImpactOscillator(omega=1.2, restitution=0.7, c1=-0.3, epsilon=0.8)
-    generator = TiltedGenerator(oscillator, UNIT_NOISE, make_mesh(phi_cells=3))
+    generator = Generator(Problem(oscillator, UNIT_NOISE), make_mesh(phi_cells=3))
     p, h = 1.7, 1e-4
     total = generator.L0() + 0.8 * generator.L1(p) + 0.8**2 * generator.L2(p) + generator.impact(p)
-    assert np.max(np.abs(generator.at(p).toarray() - total.toarray())) < 1e-12
+    assert np.max(np.abs(generator.matrix(p).toarray() - total.toarray())) < 1e-12
     slope = (generator.at(p + h) - generator.at(p - h)) / (2 * h)
     assert abs(generator.derivative(p) - slope).max() < 1e-6
     curvature = (generator.derivative(p + h) - generator.derivative(p - h)) / (2 * h)
@@ -96,24 +97,24 @@ def test_a_mesh_that_resolves_nothing_raises_with_the_partial_pair():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=2.0)
     mesh = make_mesh(phi_cells=1, phi_degree=3, xi_cells=1, xi_degree=4, xi_min=-6, xi_max=6)
     with pytest.raises(NotConverged, match=r"was not found on this mesh.*use more cells") as caught:
-        principal_pair(TiltedGenerator(oscillator, UNIT_NOISE, mesh), 6.0)
+        principal_pair(Generator(Problem(oscillator, UNIT_NOISE), mesh), 6.0)
     assert caught.value.partial.p == 6.0
 
 
 def test_dependent_elements_are_refused():
     with pytest.raises(MeshError, match=r"linearly dependent to rounding.*use more or lower-degree cells"):
-        TiltedGenerator(FIG1, UNIT_NOISE, make_mesh(xi_cells=2, xi_degree=20, xi_min=-30, xi_max=30))
+        Generator(Problem(FIG1, UNIT_NOISE), make_mesh(xi_cells=2, xi_degree=20, xi_min=-30, xi_max=30))
 
 
 @pytest.mark.parametrize("k", [0, 10_000])
 def test_spectrum_refuses_impossible_counts(k):
     with pytest.raises(ValueError, match="it must be from 1 to the number of unknowns, 12"):
         spectrum(
-            TiltedGenerator(FIG1, UNIT_NOISE, make_mesh(phi_cells=1, phi_degree=3, xi_cells=1, xi_degree=2)), 1.0, k
+            Generator(Problem(FIG1, UNIT_NOISE), make_mesh(phi_cells=1, phi_degree=3, xi_cells=1, xi_degree=2)), 1.0, k
         )
 
 
 def test_spectrum_refuses_meshes_too_large_for_dense_algebra():
-    generator = TiltedGenerator(FIG1, UNIT_NOISE, make_mesh(phi_cells=8, xi_cells=8))
+    generator = Generator(Problem(FIG1, UNIT_NOISE), make_mesh(phi_cells=8, xi_cells=8))
     with pytest.raises(ValueError, match="use a coarser mesh"):
         spectrum(generator, 1.0)

@@ -11,6 +11,7 @@ from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov, s
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite, perturbation
@@ -39,7 +40,7 @@ def test_between_the_nodes_against_fourier_hermite(weak, p):
 
 @pytest.mark.parametrize("p", [-1.37, 0.55, 2.71])
 def test_strong_noise_between_the_nodes_against_solves(strong, p):
-    exact = ExponentSolver(STRONG, UNIT_NOISE, rtol=1e-10).pair(p).value
+    exact = ExponentSolver(Problem(STRONG, UNIT_NOISE), rtol=1e-10).pair(p).value
     error, scale = abs(strong(p) - exact), perturbation.moment_scale(STRONG, UNIT_NOISE, p)
     assert error <= 1e-7 * max(abs(exact), scale)
     assert error <= 3 * strong.error_estimate(p)
@@ -94,7 +95,7 @@ def test_an_interval_on_one_side_of_zero():
 
 
 def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):
-    solver = ExponentSolver(FIG1, WEAK_NOISE)
+    solver = ExponentSolver(Problem(FIG1, WEAK_NOISE))
     true = ExponentSolver.ratio
 
     def fooled(self, p):
@@ -144,7 +145,7 @@ def test_a_coarse_mesh_gives_a_coarse_function_with_honest_errors():
 def test_stability_index_is_a_root_and_lambda_the_slope():
     for c1 in (-0.2, 0.1, 0.4):
         oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=c1, epsilon=0.1)
-        solver = ExponentSolver(oscillator, WEAK_NOISE, rtol=1e-11)
+        solver = ExponentSolver(Problem(oscillator, WEAK_NOISE), rtol=1e-11)
         index = stability_index(solver)
         assert abs(solver.pair(index.value).value) < 1e-14
         assert math.copysign(1, index.value) == -math.copysign(1, solver.lyapunov_exponent().value)
@@ -155,7 +156,7 @@ def test_stability_index_near_zero():
     indices = []
     for c1 in np.linspace(-0.1172, -0.1168, 5):
         oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=float(c1), epsilon=0.1)
-        solver = ExponentSolver(oscillator, WEAK_NOISE, rtol=1e-10)
+        solver = ExponentSolver(Problem(oscillator, WEAK_NOISE), rtol=1e-10)
         indices.append(stability_index(solver).value)
         expected = -2 * solver.lyapunov_exponent().value / solver.variance_rate().value
         assert indices[-1] == pytest.approx(expected, abs=1e-6)
@@ -164,13 +165,13 @@ def test_stability_index_near_zero():
 
 def test_no_stability_index_within_the_interval_is_none():
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
-    assert stability_index(ExponentSolver(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3))) is None
+    assert stability_index(ExponentSolver(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)))) is None
 
 
 @pytest.mark.parametrize("epsilon", [1e-2, 1e-4, 1e-5])
 def test_stability_index_of_the_weakest_noise(epsilon):
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=-0.3, epsilon=epsilon)
-    index = stability_index(ExponentSolver(oscillator, WEAK_NOISE))
+    index = stability_index(ExponentSolver(Problem(oscillator, WEAK_NOISE)))
     theory = perturbation.stability_index(oscillator, WEAK_NOISE)
     assert abs(index.value - theory) <= index.error_estimate + 10 * epsilon**2
     assert index.error_estimate < 1e-5

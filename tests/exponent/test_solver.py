@@ -9,9 +9,10 @@ from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import principal_pair, second_derivative
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite, perturbation
@@ -24,7 +25,7 @@ def test_fig1_at_p_2(fig1_solver):
 
 
 def test_fig1_at_p_2_with_the_exact_noise():
-    pair = ExponentSolver(FIG1, FIG1_NOISE).pair(2.0)
+    pair = ExponentSolver(Problem(FIG1, FIG1_NOISE)).pair(2.0)
     assert pair.value == pytest.approx(0.013021271922, rel=1e-9)
     arguments = {"D0": 1.0, "tau0": 0.5, "r0": 0.95, "omega": 1.0, "epsilon": 0.1, "c1": 0.1}
     oracle = fourier_hermite.moment_lyapunov_bounded_noise(
@@ -74,7 +75,7 @@ def test_weak_noise_against_fourier_hermite(p, law):
 def test_strong_noise_finds_the_principal_eigenvalue(epsilon, p, value, rel):
     """α = σ = ω = 1, c₁ = 0, r = 1: the guess of Eq. (37) lies nearer to other eigenvalues."""
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=epsilon)
-    pair = ExponentSolver(oscillator, UNIT_NOISE, STRONG_MESH).pair(p)
+    pair = ExponentSolver(Problem(oscillator, UNIT_NOISE), STRONG_MESH).pair(p)
     assert pair.value == pytest.approx(value, rel=rel)
     assert min(pair.sign_defects) < 1e-10
 
@@ -86,7 +87,7 @@ def test_identity_at_p_minus_2(epsilon, c1):
     noise = OrnsteinUhlenbeck(alpha=1.3, sigma=0.8)
     oscillator = VibroImpactOscillator(omega=1.7, restitution=1.0, c1=c1, epsilon=epsilon)
     mesh = make_mesh(phi_cells=4, phi_degree=12, xi_cells=6, xi_degree=10, xi_min=-10, xi_max=8)
-    value = ExponentSolver(oscillator, noise, mesh).pair(-2.0).value
+    value = ExponentSolver(Problem(oscillator, noise), mesh).pair(-2.0).value
     expected = epsilon**2 * (noise.sigma**2 / (2 * noise.alpha**2) - c1)
     assert value == pytest.approx(expected, rel=1e-10)
 
@@ -97,7 +98,7 @@ def test_without_noise_only_the_impacts_are_left(p, law):
     """Λ = p ω ln R/π for c₁ = 0, the noise being too weak to matter."""
     noise = OrnsteinUhlenbeck(alpha=1.0, sigma=1e-9)
     oscillator = VibroImpactOscillator(omega=1.7, restitution=0.6, c1=0.0, epsilon=1.0, impact=law)
-    value = ExponentSolver(oscillator, noise, make_mesh(phi_degree=14)).pair(p).value
+    value = ExponentSolver(Problem(oscillator, noise), make_mesh(phi_degree=14)).pair(p).value
     assert value == pytest.approx(p * 1.7 * oscillator.log_impact_factor / math.pi, rel=1e-10)
 
 
@@ -110,7 +111,7 @@ def test_decoupled_phase_is_exactly_quadratic(monkeypatch, restitution, p):
     noise = OrnsteinUhlenbeck(alpha=1.5, sigma=0.8)
     oscillator = VibroImpactOscillator(omega=1.2, restitution=restitution, c1=0.2, epsilon=0.4)
     mesh = make_mesh(phi_cells=2, phi_degree=16, xi_cells=6, xi_degree=12, xi_min=-9, xi_max=9)
-    value = ExponentSolver(oscillator, noise, mesh).pair(p).value
+    value = ExponentSolver(Problem(oscillator, noise), mesh).pair(p).value
     spread = 2 * noise.spectral_density(0.0) + noise.spectral_density(2 * 1.2)
     drift = 0.4**2 * 0.2 / 2 + 1.2 * oscillator.log_impact_factor / math.pi
     assert value == pytest.approx(p * drift + p**2 * 0.4**2 * spread / 16, rel=1e-10)
@@ -132,7 +133,7 @@ MESHES = {
 @pytest.mark.parametrize("epsilon", [0.1, 1.0])
 def test_zeroth_moment_is_conserved_on_every_mesh(name, noise, epsilon):
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=epsilon)
-    generator = TiltedGenerator(oscillator, noise, make_mesh(**MESHES[name]))
+    generator = Generator(Problem(oscillator, noise), make_mesh(**MESHES[name]))
     pair = principal_pair(generator, 0.0)
     assert abs(pair.value) <= 1e-13
     change = pair.right - generator.space.constant()
@@ -141,7 +142,7 @@ def test_zeroth_moment_is_conserved_on_every_mesh(name, noise, epsilon):
 
 def test_half_and_full_circle_give_one_exponent():
     noise = FIG1_NOISE.ou_reduction()
-    half, full = (ExponentSolver(FIG1, noise, make_mesh(full_circle=full)).pair(2.0) for full in (False, True))
+    half, full = (ExponentSolver(Problem(FIG1, noise), make_mesh(full_circle=full)).pair(2.0) for full in (False, True))
     assert full.value == pytest.approx(half.value, rel=1e-12)
     assert full.derivative == pytest.approx(half.derivative, rel=1e-12)
 
@@ -194,9 +195,9 @@ def test_errors_of_algebraic_tails_are_seen():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
     for r0 in (1.1, 1.15, 1.2):
         noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0)
-        near = ExponentSolver(oscillator, noise).lyapunov_exponent()
+        near = ExponentSolver(Problem(oscillator, noise)).lyapunov_exponent()
         wide = make_mesh(phi_cells=4, xi_cells=12, xi_min=-32, xi_max=32, grading=4.0)
-        far = ExponentSolver(oscillator, noise, wide).lyapunov_exponent()
+        far = ExponentSolver(Problem(oscillator, noise), wide).lyapunov_exponent()
         assert abs(near.value - far.value) <= 3 * (near.error_estimate + far.error_estimate)
 
 
@@ -207,7 +208,7 @@ def test_errors_of_a_lopsided_mesh_are_seen():
 
 def test_indices_without_meaning_are_refused():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=5.0)
-    solver = ExponentSolver(oscillator, UNIT_NOISE, make_mesh())
+    solver = ExponentSolver(Problem(oscillator, UNIT_NOISE), make_mesh())
     for compute in (solver.lyapunov_exponent, solver.variance_rate):
         with pytest.raises(NotConverged):
             compute()

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.conftest import oracle_arguments
 from tests.oracles import fourier_hermite
@@ -18,7 +19,7 @@ EXACT = fourier_hermite.moment_lyapunov(**oracle_arguments(OSCILLATOR, NOISE), p
 
 
 def error(**mesh):
-    return abs(principal_pair(TiltedGenerator(OSCILLATOR, NOISE, make_mesh(**mesh)), P).value - EXACT)
+    return abs(principal_pair(Generator(Problem(OSCILLATOR, NOISE), make_mesh(**mesh)), P).value - EXACT)
 
 
 def orders(errors):
@@ -67,7 +68,7 @@ def test_order_with_the_end_point_power_of_a_bounded_noise(r0):
         log_R=OSCILLATOR.log_impact_factor, p=P, harmonics=14, gegenbauer=40,
     )  # fmt: skip
     meshes = [make_mesh(**FINE_PHI, xi_cells=n, xi_degree=2) for n in (16, 32, 64)]
-    errors = [abs(principal_pair(TiltedGenerator(OSCILLATOR, noise, mesh), P).value - exact) for mesh in meshes]
+    errors = [abs(principal_pair(Generator(Problem(OSCILLATOR, noise), mesh), P).value - exact) for mesh in meshes]
     assert orders(errors)[-1] > 3.9
 
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noise import OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.conftest import oracle_arguments
 from tests.oracles import triangles
@@ -21,12 +22,12 @@ MESH = make_mesh(phi_cells=3, phi_degree=10, xi_cells=4, xi_degree=12, xi_min=-6
 @pytest.mark.parametrize("p", [-2.0, 1.0, 3.0])
 def test_principal_eigenvalue(p):
     other = triangles.moment_lyapunov(**oracle_arguments(OSCILLATOR, NOISE), p=p, **GRID)
-    value = principal_pair(TiltedGenerator(OSCILLATOR, NOISE, MESH), p).value
+    value = principal_pair(Generator(Problem(OSCILLATOR, NOISE), MESH), p).value
     assert value == pytest.approx(other, rel=1e-5)
 
 
 def test_triangles_converge_to_the_tensor_value():
-    value = principal_pair(TiltedGenerator(OSCILLATOR, NOISE, MESH), 2.0).value
+    value = principal_pair(Generator(Problem(OSCILLATOR, NOISE), MESH), 2.0).value
     errors = [
         abs(
             triangles.moment_lyapunov(
@@ -54,9 +55,9 @@ def test_bilinear_forms_of_smooth_functions():
     A, _, basis = triangles.matrices(**oracle_arguments(OSCILLATOR, NOISE), p=p, **GRID)
     other = test(*basis.doflocs) @ (A @ trial(*basis.doflocs))
 
-    generator = TiltedGenerator(OSCILLATOR, NOISE, MESH)
+    generator = Generator(Problem(OSCILLATOR, NOISE), MESH)
     w, t = (interpolate(generator, f) for f in (test, trial))
-    assert w @ (generator.at(p) @ t) == pytest.approx(other, rel=1e-6)
+    assert w @ (generator.matrix(p) @ t) == pytest.approx(other, rel=1e-6)
 
 
 def interpolate(generator, f):

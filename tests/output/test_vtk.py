@@ -17,9 +17,10 @@ from vtkmodules.vtkCommonDataModel import vtkLagrangeQuadrilateral
 
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.generator import TiltedGenerator
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.output.vtk import copy_show_script, write_density, write_eigenfunctions
 from tests.conftest import FIG1, UNIT_NOISE
@@ -48,7 +49,7 @@ def written(folder, solver, moments=MOMENTS, **options):
 
 @pytest.fixture(scope="module", params=MESHES)
 def solver(request):
-    return ExponentSolver(HARD, UNIT_NOISE, MESHES[request.param])
+    return ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[request.param])
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +145,9 @@ def test_periodic_by_pi(grids):
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
-    return written(tmp_path_factory.mktemp("reference"), ExponentSolver(HARD, UNIT_NOISE, MESHES["half circle"]))
+    return written(
+        tmp_path_factory.mktemp("reference"), ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
+    )
 
 
 @pytest.mark.parametrize("name", ["T", "T_adjoint", "stationary_density"])
@@ -158,7 +161,7 @@ def test_every_mesh_shows_the_same_field(grids, reference, name):
 
 def test_nodes_are_on_the_polynomials(tmp_path):
     """Values from the file against the elements evaluated at the middle of every mesh cell, in both half turns."""
-    solver = ExponentSolver(HARD, UNIT_NOISE, make_mesh(phi_cells=3, phi_degree=4, xi_cells=6, xi_degree=4))
+    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), make_mesh(phi_cells=3, phi_degree=4, xi_cells=6, xi_degree=4))
     pair, grid = solver.pair(1.0), written(tmp_path, solver, [1.0])[1.0]
     space, half = pair.generator.space, np.array([0.5])
     phi, z = space.phase.evaluation(half)[0], space.noise.evaluation(half)[0]
@@ -174,7 +177,7 @@ def test_first_order_eigenfunction(tmp_path):
     errors = []
     for eps in (0.02, 0.01, 0.005):
         oscillator = VibroImpactOscillator(omega=1.0, restitution=0.5, c1=0.1, epsilon=eps)
-        grid = written(tmp_path / str(eps), ExponentSolver(oscillator, UNIT_NOISE), [2.0])[2.0]
+        grid = written(tmp_path / str(eps), ExponentSolver(Problem(oscillator, UNIT_NOISE)), [2.0])[2.0]
         near = np.abs(grid["z"]) < 3
         phi, xi, _ = grid.points[near].T
         first = first_order_eigenfunction(oscillator, UNIT_NOISE, 2.0, phi, xi)
@@ -183,7 +186,7 @@ def test_first_order_eigenfunction(tmp_path):
 
 
 def test_stationary_pair_may_be_of_another_mesh(tmp_path):
-    coarse, fine = (ExponentSolver(HARD, UNIT_NOISE, MESHES[k]) for k in list(MESHES)[:2])
+    coarse, fine = (ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[k]) for k in list(MESHES)[:2])
     _, own = write_eigenfunctions(tmp_path / "own", [coarse.pair(2.0)], coarse.pair(0.0))
     _, other = write_eigenfunctions(tmp_path / "other", [coarse.pair(2.0)], fine.pair(0.0))
     one, two = (pyvista.read(file)["stationary_density"] for file in (own, other))
@@ -192,7 +195,9 @@ def test_stationary_pair_may_be_of_another_mesh(tmp_path):
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 5, 11])
 def test_any_degree(tmp_path, degree):
-    solver = ExponentSolver(FIG1, UNIT_NOISE, make_mesh(phi_cells=9, phi_degree=degree, xi_cells=9, xi_degree=degree))
+    solver = ExponentSolver(
+        Problem(FIG1, UNIT_NOISE), make_mesh(phi_cells=9, phi_degree=degree, xi_cells=9, xi_degree=degree)
+    )
     grid = written(tmp_path, solver, [1.0])[1.0]
     assert np.all(np.isfinite(grid["T"]))
     assert integral(grid, "tilted_density") == pytest.approx(1, abs=2e-2)
@@ -201,7 +206,7 @@ def test_any_degree(tmp_path, degree):
 def test_bounded_noise(tmp_path):
     """r₀ < 1: P_s vanishes at the ends, and nothing is undefined there."""
     noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=-1.0)
-    grid = written(tmp_path, ExponentSolver(HARD, noise), [2.0])[2.0]
+    grid = written(tmp_path, ExponentSolver(Problem(HARD, noise)), [2.0])[2.0]
     assert np.abs(grid.points[:, 1]).max() == pytest.approx(noise.half_width)
     assert all(np.all(np.isfinite(grid[name])) for name in grid.point_data)
     assert grid["T_adjoint"][np.abs(grid["z"]) == grid["z"].max()] == pytest.approx(0, abs=1e-6)
@@ -209,7 +214,7 @@ def test_bounded_noise(tmp_path):
 
 def test_far_out_where_the_density_is_tiny(tmp_path):
     mesh = make_mesh(phi_degree=6, xi_cells=90, xi_degree=2, xi_min=-37, xi_max=8)
-    pair = principal_pair(TiltedGenerator(FIG1, UNIT_NOISE, mesh), 0.0)
+    pair = principal_pair(Generator(Problem(FIG1, UNIT_NOISE), mesh), 0.0)
     grid = pyvista.read(write_eigenfunctions(tmp_path, [pair], pair)[1])
     assert all(np.all(np.isfinite(grid[name])) for name in grid.point_data)
     assert np.abs(grid["T_adjoint"][grid["z"] < -30]).max() < 1e-100
@@ -256,7 +261,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.output.vtk import write_eigenfunctions
 from tests.conftest import FIG1, UNIT_NOISE
 assert "pyvista" not in sys.modules
-pair = ExponentSolver(FIG1, UNIT_NOISE).pair(0.0)
+pair = ExponentSolver(Problem(FIG1, UNIT_NOISE)).pair(0.0)
 write_eigenfunctions(Path({str(tmp_path)!r}), [pair], pair)
 print([name for name in sys.modules if "vtkRendering" in name])
 """
@@ -307,7 +312,7 @@ def paraview():
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results")
-    solver = ExponentSolver(HARD, UNIT_NOISE, MESHES["half circle"])
+    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
     written(folder, solver)
     copy_show_script(folder)
     return folder
@@ -347,7 +352,7 @@ def test_paraview_reads_the_collection(paraview, results, tmp_path):
     found = json.loads(done.stdout)
     assert [float(p) for p in found["jumps"]] == list(MOMENTS)
     assert found["kinds"] == [70]  # VTK_LAGRANGE_QUADRILATERAL
-    solver = ExponentSolver(HARD, UNIT_NOISE, MESHES["half circle"])
+    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
     for p, jumps in found["jumps"].items():
         assert found["fields"][p] == pytest.approx([float(p), solver.pair(float(p)).value], abs=1e-14)
         lines, ratios = np.transpose(jumps)

@@ -11,6 +11,7 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation import batches
 from fpsolve.simulation import estimators as montecarlo
@@ -50,7 +51,7 @@ def test_standard_errors_are_honest(estimator, paths):
         simulate(MODERATE, REDUCED, orders, estimator=estimator, paths=paths, time=100.0, seed=seed)
         for seed in range(200)
     ]
-    exponent = ExponentSolver(MODERATE, REDUCED).lyapunov_exponent().value
+    exponent = ExponentSolver(Problem(MODERATE, REDUCED)).lyapunov_exponent().value
     check_spread([(run.lyapunov_exponent, run.lyapunov_exponent_error) for run in runs], exponent)
     for k, value in enumerate(reference):
         check_spread([(run.estimates[k].value, run.estimates[k].standard_error) for run in runs], value)
@@ -148,7 +149,7 @@ def test_slow_noise_carries_a_moment_in_two_places():
 def test_variance_rate():
     """Λ″(0) from the variance of ln‖x‖."""
     found = simulate(MODERATE, REDUCED, [], paths=8192, seed=2)
-    reference = ExponentSolver(MODERATE, REDUCED).variance_rate().value
+    reference = ExponentSolver(Problem(MODERATE, REDUCED)).variance_rate().value
     assert found.variance_rate == pytest.approx(reference, abs=4 * found.variance_rate_error + 0.02 * reference)
 
 

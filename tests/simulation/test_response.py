@@ -8,6 +8,7 @@ from scipy.stats import gamma
 
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.response import stationary_response
 from fpsolve.simulation.setup import default_step
@@ -17,7 +18,7 @@ NOISE = NonGaussianNoise(D0=0.3, tau0=0.5, r0=0.9).ou_reduction()
 
 def averaged(oscillator):
     """λ, s² = Λ″(0) and κ of the averaged amplitude: d ln A = (λ − κA²) dt + s dW."""
-    solver = ExponentSolver(oscillator, NOISE)
+    solver = ExponentSolver(Problem(oscillator, NOISE))
     kappa = oscillator.epsilon**2 * (oscillator.c2 + 3 * oscillator.omega**2 * oscillator.c3) / 8
     return solver.lyapunov_exponent().value, solver.variance_rate().value, kappa
 

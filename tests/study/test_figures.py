@@ -79,7 +79,7 @@ def test_fig2b_departure_matters_little_near_1():
     at = {}
     for r0 in (0.98, 0.99, 1.0):
         curve = case.curve({"noise.r0": r0})
-        at[r0] = ExponentSolver(curve.oscillator, curve.noise).pair(2.0).value
+        at[r0] = ExponentSolver(curve.problem).pair(2.0).value
     assert abs(at[0.99] - at[1.0]) < 0.02 * abs(at[1.0])
     assert abs(at[0.99] - at[1.0]) < 0.55 * abs(at[0.98] - at[1.0])
 
@@ -170,7 +170,7 @@ def test_almost_sure_stability_ends_where_the_paper_says(name, key):
     signs = []
     for shift in (-0.01, 0.01):
         curve = case.curve({key: threshold(case, key) + shift})
-        signs.append(np.sign(ExponentSolver(curve.oscillator, curve.noise).lyapunov_exponent().value))
+        signs.append(np.sign(ExponentSolver(curve.problem).lyapunov_exponent().value))
     assert signs == [-1, 1]
 
 

@@ -8,6 +8,7 @@ from numpy.polynomial.hermite_e import hermegauss
 
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noise import OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator, h1, q1
 from tests.oracles import perturbation
 
@@ -77,9 +78,8 @@ def test_finite_elements_leave_second_order_theory_by_epsilon_to_the_fourth(name
     constants = []
     for epsilon in (0.2, 0.1, 0.05, 0.025):
         oscillator = VibroImpactOscillator(**parameters, epsilon=epsilon)
-        difference = ExponentSolver(oscillator, noise, rtol=1e-12).pair(p).value - perturbation.moment_exponent(
-            oscillator, noise, p
-        )
+        value = ExponentSolver(Problem(oscillator, noise), rtol=1e-12).pair(p).value
+        difference = value - perturbation.moment_exponent(oscillator, noise, p)
         constants.append(difference / epsilon**4)
     # the next term is ε⁶: each halving of ε divides the distance to the limit by four
     steps = np.abs(np.diff(constants))
@@ -96,7 +96,7 @@ def test_eigenfunction_tends_to_1_plus_epsilon_T1(p):
     local = np.linspace(0, 1, 5)
     for epsilon in (0.04, 0.02, 0.01):
         oscillator = VibroImpactOscillator(omega=1.3, restitution=0.8, c1=0.1, epsilon=epsilon)
-        space = (pair := ExponentSolver(oscillator, OU).pair(p)).generator.space
+        space = (pair := ExponentSolver(Problem(oscillator, OU)).pair(p)).generator.space
         phi, z = (line.evaluation(local)[0] for line in (space.phase, space.noise))
         xi = OU.standard_deviation * z[np.abs(z) < 3]
         t1 = perturbation.first_order_eigenfunction(oscillator, OU, p, phi[:, None], xi)
