@@ -13,7 +13,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.fem.kronecker import KroneckerPattern, KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
-from fpsolve.fem.terms import Jump, Power, Term, terms_of
+from fpsolve.fem.terms import Jump, Power, Term, power_of_epsilon, terms_of
 from fpsolve.model.plane import angular_frequency, growth_rate, phase_speed
 from fpsolve.model.problem import Problem
 
@@ -42,7 +42,7 @@ class Generator:
         return type(self), (self.problem, self.space.mesh, self.space.xi.tilt)
 
     def __str__(self) -> str:
-        lines = [f"  {'ε⁰' if term.order == 0 else f'ε^{term.order}'}:  {term.text}" for term in self.terms()]
+        lines = [f"  {power_of_epsilon(term.order):<2}  {term.text}" for term in self.terms()]
         return "\n".join(["L(p), Eq. (19), the sum of", *lines])
 
     def terms(self) -> tuple[Term, ...]:

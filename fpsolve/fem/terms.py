@@ -74,10 +74,10 @@ def terms_of(system: System, space: CylinderSpace) -> Iterator[Term]:
         size, text = system.epsilon**drive.order, _prefix(drive)
         if not drive.h.vanishes:
             operator = _transport(system, space, drive, turns_back)
-            yield Term(drive.order, Power(0), size * operator, f"{text}({_written(drive.h)}) ∂φ")
+            yield Term(drive.order, Power(0), size * operator, f"{text}{_written(drive.h)} ∂φ")
         if not drive.q.vanishes:
             operator = KroneckerSum.of(space.phi.mass(drive.q), space.xi.mass(drive.g))
-            yield Term(drive.order, Power(1), size * operator, f"p {text}({_written(drive.q)})")
+            yield Term(drive.order, Power(1), size * operator, f"p {text}{_written(drive.q)}")
     for kick in system.kicks:
         text = f"(R^p − 1) |dφ/dt| δ(φ − {kick.phase:.6g} mod π), R = {math.exp(kick.log_factor):.6g}"
         yield Term(2, Jump(kick.log_factor), _load(system, space, kick), text)
@@ -121,17 +121,23 @@ def _upwind(system: System, phi: float, direction: int, g: Coefficient) -> Coeff
     return lambda xi: g(xi) * ((phase_speed(system, xi)(phi) >= 0) == (direction > 0))
 
 
+def power_of_epsilon(order: int) -> str:
+    """ε²."""
+    return "ε" if order == 1 else "ε" + str(order).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
 def _prefix(drive: Drive) -> str:
     """ε^n g(ξ)."""
-    power = {0: "", 1: "ε "}.get(drive.order, f"ε^{drive.order} ")
+    power = f"{power_of_epsilon(drive.order)} " if drive.order else ""
     g = "" if drive.g is one else "ξ " if drive.g.__name__ == "identity" else f"{drive.g.__name__}(ξ) "
     return power + g
 
 
 def _written(harmonics: Harmonics) -> str:
-    """0.5 − 0.5 cos 2φ."""
+    """(0.5 − 0.5 cos 2φ), or one number."""
     values = harmonics.mean, harmonics.cosine, harmonics.sine
     names = ("", " cos 2φ", " sin 2φ")
     parts = [(float(value), name) for value, name in zip(values, names, strict=True) if value]
     text = "".join(f" {'−' if value < 0 else '+'} {abs(value):g}{name}" for value, name in parts)
-    return text.removeprefix(" + ").removeprefix(" ")
+    text = text.removeprefix(" + ").removeprefix(" ")
+    return text if parts == [(values[0], "")] else f"({text})"

@@ -44,16 +44,16 @@ def test_stationary_density_integrates_to_1(solver):
 
 def test_noise_marginal_is_the_stationary_density_of_the_noise(solver):
     density = stationary_density(solver.pair(0.0))
-    expected = solver.noise.density(density.xi)
+    expected = solver.problem.noise.density(density.xi)
     np.testing.assert_allclose(density.xi_marginal(), expected, rtol=0, atol=1e-10 * expected.max())
     assert np.abs(density.xi_marginal() - expected) @ density.xi_weights < 1e-10
     variance = density.mean(lambda phi, xi: xi**2)
-    assert variance == pytest.approx(solver.noise.standard_deviation**2, rel=1e-10)
+    assert variance == pytest.approx(solver.problem.noise.standard_deviation**2, rel=1e-10)
 
 
 def test_furstenberg_khasminskii_integral_is_the_slope_at_zero(solver):
     pair = solver.pair(0.0)
-    scale = max(abs(pair.derivative), solver.oscillator.epsilon**2)
+    scale = max(abs(pair.derivative), solver.problem.system.epsilon**2)
     assert furstenberg_khasminskii(pair) == pytest.approx(pair.derivative, abs=1e-10 * scale)
 
 
@@ -62,7 +62,7 @@ def test_phase_flux_is_the_same_through_every_phase(solver):
     from fpsolve.model.vibro_impact import h1
 
     density = stationary_density(solver.pair(0.0))
-    eps, oscillator = solver.oscillator.epsilon, solver.oscillator
+    eps, oscillator = solver.problem.system.epsilon, solver.problem.system
 
     def speed(phi, xi):
         return oscillator.omega + eps * h1(phi) * xi + eps**2 * oscillator.h2(phi)

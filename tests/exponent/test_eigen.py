@@ -80,19 +80,6 @@ def test_repeated_solves_are_identical():
     assert first.value == second.value
 
 
-def test_the_generator_is_the_sum_of_its_terms():
-    """L(p) = L₀ + ε L₁(p) + ε² L₂(p) + impact(p), Eq. (19), and its derivative in p."""
-    oscillator = VibroImpactOscillator(omega=1.2, restitution=0.7, c1=-0.3, epsilon=0.8)
-    generator = Generator(Problem(oscillator, UNIT_NOISE), make_mesh(phi_cells=3))
-    p, h = 1.7, 1e-4
-    total = generator.L0() + 0.8 * generator.L1(p) + 0.8**2 * generator.L2(p) + generator.impact(p)
-    assert np.max(np.abs(generator.matrix(p).toarray() - total.toarray())) < 1e-12
-    slope = (generator.at(p + h) - generator.at(p - h)) / (2 * h)
-    assert abs(generator.derivative(p) - slope).max() < 1e-6
-    curvature = (generator.derivative(p + h) - generator.derivative(p - h)) / (2 * h)
-    assert abs(generator.second_derivative(p) - curvature).max() < 1e-6
-
-
 def test_a_mesh_that_resolves_nothing_raises_with_the_partial_pair():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=2.0)
     mesh = make_mesh(phi_cells=1, phi_degree=3, xi_cells=1, xi_degree=4, xi_min=-6, xi_max=6)

@@ -6,9 +6,11 @@ import pytest
 
 from fpsolve.errors import MeshError
 from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.fem.mesh_file import MARKERS, read_mesh, write_mesh
-from tests.conftest import FIG1, FIG1_NOISE, oracle_arguments
+from fpsolve.model.problem import Problem
+from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite
 
 MESHES = {
@@ -108,8 +110,6 @@ GOOD = {"phi_lines": [np.pi / 2, 3 * np.pi / 2], "z_lines": [-8.0, 0.0, 8.0], "p
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"phi_lines": [0, np.pi]}, r"1 impact line\(s\) expected at phi = pi/2 \+ k pi, 0 found"),
-        ({"phi_lines": [0, np.pi / 2, 2 * np.pi]}, r"2 impact line\(s\) expected"),
         ({"phi_lines": [np.pi / 2, 3.0]}, "the phase spans 1.4292.*half circle, pi, or the circle, 2 pi"),
         ({"phi_lines": [np.pi / 2, 4.0, 3.0, 3 * np.pi / 2]}, "phi_lines must increase"),
         ({"z_lines": [-8.0, np.nan]}, "z_lines must be at least two finite numbers"),
@@ -122,6 +122,18 @@ GOOD = {"phi_lines": [np.pi / 2, 3 * np.pi / 2], "z_lines": [-8.0, 0.0, 8.0], "p
 def test_impossible_meshes_are_refused(change, message):
     with pytest.raises(MeshError, match=message):
         CylinderMesh(**(GOOD | change))
+
+
+@pytest.mark.parametrize(
+    ("phi_lines", "message"),
+    [
+        ([0, np.pi], r"1 impact line\(s\) expected at phi = pi/2 \+ k pi, 0 found"),
+        ([0, np.pi / 2, 2 * np.pi], r"2 impact line\(s\) expected"),
+    ],
+)
+def test_generators_need_a_line_at_every_impact(phi_lines, message):
+    with pytest.raises(MeshError, match=message):
+        Generator(Problem(FIG1, UNIT_NOISE), CylinderMesh(**(GOOD | {"phi_lines": phi_lines})))
 
 
 def test_meshes_without_zero_noise_are_refused():
@@ -179,7 +191,7 @@ def test_meshes_of_other_shapes_are_refused(tmp_path):
         read_mesh(path)
     write_raw(path, np.array(HALF) + [[0.1, 0, 0]] * 4, [[0, 1, 2, 3]])
     with pytest.raises(MeshError, match="put a line of the mesh at each impact"):
-        read_mesh(path)
+        Generator(Problem(FIG1, UNIT_NOISE), read_mesh(path))
     write_raw(path, HALF, [[0, 1, 2, 3], [0, 1, 2, 3]])
     with pytest.raises(MeshError, match=r"2 quadrilaterals .* not the full tensor grid of 1 cells"):
         read_mesh(path)

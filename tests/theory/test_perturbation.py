@@ -97,10 +97,11 @@ def test_eigenfunction_tends_to_1_plus_epsilon_T1(p):
     for epsilon in (0.04, 0.02, 0.01):
         oscillator = VibroImpactOscillator(omega=1.3, restitution=0.8, c1=0.1, epsilon=epsilon)
         space = (pair := ExponentSolver(Problem(oscillator, OU)).pair(p)).generator.space
-        phi, z = (line.evaluation(local)[0] for line in (space.phase, space.noise))
+        (phi, at_phi), at_xi = space.phi.evaluation(local), space.xi.samples(local)
+        z = at_xi.xi / OU.standard_deviation
         xi = OU.standard_deviation * z[np.abs(z) < 3]
         t1 = perturbation.first_order_eigenfunction(oscillator, OU, p, phi[:, None], xi)
-        values = space.values(pair.right, local, local)[:, np.abs(z) < 3]
+        values = space.evaluate(pair.right, at_phi, at_xi.values)[:, np.abs(z) < 3]
         errors.append(np.max(np.abs(values - 1 - epsilon * t1)))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(orders, 2, atol=0.15)
