@@ -71,24 +71,24 @@ def terms_of(system: System, space: CylinderSpace) -> Iterator[Term]:
     yield Term(0, Power(0), KroneckerSum.of(space.phi.mass(), space.xi.generator()), "L_ξ, the generator of the noise")
     turns_back = _reversals(system, space)
     for drive in system.drives:
-        size, text = system.epsilon**drive.order, _prefix(drive)
+        size, text, noise = system.epsilon**drive.order, _prefix(drive), space.xi.mass(drive.g)
         if not drive.h.vanishes:
-            operator = _transport(system, space, drive, turns_back)
+            operator = _transport(system, space, drive, noise, turns_back)
             yield Term(drive.order, Power(0), size * operator, f"{text}{_written(drive.h)} ∂φ")
         if not drive.q.vanishes:
-            operator = KroneckerSum.of(space.phi.mass(drive.q), space.xi.mass(drive.g))
+            operator = KroneckerSum.of(space.phi.mass(drive.q), noise)
             yield Term(drive.order, Power(1), size * operator, f"p {text}{_written(drive.q)}")
     for kick in system.kicks:
         text = f"(R^p − 1) |dφ/dt| δ(φ − {kick.phase:.6g} mod π), R = {math.exp(kick.log_factor):.6g}"
         yield Term(2, Jump(kick.log_factor), _load(system, space, kick), text)
 
 
-def _transport(system: System, space: CylinderSpace, drive: Drive, turns_back: Any) -> KroneckerSum:
-    """∫ P_s h(φ) g(ξ) w T_φ and its upwind point loads at the φ-vertices."""
+def _transport(system: System, space: CylinderSpace, drive: Drive, noise: csr_matrix, turns_back: Any) -> KroneckerSum:
+    """∫ P_s h(φ) g(ξ) w T_φ and its upwind point loads at the φ-vertices; `noise` is ∫ P_s g(ξ)."""
     vertices = space.mesh.phi_lines[:-1]
     jumps = drive.h(vertices)[:, None] * (space.right_trace - space.left_trace)
     along = space.phi.convection(drive.h) + csr_matrix(space.left_trace[~turns_back].T @ jumps[~turns_back])
-    total = KroneckerSum.of(along, space.xi.mass(drive.g))
+    total = KroneckerSum.of(along, noise)
     for j in np.flatnonzero(turns_back):
         for trace, direction in ((space.left_trace[j], 1), (space.right_trace[j], -1)):
             load = np.outer(trace, jumps[j])

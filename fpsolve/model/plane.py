@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -84,12 +85,12 @@ class Drive:
             )
         object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
 
-    @property
+    @cached_property
     def h(self) -> Harmonics:
         """h(φ) = e′ᵀA e, the phase speed."""
         return turning(np.array(self.matrix))
 
-    @property
+    @cached_property
     def q(self) -> Harmonics:
         """q(φ) = eᵀA e, the growth rate of ln a."""
         return stretching(np.array(self.matrix))
@@ -184,12 +185,24 @@ def matrix_at(system: System, xi: ArrayLike, orders: slice = slice(None)) -> Flo
 
 def phase_speed(system: System, xi: ArrayLike) -> Harmonics:
     """dφ/dt at ξ as a function of φ: in Eq. (17) ω + ε h₁ξ + ε² h₂."""
-    return turning(matrix_at(system, xi))
+    return _total(system, [drive.h for drive in system.drives], xi)
 
 
 def growth_rate(system: System, xi: ArrayLike) -> Harmonics:
     """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
-    return stretching(matrix_at(system, xi))
+    return _total(system, [drive.q for drive in system.drives], xi)
+
+
+def _total(system: System, parts: Sequence[Harmonics], xi: ArrayLike) -> Harmonics:
+    """Σ ε^n g(ξ) of the harmonics of all drives."""
+    xi = np.asarray(xi, dtype=float)
+    sizes = [system.epsilon**drive.order * drive.g(xi) for drive in system.drives]
+    return Harmonics(
+        *(
+            sum((size * getattr(part, name) for size, part in zip(sizes, parts, strict=True)), start=np.zeros_like(xi))
+            for name in ("mean", "cosine", "sine")
+        )
+    )
 
 
 def angular_frequency(system: System) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import StrEnum
+from functools import cached_property
 from typing import Annotated, Self
 
 from numpy.typing import ArrayLike
@@ -90,7 +91,7 @@ class VibroImpactOscillator:
         """R^p: the eigenfunction obeys T(φ⁻, ξ) = R^p T(φ⁺, ξ) at φ = π/2 and 3π/2."""
         return math.exp(p * self.log_impact_factor)
 
-    @property
+    @cached_property
     def drives(self) -> tuple[Drive, ...]:
         """Free oscillation, noise and damping in (x, ẋ/ω): dφ = ω dt; ε ξ (h₁, q₁); ε² c₁ (h₁, q₁), Eqs. (17)-(18)."""
         rotation = ((0.0, self.omega), (-self.omega, 0.0))
