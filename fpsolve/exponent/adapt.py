@@ -23,11 +23,12 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import ModeEffects, Solution, Stage, mode_effects, noise_marginal, truncation
 from fpsolve.exponent.rival import rival
 from fpsolve.fem.mesh import CylinderMesh, halved
+from fpsolve.fem.space import unknowns
 from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import Diffusion, Noise, has_algebraic_tails
+from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.parameters import STRICT, Positive
 from fpsolve.model.plane import System, phase_speed
-from fpsolve.model.problem import Problem
+from fpsolve.model.problem import AnyNoise, Problem
 from fpsolve.theory.frozen import growth_without_turning, likely_center
 
 MAX_PHI_DEGREE, MAX_XI_DEGREE = 14, 10
@@ -131,7 +132,7 @@ def _search(
 class _Meter:
     """What a search for a discretisation has cost, and the best it has found."""
 
-    noise: Noise
+    noise: AnyNoise
     p: float
     budget: Budget
     started: float = field(default_factory=time.thread_time)
@@ -149,11 +150,11 @@ class _Meter:
         obstacle = self.obstacle(mesh)
         if obstacle:
             self.stop(obstacle)
-        self.last, self.stages = (self.elapsed, _finer_size(mesh, self.noise)), self.stages + 1
+        self.last, self.stages = (self.elapsed, unknowns(mesh.enriched(1.0), self.noise)), self.stages + 1
 
     def obstacle(self, mesh: CylinderMesh) -> str | None:
         """Why the budget does not suffice for a stage, or None."""
-        size = _finer_size(mesh, self.noise)
+        size = unknowns(mesh.enriched(1.0), self.noise)
         seconds = self.elapsed + self.cost * size**1.5
         if size > self.budget.unknowns:
             return f"the next mesh has {size} unknowns, more than budget.unknowns = {self.budget.unknowns}"
@@ -188,25 +189,9 @@ class _Meter:
         )
 
 
-def _finer_size(mesh: CylinderMesh, noise: Noise) -> int:
-    """Number of unknowns on the finer mesh of a stage."""
-    finer = mesh.enriched(1.0)
-    if isinstance(noise, Diffusion):
-        finer = finer.within(noise.half_width / noise.standard_deviation)
-    return _size(finer, noise)
-
-
-def _size(mesh: CylinderMesh, noise: Noise) -> int:
-    """Number of unknowns."""
-    across = len(noise.states) if isinstance(noise, MarkovChain) else (mesh.z_lines.size - 1) * mesh.xi_degree + 1
-    return (mesh.phi_lines.size - 1) * (mesh.phi_degree + 1) * across
-
-
 def _halved(mesh: CylinderMesh) -> CylinderMesh:
     """Twice the cells each way, where nothing is known yet."""
-    return replace(
-        mesh, phi_lines=halved(mesh.phi_lines), z_lines=halved(mesh.z_lines) if mesh.z_lines.size else mesh.z_lines
-    )
+    return replace(mesh, phi_lines=halved(mesh.phi_lines), z_lines=halved(mesh.z_lines))
 
 
 def _affordable(problem: Problem, center: float, rtol: float, budget: Budget) -> tuple[CylinderMesh, float]:
@@ -214,7 +199,7 @@ def _affordable(problem: Problem, center: float, rtol: float, budget: Budget) ->
     most = min(budget.unknowns, (budget.seconds / SECONDS_PER_UNKNOWN) ** (2 / 3))
     while True:
         mesh, tilt = _initial(problem, center, rtol)
-        if _size(mesh.enriched(1.0), problem.noise) <= most or rtol > 1e-3:
+        if unknowns(mesh.enriched(1.0), problem.noise) <= most or rtol > 1e-3:
             return mesh, tilt
         rtol *= 10
 
@@ -223,9 +208,8 @@ def _initial(problem: Problem, center: float, rtol: float) -> tuple[CylinderMesh
     """A first mesh and tilt for a tilted density around some z."""
     noise, degree = problem.noise, round(3 - math.log10(rtol))
     phi_degree, xi_degree = min(max(degree - 2, 4), MAX_PHI_DEGREE), min(max(degree - 4, 3), MAX_XI_DEGREE)
-    if not isinstance(noise, Diffusion):
-        ends = np.array(noise.states) if isinstance(noise, MarkovChain) else np.zeros(1)
-        cells = _phi_cells(problem.system, ends, ends)
+    if isinstance(noise, MarkovChain):
+        cells = _phi_cells(problem.system, np.array(noise.states), np.array(noise.states))
         return CylinderMesh(_phi_lines(problem.system, cells), np.zeros(0), phi_degree, xi_degree), 0.0
     unit, reach = noise.standard_deviation, math.sqrt(2 * math.log(1e5 / rtol))
     lower, upper = (center, center) if abs(center) > LEAST_TILT else (min(center, 0.0), max(center, 0.0))
@@ -275,17 +259,16 @@ def _refined(solution: Solution, tolerance: float) -> CylinderMesh:
     The effects are calibrated by the error measured, as their parts cancel, or what a cell lacks harms others.
     """
     mesh = solution.pair.generator.space.mesh
-    phase = mode_effects(solution.finer, 0)
-    seen, noise, z_lines, xi_degree = phase.above(mesh.phi_degree), None, mesh.z_lines, mesh.xi_degree
-    if z_lines.size:
-        noise = mode_effects(solution.finer, 1)
-        seen += noise.above(xi_degree)
+    effects = [mode_effects(solution.finer, axis) for axis in range(len(solution.pair.generator.space.axes))]
+    seen = sum(each.above(degree) for each, degree in zip(effects, (mesh.phi_degree, mesh.xi_degree), strict=False))
     share = DIRECTION_SHARE * tolerance * min(MOST_CANCELLED, seen / solution.error)
-    phi_lines, phi_degree = _split(mesh.phi_lines, MAX_PHI_DEGREE, phase, share)
-    if noise:
-        z_lines, xi_degree = _split(z_lines, MAX_XI_DEGREE, noise, share)
-    new, process = CylinderMesh(phi_lines, z_lines, phi_degree, xi_degree), solution.pair.generator.problem.noise
-    return new if _size(new, process) > _size(mesh, process) else mesh.enriched(1.0)
+    phi_lines, phi_degree = _split(mesh.phi_lines, MAX_PHI_DEGREE, effects[0], share)
+    new = replace(mesh, phi_lines=phi_lines, phi_degree=phi_degree)
+    if len(effects) > 1:
+        z_lines, xi_degree = _split(mesh.z_lines, MAX_XI_DEGREE, effects[1], share)
+        new = replace(new, z_lines=z_lines, xi_degree=xi_degree)
+    noise = solution.pair.generator.problem.noise
+    return new if unknowns(new, noise) > unknowns(mesh, noise) else mesh.enriched(1.0)
 
 
 def _split(lines: FloatArray, most: int, effects: ModeEffects, tolerance: float) -> tuple[FloatArray, int]:
@@ -300,7 +283,7 @@ def _split(lines: FloatArray, most: int, effects: ModeEffects, tolerance: float)
 def _moved(pair: PrincipalPair, tolerance: float) -> tuple[CylinderMesh, float] | None:
     """A mesh whose ends, and a tilt, follow the tilted density; None where they already do."""
     space, noise = pair.generator.space, pair.generator.problem.noise
-    if not isinstance(noise, Diffusion):
+    if isinstance(noise, MarkovChain):
         return None
     mesh, end = space.mesh, noise.half_width / noise.standard_deviation
     effects, is_algebraic = truncation(pair), has_algebraic_tails(noise)

@@ -24,7 +24,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import CylinderSpace
-from fpsolve.model.noise import Diffusion
+from fpsolve.model.markov_chain import MarkovChain
 
 BACKWARD_ERROR_GOAL = 1e-14
 BACKWARD_ERROR_LIMIT = 1e-11
@@ -92,7 +92,7 @@ def principal_pair(
         lambda: _carried(pairs, p, generator.space) if pairs else (one, one),
         lambda: _from_the_right(generator, p),
     ]
-    if not isinstance(generator.problem.noise, Diffusion):  # states that hardly mix have a positive pair each
+    if isinstance(generator.problem.noise, MarkovChain):  # states that hardly mix have a positive pair each
         searches.reverse()
     if guess is not None:
         searches.append(lambda: _most_positive(generator, p, guess))

@@ -157,9 +157,9 @@ class ModeEffects:
 
 
 def mode_effects(pair: PrincipalPair, axis: int) -> ModeEffects:
-    """The effects along φ (axis 0) or ξ (axis 1) of a pair."""
+    """The effects along one of the axes of a pair's space: φ (0), or ξ (1) if that is a line."""
     generator, space = pair.generator, pair.generator.space
-    line = space.xi.line if axis and isinstance(space.xi, DiffusionSpace) else space.phi
+    line = space.axes[axis]
     operator, norm = generator.matrix(pair.p, shift=pair.value), pair.left @ (generator.mass @ pair.right)
     shape = (space.phi.size, space.xi.size)
     degrees = np.arange(line.degree - 1.0, max(line.degree - 5, 0), -1)

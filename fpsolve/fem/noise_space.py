@@ -17,7 +17,8 @@ from fpsolve.errors import MeshError
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import Diffusion, Noise
+from fpsolve.model.noise import Diffusion
+from fpsolve.model.problem import AnyNoise
 
 _SAMPLES = 2001
 
@@ -46,6 +47,10 @@ class NoiseSpace(Protocol):
     @property
     def size(self) -> int:
         """Number of unknowns."""
+
+    @property
+    def axes(self) -> tuple[LineSpace, ...]:
+        """The elements, none for a chain."""
 
     @property
     def tilt(self) -> float:
@@ -111,6 +116,10 @@ class DiffusionSpace:
         return self.line.size
 
     @property
+    def axes(self) -> tuple[LineSpace, ...]:
+        return (self.line,)
+
+    @property
     def support(self) -> FloatArray:
         return self.unit * np.concatenate([self.line.lines, self.line.points])
 
@@ -155,7 +164,7 @@ class DiffusionSpace:
 class ChainSpace:
     """One value for each state of a Markov chain: ∫ P_s becomes a sum over the states with their probabilities."""
 
-    tilt = 0.0
+    tilt, axes = 0.0, ()
 
     def __init__(self, noise: MarkovChain) -> None:
         self.support, self.rates = np.array(noise.states), np.array(noise.rates)
@@ -180,22 +189,14 @@ class ChainSpace:
         return np.eye(self.size)
 
 
-def noise_space(noise: Noise, mesh: CylinderMesh, tilt: float = 0.0) -> NoiseSpace:
+def noise_space(noise: AnyNoise, mesh: CylinderMesh, tilt: float = 0.0) -> NoiseSpace:
     """The functions of a noise on a mesh, which for a chain has no lines in z.
 
     Raises:
         MeshError: the mesh has lines where the noise has states, or none where it has a line.
-        TypeError: the noise is neither a diffusion nor a Markov chain.
     """
-    has_lines = mesh.z_lines.size > 0
+    if isinstance(noise, MarkovChain) == bool(mesh.z_lines.size):
+        raise MeshError("noise with states needs a mesh without z_lines, and noise on a line one with them")
     if isinstance(noise, MarkovChain):
-        if has_lines:
-            raise MeshError("the noise has states and no line of values; use a mesh without lines in the noise")
         return ChainSpace(noise)
-    if not isinstance(noise, Diffusion):
-        raise TypeError(
-            f"got {noise!r} as a noise; it must be a diffusion, such as OrnsteinUhlenbeck, or a MarkovChain"
-        )
-    if not has_lines:
-        raise MeshError("the mesh has no lines in the noise; give it z_lines")
     return DiffusionSpace(noise, mesh.z_lines, mesh.xi_degree, tilt)

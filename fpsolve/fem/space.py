@@ -15,7 +15,20 @@ from fpsolve.arrays import FloatArray
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_space import noise_space
-from fpsolve.model.noise import Diffusion, Noise
+from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.problem import AnyNoise
+
+
+def fitted(mesh: CylinderMesh, noise: AnyNoise) -> CylinderMesh:
+    """A mesh cut off at the end of the noise's support."""
+    return mesh if isinstance(noise, MarkovChain) else mesh.within(noise.half_width / noise.standard_deviation)
+
+
+def unknowns(mesh: CylinderMesh, noise: AnyNoise) -> int:
+    """How many the space of a mesh has."""
+    mesh = fitted(mesh, noise)
+    across = len(noise.states) if isinstance(noise, MarkovChain) else (mesh.z_lines.size - 1) * mesh.xi_degree + 1
+    return (mesh.phi_lines.size - 1) * (mesh.phi_degree + 1) * across
 
 
 class CylinderSpace:
@@ -37,8 +50,8 @@ class CylinderSpace:
         MeshError: a cell's polynomials in the noise cannot be told apart under the weight.
     """
 
-    def __init__(self, mesh: CylinderMesh, noise: Noise, tilt: float = 0.0) -> None:
-        self.mesh = mesh.within(noise.half_width / noise.standard_deviation) if isinstance(noise, Diffusion) else mesh
+    def __init__(self, mesh: CylinderMesh, noise: AnyNoise, tilt: float = 0.0) -> None:
+        self.mesh = fitted(mesh, noise)
         self.phi = LineSpace(self.mesh.phi_lines, self.mesh.phi_degree, discontinuous=True)
         self.xi = noise_space(noise, self.mesh, tilt)
         self._carriers: WeakKeyDictionary[CylinderSpace, tuple[FloatArray, FloatArray]] = WeakKeyDictionary()
@@ -49,6 +62,11 @@ class CylinderSpace:
     def size(self) -> int:
         """Number of unknowns."""
         return self.phi.size * self.xi.size
+
+    @property
+    def axes(self) -> tuple[LineSpace, ...]:
+        """The elements that refinement may refine: in φ, and in ξ if that is a line."""
+        return self.phi, *self.xi.axes
 
     def table(self, coefficients: FloatArray) -> FloatArray:
         """Coefficients of a function as a matrix, shape (phi.size, xi.size)."""

@@ -7,7 +7,7 @@ part of the generator is self-adjoint in P_s. The discretisation needs only what
 from __future__ import annotations
 
 import math
-from typing import Annotated, Protocol, runtime_checkable
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,7 +43,6 @@ class Noise(Protocol):
         """S(ω) = ∫ C(t) cos ωt dt over all t, C the autocovariance."""
 
 
-@runtime_checkable
 class Diffusion(Noise, Protocol):
     """A process dξ = ½σ² (ln P_s)′ dt + σ dW on an interval."""
 

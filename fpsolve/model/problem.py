@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
-from fpsolve.model.noise import Noise
+from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noise import Diffusion
 from fpsolve.model.plane import System
 
+AnyNoise = Diffusion | MarkovChain
 P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
 
@@ -24,7 +26,7 @@ class Problem:
     """
 
     system: System
-    noise: Noise
+    noise: AnyNoise
 
 
 class OfProblem(Protocol[P, R_co]):
@@ -34,7 +36,7 @@ class OfProblem(Protocol[P, R_co]):
     def __call__(self, problem: Problem, /, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
 
     @overload
-    def __call__(self, oscillator: System, noise: Noise, /, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
+    def __call__(self, oscillator: System, noise: AnyNoise, /, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
 
 
 def of_problem(function: Callable[Concatenate[Problem, P], R_co]) -> OfProblem[P, R_co]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.noise import Diffusion
+from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.plane import matrix_at, noise_strength
 from fpsolve.model.problem import Problem
 
@@ -33,10 +33,10 @@ def frozen_rate(problem: Problem, p: float) -> tuple[FloatArray, FloatArray] | N
     For p < −1 the paths that stay on the other real mode carry more: (p + 1)·fast − slow. The second term is what
     holding ξ costs. Slow noise has its tilted density where F is largest, and more than one such place.
 
-    None for noise that is no diffusion.
+    None for a chain.
     """
     noise, system = problem.noise, problem.system
-    if not isinstance(noise, Diffusion):
+    if isinstance(noise, MarkovChain):
         return None
     unit = noise.standard_deviation
     furthest = 2.5 * abs(p) * 2 * unit * noise_strength(system) * noise.correlation_time
