@@ -1,3 +1,4 @@
+from .markov_chain import MarkovChain as MarkovChain
 from .noise import Diffusion as Diffusion
 from .noise import Noise as Noise
 from .noise import NonGaussianNoise as NonGaussianNoise

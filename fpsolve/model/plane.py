@@ -130,11 +130,11 @@ class System(Protocol):
         """ε."""
 
     @property
-    def drives(self) -> tuple[Drive, ...]:
+    def drives(self) -> Sequence[Drive]:
         """The terms of the motion."""
 
     @property
-    def kicks(self) -> tuple[Kick, ...]:
+    def kicks(self) -> Sequence[Kick]:
         """The rays at which the state is stretched."""
 
 
@@ -156,8 +156,8 @@ class PlaneSystem:
         ValueError: there is no drive, or ε is not a positive number.
     """
 
-    drives: tuple[Drive, ...]
-    kicks: tuple[Kick, ...] = ()
+    drives: Sequence[Drive]
+    kicks: Sequence[Kick] = ()
     epsilon: float = 1.0
 
     def __post_init__(self) -> None:

@@ -22,7 +22,7 @@ class Problem:
 
     Attributes:
         system: `VibroImpactOscillator`, or a `PlaneSystem`.
-        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands, or another of `fpsolve.noises`.
+        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands, or a `MarkovChain`.
     """
 
     system: System
