@@ -16,7 +16,7 @@ from numpy.random import SeedSequence, default_rng
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import ColouredNoise, has_algebraic_tails, relaxation_time
 from fpsolve.simulation.kernels import RENORMALISED, add_windows, advance, advance_population, close_slice
-from fpsolve.simulation.setup import TICKS
+from fpsolve.simulation.setup import TICKS, Estimator
 from fpsolve.simulation.step import Motion, NoiseStep, noise_step, starting_state
 
 _PORTION_SECONDS = 0.1
@@ -34,9 +34,11 @@ class Plan:
         noise: the process.
         motion, noise_step, step: the motion, one step of the noise, and its length.
         p: orders of the moments, shape (n,).
+        estimator: "direct" or "population".
         paths: in one batch.
         slice_steps: steps in one slice, the unit in which batches are advanced: one transient.
         settling: slices before the estimate begins.
+        wanted: slices for the estimate.
         levels: the direct estimator has windows of 2⁰ … 2^(levels − 1) slices.
     """
 
@@ -45,9 +47,11 @@ class Plan:
     noise_step: NoiseStep
     step: float
     p: FloatArray
+    estimator: Estimator
     paths: int
     slice_steps: int
     settling: int
+    wanted: int
     levels: int
 
     @property

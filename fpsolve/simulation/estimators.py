@@ -17,24 +17,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import get_args
 
 import numpy as np
 from scipy.special import logsumexp
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
-from fpsolve.model.noise import ColouredNoise, check_existence
+from fpsolve.model.noise import ColouredNoise
+from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.simulation.setup import (
     BATCHES,
-    MAX_PATHS,
     PATHS,
     TRANSIENTS,
     Estimator,
+    check_orders,
+    check_settings,
     default_step,
     obstacles,
+    simulated_parts,
     transient,
 )
 from fpsolve.simulation.step import motion, noise_step
@@ -98,9 +100,9 @@ class MonteCarlo:
     interrupted: bool = False
 
 
+@of_problem
 def simulate(
-    oscillator: VibroImpactOscillator,
-    noise: ColouredNoise,
+    problem: Problem,
     p: Sequence[float],
     *,
     estimator: Estimator = "direct",
@@ -117,7 +119,7 @@ def simulate(
     none, and KeyboardInterrupt is raised.
 
     Args:
-        oscillator, noise: the parameter set; c₂ and c₃ are not used.
+        problem: the oscillator and its noise, in one argument or two; c₂ and c₃ are not used.
         p: orders of the moments.
         estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
         paths: how many; a multiple of 32 is used.
@@ -127,52 +129,19 @@ def simulate(
         tick: called 100 times in all, as progress.
 
     Raises:
+        FpsolveError: the motion is no `VibroImpactOscillator`, or the noise not that of the paper.
         ValueError: an argument is out of its range, or the step is too large; the text names the largest good one.
         NoSuchExponent: some Λ(p) is infinite.
     """
-    if not (math.isfinite(noise.standard_deviation) and np.all(np.isfinite(np.array(p, dtype=float)))):
-        raise ValueError(f"got p = {p} and a noise of variance {noise.standard_deviation**2:g}; all must be finite")
+    oscillator, noise = simulated_parts(problem)
+    check_orders(noise, p)
     for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
         raise ValueError(f"{name}: {sentence}")
-    if estimator not in get_args(Estimator) or not BATCHES <= paths <= MAX_PATHS or seed < 0:
-        raise ValueError(
-            f"got estimator = {estimator!r}, paths = {paths}, seed = {seed}; must be one of "
-            f"{', '.join(get_args(Estimator))}, {BATCHES} to {MAX_PATHS}, and >= 0"
-        )
-    for order in p:
-        check_existence(noise, order)
-    plan, wanted = _plan(oscillator, noise, p, estimator, paths, time, step)
-    plain, populations = _start(plan, estimator, seed)
-    batches = [*plain, *populations]
-    interrupted = advance_all(batches, wanted + plan.settling, plan.slice_seconds, tick)
-    slices = np.array([batch.slices for batch in batches])
-    if slices.min() < 2:
-        raise KeyboardInterrupt
-    times = plan.length * np.array([batch.slices for batch in plain])
-    growth = np.array([batch.growth for batch in plain]) / times
-    spread = np.array([batch.variance for batch in plain]) / times
-    if not np.all(np.isfinite(growth)):
-        raise NotConverged("the simulation overflowed: some ξ is too large for this step; use a smaller step")
-    if estimator == "direct":
-        estimates, warnings = direct_estimates(plan, plain)
-    else:
-        estimates, warnings = population_estimates(plan, populations)
-    if interrupted:
-        warnings.append(f"stopped early, after {slices.mean() / wanted:.0%} of the time")
-    return MonteCarlo(
-        estimates=tuple(estimates),
-        lyapunov_exponent=float(growth.mean()),
-        lyapunov_exponent_error=standard_error(growth),
-        variance_rate=float(spread.mean()),
-        variance_rate_error=standard_error(spread),
-        paths=plan.paths * BATCHES,
-        time=float(slices.mean()) * plan.length,
-        step=plan.step,
-        seed=seed,
-        impacts=sum(batch.impacts for batch in plain),
-        warnings=tuple(warnings),
-        interrupted=interrupted,
-    )
+    check_settings(estimator, paths, seed)
+    plan = _plan(oscillator, noise, p, estimator, paths, time, step)
+    plain, populations = _start(plan, seed)
+    interrupted = advance_all([*plain, *populations], plan.settling + plan.wanted, plan.slice_seconds, tick)
+    return _result(plan, plain, populations, seed, interrupted)
 
 
 def _plan(
@@ -183,29 +152,30 @@ def _plan(
     paths: int,
     time: float | None,
     step: float | None,
-) -> tuple[Plan, int]:
-    """What the batches need, and how many slices they shall do."""
+) -> Plan:
+    """What the batches need."""
     h = default_step(oscillator, noise) if step is None else step
     settling = transient(oscillator, noise)
     wanted = TRANSIENTS if time is None else max(2, round(time / settling))
-    plan = Plan(
+    return Plan(
         noise=noise,
         motion=motion(replace(oscillator, c2=0.0, c3=0.0)),
         noise_step=noise_step(noise, h),
         step=h,
         p=np.array(p, dtype=float),
+        estimator=estimator,
         paths=math.ceil(paths / BATCHES),
         slice_steps=round(settling / h),
         settling=1 if estimator == "direct" else _SETTLING,
+        wanted=wanted,
         levels=min(_LEVELS, wanted.bit_length()) if estimator == "direct" else 0,
     )
-    return plan, wanted
 
 
-def _start(plan: Plan, estimator: Estimator, seed: int) -> tuple[list[PlainBatch], list[Population]]:
+def _start(plan: Plan, seed: int) -> tuple[list[PlainBatch], list[Population]]:
     """The batches, each with a stream of random numbers of its own."""
     seeds = [each.spawn(1 + plan.p.size) for each in np.random.SeedSequence(seed).spawn(BATCHES)]
-    orders = plan.p if estimator == "population" else ()
+    orders = plan.p if plan.estimator == "population" else ()
     plain = [PlainBatch(plan, each[0]) for each in seeds]
     weighted = [
         Population(plan, each[1 + k], float(p), is_far=bool(i % 2))
@@ -213,6 +183,45 @@ def _start(plan: Plan, estimator: Estimator, seed: int) -> tuple[list[PlainBatch
         for k, p in enumerate(orders)
     ]
     return plain, weighted
+
+
+def _result(
+    plan: Plan, plain: Sequence[PlainBatch], populations: Sequence[Population], seed: int, interrupted: bool
+) -> MonteCarlo:
+    """What the batches have found.
+
+    Raises:
+        KeyboardInterrupt: that is nothing yet.
+        NotConverged: the numbers overflowed.
+    """
+    slices = np.array([batch.slices for batch in (*plain, *populations)])
+    if slices.min() < 2:
+        raise KeyboardInterrupt
+    times = plan.length * np.array([batch.slices for batch in plain])
+    exponents = np.array([batch.growth for batch in plain]) / times
+    variance_rates = np.array([batch.variance for batch in plain]) / times
+    if not np.all(np.isfinite(exponents)):
+        raise NotConverged("the simulation overflowed: some ξ is too large for this step; use a smaller step")
+    if plan.estimator == "direct":
+        estimates, warnings = direct_estimates(plan, plain)
+    else:
+        estimates, warnings = population_estimates(plan, populations)
+    if interrupted:
+        warnings.append(f"stopped early, after {slices.mean() / plan.wanted:.0%} of the time")
+    return MonteCarlo(
+        estimates=tuple(estimates),
+        lyapunov_exponent=float(exponents.mean()),
+        lyapunov_exponent_error=standard_error(exponents),
+        variance_rate=float(variance_rates.mean()),
+        variance_rate_error=standard_error(variance_rates),
+        paths=plan.paths * BATCHES,
+        time=float(slices.mean()) * plan.length,
+        step=plan.step,
+        seed=seed,
+        impacts=sum(batch.impacts for batch in plain),
+        warnings=tuple(warnings),
+        interrupted=interrupted,
+    )
 
 
 def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[MomentEstimate], list[str]]:
