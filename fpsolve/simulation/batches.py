@@ -15,7 +15,7 @@ from numpy.random import SeedSequence, default_rng
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import ColouredNoise, has_algebraic_tails, relaxation_time
-from fpsolve.simulation.kernels import RENORMALISED, add_windows, advance, advance_population, close_slice
+from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
 from fpsolve.simulation.setup import TICKS, Estimator
 from fpsolve.simulation.step import Motion, NoiseStep, noise_step, starting_state
 
@@ -151,8 +151,7 @@ class Population(_Paths):
 
     Attributes:
         expected: growth of ln Z in a slice, about.
-        tallies: over slices, the sums of 1, d, d², d × the d before, d × the number of the slice, and the effective
-            paths among those of a slice ago, d being the growth of ln Z beyond `expected`; the first and the last d.
+        tallies: of the slices after settling, one record of `TALLIES`, shape (1,).
     """
 
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
@@ -161,7 +160,7 @@ class Population(_Paths):
         self._is_tilted = p != 0 and not has_algebraic_tails(plan.noise)  # in algebraic tails exp(b ξ) has no mean
         if is_far and self._is_tilted:
             self.tilt = p * plan.motion.strength * relaxation_time(plan.noise)
-        self.tallies = np.zeros(8)
+        self.tallies = np.zeros(1, TALLIES)
         self._log_weights, self._ancestors = np.zeros(plan.paths), np.arange(plan.paths)
         self._log_z = np.zeros(2)  # of the weights that have been reset, and of all at the last slice
         exponent = abs(p) * plan.motion.strength * plan.noise.standard_deviation * plan.step

@@ -27,6 +27,7 @@ from fpsolve.model.noise import ColouredNoise
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
+from fpsolve.simulation.kernels import TALLIES
 from fpsolve.simulation.setup import (
     BATCHES,
     PATHS,
@@ -255,15 +256,16 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
     Every second batch has started far away, see `Population`. Where the two kinds disagree the moment has two places;
     each batch then gives the growth of one of them, which is a lower bound, and the larger growth counts.
     """
-    tallies = np.array([each.tallies for each in populations]).reshape(BATCHES, plan.p.size, 8)
+    tallies = np.array([each.tallies[0] for each in populations], TALLIES).reshape(BATCHES, plan.p.size)
     expected = np.array([each.expected for each in populations]).reshape(BATCHES, plan.p.size)
-    count, excess, squares, products, moments, effective, first, last = np.moveaxis(tallies, 2, 0)
+    count, excess = tallies["count"], tallies["excess"]
     mean = excess / count
-    variance = squares / count - mean**2
-    covariance = (products - mean * (2 * excess - first - last)) / (count - 1) + mean**2
+    variance = tallies["squares"] / count - mean**2
+    neighbours = 2 * excess - tallies["first"] - tallies["last"]
+    covariance = (tallies["products"] - mean * neighbours) / (count - 1) + mean**2
     rate = np.maximum(variance + 2 * covariance, 0) / plan.length
     growth = (expected + mean) / plan.length
-    trends = (moments - (count - 1) / 2 * excess) / count
+    trends = (tallies["numbered"] - (count - 1) / 2 * excess) / count
     estimates: list[MomentEstimate] = []
     warnings: list[str] = []
     for k, p in enumerate(plan.p):
@@ -277,7 +279,7 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
                 "standard errors: the noise is too slow to pass between them; the larger value is given"
             )
         value = float(growth[used, k].mean() + rate[used, k].mean() / 2)
-        carrying = float(np.sum(effective[used, k] / count[used, k]))
+        carrying = float(np.sum(tallies["effective"][used, k] / count[used, k]))
         estimates.append(_estimate(plan, p, (value, standard_error(growth[used, k])), "population", carrying))
         _warn_of_drift(p, float(trends[used, k].mean()), standard_error(trends[used, k]), "more time", warnings)
     return estimates, [*_missing(plan, estimates), *warnings]
