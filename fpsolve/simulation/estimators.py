@@ -111,7 +111,7 @@ def simulate(
     time: float | None = None,
     step: float | None = None,
     seed: int = 0,
-    tick: Callable[[], None] = lambda: None,
+    progress: Callable[[], None] = lambda: None,
 ) -> MonteCarlo:
     """Simulate paths of the linear system and estimate λ and Λ(p) from them.
 
@@ -127,7 +127,7 @@ def simulate(
         time: length of the paths after the transient; 64 transients if None. Whole transients are used.
         step: time step; None chooses one.
         seed: ≥ 0.
-        tick: called 100 times in all, as progress.
+        progress: called 100 times in all.
 
     Raises:
         FpsolveError: the motion is no `VibroImpactOscillator`, or the noise not that of the paper.
@@ -141,7 +141,7 @@ def simulate(
     check_settings(estimator, paths, seed)
     plan = _plan(oscillator, noise, p, estimator, paths, time, step)
     plain, populations = _start(plan, seed)
-    interrupted = advance_all([*plain, *populations], plan.settling + plan.wanted, plan.slice_seconds, tick)
+    interrupted = advance_all([*plain, *populations], plan.settling + plan.wanted, plan.slice_seconds, progress)
     return _result(plan, plain, populations, seed, interrupted)
 
 

@@ -10,7 +10,7 @@ integrates the motion in the frame that rotates with ω (Lawson's method), so th
 is sought within the step, to the precision of floating point, and the rest of the step follows after the bounce.
 
 State: x, u and ξ of each path, arrays of shape (n,), changed in place. The coefficients are a `Motion` and a
-`NoiseStep` of simulation.py.
+`NoiseStep` of step.py.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _inlined: Any = njit(nogil=True, error_model="numpy", inline="always")
 def draw(noise, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
     """The mean and the end of the noise in one step that begins at `xi`; all of shape (n,).
 
-    `push` takes in ∫f(ξ) dt over the step, f without the tilt.
+    `push` takes in ∫f(ξ) dt over the step, f without σ² b.
     """
     for i in range(xi.size):
         xi_end[i] = rng.standard_normal()
@@ -255,12 +255,12 @@ def advance_population(  # type: ignore[no-untyped-def]
 ):
     """Advance a population by some steps; the weights are looked at after every `interval` steps."""
     done = 0
-    p, tilt, bonus = exponents
+    p, bias, bonus = exponents
     while done < steps:
         count = min(interval, steps - done)
         log_norm[:], push[:] = 0, 0
         advance(m, noise, h, x, u, xi, log_norm, push, count, RENORMALISED, rng)
-        log_weights += p * log_norm + tilt * push + bonus * count
+        log_weights += p * log_norm + bias * push + bonus * count
         log_z[0] += _resample(x, u, xi, log_weights, ancestors, rng)
         done += count
 

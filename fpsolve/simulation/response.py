@@ -97,7 +97,7 @@ def stationary_response(
     time: float,
     step: float,
     seed: int,
-    tick: Callable[[], None] = lambda: None,
+    progress: Callable[[], None] = lambda: None,
 ) -> Response:
     """Simulate the nonlinear system of Eq. (3) until it is stationary, and then for `time` at least.
 
@@ -106,7 +106,7 @@ def stationary_response(
         exponent, variance_rate: λ > 0 and Λ″(0) of the linear system. ln A forgets its start in 1/λ, or, where it
             wanders more than it drifts, in 2Λ″(0)/λ².
         paths, time, step, seed: as for `simulate`; the time is at least 20 times that.
-        tick: called 200 times in all, as progress.
+        progress: called 200 times in all.
 
     Raises:
         FpsolveError: as `simulate`.
@@ -124,12 +124,12 @@ def stationary_response(
     settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
     batches = [_Batch(setting, each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
     seconds = STEP_SECONDS * setting.paths * setting.steps
-    if advance_all(batches, settling, seconds, tick):
+    if advance_all(batches, settling, seconds, progress):
         raise KeyboardInterrupt
     reach = _MARGIN * max(float(np.max(np.hypot(batch.x, batch.u))) for batch in batches)
     for batch in batches:
         batch.impacts, batch.reach = 0, reach
-    interrupted = advance_all(batches, looks, seconds, tick)
+    interrupted = advance_all(batches, looks, seconds, progress)
     return _collect(oscillator, batches, between, reach, interrupted)
 
 

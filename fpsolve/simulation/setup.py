@@ -19,7 +19,7 @@ BATCHES = 32
 PATHS, TRANSIENTS = 32_768, 64
 """Defaults: how many paths, and how many transients long they are."""
 MAX_PATHS = 10_000_000
-TICKS = 100
+PROGRESS_STEPS = 100
 """How often each stretch of a simulation reports progress."""
 _LONGEST = 1_000_000
 """Steps in a transient; with more, a simulation would not end."""
