@@ -15,8 +15,8 @@ from numpy.random import SeedSequence, default_rng
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import ColouredNoise, has_algebraic_tails, relaxation_time
-from fpsolve.simulation.kernels import RENORMALISED, add_windows, advance, advance_population, close_slice
-from fpsolve.simulation.setup import TICKS
+from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
+from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator
 from fpsolve.simulation.step import Motion, NoiseStep, noise_step, starting_state
 
 _PORTION_SECONDS = 0.1
@@ -34,9 +34,11 @@ class Plan:
         noise: the process.
         motion, noise_step, step: the motion, one step of the noise, and its length.
         p: orders of the moments, shape (n,).
+        estimator: "direct" or "population".
         paths: in one batch.
         slice_steps: steps in one slice, the unit in which batches are advanced: one transient.
         settling: slices before the estimate begins.
+        wanted: slices for the estimate.
         levels: the direct estimator has windows of 2⁰ … 2^(levels − 1) slices.
     """
 
@@ -45,9 +47,11 @@ class Plan:
     noise_step: NoiseStep
     step: float
     p: FloatArray
+    estimator: Estimator
     paths: int
     slice_steps: int
     settling: int
+    wanted: int
     levels: int
 
     @property
@@ -146,18 +150,18 @@ class Population(_Paths):
     with the b that T has where the oscillator does not turn, ln ‖x‖ growing by ε ξ, b = p ε/α₀.
 
     Attributes:
+        bias: b, which stays 0 where exp(b ξ) has no mean.
         expected: growth of ln Z in a slice, about.
-        tallies: over slices, the sums of 1, d, d², d × the d before, d × the number of the slice, and the effective
-            paths among those of a slice ago, d being the growth of ln Z beyond `expected`; the first and the last d.
+        tallies: of the slices after settling, one record of `TALLIES`, shape (1,).
     """
 
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
         super().__init__(plan, seed)
-        self.p, self.tilt, self.expected = p, 0.0, 0.0
-        self._is_tilted = p != 0 and not has_algebraic_tails(plan.noise)  # in algebraic tails exp(b ξ) has no mean
-        if is_far and self._is_tilted:
-            self.tilt = p * plan.motion.strength * relaxation_time(plan.noise)
-        self.tallies = np.zeros(8)
+        self.p, self.bias, self.expected = p, 0.0, 0.0
+        self._is_biased = p != 0 and not has_algebraic_tails(plan.noise)
+        if is_far and self._is_biased:
+            self.bias = p * plan.motion.strength * relaxation_time(plan.noise)
+        self.tallies = np.zeros(1, TALLIES)
         self._log_weights, self._ancestors = np.zeros(plan.paths), np.arange(plan.paths)
         self._log_z = np.zeros(2)  # of the weights that have been reset, and of all at the last slice
         exponent = abs(p) * plan.motion.strength * plan.noise.standard_deviation * plan.step
@@ -165,10 +169,10 @@ class Population(_Paths):
 
     def _move(self, steps: int) -> None:
         plan = self.plan
-        bonus = 0.5 * (plan.noise.diffusion * self.tilt) ** 2 * plan.step
+        bonus = 0.5 * (plan.noise.diffusion * self.bias) ** 2 * plan.step
         advance_population(
-            plan.motion, noise_step(plan.noise, plan.step, self.tilt), plan.step, *self.state, self._log_weights,
-            self._ancestors, (self.p, self.tilt, bonus), steps, self._interval, self._log_z, self.rng,
+            plan.motion, noise_step(plan.noise, plan.step, bias=self.bias), plan.step, *self.state, self._log_weights,
+            self._ancestors, (self.p, self.bias, bonus), steps, self._interval, self._log_z, self.rng,
         )  # fmt: skip
 
     def _close(self) -> None:
@@ -177,8 +181,8 @@ class Population(_Paths):
         if self.slices < 0:
             self.expected = growth
             self.tallies[:] = 0
-        if self._is_tilted and 2 - self.plan.settling <= self.slices < -2:
-            self.tilt = self._slope()
+        if self._is_biased and 2 - self.plan.settling <= self.slices < -2:
+            self.bias = self._slope()
 
     def _slope(self) -> float:
         """⟨ξ⟩/2⟨ξ²⟩₀, that is α₀⟨ξ⟩/σ², the b under which Ornstein-Uhlenbeck noise has this mean."""
@@ -198,12 +202,12 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(count)
 
 
-def advance_all(batches: Sequence[Batch], wanted: int, seconds: float, tick: Callable[[], None]) -> bool:
+def advance_all(batches: Sequence[Batch], wanted: int, seconds: float, progress: Callable[[], None]) -> bool:
     """Advance batches side by side by the wanted number of units, each of which takes some `seconds`.
 
-    `tick` is called 100 times in all. An interrupt ends this early; returns whether it did.
+    `progress` is called 100 times in all. An interrupt ends this early; returns whether it did.
     """
-    portion = max(1, min(math.ceil(wanted / TICKS), round(_PORTION_SECONDS / seconds)))
+    portion = max(1, min(math.ceil(wanted / PROGRESS_STEPS), round(_PORTION_SECONDS / seconds)))
     stop = Event()
     with _pool() as pool:
         for done in range(0, wanted, portion):
@@ -213,8 +217,8 @@ def advance_all(batches: Sequence[Batch], wanted: int, seconds: float, tick: Cal
                 for batch in batches:
                     futures.append(pool.submit(batch.advance, count, stop))
                 wait(futures)
-                for _ in range(TICKS * (done + count) // wanted - TICKS * done // wanted):
-                    tick()
+                for _ in range(PROGRESS_STEPS * (done + count) // wanted - PROGRESS_STEPS * done // wanted):
+                    progress()
             except KeyboardInterrupt:
                 stop.set()
                 wait(futures)

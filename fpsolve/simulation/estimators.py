@@ -17,24 +17,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import get_args
 
 import numpy as np
 from scipy.special import logsumexp
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
-from fpsolve.model.noise import ColouredNoise, check_existence
+from fpsolve.model.noise import ColouredNoise
+from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
+from fpsolve.simulation.kernels import TALLIES
 from fpsolve.simulation.setup import (
     BATCHES,
-    MAX_PATHS,
     PATHS,
     TRANSIENTS,
     Estimator,
+    check_orders,
+    check_settings,
     default_step,
     obstacles,
+    simulated_parts,
     transient,
 )
 from fpsolve.simulation.step import motion, noise_step
@@ -98,9 +101,9 @@ class MonteCarlo:
     interrupted: bool = False
 
 
+@of_problem
 def simulate(
-    oscillator: VibroImpactOscillator,
-    noise: ColouredNoise,
+    problem: Problem,
     p: Sequence[float],
     *,
     estimator: Estimator = "direct",
@@ -108,7 +111,7 @@ def simulate(
     time: float | None = None,
     step: float | None = None,
     seed: int = 0,
-    tick: Callable[[], None] = lambda: None,
+    progress: Callable[[], None] = lambda: None,
 ) -> MonteCarlo:
     """Simulate paths of the linear system and estimate λ and Λ(p) from them.
 
@@ -117,62 +120,29 @@ def simulate(
     none, and KeyboardInterrupt is raised.
 
     Args:
-        oscillator, noise: the parameter set; c₂ and c₃ are not used.
+        problem: the oscillator and its noise, in one argument or two; c₂ and c₃ are not used.
         p: orders of the moments.
         estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
         paths: how many; a multiple of 32 is used.
         time: length of the paths after the transient; 64 transients if None. Whole transients are used.
         step: time step; None chooses one.
         seed: ≥ 0.
-        tick: called 100 times in all, as progress.
+        progress: called 100 times in all.
 
     Raises:
+        FpsolveError: the motion is no `VibroImpactOscillator`, or the noise not that of the paper.
         ValueError: an argument is out of its range, or the step is too large; the text names the largest good one.
         NoSuchExponent: some Λ(p) is infinite.
     """
-    if not (math.isfinite(noise.standard_deviation) and np.all(np.isfinite(np.array(p, dtype=float)))):
-        raise ValueError(f"got p = {p} and a noise of variance {noise.standard_deviation**2:g}; all must be finite")
+    oscillator, noise = simulated_parts(problem)
+    check_orders(noise, p)
     for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
         raise ValueError(f"{name}: {sentence}")
-    if estimator not in get_args(Estimator) or not BATCHES <= paths <= MAX_PATHS or seed < 0:
-        raise ValueError(
-            f"got estimator = {estimator!r}, paths = {paths}, seed = {seed}; must be one of "
-            f"{', '.join(get_args(Estimator))}, {BATCHES} to {MAX_PATHS}, and >= 0"
-        )
-    for order in p:
-        check_existence(noise, order)
-    plan, wanted = _plan(oscillator, noise, p, estimator, paths, time, step)
-    plain, populations = _start(plan, estimator, seed)
-    batches = [*plain, *populations]
-    interrupted = advance_all(batches, wanted + plan.settling, plan.slice_seconds, tick)
-    slices = np.array([batch.slices for batch in batches])
-    if slices.min() < 2:
-        raise KeyboardInterrupt
-    times = plan.length * np.array([batch.slices for batch in plain])
-    growth = np.array([batch.growth for batch in plain]) / times
-    spread = np.array([batch.variance for batch in plain]) / times
-    if not np.all(np.isfinite(growth)):
-        raise NotConverged("the simulation overflowed: some ξ is too large for this step; use a smaller step")
-    if estimator == "direct":
-        estimates, warnings = direct_estimates(plan, plain)
-    else:
-        estimates, warnings = population_estimates(plan, populations)
-    if interrupted:
-        warnings.append(f"stopped early, after {slices.mean() / wanted:.0%} of the time")
-    return MonteCarlo(
-        estimates=tuple(estimates),
-        lyapunov_exponent=float(growth.mean()),
-        lyapunov_exponent_error=standard_error(growth),
-        variance_rate=float(spread.mean()),
-        variance_rate_error=standard_error(spread),
-        paths=plan.paths * BATCHES,
-        time=float(slices.mean()) * plan.length,
-        step=plan.step,
-        seed=seed,
-        impacts=sum(batch.impacts for batch in plain),
-        warnings=tuple(warnings),
-        interrupted=interrupted,
-    )
+    check_settings(estimator, paths, seed)
+    plan = _plan(oscillator, noise, p, estimator, paths, time, step)
+    plain, populations = _start(plan, seed)
+    interrupted = advance_all([*plain, *populations], plan.settling + plan.wanted, plan.slice_seconds, progress)
+    return _result(plan, plain, populations, seed, interrupted)
 
 
 def _plan(
@@ -183,29 +153,30 @@ def _plan(
     paths: int,
     time: float | None,
     step: float | None,
-) -> tuple[Plan, int]:
-    """What the batches need, and how many slices they shall do."""
+) -> Plan:
+    """What the batches need."""
     h = default_step(oscillator, noise) if step is None else step
     settling = transient(oscillator, noise)
     wanted = TRANSIENTS if time is None else max(2, round(time / settling))
-    plan = Plan(
+    return Plan(
         noise=noise,
         motion=motion(replace(oscillator, c2=0.0, c3=0.0)),
         noise_step=noise_step(noise, h),
         step=h,
         p=np.array(p, dtype=float),
+        estimator=estimator,
         paths=math.ceil(paths / BATCHES),
         slice_steps=round(settling / h),
         settling=1 if estimator == "direct" else _SETTLING,
+        wanted=wanted,
         levels=min(_LEVELS, wanted.bit_length()) if estimator == "direct" else 0,
     )
-    return plan, wanted
 
 
-def _start(plan: Plan, estimator: Estimator, seed: int) -> tuple[list[PlainBatch], list[Population]]:
+def _start(plan: Plan, seed: int) -> tuple[list[PlainBatch], list[Population]]:
     """The batches, each with a stream of random numbers of its own."""
     seeds = [each.spawn(1 + plan.p.size) for each in np.random.SeedSequence(seed).spawn(BATCHES)]
-    orders = plan.p if estimator == "population" else ()
+    orders = plan.p if plan.estimator == "population" else ()
     plain = [PlainBatch(plan, each[0]) for each in seeds]
     weighted = [
         Population(plan, each[1 + k], float(p), is_far=bool(i % 2))
@@ -213,6 +184,45 @@ def _start(plan: Plan, estimator: Estimator, seed: int) -> tuple[list[PlainBatch
         for k, p in enumerate(orders)
     ]
     return plain, weighted
+
+
+def _result(
+    plan: Plan, plain: Sequence[PlainBatch], populations: Sequence[Population], seed: int, interrupted: bool
+) -> MonteCarlo:
+    """What the batches have found.
+
+    Raises:
+        KeyboardInterrupt: that is nothing yet.
+        NotConverged: the numbers overflowed.
+    """
+    slices = np.array([batch.slices for batch in (*plain, *populations)])
+    if slices.min() < 2:
+        raise KeyboardInterrupt
+    times = plan.length * np.array([batch.slices for batch in plain])
+    exponents = np.array([batch.growth for batch in plain]) / times
+    variance_rates = np.array([batch.variance for batch in plain]) / times
+    if not np.all(np.isfinite(exponents)):
+        raise NotConverged("the simulation overflowed: some ξ is too large for this step; use a smaller step")
+    if plan.estimator == "direct":
+        estimates, warnings = direct_estimates(plan, plain)
+    else:
+        estimates, warnings = population_estimates(plan, populations)
+    if interrupted:
+        warnings.append(f"stopped early, after {slices.mean() / plan.wanted:.0%} of the time")
+    return MonteCarlo(
+        estimates=tuple(estimates),
+        lyapunov_exponent=float(exponents.mean()),
+        lyapunov_exponent_error=standard_error(exponents),
+        variance_rate=float(variance_rates.mean()),
+        variance_rate_error=standard_error(variance_rates),
+        paths=plan.paths * BATCHES,
+        time=float(slices.mean()) * plan.length,
+        step=plan.step,
+        seed=seed,
+        impacts=sum(batch.impacts for batch in plain),
+        warnings=tuple(warnings),
+        interrupted=interrupted,
+    )
 
 
 def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[MomentEstimate], list[str]]:
@@ -246,15 +256,16 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
     Every second batch has started far away, see `Population`. Where the two kinds disagree the moment has two places;
     each batch then gives the growth of one of them, which is a lower bound, and the larger growth counts.
     """
-    tallies = np.array([each.tallies for each in populations]).reshape(BATCHES, plan.p.size, 8)
+    tallies = np.array([each.tallies[0] for each in populations], TALLIES).reshape(BATCHES, plan.p.size)
     expected = np.array([each.expected for each in populations]).reshape(BATCHES, plan.p.size)
-    count, excess, squares, products, moments, effective, first, last = np.moveaxis(tallies, 2, 0)
+    count, excess = tallies["count"], tallies["excess"]
     mean = excess / count
-    variance = squares / count - mean**2
-    covariance = (products - mean * (2 * excess - first - last)) / (count - 1) + mean**2
+    variance = tallies["squares"] / count - mean**2
+    neighbours = 2 * excess - tallies["first"] - tallies["last"]
+    covariance = (tallies["products"] - mean * neighbours) / (count - 1) + mean**2
     rate = np.maximum(variance + 2 * covariance, 0) / plan.length
     growth = (expected + mean) / plan.length
-    trends = (moments - (count - 1) / 2 * excess) / count
+    trends = (tallies["numbered"] - (count - 1) / 2 * excess) / count
     estimates: list[MomentEstimate] = []
     warnings: list[str] = []
     for k, p in enumerate(plan.p):
@@ -268,7 +279,7 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
                 "standard errors: the noise is too slow to pass between them; the larger value is given"
             )
         value = float(growth[used, k].mean() + rate[used, k].mean() / 2)
-        carrying = float(np.sum(effective[used, k] / count[used, k]))
+        carrying = float(np.sum(tallies["effective"][used, k] / count[used, k]))
         estimates.append(_estimate(plan, p, (value, standard_error(growth[used, k])), "population", carrying))
         _warn_of_drift(p, float(trends[used, k].mean()), standard_error(trends[used, k]), "more time", warnings)
     return estimates, [*_missing(plan, estimates), *warnings]

@@ -10,7 +10,7 @@ integrates the motion in the frame that rotates with ω (Lawson's method), so th
 is sought within the step, to the precision of floating point, and the rest of the step follows after the bounce.
 
 State: x, u and ξ of each path, arrays of shape (n,), changed in place. The coefficients are a `Motion` and a
-`NoiseStep` of simulation.py.
+`NoiseStep` of step.py.
 """
 
 from __future__ import annotations
@@ -31,6 +31,11 @@ RENORMALISED = 4
 """Steps after which a path has the norm 1 again."""
 _RESAMPLED = 0.5
 """The share of effective paths at which a population is drawn anew."""
+TALLIES = np.dtype(
+    [(name, float) for name in ("count", "excess", "squares", "products", "numbered", "effective", "first", "last")]
+)
+"""Of the slices of a population, d being the growth of ln Z beyond what is expected: how many; Σd; Σd²; Σd × the d
+before; Σd × the number of the slice, from 0; Σ effective paths among those of a slice ago; the first and the last d."""
 _compiled: Any = njit(nogil=True, cache=True, error_model="numpy")
 _inlined: Any = njit(nogil=True, error_model="numpy", inline="always")
 
@@ -39,7 +44,7 @@ _inlined: Any = njit(nogil=True, error_model="numpy", inline="always")
 def draw(noise, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
     """The mean and the end of the noise in one step that begins at `xi`; all of shape (n,).
 
-    `push` takes in ∫f(ξ) dt over the step, f without the tilt.
+    `push` takes in ∫f(ξ) dt over the step, f without σ² b.
     """
     for i in range(xi.size):
         xi_end[i] = rng.standard_normal()
@@ -250,12 +255,12 @@ def advance_population(  # type: ignore[no-untyped-def]
 ):
     """Advance a population by some steps; the weights are looked at after every `interval` steps."""
     done = 0
-    p, tilt, bonus = exponents
+    p, bias, bonus = exponents
     while done < steps:
         count = min(interval, steps - done)
         log_norm[:], push[:] = 0, 0
         advance(m, noise, h, x, u, xi, log_norm, push, count, RENORMALISED, rng)
-        log_weights += p * log_norm + tilt * push + bonus * count
+        log_weights += p * log_norm + bias * push + bonus * count
         log_z[0] += _resample(x, u, xi, log_weights, ancestors, rng)
         done += count
 
@@ -270,7 +275,7 @@ def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: igno
         shares[ancestors[i]] += math.exp(log_weights[i] - largest)
     now = log_z[0] + largest + math.log(shares.sum() / n)
     growth = now - log_z[1]
-    _tally(tallies, growth - expected, shares.sum() ** 2 / (shares * shares).sum())
+    _tally(tallies[0], growth - expected, shares.sum() ** 2 / (shares * shares).sum())
     log_z[1] = now
     ancestors[:] = np.arange(n)
     return growth
@@ -278,17 +283,17 @@ def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: igno
 
 @_compiled
 def _tally(tallies, excess, effective):  # type: ignore[no-untyped-def]
-    """Add a slice to the tallies of a population."""
-    if tallies[0] == 0:
-        tallies[6] = excess
+    """Add a slice to a record of `TALLIES`."""
+    if tallies.count == 0:
+        tallies.first = excess
     else:
-        tallies[3] += excess * tallies[7]
-    tallies[4] += excess * tallies[0]
-    tallies[0] += 1
-    tallies[1] += excess
-    tallies[2] += excess * excess
-    tallies[5] += effective
-    tallies[7] = excess
+        tallies.products += excess * tallies.last
+    tallies.numbered += excess * tallies.count
+    tallies.count += 1
+    tallies.excess += excess
+    tallies.squares += excess * excess
+    tallies.effective += effective
+    tallies.last = excess
 
 
 @_compiled

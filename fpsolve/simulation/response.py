@@ -11,10 +11,11 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import ColouredNoise
+from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.kernels import advance_and_count
-from fpsolve.simulation.setup import BATCHES
+from fpsolve.simulation.setup import BATCHES, simulated_parts
 from fpsolve.simulation.step import Motion, NoiseStep, motion, noise_step, starting_state
 
 BINS = 100
@@ -86,9 +87,9 @@ class _Setting:
     amplitude: float
 
 
+@of_problem
 def stationary_response(
-    oscillator: VibroImpactOscillator,
-    noise: ColouredNoise,
+    problem: Problem,
     exponent: float,
     variance_rate: float,
     *,
@@ -96,20 +97,22 @@ def stationary_response(
     time: float,
     step: float,
     seed: int,
-    tick: Callable[[], None] = lambda: None,
+    progress: Callable[[], None] = lambda: None,
 ) -> Response:
     """Simulate the nonlinear system of Eq. (3) until it is stationary, and then for `time` at least.
 
     Args:
-        oscillator, noise: with c₂ or c₃ > 0.
+        problem: the oscillator, with c₂ or c₃ > 0, and its noise, in one argument or two.
         exponent, variance_rate: λ > 0 and Λ″(0) of the linear system. ln A forgets its start in 1/λ, or, where it
             wanders more than it drifts, in 2Λ″(0)/λ².
-        paths, time, step, seed: as for `montecarlo.simulate`; the time is at least 20 times that.
-        tick: called 200 times in all, as progress.
+        paths, time, step, seed: as for `simulate`; the time is at least 20 times that.
+        progress: called 200 times in all.
 
     Raises:
+        FpsolveError: as `simulate`.
         KeyboardInterrupt: before the response was stationary.
     """
+    oscillator, noise = simulated_parts(problem)
     steps = max(1, round(math.pi / (oscillator.omega * step * _LOOKS)))
     damping = oscillator.epsilon**2 * (oscillator.c2 + 3 * oscillator.omega**2 * oscillator.c3) / 8
     setting = _Setting(
@@ -121,12 +124,12 @@ def stationary_response(
     settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
     batches = [_Batch(setting, each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
     seconds = STEP_SECONDS * setting.paths * setting.steps
-    if advance_all(batches, settling, seconds, tick):
+    if advance_all(batches, settling, seconds, progress):
         raise KeyboardInterrupt
     reach = _MARGIN * max(float(np.max(np.hypot(batch.x, batch.u))) for batch in batches)
     for batch in batches:
         batch.impacts, batch.reach = 0, reach
-    interrupted = advance_all(batches, looks, seconds, tick)
+    interrupted = advance_all(batches, looks, seconds, progress)
     return _collect(oscillator, batches, between, reach, interrupted)
 
 

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from collections.abc import Sequence
+from typing import Literal, get_args
 
-from fpsolve.model.noise import ColouredNoise, NonGaussianNoise, relaxation_time
+import numpy as np
+
+from fpsolve.errors import FpsolveError
+from fpsolve.model.noise import ColouredNoise, NonGaussianNoise, check_existence, relaxation_time
+from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 
 Estimator = Literal["direct", "population"]
@@ -14,10 +19,51 @@ BATCHES = 32
 PATHS, TRANSIENTS = 32_768, 64
 """Defaults: how many paths, and how many transients long they are."""
 MAX_PATHS = 10_000_000
-TICKS = 100
+PROGRESS_STEPS = 100
 """How often each stretch of a simulation reports progress."""
 _LONGEST = 1_000_000
 """Steps in a transient; with more, a simulation would not end."""
+
+
+def simulated_parts(problem: Problem) -> tuple[VibroImpactOscillator, ColouredNoise]:
+    """The motion and the noise of a problem, if they can be simulated.
+
+    Raises:
+        FpsolveError: they cannot.
+    """
+    system, noise = problem.system, problem.noise
+    if isinstance(system, VibroImpactOscillator) and isinstance(noise, ColouredNoise):
+        return system, noise
+    raise FpsolveError(
+        "simulation is for a VibroImpactOscillator under OrnsteinUhlenbeck or NonGaussianNoise, but this is a "
+        f"{type(system).__name__} under {type(noise).__name__}; use the finite elements"
+    )
+
+
+def check_orders(noise: ColouredNoise, p: Sequence[float]) -> None:
+    """Refuse a noise without variance, and orders of moments that are not finite numbers or whose Λ(p) is not.
+
+    Raises:
+        ValueError: the variance or an order is not finite.
+        NoSuchExponent: some Λ(p) is infinite.
+    """
+    if not (math.isfinite(noise.standard_deviation) and np.all(np.isfinite(np.array(p, dtype=float)))):
+        raise ValueError(f"got p = {p} and a noise of variance {noise.standard_deviation**2:g}; all must be finite")
+    for order in p:
+        check_existence(noise, order)
+
+
+def check_settings(estimator: Estimator, paths: int, seed: int) -> None:
+    """Refuse an unknown estimator, too few or too many paths, and a negative seed.
+
+    Raises:
+        ValueError: one of them.
+    """
+    if estimator not in get_args(Estimator) or not BATCHES <= paths <= MAX_PATHS or seed < 0:
+        raise ValueError(
+            f"got estimator = {estimator!r}, paths = {paths}, seed = {seed}; must be one of "
+            f"{', '.join(get_args(Estimator))}, {BATCHES} to {MAX_PATHS}, and >= 0"
+        )
 
 
 def largest_step(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> tuple[float, str]:

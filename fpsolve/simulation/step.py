@@ -27,7 +27,7 @@ class Motion(NamedTuple):
 
 
 class NoiseStep(NamedTuple):
-    """One step of the noise dξ = (f(ξ) + σ² b) dt + σ dW: its end ξ₁ and its mean ξ̄, from normal variables ζ.
+    """One step of the noise dξ = (f(ξ) + σ² b) dt + σ dW, b the bias: its end ξ₁ and mean ξ̄ from normal variables ζ.
 
     Ornstein-Uhlenbeck, by the exact transition of both: ξ₁ = decay ξ₀ + kick ζ₁ + end₀ and
     ξ̄ = mean ξ₀ + mean₁ ζ₁ + mean₂ ζ₂ + mean₀.
@@ -60,9 +60,9 @@ def motion(oscillator: VibroImpactOscillator, *, smooth: bool = False) -> Motion
     )
 
 
-def noise_step(noise: ColouredNoise, h: float, tilt: float = 0.0) -> NoiseStep:
-    """The coefficients of one step of length h; `tilt` is b, which adds σ² b to the drift."""
-    force = noise.diffusion**2 * tilt
+def noise_step(noise: ColouredNoise, h: float, bias: float = 0.0) -> NoiseStep:
+    """The coefficients of one step of length h; `bias` is b, which adds σ² b to the drift."""
+    force = noise.diffusion**2 * bias
     if isinstance(noise, NonGaussianNoise) and noise.r0 != 1:
         kick = noise.diffusion * math.sqrt(h)
         return NoiseStep(0.0, 0.0, kick, force * h, 0.0, 0.0, 0.0, 0.0, h / (2 * noise.tau0), noise.curvature)

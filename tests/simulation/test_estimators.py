@@ -13,8 +13,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.simulation import batches
-from fpsolve.simulation import estimators as montecarlo
+from fpsolve.simulation import batches, estimators
 from fpsolve.simulation.estimators import simulate
 from fpsolve.simulation.setup import largest_step, transient
 from tests.agreement import rows
@@ -44,7 +43,7 @@ def test_agrees_with_finite_elements():
 
 @pytest.mark.parametrize(("estimator", "paths"), [("direct", 2048), ("population", 3072)])
 def test_standard_errors_are_honest(estimator, paths):
-    """Over 200 seeds the spread of the estimates is their standard error, within 20 %, and their mean is Λ(p)."""
+    """Over 200 seeds the estimates deviate by their standard error, within 20 %, and their mean is Λ(p)."""
     orders = [1.0] if estimator == "population" else [-1.0, 0.5, 1.0]
     reference = exact(MODERATE, REDUCED, orders)
     runs = [
@@ -52,16 +51,16 @@ def test_standard_errors_are_honest(estimator, paths):
         for seed in range(200)
     ]
     exponent = ExponentSolver(Problem(MODERATE, REDUCED)).lyapunov_exponent().value
-    check_spread([(run.lyapunov_exponent, run.lyapunov_exponent_error) for run in runs], exponent)
+    check_standard_errors([(run.lyapunov_exponent, run.lyapunov_exponent_error) for run in runs], exponent)
     for k, value in enumerate(reference):
-        check_spread([(run.estimates[k].value, run.estimates[k].standard_error) for run in runs], value)
+        check_standard_errors([(run.estimates[k].value, run.estimates[k].standard_error) for run in runs], value)
 
 
-def check_spread(pairs, reference):
+def check_standard_errors(pairs, reference):
     values, errors = np.array(pairs, dtype=float).T
-    spread = np.std(values, ddof=1)
-    assert spread / math.sqrt(np.mean(errors**2)) == pytest.approx(1, abs=0.2)
-    assert abs(values.mean() - reference) < 4 * spread / math.sqrt(200) + 0.1 * spread
+    deviation = np.std(values, ddof=1)
+    assert deviation / math.sqrt(np.mean(errors**2)) == pytest.approx(1, abs=0.2)
+    assert abs(values.mean() - reference) < 4 * deviation / math.sqrt(200) + 0.1 * deviation
 
 
 def test_population_succeeds_where_the_direct_estimator_fails():
@@ -86,7 +85,7 @@ def test_three_digits_in_seconds():
 
 def biases(monkeypatch, oscillator, noise, p, steps, paths):
     """Relative bias of Λ(p) and its standard error for each step."""
-    monkeypatch.setattr(montecarlo, "obstacles", lambda *_, **__: {})
+    monkeypatch.setattr(estimators, "obstacles", lambda *_, **__: {})
     reference = exact(oscillator, noise, [p])[0]
     found = [
         simulate(oscillator, noise, [p], estimator="population", paths=paths, step=step, seed=4).estimates[0]
@@ -204,12 +203,12 @@ def test_memory_does_not_grow_with_time():
 def test_an_interrupt_keeps_what_is_done(estimator):
     calls = []
 
-    def tick():
+    def progress():
         calls.append(1)
         if len(calls) == 50:
             raise KeyboardInterrupt
 
-    found = simulate(MODERATE, REDUCED, [1.0], estimator=estimator, paths=4096, time=400.0, seed=1, tick=tick)
+    found = simulate(MODERATE, REDUCED, [1.0], estimator=estimator, paths=4096, time=400.0, seed=1, progress=progress)
     whole = simulate(MODERATE, REDUCED, [1.0], estimator=estimator, paths=4096, time=400.0, seed=1)
     assert found.interrupted
     assert 100 < found.time < 300
@@ -221,18 +220,18 @@ def test_an_interrupt_keeps_what_is_done(estimator):
 
 
 def test_an_interrupt_before_there_is_anything():
-    def tick():
+    def progress():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        simulate(MODERATE, REDUCED, [1.0], paths=64, time=20.0, tick=tick)
+        simulate(MODERATE, REDUCED, [1.0], paths=64, time=20.0, progress=progress)
 
 
 def test_drift_is_noticed(monkeypatch):
     """With windows far shorter than the correlation time the slope depends on the window, and a warning says so."""
     slow = OrnsteinUhlenbeck(alpha=0.05, sigma=0.1)
-    monkeypatch.setattr(montecarlo, "transient", lambda *_: 2.0)
-    monkeypatch.setattr(montecarlo, "obstacles", lambda *_, **__: {})
+    monkeypatch.setattr(estimators, "transient", lambda *_: 2.0)
+    monkeypatch.setattr(estimators, "obstacles", lambda *_, **__: {})
     found = simulate(MODERATE, slow, [1.0], paths=8192, time=16.0, seed=2)
     assert any("still drifts" in text for text in found.warnings)
 

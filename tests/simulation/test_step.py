@@ -206,12 +206,12 @@ def test_heavy_tails_are_kept():
     assert np.count_nonzero(np.abs(xi) > far) == pytest.approx(expected, abs=5 * math.sqrt(expected))
 
 
-def test_pushed_noise_has_the_tilted_law():
+def test_noise_with_a_bias_has_its_law():
     """With σ²b added to its drift the noise has the density P_s exp(2bξ)."""
     b, n, h = 0.4, 200_000, 0.02
     for noise in (FIG1_NOISE, FIG1_NOISE.ou_reduction()):
         rng = np.random.default_rng(5)
-        xi, step = stationary_noise(noise, n, rng), noise_step(noise, h, b)
+        xi, step = stationary_noise(noise, n, rng), noise_step(noise, h, bias=b)
         mean, end, push = np.empty((2, n)), np.empty(n), np.zeros(n)
         for _ in range(math.ceil(6 * 0.5 / h)):
             draw(step, xi, mean[0], end, push, rng)
