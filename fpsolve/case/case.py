@@ -34,6 +34,7 @@ from fpsolve.errors import CaseError, Fault, MeshError, NoSuchExponent
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import ColouredNoise, NonGaussianNoise, check_existence
+from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.setup import obstacles
@@ -88,17 +89,27 @@ class Case(Section):
         pydantic.ValidationError: with every fault of the sections and of what they say about each other.
     """
 
-    title: Text
-    oscillator: Annotated[VibroImpactOscillator, BeforeValidator(_oscillator)]
-    noise: NoiseSection
-    moments: Moments
-    budget: Annotated[Budget, BeforeValidator(_budget)] = Field(default_factory=Budget)
-    vary: Vary = Field(default_factory=dict)
-    mesh: MeshSection = MeshSection()
-    monte_carlo: MonteCarloSection = MonteCarloSection()
-    figure: FigureSection = FigureSection()
-    output: OutputSection = OutputSection()
-    expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = ()
+    title: Annotated[Text, parameter("the heading of its results", 'title = "Fig. 1"')]
+    oscillator: Annotated[VibroImpactOscillator, BeforeValidator(_oscillator), parameter("Eq. (3)", "[oscillator]")]
+    noise: Annotated[NoiseSection, parameter("Eqs. (7)-(8)", "[noise]")]
+    moments: Annotated[Moments, parameter("which p", "[moments]")]
+    budget: Annotated[
+        Budget,
+        BeforeValidator(_budget),
+        parameter("what one p may cost", "[budget]"),
+    ] = Field(default_factory=Budget)
+    vary: Annotated[
+        Vary,
+        parameter("one curve for each value", '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'),
+    ] = Field(default_factory=dict)
+    mesh: Annotated[MeshSection, parameter("the finite elements", "[mesh]")] = MeshSection()
+    monte_carlo: Annotated[
+        MonteCarloSection,
+        parameter("how the system is simulated", "[monte_carlo]"),
+    ] = MonteCarloSection()
+    figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
+    output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
+    expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
     _path: Path = PrivateAttr(default=Path("case.toml"))
 
     @property

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from fpsolve.arrays import FloatArray
@@ -25,7 +24,7 @@ from fpsolve.exponent.rival import rival
 from fpsolve.fem.mesh import CylinderMesh, halved
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import Diffusion, Noise, has_algebraic_tails
-from fpsolve.model.parameters import STRICT, Positive
+from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import System, phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import growth_without_turning, likely_center
@@ -55,8 +54,8 @@ class Budget:
         pydantic.ValidationError: a number is out of its range.
     """
 
-    unknowns: Annotated[int, Field(ge=100)] = 60_000
-    seconds: Positive = 60.0
+    unknowns: Annotated[int, parameter("unknowns of the largest system", "unknowns = 60000", ge=100)] = 60_000
+    seconds: Annotated[float, parameter("time for one p", "seconds = 60.0", gt=0)] = 60.0
 
 
 def fits(stage: Stage, problem: Problem, old: float, new: float) -> bool:
