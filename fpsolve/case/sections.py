@@ -6,7 +6,7 @@ The ranges of the oscillator are those of `VibroImpactOscillator`; the others st
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -18,20 +18,16 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
-    TypeAdapter,
-    ValidationError,
     model_validator,
 )
-from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.messages import LIST, TABLE, Refusal, nearest, refuse
+from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
 from fpsolve.errors import MeshError
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh
 from fpsolve.fem.mesh_file import read_mesh
 from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.parameters import STRICT, parameter
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.parameters import parameter
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
@@ -270,49 +266,3 @@ class Expectation(Section):
 def same(value: float, other: float) -> bool:
     """Whether two values of a varied key are one."""
     return math.isclose(value, other, rel_tol=_SAME)
-
-
-_VARIED_SECTIONS: Mapping[str, Any] = {"oscillator": VibroImpactOscillator, "noise": NoiseSection}
-PARAMETERS: Mapping[str, FieldInfo] = {
-    f"{section}.{name}": field
-    for section, model in _VARIED_SECTIONS.items()
-    for name, field in model.__pydantic_fields__.items()
-    if field.annotation is float
-}
-"""The keys that [vary] may name, each with its record."""
-ABSCISSAE: Mapping[str, FieldInfo] = {"p": Moments.__pydantic_fields__["p"], **PARAMETERS}
-"""What a figure may have along its x-axis, each with its record."""
-VARIABLE: Mapping[str, TypeAdapter[Values]] = {
-    key: TypeAdapter(
-        Annotated[tuple[Annotated[float, Field(), *field.metadata], ...], Field(strict=False, min_length=1)],
-        config=STRICT,
-    )
-    for key, field in PARAMETERS.items()
-}
-"""What the lists of [vary] may hold."""
-
-
-def _vary(value: Any) -> Any:
-    """[vary] with its keys made flat, checked value by value against the ranges of the keys."""
-    table = flat(value)
-    if isinstance(table, dict):
-        refuse(refusal for key, values in table.items() for refusal in _varied_refusals(key, values))
-    return table
-
-
-def _varied_refusals(key: str, values: Any) -> Iterator[Refusal]:
-    if key not in VARIABLE:
-        guess = nearest(key, VARIABLE)
-        yield (key,), values, f"cannot be varied;{guess} known keys: {', '.join(VARIABLE)}; rename or remove it"
-        return
-    try:
-        numbers = VARIABLE[key].validate_python(values)
-    except ValidationError as error:
-        yield from (((key, *detail["loc"]), detail["input"], "") for detail in error.errors())
-        return
-    for i, number in enumerate(numbers):
-        if any(same(number, other) for other in numbers[:i]):
-            yield (key, i), number, f"got {number} twice; values must be distinct; remove one of them"
-
-
-Vary = Annotated[dict[str, NonEmpty], BeforeValidator(_vary)]

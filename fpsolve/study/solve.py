@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
 from fpsolve.case.sections import Expectation
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
@@ -162,7 +163,7 @@ def _solve_moments(
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov) -> tuple[str, ...]:
     """Where the reduction of the noise, the impact law or Eq. (37) is not valid."""
     notes = [
-        None if case.is_exact else validity.reduction_note(case.original_noise(curve)),
+        None if case.is_exact else validity.reduction_note(curve.original_noise),
         validity.impact_note(curve.oscillator),
         validity.weak_noise_note(curve.problem, moments.p, moments.value),
     ]

@@ -11,7 +11,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
 from fpsolve.case.case import Case
-from fpsolve.case.sections import ABSCISSAE, PARAMETERS, VARIABLE
+from fpsolve.case.vary import ABSCISSAE, PARAMETERS, VARIABLE
 from fpsolve.exponent.adapt import Budget
 from fpsolve.model.parameters import STRICT, axis_title, example_of, symbol_of
 from fpsolve.model.vibro_impact import VibroImpactOscillator
