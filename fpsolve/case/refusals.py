@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from fpsolve.case.sections import (
     Values,
     same,
 )
-from fpsolve.errors import MeshError, NoSuchExponent
+from fpsolve.errors import MeshError, NoPerturbationTheory, NoSuchExponent
 from fpsolve.model.noise import ColouredNoise, check_existence
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.setup import obstacles
@@ -79,7 +80,7 @@ def _obstacle(
     except ValidationError as error:
         context = error.errors()[0].get("ctx", {})
         return str(context.get("error", f"the noise has no finite strength; {_MODERATE}"))
-    except ArithmeticError:
+    except (ArithmeticError, NoPerturbationTheory):  # the square of omega may be too small for a number
         sizes = np.array([math.inf])
     return "" if np.all(np.isfinite(sizes)) else f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
 
@@ -106,17 +107,19 @@ def mesh_refusals(mesh: MeshSection, folder: Path) -> Iterator[Refusal]:
 
 def simulation_refusals(valid: Mapping[str, Any], section: MonteCarloSection) -> Iterator[Refusal]:
     """The first parameter set for which the time, the step or a p of the simulation is not right."""
+    p = np.array(section.p or (0.0,))
     for varied in combinations(valid["vary"]):
-        curve = make_curve(valid["oscillator"], valid["noise"], varied)
-        faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
+        reason, faults = _obstacle(valid["oscillator"], valid["noise"], varied, p), {}
+        with suppress(ArithmeticError, ValidationError):  # of parameters that are the reason
+            curve = make_curve(valid["oscillator"], valid["noise"], varied)
+            faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
+            reason = reason or _infinite(curve.noise, p)
         for name, text in faults.items():
             if getattr(section, name) is not None:
                 yield (name,), getattr(section, name), _with(varied) + text
-        p = np.array(section.p or (0.0,))
-        infinite = _obstacle(valid["oscillator"], valid["noise"], varied, p) or _infinite(curve.noise, p)
-        if infinite:
-            yield ("p",), section.p, _with(varied) + infinite
-        if faults or infinite:
+        if reason:
+            yield ("p",), section.p, _with(varied) + reason
+        if faults or reason:
             return
 
 
