@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from fpsolve.arrays import FloatArray
 from fpsolve.case.curves import assignments, combinations, make_curve
 from fpsolve.case.messages import Refusal, nearest, shown
+from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.case.sections import (
     Expectation,
     FigureSection,
@@ -91,7 +92,7 @@ def _infinite(noise: ColouredNoise, p: FloatArray) -> str:
         for extreme in (p.max(), p.min()):
             check_existence(noise, float(extreme))
     except NoSuchExponent as error:
-        return str(error)
+        return in_words_of_a_case(str(error))
     return ""
 
 
@@ -101,7 +102,8 @@ def mesh_refusals(mesh: MeshSection, folder: Path) -> Iterator[Refusal]:
         with np.errstate(all="ignore"):
             mesh.mesh(folder)
     except (MeshError, OSError, ValueError) as error:
-        text = f"got {shown(mesh.file)}; {error}" if mesh.file else str(error)
+        reason = in_words_of_a_case(str(error))
+        text = f"got {shown(mesh.file)}; {reason}" if mesh.file else reason
         yield ("file",) if mesh.file else (), mesh.file, text
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import MeshError, NotConverged
+from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import ModeEffects, Solution, Stage, mode_effects, noise_marginal, truncation
 from fpsolve.exponent.rival import rival
@@ -31,7 +31,6 @@ from fpsolve.theory.frozen import growth_without_turning, likely_center
 
 MAX_PHI_DEGREE, MAX_XI_DEGREE = 14, 10
 MAX_STAGES, MOST_CANCELLED = 40, 30.0
-REMEDY = "use a larger rtol or a larger [budget]"
 LEAST_TILT = 2.5
 """Distance of the tilted density from z = 0 from which on the functions carry an exponential factor."""
 SAFETY = 3.0
@@ -178,11 +177,11 @@ class _Meter:
                 text += ", as the layers of slow, strong noise are too thin"
             if self.failure:
                 text += f" ({self.failure})"
-            raise NotConverged(f"Λ({self.p:g}) did not converge: {reason}; {text}; {REMEDY}")
+            raise NotConverged(f"Λ({self.p:g}) did not converge: {reason}; {text}; {Remedy.BUDGET}")
         best = self.best
         raise NotConverged(
             f"Λ({self.p:g}) did not converge: {reason}; best value {best.pair.value:.6g} with an estimated error of "
-            f"{best.error:.1e}, {self.share:.1e} times the tolerance; {REMEDY}",
+            f"{best.error:.1e}, {self.share:.1e} times the tolerance; {Remedy.BUDGET}",
             best,
         )
 

@@ -16,7 +16,7 @@ from pydantic.dataclasses import dataclass
 from scipy.special import betaln, xlog1py
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NoSuchExponent
+from fpsolve.errors import NoSuchExponent, Remedy
 from fpsolve.model.parameters import STRICT, Positive, parameter
 
 Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", gt=0)]
@@ -273,5 +273,5 @@ def check_existence(noise: Noise, p: float) -> None:
     if not low <= p <= high:
         raise NoSuchExponent(
             f"Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
-            f'hide it; choose p in [{low:g}, {high:g}], r0 <= 1, or treatment = "ou-reduction"'
+            f"hide it; choose p in [{low:g}, {high:g}], r0 <= 1, {Remedy.REDUCTION}"
         )
