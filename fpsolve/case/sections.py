@@ -1,6 +1,6 @@
 """The sections of a case file, each with the rules that it can check by itself.
 
-The ranges of the oscillator are those of `VibroImpactOscillator`; the others stand here.
+What keys of the oscillator, the noise and the budget mean stands where these do; the others stand here.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 def parameter(
     meaning: str, example: str, symbol: str = "", unit: str = "", *, name: str | None = None, **rules: Any
-) -> Any:
+) -> FieldInfo:
     """All that is said about a parameter, to stand beside its type.
 
     Args:
