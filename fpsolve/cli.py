@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.text import Text
 
 from fpsolve import __version__
+from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import FpsolveError, NotConverged
 
 if TYPE_CHECKING:
@@ -216,7 +217,7 @@ def _stderr() -> Console:
 
 
 def _print_error(text: str) -> None:
-    _stderr().print(Text(text), style="bold red", soft_wrap=True)
+    _stderr().print(Text(in_words_of_a_case(text)), style="bold red", soft_wrap=True)
 
 
 def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:

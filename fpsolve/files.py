@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fpsolve.errors import OutputError
+from fpsolve.errors import OutputError, Remedy
 
 
 @contextmanager
@@ -43,9 +43,9 @@ def prepare_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as failure:
-        raise OutputError(f"{folder} cannot be made: {failure.strerror}; choose another --out") from failure
+        raise OutputError(f"{folder} cannot be made: {failure.strerror}; {Remedy.FOLDER}") from failure
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder} cannot be written to; choose another --out")
+        raise OutputError(f"{folder} cannot be written to; {Remedy.FOLDER}")
 
 
 def write_json(path: Path, data: Any) -> None:

@@ -16,7 +16,7 @@ ROOMS = {
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
     "exponent": ["eigen", "fields", "error", "rival", "adapt", "solver", "function"],
     "analysis": ["density"],
-    "case": ["toml", "messages", "sections", "case"],
+    "case": ["toml", "messages", "sections", "vary", "curves", "remedies", "refusals", "case"],
     "study": ["solve", "simulate"],
     "output": ["vtk", "plots", "report", "terminal"],
     "cli": [],

@@ -16,6 +16,8 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from fpsolve.model.parameters import example_of
+
 _OWN, _RANGE = "own sentence", "range"
 LIST, TABLE = "<list>", "<table>"
 """Tags of a discriminated union: parts of pydantic's error locations that are no keys."""
@@ -34,62 +36,6 @@ _KINDS = {
 Path = tuple[str | int, ...]
 Refusal = tuple[Path, Any, str]
 """Where, which value, and why; an empty sentence stands for "not what this key accepts"."""
-
-GLOSSARY: Mapping[str, tuple[str, str]] = {
-    "title": ("the heading of its results", 'title = "Fig. 1"'),
-    "oscillator": ("Eq. (3)", "[oscillator]"),
-    "oscillator.omega": ("natural frequency", "omega = 1.0"),
-    "oscillator.restitution": ("coefficient of restitution; 1 means no loss", "restitution = 0.8"),
-    "oscillator.c1": ("linear damping coefficient", "c1 = 0.1"),
-    "oscillator.c2": ("nonlinear damping coefficient", "c2 = 0.0"),
-    "oscillator.c3": ("nonlinear damping coefficient", "c3 = 0.0"),
-    "oscillator.epsilon": ("small parameter of Eq. (6); 1 is the unscaled system", "epsilon = 0.1"),
-    "oscillator.impact": ("impact law", 'impact = "delta"'),
-    "noise": ("Eqs. (7)-(8)", "[noise]"),
-    "noise.D0": ("noise intensity", "D0 = 0.1"),
-    "noise.tau0": ("correlation time", "tau0 = 0.5"),
-    "noise.r0": ("departure from Gaussian noise; from 5/3 on the variance (10) is infinite", "r0 = 0.95"),
-    "noise.treatment": ("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"'),
-    "moments": ("which p", "[moments]"),
-    "moments.p": ("orders of the moments", "p = [1.0, 2.0] or p = { start = -2.0, stop = 6.0, num = 33 }"),
-    "moments.p.start": ("first p", "start = -2.0"),
-    "moments.p.stop": ("last p", "stop = 6.0"),
-    "moments.p.num": ("how many p", "num = 33"),
-    "moments.rtol": ("wanted relative error", "rtol = 1e-8"),
-    "budget": ("what one p may cost", "[budget]"),
-    "budget.unknowns": ("unknowns of the largest system", "unknowns = 60000"),
-    "budget.seconds": ("time for one p", "seconds = 60.0"),
-    "vary": ("one curve for each value", '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'),
-    "mesh": ("the finite elements", "[mesh]"),
-    "mesh.file": ("a mesh file, by its path from the case file", 'file = "../meshes/default.vtu"'),
-    "mesh.phi_cells": ("cells around the phase", "phi_cells = 2"),
-    "mesh.phi_degree": ("degree of the elements in the phase", "phi_degree = 10"),
-    "mesh.xi_cells": ("cells along the noise", "xi_cells = 4"),
-    "mesh.xi_degree": ("degree of the elements along the noise", "xi_degree = 9"),
-    "mesh.xi_min": ("lower end of the noise, in standard deviations", "xi_min = -8.0"),
-    "mesh.xi_max": ("upper end of the noise, in standard deviations", "xi_max = 8.0"),
-    "monte_carlo": ("how the system is simulated", "[monte_carlo]"),
-    "monte_carlo.paths": ("how many paths", "paths = 32768"),
-    "monte_carlo.time": ("length of the paths, in the units of 1/omega", "time = 400.0"),
-    "monte_carlo.step": ("time step", "step = 0.05"),
-    "monte_carlo.seed": ("seed of the random numbers", "seed = 0"),
-    "monte_carlo.estimator": ("how moments are estimated", 'estimator = "population"'),
-    "monte_carlo.p": ("orders of the moments that are simulated", "p = [1.0, 2.0]"),
-    "figure": ("what is drawn", "[figure]"),
-    "figure.x": ("the abscissa", 'x = "p"'),
-    "figure.y": ("the ordinate", 'y = "moment"'),
-    "output": ("what is written", "[output]"),
-    "output.eigenfunctions": ("the p written as VTK", "eigenfunctions = [1.0, 2.0]"),
-    "expect": ("values to check", "[[expect]]"),
-    "expect.quantity": ("what is checked", 'quantity = "moment"'),
-    "expect.p": ("order of the moment", "p = 2.0"),
-    "expect.value": ("the expected value", "value = 0.01416"),
-    "expect.rtol": ("relative tolerance", "rtol = 1e-3"),
-    "expect.atol": ("absolute tolerance", "atol = 1e-6"),
-    "expect.source": ("where the value comes from", 'source = "Eq. (37), second order"'),
-    "expect.where": ("which curves: some of the varied keys", 'where = { "noise.D0" = 1.0 }'),
-}
-"""Meaning and example of every key of a case file."""
 
 
 def refuse(refusals: Iterable[Refusal]) -> None:
@@ -154,12 +100,11 @@ def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
         known = list(_fields(model, path[:-1]))
         guess = nearest(str(path[-1]), known)
         return f"unknown key;{guess} known keys: {', '.join(known)}; rename or remove it"
-    names = _schema_names(path, model)
-    meaning, example = GLOSSARY[".".join(names)]
-    field = _fields(model, names[:-1])[names[-1]]
-    must = f"must be {_accepted(field)} ({meaning})"
+    *section, name = _schema_names(path, model)
+    field = _fields(model, section)[name]
+    must, example = f"must be {_accepted(field)} ({field.description})", example_of(field)
     if path[0] == "vary" and len(path) > 1:
-        example = GLOSSARY["vary"][1]
+        example = example_of(_fields(model, ())["vary"])
         must = must.replace("be", "be a non-empty list, each entry", 1) if len(path) == 2 else must
     if detail["type"] == "missing":
         return f"missing; {must}; add it, for example {example}"
@@ -177,7 +122,7 @@ def _kind(value: Any, error_type: str) -> str:
 
 def _schema_names(path: Path, model: Any) -> tuple[str, ...]:
     """The deepest key on the path that the schema names; a value of [vary] obeys the range of its own key."""
-    if path[0] == "vary" and len(path) > 1 and path[1] in GLOSSARY:
+    if path[0] == "vary" and len(path) > 1:
         return tuple(str(path[1]).split("."))
     names: list[str] = []
     for part in (part for part in path if isinstance(part, str)):

@@ -1,12 +1,12 @@
 """The sections of a case file, each with the rules that it can check by itself.
 
-The ranges of the oscillator are those of `VibroImpactOscillator`; the others stand here.
+What keys of the oscillator, the noise and the budget mean stands where these do; the others stand here.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -18,19 +18,16 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
-    TypeAdapter,
-    ValidationError,
     model_validator,
 )
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.messages import LIST, TABLE, Refusal, nearest, refuse
+from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
 from fpsolve.errors import MeshError
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh
 from fpsolve.fem.mesh_file import read_mesh
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.parameters import STRICT, Positive
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.parameters import parameter
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
@@ -42,7 +39,6 @@ NonEmpty = Annotated[Values, Field(strict=False, min_length=1)]
 Text = Annotated[str, Field(min_length=1)]
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
-Tolerance = Annotated[float | None, Field(gt=0)]
 
 
 def flat(value: Any) -> Any:
@@ -68,10 +64,13 @@ class Section(BaseModel):
 class NoiseSection(Section):
     """[noise]: the parameters of Eqs. (7)-(8), and whether the paper's reduction (12)-(14) replaces them."""
 
-    D0: Positive
-    tau0: Positive
-    r0: Annotated[float, Field(lt=5 / 3)]
-    treatment: Literal["ou-reduction", "exact"] = "ou-reduction"
+    D0: Intensity
+    tau0: CorrelationTime
+    r0: Annotated[Departure, Field(lt=5 / 3)]
+    treatment: Annotated[
+        Literal["ou-reduction", "exact"],
+        parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"'),
+    ] = "ou-reduction"
 
     def original(self) -> NonGaussianNoise:
         """The noise of Eq. (7), whatever the treatment."""
@@ -85,9 +84,9 @@ class NoiseSection(Section):
 class Sweep(Section):
     """{ start, stop, num }: equidistant numbers, both ends included."""
 
-    start: float
-    stop: float
-    num: Annotated[int, Field(ge=2, le=MAX_MOMENTS)]
+    start: Annotated[float, parameter("first p", "start = -2.0")]
+    stop: Annotated[float, parameter("last p", "stop = 6.0")]
+    num: Annotated[int, parameter("how many p", "num = 33", ge=2, le=MAX_MOMENTS)]
 
     @model_validator(mode="after")
     def _increases(self) -> Self:
@@ -109,8 +108,14 @@ class Moments(Section):
     p: Annotated[
         Annotated[NonEmpty, Tag(LIST)] | Annotated[Sweep, Tag(TABLE)],
         Discriminator(_list_or_table),
+        parameter(
+            "orders of the moments",
+            "p = [1.0, 2.0] or p = { start = -2.0, stop = 6.0, num = 33 }",
+            "$p$",
+            name="order of the moment",
+        ),
     ]
-    rtol: Annotated[float, Field(gt=1e-13, lt=1)] = 1e-8
+    rtol: Annotated[float, parameter("wanted relative error", "rtol = 1e-8", gt=1e-13, lt=1)] = 1e-8
 
     @property
     def values(self) -> FloatArray:
@@ -137,13 +142,20 @@ class Moments(Section):
 class MeshSection(Section):
     """[mesh]: a mesh file, or some of the numbers that make one; ξ in noise units."""
 
-    file: Annotated[str | None, Field(min_length=1)] = None
-    phi_cells: Cells = None
-    phi_degree: Degree = None
-    xi_cells: Cells = None
-    xi_degree: Degree = None
-    xi_min: Annotated[float | None, Field(lt=0)] = None
-    xi_max: Annotated[float | None, Field(gt=0)] = None
+    file: Annotated[
+        str | None,
+        parameter("a mesh file, by its path from the case file", 'file = "../meshes/default.vtu"', min_length=1),
+    ] = None
+    phi_cells: Annotated[Cells, parameter("cells around the phase", "phi_cells = 2")] = None
+    phi_degree: Annotated[Degree, parameter("degree of the elements in the phase", "phi_degree = 10")] = None
+    xi_cells: Annotated[Cells, parameter("cells along the noise", "xi_cells = 4")] = None
+    xi_degree: Annotated[Degree, parameter("degree of the elements along the noise", "xi_degree = 9")] = None
+    xi_min: Annotated[
+        float | None, parameter("lower end of the noise, in standard deviations", "xi_min = -8.0", lt=0)
+    ] = None
+    xi_max: Annotated[
+        float | None, parameter("upper end of the noise, in standard deviations", "xi_max = 8.0", gt=0)
+    ] = None
 
     def mesh(self, folder: Path) -> CylinderMesh | None:
         """The mesh, its file sought from `folder`; None where nothing is stated."""
@@ -169,19 +181,24 @@ class MeshSection(Section):
 class MonteCarloSection(Section):
     """[monte_carlo]: how the system is simulated; time and step are chosen where they are not stated."""
 
-    paths: Annotated[int, Field(ge=BATCHES, le=MAX_PATHS)] = PATHS
-    time: Annotated[float | None, Field(gt=0)] = None
-    step: Annotated[float | None, Field(gt=0)] = None
-    seed: Annotated[int, Field(ge=0)] = 0
-    estimator: Estimator = "direct"
-    p: NonEmpty | None = None
+    paths: Annotated[int, parameter("how many paths", "paths = 32768", ge=BATCHES, le=MAX_PATHS)] = PATHS
+    time: Annotated[
+        float | None,
+        parameter("length of the paths, in the units of 1/omega", "time = 400.0", gt=0),
+    ] = None
+    step: Annotated[float | None, parameter("time step", "step = 0.05", gt=0)] = None
+    seed: Annotated[int, parameter("seed of the random numbers", "seed = 0", ge=0)] = 0
+    estimator: Annotated[Estimator, parameter("how moments are estimated", 'estimator = "population"')] = "direct"
+    p: Annotated[NonEmpty | None, parameter("orders of the moments that are simulated", "p = [1.0, 2.0]")] = None
 
 
 class FigureSection(Section):
     """[figure]: the axes; x is "p" or a varied key."""
 
-    x: Text = "p"
-    y: Literal["moment", "lyapunov_exponent", "stability_index"] = "moment"
+    x: Annotated[Text, parameter("the abscissa", 'x = "p"')] = "p"
+    y: Annotated[
+        Literal["moment", "lyapunov_exponent", "stability_index"], parameter("the ordinate", 'y = "moment"')
+    ] = "moment"
 
     @model_validator(mode="after")
     def _y_fits_x(self) -> Self:
@@ -198,7 +215,9 @@ class FigureSection(Section):
 class OutputSection(Section):
     """[output]: the p whose eigenfunctions are written; None is all of them."""
 
-    eigenfunctions: Annotated[Values | None, Field(strict=False)] = None
+    eigenfunctions: Annotated[
+        Values | None, parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False)
+    ] = None
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:
@@ -211,13 +230,20 @@ class OutputSection(Section):
 class Expectation(Section):
     """[[expect]]: a value that the result must have, on the curves that `where` selects."""
 
-    quantity: Literal["moment", "lyapunov_exponent", "stability_index", "variance_rate"]
-    p: float | None = None
-    value: float
-    rtol: Tolerance = None
-    atol: Tolerance = None
-    source: Text
-    where: Annotated[dict[str, float], BeforeValidator(flat)] = Field(default_factory=dict)
+    quantity: Annotated[
+        Literal["moment", "lyapunov_exponent", "stability_index", "variance_rate"],
+        parameter("what is checked", 'quantity = "moment"'),
+    ]
+    p: Annotated[float | None, parameter("order of the moment", "p = 2.0")] = None
+    value: Annotated[float, parameter("the expected value", "value = 0.01416")]
+    rtol: Annotated[float | None, parameter("relative tolerance", "rtol = 1e-3", gt=0)] = None
+    atol: Annotated[float | None, parameter("absolute tolerance", "atol = 1e-6", gt=0)] = None
+    source: Annotated[Text, parameter("where the value comes from", 'source = "Eq. (37), second order"')]
+    where: Annotated[
+        dict[str, float],
+        BeforeValidator(flat),
+        parameter("which curves: some of the varied keys", 'where = { "noise.D0" = 1.0 }'),
+    ] = Field(default_factory=dict)
 
     def selects(self, varied: Mapping[str, float]) -> bool:
         """Whether this is about the curve with these varied values; without `where`, about all curves."""
@@ -240,42 +266,3 @@ class Expectation(Section):
 def same(value: float, other: float) -> bool:
     """Whether two values of a varied key are one."""
     return math.isclose(value, other, rel_tol=_SAME)
-
-
-_VARIED_SECTIONS: Mapping[str, Any] = {"oscillator": VibroImpactOscillator, "noise": NoiseSection}
-VARIABLE: Mapping[str, TypeAdapter[Values]] = {
-    f"{section}.{name}": TypeAdapter(
-        Annotated[tuple[Annotated[float, Field(), *field.metadata], ...], Field(strict=False, min_length=1)],
-        config=STRICT,
-    )
-    for section, model in _VARIED_SECTIONS.items()
-    for name, field in model.__pydantic_fields__.items()
-    if field.annotation is float
-}
-"""The keys that [vary] may name, each with what its values may be."""
-
-
-def _vary(value: Any) -> Any:
-    """[vary] with its keys made flat, checked value by value against the ranges of the keys."""
-    table = flat(value)
-    if isinstance(table, dict):
-        refuse(refusal for key, values in table.items() for refusal in _varied_refusals(key, values))
-    return table
-
-
-def _varied_refusals(key: str, values: Any) -> Iterator[Refusal]:
-    if key not in VARIABLE:
-        guess = nearest(key, VARIABLE)
-        yield (key,), values, f"cannot be varied;{guess} known keys: {', '.join(VARIABLE)}; rename or remove it"
-        return
-    try:
-        numbers = VARIABLE[key].validate_python(values)
-    except ValidationError as error:
-        yield from (((key, *detail["loc"]), detail["input"], "") for detail in error.errors())
-        return
-    for i, number in enumerate(numbers):
-        if any(same(number, other) for other in numbers[:i]):
-            yield (key, i), number, f"got {number} twice; values must be distinct; remove one of them"
-
-
-Vary = Annotated[dict[str, NonEmpty], BeforeValidator(_vary)]

@@ -14,11 +14,10 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import MeshError, NotConverged
+from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import ModeEffects, Solution, Stage, mode_effects, noise_marginal, truncation
 from fpsolve.exponent.rival import rival
@@ -26,14 +25,13 @@ from fpsolve.fem.mesh import CylinderMesh, halved
 from fpsolve.fem.space import unknowns
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import has_algebraic_tails
-from fpsolve.model.parameters import STRICT, Positive
+from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import System, phase_speed
 from fpsolve.model.problem import AnyNoise, Problem
 from fpsolve.theory.frozen import growth_without_turning, likely_center
 
 MAX_PHI_DEGREE, MAX_XI_DEGREE = 14, 10
 MAX_STAGES, MOST_CANCELLED = 40, 30.0
-REMEDY = "use a larger rtol or a larger [budget]"
 LEAST_TILT = 2.5
 """Distance of the tilted density from z = 0 from which on the functions carry an exponential factor."""
 SAFETY = 3.0
@@ -56,8 +54,8 @@ class Budget:
         pydantic.ValidationError: a number is out of its range.
     """
 
-    unknowns: Annotated[int, Field(ge=100)] = 60_000
-    seconds: Positive = 60.0
+    unknowns: Annotated[int, parameter("unknowns of the largest system", "unknowns = 60000", ge=100)] = 60_000
+    seconds: Annotated[float, parameter("time for one p", "seconds = 60.0", gt=0)] = 60.0
 
 
 def fits(stage: Stage, problem: Problem, old: float, new: float) -> bool:
@@ -180,11 +178,11 @@ class _Meter:
                 text += ", as the layers of slow, strong noise are too thin"
             if self.failure:
                 text += f" ({self.failure})"
-            raise NotConverged(f"Λ({self.p:g}) did not converge: {reason}; {text}; {REMEDY}")
+            raise NotConverged(f"Λ({self.p:g}) did not converge: {reason}; {text}; {Remedy.BUDGET}")
         best = self.best
         raise NotConverged(
             f"Λ({self.p:g}) did not converge: {reason}; best value {best.pair.value:.6g} with an estimated error of "
-            f"{best.error:.1e}, {self.share:.1e} times the tolerance; {REMEDY}",
+            f"{best.error:.1e}, {self.share:.1e} times the tolerance; {Remedy.BUDGET}",
             best,
         )
 

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NotConverged
+from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.fields import xi_marginal
 from fpsolve.fem.generator import Generator
@@ -26,7 +26,6 @@ from fpsolve.model.problem import Problem
 
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
-MESH_REMEDY = "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]"
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ def checked(name: str, estimate: Estimate) -> Estimate:
     if not estimate.relative_error <= MEANINGLESS:
         raise NotConverged(
             f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "
-            f"mean anything; {MESH_REMEDY}",
+            f"mean anything; {Remedy.MESH}",
             estimate,
         )
     return estimate

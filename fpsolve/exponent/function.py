@@ -11,7 +11,7 @@ from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NotConverged
+from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, checked
@@ -206,7 +206,7 @@ def _check_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> None
     if above[i, j] < -slack[i, j]:
         raise NotConverged(
             f"Λ(p) is not convex between p = {p[i]:g} and p = {np.append(p, 0.0)[j]:g}, which the exponent always is: "
-            "a wrong eigenvalue was found; use a smaller rtol, or more cells in [mesh]"
+            f"a wrong eigenvalue was found; {Remedy.CELLS}"
         )
 
 

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import REMEDY, SAFETY, Budget, fits, resolve
+from fpsolve.errors import NoSuchExponent, NotConverged, Remedy
+from fpsolve.exponent.adapt import SAFETY, Budget, fits, resolve
 from fpsolve.exponent.eigen import PrincipalPair, second_derivative
-from fpsolve.exponent.error import MESH_REMEDY, Estimate, Solution, Stage, checked
+from fpsolve.exponent.error import Estimate, Solution, Stage, checked
 from fpsolve.exponent.rival import rival
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
@@ -118,7 +118,7 @@ class ExponentSolver:
                 self._failed[p] = failure
                 raise
             except np.linalg.LinAlgError as failure:
-                raise NotConverged(f"Λ({p:g}) cannot be solved on this mesh ({failure}); {MESH_REMEDY}") from failure
+                raise NotConverged(f"Λ({p:g}) cannot be solved on this mesh ({failure}); {Remedy.MESH}") from failure
             except (ArithmeticError, RuntimeError, ValueError) as failure:
                 raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
         return self._known[p][1]
@@ -248,7 +248,7 @@ class ExponentSolver:
             tried = self._tried(new[0], p)
             if self._suffices(tried[1]):
                 return tried
-        raise NotConverged(f"Λ({p:g}) did not converge on the meshes for p = {q:g}; {REMEDY}")
+        raise NotConverged(f"Λ({p:g}) did not converge on the meshes for p = {q:g}; {Remedy.BUDGET}")
 
     def _suffices(self, solution: Solution) -> bool:
         """Whether Λ(p), and at p = 0 its derivative, meets rtol; for tiny p apart from rounding."""
@@ -281,7 +281,7 @@ class ExponentSolver:
         if not np.any(shares > self.rtol):
             return ()
         worst = int(np.argmax(shares))
-        remedy = MESH_REMEDY if self.mesh is not None else "as rounding limits it"
+        remedy = Remedy.MESH if self.mesh is not None else "as rounding limits it"
         return (
             f"rtol = {self.rtol:g} is not met at {np.count_nonzero(shares > self.rtol)} of {p.size} moments, worst at "
             f"p = {p[worst]:g} with an estimated relative error of {shares[worst]:.1e}; {remedy}, or use a larger rtol",
@@ -296,8 +296,8 @@ class ExponentSolver:
         if pair is None:
             return ()
         return (
-            f"Λ({pair.p:g}) may be larger: slow noise may carry the moment near {z:.3g} standard deviations; use "
-            "a [mesh] that reaches there, or no [mesh]",
+            f"Λ({pair.p:g}) may be larger: slow noise may carry the moment near {z:.3g} standard "
+            f"deviations; {Remedy.REACH}",
         )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import MeshError
+from fpsolve.errors import MeshError, Remedy
 from fpsolve.fem.mesh import NO_ZERO, TOLERANCE, CylinderMesh, make_mesh
 from fpsolve.files import atomic
 
@@ -55,7 +55,7 @@ def read_mesh(path: str | Path) -> CylinderMesh:
     except Exception as failure:  # meshio raises whatever its parsers do
         raise MeshError(
             f"{path} cannot be read as a {path.suffix} mesh ({str(failure) or type(failure).__name__}); "
-            "make one with `fpsolve mesh`"
+            f"{Remedy.MESH_FILE}"
         ) from failure
     quads = content.cells_dict.get("quad")
     others = {block.type for block in content.cells} - {"quad", "line", "vertex"}

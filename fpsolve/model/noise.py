@@ -16,8 +16,15 @@ from pydantic.dataclasses import dataclass
 from scipy.special import betaln, xlog1py
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NoSuchExponent
-from fpsolve.model.parameters import STRICT, Positive
+from fpsolve.errors import NoSuchExponent, Remedy
+from fpsolve.model.parameters import STRICT, Positive, parameter
+
+Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", gt=0)]
+CorrelationTime = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", gt=0)]
+Departure = Annotated[
+    float,
+    parameter("departure from Gaussian noise; from 5/3 on the variance (10) is infinite", "r0 = 0.95", "$r_0$"),
+]
 
 
 class Noise(Protocol):
@@ -144,9 +151,9 @@ class NonGaussianNoise:
         pydantic.ValidationError: a parameter is not a finite number in its range.
     """
 
-    D0: Positive
-    tau0: Positive
-    r0: Annotated[float, Field(lt=3)]
+    D0: Intensity
+    tau0: CorrelationTime
+    r0: Annotated[Departure, Field(lt=3)]
 
     @property
     def curvature(self) -> float:
@@ -265,5 +272,5 @@ def check_existence(noise: Noise, p: float) -> None:
     if not low <= p <= high:
         raise NoSuchExponent(
             f"Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
-            f'hide it; choose p in [{low:g}, {high:g}], r0 <= 1, or treatment = "ou-reduction"'
+            f"hide it; choose p in [{low:g}, {high:g}], r0 <= 1, {Remedy.REDUCTION}"
         )

@@ -8,11 +8,11 @@ from functools import cached_property
 from typing import Annotated, Self
 
 from numpy.typing import ArrayLike
-from pydantic import Field, model_validator
+from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray, identity
-from fpsolve.model.parameters import STRICT, Positive
+from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import Drive, Kick
 
 IMPACT_PHASES = (math.pi / 2, 3 * math.pi / 2)
@@ -61,13 +61,20 @@ class VibroImpactOscillator:
             would reverse the velocity: 1 − ε²(1 − r) ≤ 0.
     """
 
-    omega: Positive
-    restitution: Annotated[float, Field(gt=0, le=1)]
-    c1: float
-    epsilon: Positive
-    c2: Annotated[float, Field(ge=0)] = 0.0
-    c3: Annotated[float, Field(ge=0)] = 0.0
-    impact: Annotated[ImpactLaw, Field(strict=False)] = ImpactLaw.DELTA
+    omega: Annotated[float, parameter("natural frequency", "omega = 1.0", r"$\omega$", "rad/time", gt=0)]
+    restitution: Annotated[
+        float, parameter("coefficient of restitution; 1 means no loss", "restitution = 0.8", "$r$", gt=0, le=1)
+    ]
+    c1: Annotated[
+        float, parameter("linear damping coefficient", "c1 = 0.1", "$c_1$", "1/time", name="damping coefficient")
+    ]
+    epsilon: Annotated[
+        float,
+        parameter("small parameter of Eq. (6); 1 is the unscaled system", "epsilon = 0.1", r"$\varepsilon$", gt=0),
+    ]
+    c2: Annotated[float, parameter("nonlinear damping coefficient", "c2 = 0.0", "$c_2$", ge=0)] = 0.0
+    c3: Annotated[float, parameter("nonlinear damping coefficient", "c3 = 0.0", "$c_3$", ge=0)] = 0.0
+    impact: Annotated[ImpactLaw, parameter("impact law", 'impact = "delta"', strict=False)] = ImpactLaw.DELTA
 
     @model_validator(mode="after")
     def _restitution_law_keeps_the_direction(self) -> Self:

@@ -10,7 +10,8 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
 from fpsolve.exponent.error import Estimate
 from fpsolve.study.simulate import SimulatedCurve
 from fpsolve.study.solve import Comparison, CurveResult

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fpsolve import __version__
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
 from fpsolve.errors import FpsolveError, OutputError
 from fpsolve.files import atomic, prepare_folder, write_json
 from fpsolve.output.plots import write_response_figure

@@ -10,11 +10,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
+from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.case.sections import Expectation
-from fpsolve.errors import MeshError, NotConverged
+from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import MESH_REMEDY, Estimate
+from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import SEARCH_INTERVAL, solve_moments, stability_index
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
@@ -117,6 +119,7 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: A
     attempts = (_attempt(partial(solver.pair, float(p)))[0] for p in case.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
     warnings += _unresolved(pairs)
+    lines = (line for failure in failures for line in failure.splitlines())
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -127,9 +130,9 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: A
         eigenpairs=pairs,
         stationary=stationary,
         mesh=None if (space := solver.largest()) is None else _mesh(space),
-        warnings=(*warnings, *(line for failure in failures for line in failure.splitlines())),
-        notes=_notes(case, curve, moments),
-        failures=failures,
+        warnings=tuple(map(in_words_of_a_case, (*warnings, *lines))),
+        notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments))),
+        failures=tuple(map(in_words_of_a_case, failures)),
     )
 
 
@@ -162,7 +165,7 @@ def _solve_moments(
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov) -> tuple[str, ...]:
     """Where the reduction of the noise, the impact law or Eq. (37) is not valid."""
     notes = [
-        None if case.is_exact else validity.reduction_note(case.original_noise(curve)),
+        None if case.is_exact else validity.reduction_note(curve.original_noise),
         validity.impact_note(curve.oscillator),
         validity.weak_noise_note(curve.problem, moments.p, moments.value),
     ]
@@ -184,7 +187,7 @@ def _imprecise(estimates: dict[str, Estimate | None], rtol: float, is_adaptive: 
     """Which of some named numbers miss rtol."""
     return [
         f"rtol = {rtol:g} is not met by {name}: {estimate.value:.6g} has an estimated error of "
-        f"{estimate.error_estimate:.1e}; {'' if is_adaptive else MESH_REMEDY + ', or '}use a larger rtol"
+        f"{estimate.error_estimate:.1e}; {'' if is_adaptive else Remedy.MESH + ', or '}use a larger rtol"
         for name, estimate in estimates.items()
         if estimate and estimate.relative_error > rtol
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.errors import Remedy
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
@@ -22,7 +23,7 @@ def reduction_note(noise: NonGaussianNoise) -> str | None:
     return (
         f"the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = {abs(noise.r0 - 1):.3g} > "
         f"{NEAR_GAUSSIAN:g}: it gives the noise the variance {reduced:.4g} instead of {noise.variance:.4g}, Eq. (10); "
-        'treatment = "exact" keeps Eq. (7)'
+        f"{Remedy.NO_REDUCTION}"
     )
 
 

@@ -388,6 +388,7 @@ def test_key_with_and_without_quotes(tmp_path: Path, old: str, new: str) -> None
         {"tau0": "1e200"},
         {"D0": "1e-320", "tau0": "1e5"},
         {"epsilon": "1e200"},
+        {"omega": "1e-200"},
         {"r0": "-1e308"},
         {"r0": "1.6666666666666665"},
         {"c1": "-1e308", "p": "[1e10]"},
@@ -402,6 +403,15 @@ def test_extreme_parameters_are_refused(tmp_path: Path, changes: dict[str, str])
     message = only_message(path)
     assert message.startswith(f"{path}:{line_of(text, 'moments')}: moments: ")
     assert "moderate sizes; bring the extreme ones nearer to 1" in message
+
+
+@pytest.mark.parametrize("key", ["epsilon", "tau0"])
+@pytest.mark.parametrize("value", ["1e308", "1e-320"])
+def test_extreme_parameters_are_refused_before_they_are_simulated(tmp_path: Path, key: str, value: str) -> None:
+    text = re.sub(rf"^{key} = .*", f"{key} = {value}", GOOD[: GOOD.index("[vary]")], flags=re.MULTILINE)
+    faults = faults_of(write(tmp_path, text + "[monte_carlo]\nseed = 0\n"))
+    assert [fault.key for fault in faults] == ["moments", "monte_carlo.p"]
+    assert all("moderate sizes" in fault.sentence for fault in faults)
 
 
 def test_all_faults_at_once(tmp_path: Path) -> None:

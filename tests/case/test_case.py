@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fpsolve.case.case import Case, Curve, load_case
+from fpsolve.case.case import Case, load_case
+from fpsolve.case.curves import Curve
 from fpsolve.case.toml import read_document
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.mesh_file import write_mesh
@@ -208,6 +209,28 @@ def test_several_varied_keys_give_their_product(write: Write) -> None:
     curves = load_case(write(text)).curves()
     pairs = [(curve.varied["noise.D0"], curve.oscillator.omega) for curve in curves]
     assert pairs == [(1, 3), (1, 4), (1, 5), (2, 3), (2, 4), (2, 5)]
+
+
+def test_curves_are_numbered_and_named(write: Write) -> None:
+    case = load_case(write(SMALL + '[vary]\n"noise.D0" = [1, 2.5]\n"oscillator.omega" = [3, 0.0001]\n'))
+    curves = case.curves()
+    assert [(curve.number, curve.suffix) for curve in curves] == [(1, ""), (2, "-2"), (3, "-3"), (4, "-4")]
+    assert curves[3].label == "noise.D0 = 2.5, oscillator.omega = 0.0001"
+    assert case.place(curves[3]) == "small, noise.D0 = 2.5, oscillator.omega = 0.0001"
+    assert case.heading(curves[0]) == "small: noise.D0 = 1, oscillator.omega = 3"
+
+
+def test_the_only_curve_needs_no_name(write: Write) -> None:
+    case = load_case(write(SMALL))
+    [curve] = case.curves()
+    assert (curve.number, curve.suffix, curve.label) == (1, "", "")
+    assert (case.place(curve), case.heading(curve)) == ("small", "small")
+
+
+def test_a_curve_knows_the_noise_before_its_reduction(write: Write) -> None:
+    [curve] = load_case(write(SMALL.replace("r0 = 1", "r0 = 0.9"))).curves()
+    assert curve.original_noise == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
+    assert curve.noise == curve.original_noise.ou_reduction()
 
 
 def test_varied_keys_may_be_dotted_without_quotes(write: Write) -> None:

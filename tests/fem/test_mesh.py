@@ -166,9 +166,7 @@ HALF = [[np.pi / 2, -8, 0], [3 * np.pi / 2, -8, 0], [3 * np.pi / 2, 8, 0], [np.p
 def test_unreadable_files_are_refused(tmp_path, content, ending):
     path = tmp_path / f"bad{ending}"
     path.write_text(content)
-    with pytest.raises(
-        MeshError, match=rf"bad{ending} cannot be read as a {ending} mesh .*make one with `fpsolve mesh`"
-    ):
+    with pytest.raises(MeshError, match=rf"bad{ending} cannot be read as a {ending} mesh .*make one with `write_mesh`"):
         read_mesh(path)
 
 

@@ -214,7 +214,7 @@ def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
 def test_an_unwritable_folder_is_refused_before_solving(case, tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     calls = []
-    with pytest.raises(OutputError, match=r"file/test cannot be made: .*choose another --out"):
+    with pytest.raises(OutputError, match=r"file/test cannot be made: .*choose another folder"):
         fpsolve.run(case, tmp_path / "file", advance=lambda: calls.append(1))
     assert calls == []
 

@@ -1,0 +1,161 @@
+"""What the sections of a case say about each other: every contradiction, with the value and the remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.curves import assignments, combinations, make_curve
+from fpsolve.case.messages import Refusal, nearest, shown
+from fpsolve.case.remedies import in_words_of_a_case
+from fpsolve.case.sections import (
+    Expectation,
+    FigureSection,
+    MeshSection,
+    Moments,
+    MonteCarloSection,
+    NoiseSection,
+    Values,
+    same,
+)
+from fpsolve.errors import MeshError, NoPerturbationTheory, NoSuchExponent
+from fpsolve.model.noise import ColouredNoise, check_existence
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.simulation.setup import obstacles
+from fpsolve.theory.second_order import second_order
+
+MAX_CURVES = 10_000
+_MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
+
+
+def vary_refusals(valid: Mapping[str, Any], vary: Mapping[str, Values]) -> Iterator[Refusal]:
+    """Too many curves, or one that cannot be solved."""
+    number = math.prod(map(len, vary.values()))
+    if number > MAX_CURVES:
+        yield (), None, f"makes {number} curves; must be at most {MAX_CURVES}; list fewer values"
+    else:
+        yield from curve_refusals(valid, vary)
+
+
+def curve_refusals(
+    valid: Mapping[str, Any], vary: Mapping[str, Values], *, with_existence: bool = True
+) -> Iterator[Refusal]:
+    """The first combination whose parameters contradict each other or overflow, or whose moments are infinite."""
+    if not {"oscillator", "noise", "moments"} <= valid.keys():
+        return
+    p = valid["moments"].values
+    for varied in combinations(vary):
+        reason = _obstacle(valid["oscillator"], valid["noise"], varied, p)
+        if not reason and with_existence:
+            reason = _infinite(make_curve(valid["oscillator"], valid["noise"], varied).noise, p)
+        if reason:
+            yield (), varied, _with(varied) + reason
+            return
+
+
+def _with(varied: Mapping[str, float]) -> str:
+    """Beginning of a sentence on one of several curves."""
+    return f"with {assignments(varied)}: " if varied else ""
+
+
+def _obstacle(
+    oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Mapping[str, float], p: FloatArray
+) -> str:
+    """Why there is no such curve, or nothing."""
+    try:
+        curve = make_curve(oscillator, noise, varied)
+        with np.errstate(all="ignore"):
+            theory = second_order(curve.problem)
+            factors = [curve.oscillator.impact_factor(float(extreme)) for extreme in (p.max(), p.min())]
+            sizes = np.append(
+                theory.scale.moment(p),
+                [theory.stability_index, *factors],
+            )
+    except ValidationError as error:
+        context = error.errors()[0].get("ctx", {})
+        return str(context.get("error", f"the noise has no finite strength; {_MODERATE}"))
+    except (ArithmeticError, NoPerturbationTheory):  # the square of omega may be too small for a number
+        sizes = np.array([math.inf])
+    return "" if np.all(np.isfinite(sizes)) else f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
+
+
+def _infinite(noise: ColouredNoise, p: FloatArray) -> str:
+    """Why some Λ(p) is infinite, or nothing."""
+    try:
+        for extreme in (p.max(), p.min()):
+            check_existence(noise, float(extreme))
+    except NoSuchExponent as error:
+        return in_words_of_a_case(str(error))
+    return ""
+
+
+def mesh_refusals(mesh: MeshSection, folder: Path) -> Iterator[Refusal]:
+    """A mesh that cannot be read or made."""
+    try:
+        with np.errstate(all="ignore"):
+            mesh.mesh(folder)
+    except (MeshError, OSError, ValueError) as error:
+        reason = in_words_of_a_case(str(error))
+        text = f"got {shown(mesh.file)}; {reason}" if mesh.file else reason
+        yield ("file",) if mesh.file else (), mesh.file, text
+
+
+def simulation_refusals(valid: Mapping[str, Any], section: MonteCarloSection) -> Iterator[Refusal]:
+    """The first parameter set for which the time, the step or a p of the simulation is not right."""
+    p = np.array(section.p or (0.0,))
+    for varied in combinations(valid["vary"]):
+        reason, faults = _obstacle(valid["oscillator"], valid["noise"], varied, p), {}
+        with suppress(ArithmeticError, ValidationError):  # of parameters that are the reason
+            curve = make_curve(valid["oscillator"], valid["noise"], varied)
+            faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
+            reason = reason or _infinite(curve.noise, p)
+        for name, text in faults.items():
+            if getattr(section, name) is not None:
+                yield (name,), getattr(section, name), _with(varied) + text
+        if reason:
+            yield ("p",), section.p, _with(varied) + reason
+        if faults or reason:
+            return
+
+
+def figure_refusals(valid: Mapping[str, Any], figure: FigureSection) -> Iterator[Refusal]:
+    """An abscissa that is not varied."""
+    known = ("p", *valid.get("vary", (figure.x,)))
+    if figure.x not in known:
+        guess = nearest(figure.x, known)
+        text = f"got {shown(figure.x)};{guess} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
+        yield ("x",), figure.x, text
+
+
+def moment_refusals(
+    valid: Mapping[str, Any], wanted: Iterable[tuple[tuple[str | int, ...], float]]
+) -> Iterator[Refusal]:
+    """Each wanted p, with its path, that is not among the moments."""
+    moments: Moments | None = valid.get("moments")
+    for path, p in wanted:
+        if moments is not None and not moments.has(p):
+            first, last = moments.values[[0, -1]]
+            known = f"moments.p ({moments.values.size} values, {first:g} to {last:g})"
+            yield path, p, f"got {p}; must be among {known}; add it there, or choose one of them"
+
+
+def where_refusals(valid: Mapping[str, Any], expect: Sequence[Expectation]) -> Iterator[Refusal]:
+    """Each key of a `where` that is not varied, or not with that value."""
+    vary: Mapping[str, Values] | None = valid.get("vary")
+    if vary is None:
+        return
+    stated = ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items())
+    for i, key, value in stated:
+        if key not in vary:
+            guess, known = nearest(key, vary), ", ".join(vary) or "none"
+            yield (i, "where", key), value, f"is not varied;{guess} varied keys: {known}; add it to [vary]"
+        elif not any(same(value, other) for other in vary[key]):
+            known = shown(vary[key])
+            yield (i, "where", key), value, f"got {value}; must be one of {known}; add it to [vary]"
