@@ -74,8 +74,8 @@ def run(
     code = 0
     for case in loaded:
         try:
-            with _progress(case.name, curves.work(case)) as advance:
-                results = report.run(case, out, advance=advance)
+            with _progress(case.name, curves.work(case)) as progress:
+                results = report.run(case, out, progress=progress)
         except NotConverged as failure:
             results, code = failure.partial, NOT_CONVERGED
         print_results(case, results)
@@ -139,8 +139,8 @@ def check(cases: Cases, *, overrides: Overrides = None) -> int:
 
     code = 0
     for case in _load(cases, overrides):
-        with _progress(case.name, curves.work(case)) as advance:
-            results = [result.without_pairs() for result in curves.solve(case, advance=advance)]
+        with _progress(case.name, curves.work(case)) as progress:
+            results = [result.without_pairs() for result in curves.solve(case, progress=progress)]
         comparisons = curves.compare(case, results)
         print_comparisons(case, comparisons)
         print_warnings(case, results)
@@ -240,8 +240,8 @@ def _simulate(case: Case, out: Path, results: Sequence[CurveResult] = ()) -> tup
     from fpsolve.output.terminal import print_simulation
     from fpsolve.study.simulate import simulate_case, simulation_work
 
-    with _progress(f"{case.name}, simulation", simulation_work(case)) as tick:
-        simulated, is_interrupted = simulate_case(case, out, tick=tick)
+    with _progress(f"{case.name}, simulation", simulation_work(case)) as progress:
+        simulated, is_interrupted = simulate_case(case, out, progress=progress)
     print_simulation(case, simulated, results)
     if is_interrupted:
         _print_error("interrupted; what was done is kept")

@@ -40,7 +40,7 @@ class MomentLyapunovFunction:
         budget: what the choice of a mesh may cost for one p; None for the default one.
         most: the largest number of nodes.
         solver: one of the same problem, to go on with; it decides the mesh, rtol and the budget.
-        advance: called after each solve.
+        progress: called after each solve.
 
     Attributes:
         nodes: the p that were solved, increasing, shape (n + 1,).
@@ -67,7 +67,7 @@ class MomentLyapunovFunction:
         budget: Budget | None = None,
         most: int = LEVELS[-1],
         solver: ExponentSolver | None = None,
-        advance: Callable[[], None] = lambda: None,
+        progress: Callable[[], None] = lambda: None,
     ) -> None:
         low, high = (float(end) for end in checked_moments(list(interval), problem.noise))
         if not low < high:
@@ -78,7 +78,7 @@ class MomentLyapunovFunction:
         self.interpolation_error = math.inf
         for count in LEVELS:
             last = self.interpolation_error
-            self._interpolate(count, advance)
+            self._interpolate(count, progress)
             if self.is_converged or self._nodes_needed(last) > most:
                 break
         self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
@@ -160,7 +160,7 @@ class MomentLyapunovFunction:
         rate = math.log(max(last / self.interpolation_error, 1.1)) / (count // 2)
         return max(2 * count - 1, count + math.log(self.interpolation_error / self._allowed) / rate)
 
-    def _interpolate(self, count: int, advance: Callable[[], None]) -> None:
+    def _interpolate(self, count: int, progress: Callable[[], None]) -> None:
         """Solve at so many Chebyshev points, the outermost first, and interpolate."""
         low, high = self.interval
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -171,7 +171,7 @@ class MomentLyapunovFunction:
         ratios = np.empty((count, 3))
         for i in best_order(nodes):
             ratios[i] = self.solver.ratio(float(nodes[i]))
-            advance()
+            progress()
         values, slopes, errors = ratios.T
         basis = np.eye(2 * count)
         conditions = np.concatenate([chebval(x, basis).T, chebval(x, chebder(basis, axis=0)).T / count])
@@ -271,7 +271,7 @@ def moment_lyapunov(
 
 
 def solve_moments(
-    solver: ExponentSolver, p: ArrayLike, *, advance: Callable[[], None] = lambda: None
+    solver: ExponentSolver, p: ArrayLike, *, progress: Callable[[], None] = lambda: None
 ) -> tuple[MomentLyapunov, float | None]:
     """Λ at several p, by interpolation where that saves solves, and then also its root other than 0.
 
@@ -284,13 +284,13 @@ def solve_moments(
         ends = float(points.min()), float(points.max())
         try:
             function = MomentLyapunovFunction(
-                solver.problem, ends, solver=solver, most=points.size // 2, advance=advance
+                solver.problem, ends, solver=solver, most=points.size // 2, progress=progress
             )
             if function.is_converged:
                 return function.moments(points), function.root()
         except NotConverged:
             pass  # then each p for itself
-    result = solver.moments(points, advance=advance)
+    result = solver.moments(points, progress=progress)
     try:
         _check_convexity(result.pairs, result.error_estimate)
     except NotConverged as failure:

@@ -149,8 +149,8 @@ class ExponentSolver:
             object.__setattr__(other, name, getattr(self, name))
         return other
 
-    def moments(self, p: ArrayLike, *, advance: Callable[[], None] = lambda: None) -> MomentLyapunov:
-        """Λ(p) at several p; `advance` is called after each.
+    def moments(self, p: ArrayLike, *, progress: Callable[[], None] = lambda: None) -> MomentLyapunov:
+        """Λ(p) at several p; `progress` is called after each.
 
         Raises:
             NoSuchExponent: Λ(p) is infinite for one of the p.
@@ -166,7 +166,7 @@ class ExponentSolver:
                 solutions[i] = solution
             except NotConverged as failure:
                 failures.append(str(failure))
-            advance()
+            progress()
         result = self._result([solutions[i] for i in sorted(solutions)])
         if failures:
             raise NotConverged("\n".join(failures), result)

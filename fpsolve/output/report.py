@@ -18,14 +18,14 @@ from fpsolve.exponent.function import SEARCH_INTERVAL
 from fpsolve.files import atomic, prepare_folder, write_json
 from fpsolve.output.plots import Series, write_figure
 from fpsolve.study.simulate import SimulatedCurve
-from fpsolve.study.solve import Advance, CurveResult, solve
+from fpsolve.study.solve import CurveResult, Progress, solve
 from fpsolve.theory.second_order import second_order
 
 if TYPE_CHECKING:
     from fpsolve.simulation.estimators import MonteCarlo
 
 
-def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: None) -> tuple[CurveResult, ...]:
+def run(case: Case, out: str | Path = "results", *, progress: Progress = lambda: None) -> tuple[CurveResult, ...]:
     """Solve a case and write `out`/<name of the case>/.
 
     Tables are written anew after every curve, each file whole or not at all, so that what is finished stays.
@@ -33,7 +33,7 @@ def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: N
     Args:
         case: from `load_case`.
         out: folder for the results.
-        advance: called after each moment, `work(case)` times in all.
+        progress: called after each moment, `work(case)` times in all.
 
     Raises:
         OutputError: the folder cannot be made or written to; nothing is solved.
@@ -42,7 +42,7 @@ def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: N
     folder = Path(out) / case.name
     prepare_folder(folder)
     try:
-        results = _solve_and_write(case, folder, advance)
+        results = _solve_and_write(case, folder, progress)
     except OSError as failure:
         raise OutputError(f"{failure.filename or folder} cannot be written: {failure.strerror}") from failure
     failures = [failure for result in results for failure in result.failures]
@@ -51,10 +51,10 @@ def run(case: Case, out: str | Path = "results", *, advance: Advance = lambda: N
     return results
 
 
-def _solve_and_write(case: Case, folder: Path, advance: Advance) -> tuple[CurveResult, ...]:
+def _solve_and_write(case: Case, folder: Path, progress: Progress) -> tuple[CurveResult, ...]:
     results: list[CurveResult] = []
     written: set[Path] = set()
-    for number, result in enumerate(solve(case, advance=advance), start=1):
+    for number, result in enumerate(solve(case, progress=progress), start=1):
         written |= _write_paraview(case, result, number, folder)
         results.append(result.without_pairs())
         _write_tables(case, results, folder)

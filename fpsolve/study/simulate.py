@@ -22,7 +22,7 @@ if TYPE_CHECKING:  # numba takes half a second to import
 
 SIGNIFICANT = 3.0
 """Standard errors by which λ must exceed 0 before a stationary response is sought."""
-Tick = Callable[[], None]
+Progress = Callable[[], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def simulation_work(case: Case) -> int:
 
 
 def simulate_case(
-    case: Case, out: str | Path = "results", *, tick: Tick = lambda: None
+    case: Case, out: str | Path = "results", *, progress: Progress = lambda: None
 ) -> tuple[tuple[SimulatedCurve, ...], bool]:
     """Simulate a case and write monte_carlo.json into `out`/<name of the case>/; further curves have a number.
 
@@ -77,7 +77,7 @@ def simulate_case(
     try:
         for number, curve in enumerate(case.curves(), start=1):
             try:
-                results.append(_simulate_curve(case, curve, tick))
+                results.append(_simulate_curve(case, curve, progress))
             except KeyboardInterrupt:
                 if not results:
                     raise
@@ -105,28 +105,28 @@ def refuse_obstacles(case: Case) -> None:
             raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
 
 
-def _simulate_curve(case: Case, curve: Curve, tick: Tick) -> SimulatedCurve:
+def _simulate_curve(case: Case, curve: Curve, progress: Progress) -> SimulatedCurve:
     from fpsolve.simulation.estimators import simulate
 
     setting = case.monte_carlo
     result = simulate(
         curve.oscillator, curve.noise, [float(p) for p in case.simulated], estimator=setting.estimator,
-        paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, tick=tick,
+        paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, tick=progress,
     )  # fmt: skip
     if not _is_nonlinear(curve) or result.interrupted:
         return SimulatedCurve(curve, result, None, result.warnings)
-    response, warnings = _respond(case, curve, result, tick)
+    response, warnings = _respond(case, curve, result, progress)
     return SimulatedCurve(curve, result, response, (*result.warnings, *warnings))
 
 
-def _respond(case: Case, curve: Curve, result: MonteCarlo, tick: Tick) -> tuple[Response | None, list[str]]:
+def _respond(case: Case, curve: Curve, result: MonteCarlo, progress: Progress) -> tuple[Response | None, list[str]]:
     """The stationary response, or why there is none."""
     from fpsolve.simulation.response import stationary_response
 
     value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
     if value <= SIGNIFICANT * error:
         for _ in range(2 * TICKS):
-            tick()
+            progress()
         reason = "is not positive" if value <= 0 else f"is not {SIGNIFICANT:g} standard errors above 0"
         return None, [
             f"no stationary response: λ = {value:.3g} ± {error:.1e} {reason}, "
@@ -135,7 +135,7 @@ def _respond(case: Case, curve: Curve, result: MonteCarlo, tick: Tick) -> tuple[
     try:
         response = stationary_response(
             curve.oscillator, curve.noise, value, result.variance_rate, paths=max(result.paths // 8, 32),
-            time=result.time, step=result.step, seed=result.seed, tick=tick,
+            time=result.time, step=result.step, seed=result.seed, tick=progress,
         )  # fmt: skip
     except KeyboardInterrupt:
         return None, ["no stationary response: stopped before it was reached"]

@@ -24,7 +24,7 @@ from fpsolve.theory.second_order import second_order
 
 UNRESOLVED = 0.1
 """The share of an eigenfunction with the wrong sign from which on its picture misleads."""
-Advance = Callable[[], None]
+Progress = Callable[[], None]
 Found = TypeVar("Found")
 
 
@@ -80,12 +80,12 @@ def work(case: Case) -> int:
     return len(case.curves()) * case.p.size
 
 
-def solve(case: Case, *, advance: Advance = lambda: None) -> Iterator[CurveResult]:
+def solve(case: Case, *, progress: Progress = lambda: None) -> Iterator[CurveResult]:
     """Solve the curves of a case one after the other; what did not converge is in their `failures`."""
     mesh = case.cylinder_mesh()
     for curve in case.curves():
         try:
-            yield _solve_curve(case, curve, mesh, advance)
+            yield _solve_curve(case, curve, mesh, progress)
         except MeshError as failure:
             raise MeshError(f"{case.path}: mesh, or the finer one that measures its error: {failure}") from failure
 
@@ -100,9 +100,9 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
     ]
 
 
-def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: Advance) -> CurveResult:
+def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: Progress) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
-    moments, root, failures = _solve_moments(solver, case.p, advance)
+    moments, root, failures = _solve_moments(solver, case.p, progress)
     warnings = list(moments.warnings)
     index, obstacle = _attempt(lambda: stability_index(solver, guess=root))
     if index is None and not obstacle:
@@ -134,11 +134,11 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: A
 
 
 def _solve_moments(
-    solver: ExponentSolver, p: FloatArray, advance: Advance
+    solver: ExponentSolver, p: FloatArray, progress: Progress
 ) -> tuple[MomentLyapunov, float | None, tuple[str, ...]]:
     """Λ at all p; its root other than 0, where that is known; and why some p failed.
 
-    `advance` is called once for each p, whatever the number of solves.
+    `progress` is called once for each p, whatever the number of solves.
     """
     left = p.size
 
@@ -146,12 +146,12 @@ def _solve_moments(
         nonlocal left
         if left:
             left -= 1
-            advance()
+            progress()
 
     root: float | None = None
     failures: tuple[str, ...] = ()
     try:
-        moments, root = solve_moments(solver, p, advance=step)
+        moments, root = solve_moments(solver, p, progress=step)
     except NotConverged as failure:
         moments, failures = failure.partial, (str(failure),)
     for _ in range(left):

@@ -149,7 +149,7 @@ def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        fpsolve.run(case, tmp_path / "out", advance=interrupt)
+        fpsolve.run(case, tmp_path / "out", progress=interrupt)
     summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
     assert [curve["varied"]["noise.D0"] for curve in summary["curves"]] == [0.1]
     assert "eigenfunctions.pvd" in files(tmp_path / "out/test")
@@ -215,13 +215,13 @@ def test_an_unwritable_folder_is_refused_before_solving(case, tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     calls = []
     with pytest.raises(OutputError, match=r"file/test cannot be made: .*choose another --out"):
-        fpsolve.run(case, tmp_path / "file", advance=lambda: calls.append(1))
+        fpsolve.run(case, tmp_path / "file", progress=lambda: calls.append(1))
     assert calls == []
 
 
-def test_advance_is_called_once_for_each_moment(case, tmp_path):
+def test_progress_is_called_once_for_each_moment(case, tmp_path):
     calls = []
-    fpsolve.run(case, tmp_path, advance=lambda: calls.append(1))
+    fpsolve.run(case, tmp_path, progress=lambda: calls.append(1))
     assert len(calls) == curves.work(case) == 6
 
 

@@ -164,10 +164,10 @@ def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
     """What is finished stays, and the message says so."""
     original = simulated._simulate_curve
 
-    def interrupted(case, curve, tick):
+    def interrupted(case, curve, progress):
         if curve.varied["noise.D0"] == 0.2:
             raise KeyboardInterrupt
-        return original(case, curve, tick)
+        return original(case, curve, progress)
 
     monkeypatch.setattr(simulated, "_simulate_curve", interrupted)
     assert simulate(case, "--out", out, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]') == 130
@@ -197,12 +197,12 @@ def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
     """An interrupt in the second of three curves: the first is whole, the second is marked, the third is not begun."""
     original, calls = simulated._simulate_curve, []
 
-    def interrupted_later(case, curve, tick):
+    def interrupted_later(case, curve, progress):
         def counted():
             calls.append(1)
             if len(calls) == 150:
                 raise KeyboardInterrupt
-            tick()
+            progress()
 
         return original(case, curve, counted)
 
