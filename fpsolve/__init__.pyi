@@ -9,7 +9,7 @@ from .errors import NotConverged as NotConverged
 from .exponent.eigen import principal_pair as principal_pair
 from .exponent.eigen import spectrum as spectrum
 from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
-from .exponent.function import moment_lyapunov as moment_lyapunov
+from .exponent.moments import moment_lyapunov as moment_lyapunov
 from .exponent.solver import ExponentSolver as ExponentSolver
 from .fem.mesh import CylinderMesh as CylinderMesh
 from .fem.mesh import make_mesh as make_mesh

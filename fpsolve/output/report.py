@@ -47,7 +47,7 @@ def run(case: Case, out: str | Path = "results", *, progress: Progress = lambda:
         raise OutputError(f"{failure.filename or folder} cannot be written: {failure.strerror}") from failure
     failures = [failure for result in results for failure in result.failures]
     if failures:
-        raise NotConverged("\n".join(failures), results)
+        raise NotConverged("\n".join(failure.reason for failure in failures), results)
     return results
 
 
@@ -96,7 +96,7 @@ def _summary(result: CurveResult) -> dict[str, Any]:
         "stability_index": _estimate(result.stability_index, theory.stability_index),
         "variance_rate": _estimate(result.variance_rate, theory.variance_rate),
         "mesh": result.mesh,
-        "warnings": list(result.warnings),
+        "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
         "notes": list(result.notes),
     }
 

@@ -32,15 +32,15 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
 def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
     """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
     for result in results:
-        failures = {line for failure in result.failures for line in failure.splitlines()}
         place = _place(case, result.curve)
-        kinds = [
-            ("not converged", "bold red") if text in failures else ("warning", "yellow") for text in result.warnings
-        ]
-        for (kind, style), text in zip(kinds, result.warnings, strict=True):
-            Console(stderr=True).print(Text(f"{kind}: {place}: {text}"), style=style, soft_wrap=True)
-        for text in result.notes:
-            Console(stderr=True).print(Text(f"note: {place}: {text}"), style="cyan", soft_wrap=True)
+        reasons = [failure.reason for failure in result.failures]
+        for kind, style, texts in (
+            ("warning", "yellow", result.warnings),
+            ("not converged", "bold red", reasons),
+            ("note", "cyan", result.notes),
+        ):
+            for text in texts:
+                Console(stderr=True).print(Text(f"{kind}: {place}: {text}"), style=style, soft_wrap=True)
 
 
 def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:

@@ -15,8 +15,9 @@ from fpsolve.case.sections import Expectation
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import MESH_REMEDY, Estimate
-from fpsolve.exponent.function import SEARCH_INTERVAL, solve_moments, stability_index
-from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
+from fpsolve.exponent.function import SEARCH_INTERVAL, stability_index
+from fpsolve.exponent.moments import solve_moments
+from fpsolve.exponent.solver import ExponentSolver, Failure, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
 from fpsolve.theory import validity
@@ -57,7 +58,7 @@ class CurveResult:
     mesh: dict[str, Any] | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
-    failures: tuple[str, ...] = ()
+    failures: tuple[Failure, ...] = ()
 
     def without_pairs(self) -> CurveResult:
         """The numbers without the eigenpairs, whose matrices take some 20 MB a curve."""
@@ -102,9 +103,9 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
 
 def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: Progress) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
-    moments, root, failures = _solve_moments(solver, case.p, progress)
+    moments = solve_moments(solver, case.p, progress=progress)
     warnings = list(moments.warnings)
-    index, obstacle = _attempt(lambda: stability_index(solver, guess=root))
+    index, obstacle = _attempt(lambda: stability_index(solver, guess=moments.root))
     if index is None and not obstacle:
         low, high = np.clip(SEARCH_INTERVAL, *curve.noise.moments)
         warnings.append(f"no stability index: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]")
@@ -127,36 +128,10 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: 
         eigenpairs=pairs,
         stationary=stationary,
         mesh=None if (space := solver.largest()) is None else _mesh(space),
-        warnings=(*warnings, *(line for failure in failures for line in failure.splitlines())),
+        warnings=tuple(warnings),
         notes=_notes(case, curve, moments),
-        failures=failures,
+        failures=moments.failures,
     )
-
-
-def _solve_moments(
-    solver: ExponentSolver, p: FloatArray, progress: Progress
-) -> tuple[MomentLyapunov, float | None, tuple[str, ...]]:
-    """Λ at all p; its root other than 0, where that is known; and why some p failed.
-
-    `progress` is called once for each p, whatever the number of solves.
-    """
-    left = p.size
-
-    def step() -> None:
-        nonlocal left
-        if left:
-            left -= 1
-            progress()
-
-    root: float | None = None
-    failures: tuple[str, ...] = ()
-    try:
-        moments, root = solve_moments(solver, p, progress=step)
-    except NotConverged as failure:
-        moments, failures = failure.partial, (str(failure),)
-    for _ in range(left):
-        step()
-    return moments, root, failures
 
 
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov) -> tuple[str, ...]:

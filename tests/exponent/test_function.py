@@ -7,7 +7,8 @@ import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import second_derivative
-from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov, stability_index
+from fpsolve.exponent.function import MomentLyapunovFunction, stability_index
+from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
