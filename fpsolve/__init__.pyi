@@ -10,6 +10,8 @@ from .exponent.eigen import principal_pair as principal_pair
 from .exponent.eigen import spectrum as spectrum
 from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
 from .exponent.moments import moment_lyapunov as moment_lyapunov
+from .exponent.quantities import lyapunov_exponent as lyapunov_exponent
+from .exponent.quantities import stability_index as stability_index
 from .exponent.solver import ExponentSolver as ExponentSolver
 from .fem.mesh import CylinderMesh as CylinderMesh
 from .fem.mesh import make_mesh as make_mesh

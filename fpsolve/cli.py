@@ -62,6 +62,7 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
+    from fpsolve.exponent.quantities import STABILITY_INDEX
     from fpsolve.output import report
     from fpsolve.output.terminal import print_results
     from fpsolve.study import solve as curves
@@ -81,7 +82,7 @@ def run(
         print_results(case, results)
         if monte_carlo:
             simulated, is_interrupted = _simulate(case, out, results)
-            if case.figure.y == "stability_index":
+            if case.figure.y == STABILITY_INDEX.name:
                 _stderr().print(
                     "note: a simulation gives no stability index, so that the figure has no dots", style="cyan"
                 )

@@ -14,7 +14,7 @@ ROOMS = {
     "theory": ["second_order", "frozen", "validity"],
     "fem": ["line", "mesh", "mesh_file", "noise_space", "space", "kronecker", "terms", "generator"],
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
-    "exponent": ["eigen", "fields", "error", "rival", "adapt", "solver", "function", "moments"],
+    "exponent": ["eigen", "fields", "error", "rival", "adapt", "solver", "function", "moments", "quantities"],
     "analysis": ["density"],
     "case": ["toml", "messages", "sections", "case"],
     "study": ["solve", "simulate"],

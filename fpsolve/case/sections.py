@@ -26,6 +26,7 @@ from pydantic import (
 from fpsolve.arrays import FloatArray
 from fpsolve.case.messages import LIST, TABLE, Refusal, nearest, refuse
 from fpsolve.errors import MeshError
+from fpsolve.exponent.quantities import DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh
 from fpsolve.fem.mesh_file import read_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
@@ -181,7 +182,7 @@ class FigureSection(Section):
     """[figure]: the axes; x is "p" or a varied key."""
 
     x: Text = "p"
-    y: Literal["moment", "lyapunov_exponent", "stability_index"] = "moment"
+    y: DrawnName = "moment"
 
     @model_validator(mode="after")
     def _y_fits_x(self) -> Self:
@@ -211,7 +212,7 @@ class OutputSection(Section):
 class Expectation(Section):
     """[[expect]]: a value that the result must have, on the curves that `where` selects."""
 
-    quantity: Literal["moment", "lyapunov_exponent", "stability_index", "variance_rate"]
+    quantity: QuantityName
     p: float | None = None
     value: float
     rtol: Tolerance = None

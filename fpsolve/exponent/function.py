@@ -141,8 +141,8 @@ class MomentLyapunovFunction:
         return self.solver.variance_rate()
 
     def stability_index(self, search: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | None:
-        """δ_p, see `stability_index`, from `root` on. Raises `NotConverged`."""
-        return stability_index(self.solver, search, self.root())
+        """δ_p, see `nonzero_root`, from `root` on. Raises `NotConverged`."""
+        return nonzero_root(self.solver, search, self.root())
 
     def _inside(self, p: ArrayLike) -> FloatArray:
         points = np.asarray(p, dtype=float)
@@ -207,7 +207,7 @@ def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str 
     )
 
 
-def stability_index(
+def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
 ) -> Estimate | None:
     """δ_p, the non-zero root of Λ(p); None where Λ has no such root in the interval.

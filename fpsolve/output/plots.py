@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.exponent.quantities import Quantity
 from fpsolve.files import atomic
 
 SYMBOLS = {
@@ -35,11 +36,7 @@ TITLES = {
     "noise.D0": "noise intensity $D_0$",
     "noise.tau0": r"correlation time $\tau_0$ (time)",
     "noise.r0": "departure from Gaussian noise $r_0$",
-    "moment": r"moment Lyapunov exponent $\Lambda(p)$ (1/time)",
-    "lyapunov_exponent": r"largest Lyapunov exponent $\lambda$ (1/time)",
-    "stability_index": r"stability index $\delta_p$",
 }
-EQUATIONS = {"moment": "(37)", "lyapunov_exponent": "(39)", "stability_index": "(38)"}
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
@@ -63,26 +60,26 @@ class Series:
 
 
 def write_figure(
-    series: Sequence[Series], x: str, y: str, title: str, paths: Sequence[Path], *, is_reduced: bool = False
+    series: Sequence[Series], x: str, y: Quantity, title: str, paths: Sequence[Path], *, is_reduced: bool = False
 ) -> None:
     """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
 
     Args:
         series: the curves.
         x: "p" or the dotted key of a parameter.
-        y: "moment", "lyapunov_exponent" or "stability_index".
+        y: what is drawn.
         title: stands above the axes.
         paths: .png, .pdf or what else matplotlib writes.
         is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
     with _canvas(paths) as figure:
-        axes = figure.add_subplot(xlabel=TITLES.get(x, SYMBOLS.get(x, x)), ylabel=TITLES[y])
+        axes = figure.add_subplot(xlabel=TITLES.get(x, SYMBOLS.get(x, x)), ylabel=y.title)
         axes.set_title(fill(title, 80), parse_math=False)
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
             _draw(axes, item, i)
         is_simulated = any(item.simulated is not None for item in series)
-        _add_legend(axes, EQUATIONS[y] + (", reduced noise" if is_reduced else ""), is_simulated)
+        _add_legend(axes, y.equation + (", reduced noise" if is_reduced else ""), is_simulated)
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         axes.margins(x=0.03)
 

@@ -14,7 +14,7 @@ from fpsolve import __version__
 from fpsolve.case.case import Case
 from fpsolve.errors import NotConverged, OutputError
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.function import SEARCH_INTERVAL
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, QUANTITIES
 from fpsolve.files import atomic, prepare_folder, write_json
 from fpsolve.output.plots import Series, write_figure
 from fpsolve.study.simulate import SimulatedCurve
@@ -67,7 +67,7 @@ def draw(case: Case, results: Sequence[CurveResult], folder: Path, simulated: Se
     """Draw the figure of a case into its folder, with the simulated curves as dots."""
     pictures = [folder / "figure.png", folder / "figure.pdf"]
     series = _series(case, results, simulated)
-    write_figure(series, case.figure.x, case.figure.y, case.title, pictures, is_reduced=case.is_exact)
+    write_figure(series, case.figure.x, QUANTITIES[case.figure.y], case.title, pictures, is_reduced=case.is_exact)
 
 
 def _write_tables(case: Case, results: Sequence[CurveResult], folder: Path) -> None:
@@ -92,9 +92,7 @@ def _summary(result: CurveResult) -> dict[str, Any]:
         "parameters": dict(result.curve.parameters),
         "varied": dict(result.curve.varied),
         "moments": _rows(result),
-        "lyapunov_exponent": _estimate(result.lyapunov_exponent, theory.lyapunov_exponent),
-        "stability_index": _estimate(result.stability_index, theory.stability_index),
-        "variance_rate": _estimate(result.variance_rate, theory.variance_rate),
+        **{name: _estimate(result.estimates[name], index.theory(theory)) for name, index in INDICES.items()},
         "mesh": result.mesh,
         "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
         "notes": list(result.notes),
@@ -174,13 +172,14 @@ def _parameter_series(
     samples: Mapping[tuple[tuple[str, float], ...], MonteCarlo],
 ) -> Series:
     x = np.array([result.curve.varied[case.figure.x] for result in group])
-    estimates = [getattr(result, case.figure.y) for result in group]
+    index = INDICES[case.figure.y]
+    estimates = [result.estimates[index.name] for result in group]
     y = np.array([np.nan if estimate is None else estimate.value for estimate in estimates])
     line = np.linspace(x.min(), x.max(), 200)
     curves = [case.curve({**others, case.figure.x: float(value)}) for value in line]
-    line_y = np.array([getattr(second_order(curve.problem), case.figure.y) for curve in curves])
-    if case.figure.y == "stability_index":  # it has poles, and is sought in this interval only
-        line_y[(line_y < SEARCH_INTERVAL[0]) | (line_y > SEARCH_INTERVAL[1])] = np.nan
+    line_y = np.array([index.theory(second_order(curve.problem)) for curve in curves])
+    line_y[(line_y < index.interval[0]) | (line_y > index.interval[1])] = np.nan  # δ_p has poles
+    if index is not LYAPUNOV_EXPONENT:
         return Series(others, x, y, line, line_y)
     found = [(each, samples.get(result.curve.key)) for each, result in zip(x, group, strict=True)]
     dots = [(each, sample.lyapunov_exponent, sample.lyapunov_exponent_error) for each, sample in found if sample]
