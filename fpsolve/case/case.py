@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
@@ -50,12 +50,14 @@ class Curve:
         oscillator, noise: what the solver takes.
         parameters: every parameter by its dotted key, such as "noise.D0".
         varied: those of them that [vary] names.
+        number: its place among the curves of its case, from 1.
     """
 
     oscillator: VibroImpactOscillator
     noise: ColouredNoise
     parameters: Mapping[str, float | str]
     varied: Mapping[str, float]
+    number: int = 1
 
     @property
     def problem(self) -> Problem:
@@ -71,6 +73,11 @@ class Curve:
     def label(self) -> str:
         """The same for the eye: "noise.D0 = 0.1, noise.r0 = 0.9"."""
         return ", ".join(f"{key} = {value:g}" for key, value in self.varied.items())
+
+    @property
+    def suffix(self) -> str:
+        """What the names of its files end with: "", "-2", "-3" and so on."""
+        return "" if self.number == 1 else f"-{self.number}"
 
 
 def _oscillator(value: Any) -> Any:
@@ -141,7 +148,8 @@ class Case(Section):
 
     def curves(self) -> tuple[Curve, ...]:
         """One curve for each combination of the varied values, the last key varying fastest."""
-        return tuple(self.curve(varied) for varied in _combinations(self.vary))
+        combinations = enumerate(_combinations(self.vary), start=1)
+        return tuple(replace(self.curve(varied), number=number) for number, varied in combinations)
 
     def curve(self, varied: Mapping[str, float]) -> Curve:
         """The case's parameter set with some parameters replaced, by their dotted keys."""
@@ -150,6 +158,10 @@ class Case(Section):
     def heading(self, curve: Curve) -> str:
         """The title, and which of the curves."""
         return f"{self.title}: {curve.label}" if curve.varied else self.title
+
+    def place(self, curve: Curve) -> str:
+        """The name, and which of the curves."""
+        return f"{self.name}, {curve.label}" if curve.varied else self.name
 
     def original_noise(self, curve: Curve) -> NonGaussianNoise:
         """The noise of Eq. (7) behind a curve, whatever its treatment."""
