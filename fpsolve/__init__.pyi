@@ -20,7 +20,7 @@ from .model.noise import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .model.plane import PlaneSystem as PlaneSystem
 from .model.problem import Problem as Problem
 from .model.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
-from .output.report import run as run
 from .simulation.estimators import simulate as simulate
+from .workflow import run as run
 
 __version__: str

@@ -17,8 +17,9 @@ ROOMS = {
     "exponent": ["eigen", "fields", "error", "rival", "adapt", "solver", "function", "moments", "quantities"],
     "analysis": ["density"],
     "case": ["toml", "messages", "sections", "case"],
-    "study": ["solve", "simulate"],
-    "output": ["vtk", "plots", "report", "terminal"],
+    "study": ["results", "solve", "simulate"],
+    "output": ["vtk", "tables", "plots", "figures", "terminal"],
+    "workflow": [],
     "cli": [],
 }
 """Rooms from the ground up, each with its files from the lowest to the highest."""

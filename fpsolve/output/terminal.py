@@ -10,11 +10,10 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, VARIANCE_RATE, Quantity
-from fpsolve.study.simulate import SimulatedCurve
-from fpsolve.study.solve import Comparison, CurveResult
+from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.theory.second_order import second_order
 
 
@@ -33,7 +32,7 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
 def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
     """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
     for result in results:
-        place = _place(case, result.curve)
+        place = case.place(result.curve)
         reasons = [failure.reason for failure in result.failures]
         for kind, style, texts in (
             ("warning", "yellow", result.warnings),
@@ -61,10 +60,10 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
                 f"{name} = {sampled(value, error)} ± {error:.1e}"
                 for name, (value, error) in each.response.means.items()
             )
-            text = f"{_place(case, each.curve)}: stationary means: {means}\n"
+            text = f"{case.place(each.curve)}: stationary means: {means}\n"
             console.print(text, highlight=False, soft_wrap=True)
         for warning in each.warnings:
-            line = Text(f"warning: {_place(case, each.curve)}: {warning}")
+            line = Text(f"warning: {case.place(each.curve)}: {warning}")
             Console(stderr=True).print(line, style="yellow", soft_wrap=True)
 
 
@@ -125,10 +124,6 @@ def sampled(value: float, error: float) -> str:
 
 def _deviation(value: float, error: float, exact: float) -> str:
     return f"{(value - exact) / error:+.1f}"
-
-
-def _place(case: Case, curve: Curve) -> str:
-    return f"{case.name}, {curve.label}" if curve.varied else case.name
 
 
 def _moment_table(case: Case, result: CurveResult) -> Table:

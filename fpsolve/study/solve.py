@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Expectation
 from fpsolve.errors import MeshError, NotConverged
@@ -16,82 +14,23 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import MESH_REMEDY, Estimate
 from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
-from fpsolve.exponent.solver import ExponentSolver, Failure, MomentLyapunov
+from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
+from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
 from fpsolve.theory.second_order import second_order
 
 UNRESOLVED = 0.1
 """The share of an eigenfunction with the wrong sign from which on its picture misleads."""
-Progress = Callable[[], None]
 
 
-@dataclass(frozen=True, eq=False)
-class CurveResult:
-    """What was computed for one parameter set.
-
-    Attributes:
-        curve: the parameters, the oscillator and the noise.
-        moments: Λ(p); where some p failed, of the others.
-        moments_perturbation: Eq. (37) at the same p.
-        estimates: of each of the `INDICES`, by its name; None where there is none, or it did not converge.
-        eigenpairs: those whose eigenfunctions are written; none once they are no longer needed.
-        stationary: the eigenpair at p = 0; None once it is no longer needed.
-        mesh: what was used for the p of the largest size, ξ in noise units; None where no p was solved.
-        warnings: what limits these numbers.
-        notes: where the theories compared with are not valid.
-        failures: why some p are missing.
-    """
-
-    curve: Curve
-    moments: MomentLyapunov
-    moments_perturbation: FloatArray
-    estimates: Mapping[str, Estimate | None]
-    eigenpairs: tuple[PrincipalPair, ...]
-    stationary: PrincipalPair | None
-    mesh: dict[str, Any] | None
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]
-    failures: tuple[Failure, ...] = ()
-
-    @property
-    def lyapunov_exponent(self) -> Estimate | None:
-        """λ."""
-        return self.estimates[LYAPUNOV_EXPONENT.name]
-
-    @property
-    def stability_index(self) -> Estimate | None:
-        """δ_p."""
-        return self.estimates[STABILITY_INDEX.name]
-
-    @property
-    def variance_rate(self) -> Estimate | None:
-        """Λ″(0)."""
-        return self.estimates[VARIANCE_RATE.name]
-
-    def without_pairs(self) -> CurveResult:
-        """The numbers without the eigenpairs, whose matrices take some 20 MB a curve."""
-        return replace(self, moments=replace(self.moments, pairs=()), eigenpairs=(), stationary=None)
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One expectation of a case and what was computed; `met` says whether they agree."""
-
-    expectation: Expectation
-    varied: dict[str, float]
-    value: float | None
-    tolerance: float
-    met: bool
-
-
-def work(case: Case) -> int:
-    """How many moments a case has in all its curves."""
+def solving_work(case: Case) -> int:
+    """How often `solve_curves` reports progress: once for each moment of each curve."""
     return len(case.curves()) * case.p.size
 
 
-def solve(case: Case, *, progress: Progress = lambda: None) -> Iterator[CurveResult]:
+def solve_curves(case: Case, *, progress: Callable[[], None] = lambda: None) -> Iterator[CurveResult]:
     """Solve the curves of a case one after the other; what did not converge is in their `failures`."""
     mesh = case.cylinder_mesh()
     for curve in case.curves():
@@ -111,7 +50,7 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
     ]
 
 
-def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: Progress) -> CurveResult:
+def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: Callable[[], None]) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
     moments = solve_moments(solver, case.p, progress=progress)
     estimates, missing = _solve_indices(solver, moments.root)
