@@ -9,7 +9,9 @@ from .errors import NotConverged as NotConverged
 from .exponent.eigen import principal_pair as principal_pair
 from .exponent.eigen import spectrum as spectrum
 from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
-from .exponent.function import moment_lyapunov as moment_lyapunov
+from .exponent.moments import moment_lyapunov as moment_lyapunov
+from .exponent.quantities import lyapunov_exponent as lyapunov_exponent
+from .exponent.quantities import stability_index as stability_index
 from .exponent.solver import ExponentSolver as ExponentSolver
 from .fem.mesh import CylinderMesh as CylinderMesh
 from .fem.mesh import make_mesh as make_mesh
@@ -18,7 +20,7 @@ from .model.noise import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .model.plane import PlaneSystem as PlaneSystem
 from .model.problem import Problem as Problem
 from .model.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
-from .output.report import run as run
 from .simulation.estimators import simulate as simulate
+from .workflow import run as run
 
 __version__: str

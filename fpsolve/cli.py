@@ -20,10 +20,10 @@ from fpsolve.errors import FpsolveError, NotConverged
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
-    from fpsolve.study.simulate import SimulatedCurve
-    from fpsolve.study.solve import CurveResult
+    from fpsolve.workflow import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
+KEPT = "interrupted; what was done is kept"
 
 app = App(
     name="fpsolve",
@@ -63,10 +63,9 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
-    from fpsolve.output import report
-    from fpsolve.output.terminal import print_results
-    from fpsolve.study import solve as curves
+    from fpsolve.exponent.quantities import STABILITY_INDEX
     from fpsolve.study.simulate import refuse_obstacles
+    from fpsolve.workflow import run_case
 
     loaded = _load(cases, overrides)
     _refuse_namesakes(loaded)
@@ -74,22 +73,16 @@ def run(
         refuse_obstacles(case)
     code = 0
     for case in loaded:
-        try:
-            with _progress(case.name, curves.work(case)) as advance:
-                results = report.run(case, out, advance=advance)
-        except NotConverged as failure:
-            results, code = failure.partial, NOT_CONVERGED
-        print_results(case, results)
-        if monte_carlo:
-            simulated, is_interrupted = _simulate(case, out, results)
-            if case.figure.y == "stability_index":
-                _stderr().print(
-                    "note: a simulation gives no stability index, so that the figure has no dots", style="cyan"
-                )
-            report.draw(case, results, out / case.name, simulated)
+        outcome = run_case(case, out, monte_carlo=monte_carlo, watch=_watch())
+        if outcome.interrupted:
+            _print_error(KEPT)
+        if monte_carlo and case.figure.y == STABILITY_INDEX.name:
+            _stderr().print("note: a simulation gives no stability index, so that the figure has no dots", style="cyan")
         print(f"written: {out / case.name}")
-        if monte_carlo and is_interrupted:
+        if outcome.interrupted:
             return INTERRUPTED
+        if outcome.failures:
+            code = NOT_CONVERGED
     return code
 
 
@@ -114,6 +107,7 @@ def simulate(
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
     from fpsolve.study.simulate import refuse_obstacles
+    from fpsolve.workflow import simulate_case
 
     options = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
     stated = [f"monte_carlo.{name}={value}" for name, value in options.items() if value is not None]
@@ -122,9 +116,11 @@ def simulate(
     for case in loaded:
         refuse_obstacles(case)
     for case in loaded:
-        _, is_interrupted = _simulate(case, out)
+        outcome = simulate_case(case, out, watch=_watch())
+        if outcome.interrupted:
+            _print_error(KEPT)
         print(f"written: {out / case.name}")
-        if is_interrupted:
+        if outcome.interrupted:
             return INTERRUPTED
     return 0
 
@@ -136,18 +132,16 @@ def check(cases: Cases, *, overrides: Overrides = None) -> int:
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
     from fpsolve.output.terminal import print_comparisons, print_warnings
-    from fpsolve.study import solve as curves
+    from fpsolve.workflow import check_case
 
     code = 0
     for case in _load(cases, overrides):
-        with _progress(case.name, curves.work(case)) as advance:
-            results = [result.without_pairs() for result in curves.solve(case, advance=advance)]
-        comparisons = curves.compare(case, results)
-        print_comparisons(case, comparisons)
-        print_warnings(case, results)
-        if any(result.failures for result in results):
+        outcome = check_case(case, watch=_watch())
+        print_comparisons(case, outcome.comparisons)
+        print_warnings(case, outcome.results)
+        if outcome.failures:
             code = NOT_CONVERGED
-        elif not all(comparison.met for comparison in comparisons):
+        elif not all(comparison.met for comparison in outcome.comparisons):
             code = max(code, CHECK_FAILED)
     return code
 
@@ -236,19 +230,6 @@ def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
     return cases
 
 
-def _simulate(case: Case, out: Path, results: Sequence[CurveResult] = ()) -> tuple[Sequence[SimulatedCurve], bool]:
-    """Simulate a case, write it, print it; and whether an interrupt ended it."""
-    from fpsolve.output.terminal import print_simulation
-    from fpsolve.study.simulate import simulate_case, simulation_work
-
-    with _progress(f"{case.name}, simulation", simulation_work(case)) as tick:
-        simulated, is_interrupted = simulate_case(case, out, tick=tick)
-    print_simulation(case, simulated, results)
-    if is_interrupted:
-        _print_error("interrupted; what was done is kept")
-    return simulated, is_interrupted
-
-
 def _refuse_namesakes(cases: Sequence[Case]) -> None:
     names = [case.name for case in cases]
     for name in names:
@@ -256,8 +237,16 @@ def _refuse_namesakes(cases: Sequence[Case]) -> None:
             raise FpsolveError(f'several cases are called "{name}" and would overwrite each other; run them apart')
 
 
+def _watch() -> Watch:
+    """Shows bars, and prints what is found."""
+    from fpsolve.output.terminal import print_results, print_simulation
+    from fpsolve.workflow import Watch
+
+    return Watch(_bar, print_results, print_simulation)
+
+
 @contextmanager
-def _progress(name: str, total: int) -> Iterator[Callable[[], None]]:
+def _bar(name: str, total: int) -> Iterator[Callable[[], None]]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=_stderr(), transient=True) as progress:
         task = progress.add_task(name, total=total)

@@ -34,11 +34,12 @@ def atomic(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def prepare_folder(folder: Path) -> None:
-    """Make a folder for results, with those around it.
+@contextmanager
+def writable(folder: Path) -> Iterator[None]:
+    """Make a folder for results, with those around it, for a body that writes into it.
 
     Raises:
-        OutputError: it cannot be made or written to.
+        OutputError: it cannot be made, or something in it cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -46,6 +47,10 @@ def prepare_folder(folder: Path) -> None:
         raise OutputError(f"{folder} cannot be made: {failure.strerror}; {Remedy.FOLDER}") from failure
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder} cannot be written to; {Remedy.FOLDER}")
+    try:
+        yield
+    except OSError as failure:
+        raise OutputError(f"{failure.filename or folder} cannot be written: {failure.strerror}") from failure
 
 
 def write_json(path: Path, data: Any) -> None:

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.estimators import MomentEstimate, simulate

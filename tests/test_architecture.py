@@ -14,11 +14,12 @@ ROOMS = {
     "theory": ["second_order", "frozen", "validity"],
     "fem": ["line", "mesh", "mesh_file", "noise_space", "space", "kronecker", "terms", "generator"],
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
-    "exponent": ["eigen", "fields", "error", "rival", "adapt", "solver", "function"],
+    "exponent": ["eigen", "fields", "error", "rival", "adapt", "solver", "function", "moments", "quantities"],
     "analysis": ["density"],
     "case": ["toml", "messages", "sections", "vary", "curves", "remedies", "refusals", "case"],
-    "study": ["solve", "simulate"],
-    "output": ["vtk", "plots", "report", "terminal"],
+    "study": ["results", "solve", "simulate"],
+    "output": ["vtk", "tables", "plots", "figures", "terminal"],
+    "workflow": [],
     "cli": [],
 }
 """Rooms from the ground up, each with its files from the lowest to the highest."""

@@ -9,7 +9,7 @@ import pytest
 
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, NOT_CONVERGED, main
 from fpsolve.output.terminal import digits
-from tests.output.test_report import HOPELESS, TEXT, files
+from tests.test_workflow import HOPELESS, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
 

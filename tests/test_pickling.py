@@ -8,7 +8,8 @@ import pytest
 
 from fpsolve.errors import CaseError, Fault, NotConverged
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov
+from fpsolve.exponent.function import MomentLyapunovFunction
+from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh

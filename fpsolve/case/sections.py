@@ -24,6 +24,7 @@ from pydantic import (
 from fpsolve.arrays import FloatArray
 from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
 from fpsolve.errors import MeshError
+from fpsolve.exponent.quantities import DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh
 from fpsolve.fem.mesh_file import read_mesh
 from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
@@ -196,9 +197,7 @@ class FigureSection(Section):
     """[figure]: the axes; x is "p" or a varied key."""
 
     x: Annotated[Text, parameter("the abscissa", 'x = "p"')] = "p"
-    y: Annotated[
-        Literal["moment", "lyapunov_exponent", "stability_index"], parameter("the ordinate", 'y = "moment"')
-    ] = "moment"
+    y: Annotated[DrawnName, parameter("the ordinate", 'y = "moment"')] = "moment"
 
     @model_validator(mode="after")
     def _y_fits_x(self) -> Self:
@@ -230,10 +229,7 @@ class OutputSection(Section):
 class Expectation(Section):
     """[[expect]]: a value that the result must have, on the curves that `where` selects."""
 
-    quantity: Annotated[
-        Literal["moment", "lyapunov_exponent", "stability_index", "variance_rate"],
-        parameter("what is checked", 'quantity = "moment"'),
-    ]
+    quantity: Annotated[QuantityName, parameter("what is checked", 'quantity = "moment"')]
     p: Annotated[float | None, parameter("order of the moment", "p = 2.0")] = None
     value: Annotated[float, parameter("the expected value", "value = 0.01416")]
     rtol: Annotated[float | None, parameter("relative tolerance", "rtol = 1e-3", gt=0)] = None

@@ -5,6 +5,14 @@ from .eigen import second_derivative as second_derivative
 from .eigen import spectrum as spectrum
 from .error import Estimate as Estimate
 from .function import MomentLyapunovFunction as MomentLyapunovFunction
-from .function import moment_lyapunov as moment_lyapunov
+from .moments import moment_lyapunov as moment_lyapunov
+from .moments import solve_moments as solve_moments
+from .quantities import INDICES as INDICES
+from .quantities import QUANTITIES as QUANTITIES
+from .quantities import Index as Index
+from .quantities import Quantity as Quantity
+from .quantities import lyapunov_exponent as lyapunov_exponent
+from .quantities import stability_index as stability_index
 from .solver import ExponentSolver as ExponentSolver
+from .solver import Failure as Failure
 from .solver import MomentLyapunov as MomentLyapunov

@@ -17,11 +17,9 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, checked
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, checked_moments
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.model.problem import Problem, of_problem, of_problem_too
+from fpsolve.model.problem import Problem, of_problem_too
 
 SEARCH_INTERVAL = (-20.0, 20.0)
-FEW_MOMENTS = 9
-"""Up to so many p are solved one by one."""
 LEVELS = (3, 5, 9, 17, 33, 65)
 """Numbers of nodes tried; each has the nodes of the one before, and new ones between them."""
 
@@ -40,7 +38,7 @@ class MomentLyapunovFunction:
         budget: what the choice of a mesh may cost for one p; None for the default one.
         most: the largest number of nodes.
         solver: one of the same problem, to go on with; it decides the mesh, rtol and the budget.
-        advance: called after each solve.
+        progress: called after each solve.
 
     Attributes:
         nodes: the p that were solved, increasing, shape (n + 1,).
@@ -67,7 +65,7 @@ class MomentLyapunovFunction:
         budget: Budget | None = None,
         most: int = LEVELS[-1],
         solver: ExponentSolver | None = None,
-        advance: Callable[[], None] = lambda: None,
+        progress: Callable[[], None] = lambda: None,
     ) -> None:
         low, high = (float(end) for end in checked_moments(list(interval), problem.noise))
         if not low < high:
@@ -78,11 +76,12 @@ class MomentLyapunovFunction:
         self.interpolation_error = math.inf
         for count in LEVELS:
             last = self.interpolation_error
-            self._interpolate(count, advance)
+            self._interpolate(count, progress)
             if self.is_converged or self._nodes_needed(last) > most:
                 break
         self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
-        _check_convexity(self._pairs, np.abs(self.nodes) * self._errors)
+        if obstacle := broken_convexity(self._pairs, np.abs(self.nodes) * self._errors):
+            raise NotConverged(obstacle)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
         """Λ(p), per unit time, of the shape of p. Raises `ValueError` outside the interval."""
@@ -123,6 +122,7 @@ class MomentLyapunovFunction:
             residual=np.full(points.size, max(pair.residual for pair in self._pairs)),
             pairs=(),
             warnings=(*self.solver.missed(points, value, error), *self.solver.misplaced(self._pairs)),
+            root=self.root(),
         )
 
     def root(self) -> float | None:
@@ -141,8 +141,8 @@ class MomentLyapunovFunction:
         return self.solver.variance_rate()
 
     def stability_index(self, search: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | None:
-        """δ_p, see `stability_index`, from `root` on. Raises `NotConverged`."""
-        return stability_index(self.solver, search, self.root())
+        """δ_p, see `nonzero_root`, from `root` on. Raises `NotConverged`."""
+        return nonzero_root(self.solver, search, self.root())
 
     def _inside(self, p: ArrayLike) -> FloatArray:
         points = np.asarray(p, dtype=float)
@@ -160,7 +160,7 @@ class MomentLyapunovFunction:
         rate = math.log(max(last / self.interpolation_error, 1.1)) / (count // 2)
         return max(2 * count - 1, count + math.log(self.interpolation_error / self._allowed) / rate)
 
-    def _interpolate(self, count: int, advance: Callable[[], None]) -> None:
+    def _interpolate(self, count: int, progress: Callable[[], None]) -> None:
         """Solve at so many Chebyshev points, the outermost first, and interpolate."""
         low, high = self.interval
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -171,7 +171,7 @@ class MomentLyapunovFunction:
         ratios = np.empty((count, 3))
         for i in best_order(nodes):
             ratios[i] = self.solver.ratio(float(nodes[i]))
-            advance()
+            progress()
         values, slopes, errors = ratios.T
         basis = np.eye(2 * count)
         conditions = np.concatenate([chebval(x, basis).T, chebval(x, chebder(basis, axis=0)).T / count])
@@ -192,25 +192,22 @@ class MomentLyapunovFunction:
         return 0.4 * self.solver.rtol * self.solver.scales.linear
 
 
-def _check_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> None:
-    """Every point of a convex curve, and Λ(0) = 0, lies above every tangent.
-
-    Raises:
-        NotConverged: one does not, by more than the errors explain.
-    """
+def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str | None:
+    """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex."""
     p, value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("p", "value", "derivative"))
     value[p == 0] = 0.0  # but for rounding
     above = np.append(value, 0.0)[None] - (value[:, None] + slope[:, None] * (np.append(p, 0.0)[None] - p[:, None]))
     slack = 10 * (errors[:, None] + np.append(errors, 0.0)[None]) + 1e-6 * np.abs(np.append(value, 0.0)[None])
     i, j = np.unravel_index(np.argmin(above + slack), above.shape)
-    if above[i, j] < -slack[i, j]:
-        raise NotConverged(
-            f"Λ(p) is not convex between p = {p[i]:g} and p = {np.append(p, 0.0)[j]:g}, which the exponent always is: "
-            f"a wrong eigenvalue was found; {Remedy.CELLS}"
-        )
+    if not above[i, j] < -slack[i, j]:
+        return None
+    return (
+        f"Λ(p) is not convex between p = {p[i]:g} and p = {np.append(p, 0.0)[j]:g}, which the exponent always is: "
+        f"a wrong eigenvalue was found; {Remedy.CELLS}"
+    )
 
 
-def stability_index(
+def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
 ) -> Estimate | None:
     """δ_p, the non-zero root of Λ(p); None where Λ has no such root in the interval.
@@ -240,59 +237,3 @@ def stability_index(
             new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
         p = new
     raise NotConverged(f"the stability index did not settle, last near p = {p:g}; use a smaller rtol")
-
-
-@of_problem
-def moment_lyapunov(
-    problem: Problem,
-    p: ArrayLike,
-    *,
-    rtol: float = 1e-8,
-    mesh: CylinderMesh | None = None,
-    budget: Budget | None = None,
-) -> MomentLyapunov:
-    """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
-
-    Args:
-        problem: a motion and its noise, in one argument or two.
-        p: one moment, or an array of shape (n,).
-        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
-        mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
-        budget: what the choice of a mesh may cost; None for the default one.
-
-    Many p are interpolated, see `MomentLyapunovFunction`, where that saves solves; the result then has no `pairs`.
-
-    Raises:
-        ValueError: p is not finite, or empty, or rtol is not positive.
-        NoSuchExponent: Λ(p) is infinite.
-        NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
-    """
-    return solve_moments(ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()), p)[0]
-
-
-def solve_moments(
-    solver: ExponentSolver, p: ArrayLike, *, advance: Callable[[], None] = lambda: None
-) -> tuple[MomentLyapunov, float | None]:
-    """Λ at several p, by interpolation where that saves solves, and then also its root other than 0.
-
-    Raises:
-        NoSuchExponent: Λ(p) is infinite for one of the p.
-        NotConverged: some p failed, or Λ(p) is not convex; `partial` is the `MomentLyapunov` of the others.
-    """
-    points = checked_moments(p, solver.problem.noise)
-    if points.size > FEW_MOMENTS:
-        ends = float(points.min()), float(points.max())
-        try:
-            function = MomentLyapunovFunction(
-                solver.problem, ends, solver=solver, most=points.size // 2, advance=advance
-            )
-            if function.is_converged:
-                return function.moments(points), function.root()
-        except NotConverged:
-            pass  # then each p for itself
-    result = solver.moments(points, advance=advance)
-    try:
-        _check_convexity(result.pairs, result.error_estimate)
-    except NotConverged as failure:
-        raise NotConverged(str(failure), result) from failure
-    return result, None

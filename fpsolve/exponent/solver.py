@@ -32,12 +32,25 @@ NEIGHBOURS = 6
 """How many known eigenfunctions those of another p are interpolated from."""
 
 
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no Λ(p), or none to be trusted.
+
+    Attributes:
+        p: the moment; None where all of them are doubtful.
+        reason: what happened, and what to do.
+    """
+
+    p: float | None
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class MomentLyapunov:
     """Λ(p) at several p.
 
     Attributes:
-        p: the moments, shape (n,), in the order asked for.
+        p: the moments, shape (n,), in the order asked for, without those that failed.
         value: Λ(p), per unit time, shape (n,).
         derivative: Λ′(p), shape (n,).
         error_estimate: estimate of |error of `value`|, from a finer mesh, the ends of the noise interval and the
@@ -45,6 +58,8 @@ class MomentLyapunov:
         residual: backward error of the eigenpairs, shape (n,).
         pairs: the eigenpairs, one for each p; none where Λ was interpolated.
         warnings: sentences on p where `error_estimate` exceeds rtol.
+        root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
+        failures: why some p are missing, or none is to be trusted.
     """
 
     p: FloatArray
@@ -54,6 +69,8 @@ class MomentLyapunov:
     residual: FloatArray
     pairs: tuple[PrincipalPair, ...] = field(repr=False)
     warnings: tuple[str, ...] = ()
+    root: float | None = None
+    failures: tuple[Failure, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,12 +166,11 @@ class ExponentSolver:
             object.__setattr__(other, name, getattr(self, name))
         return other
 
-    def moments(self, p: ArrayLike, *, advance: Callable[[], None] = lambda: None) -> MomentLyapunov:
-        """Λ(p) at several p; `advance` is called after each.
+    def moments(self, p: ArrayLike, *, progress: Callable[[], None] = lambda: None) -> MomentLyapunov:
+        """Λ(p) at several p; `progress` is called after each, also after one that fails.
 
         Raises:
             NoSuchExponent: Λ(p) is infinite for one of the p.
-            NotConverged: some p failed; `partial` is the `MomentLyapunov` of the others.
         """
         points = checked_moments(p, self.problem.noise)
         solutions, failures = {}, []
@@ -165,12 +181,9 @@ class ExponentSolver:
                     checked(f"Λ({points[i]:g})", self.estimate(solution))
                 solutions[i] = solution
             except NotConverged as failure:
-                failures.append(str(failure))
-            advance()
-        result = self._result([solutions[i] for i in sorted(solutions)])
-        if failures:
-            raise NotConverged("\n".join(failures), result)
-        return result
+                failures.append(Failure(float(points[i]), str(failure)))
+            progress()
+        return self._result([solutions[i] for i in sorted(solutions)], failures)
 
     def estimate(self, solution: Solution) -> Estimate:
         """Λ(p) on the scale of the terms of Eq. (37) before they cancel."""
@@ -260,7 +273,7 @@ class ExponentSolver:
             error, allowed = solution.error, self.tolerance(pair.p, pair.value)
         return SAFETY * error <= allowed
 
-    def _result(self, solutions: Sequence[Solution]) -> MomentLyapunov:
+    def _result(self, solutions: Sequence[Solution], failures: Sequence[Failure]) -> MomentLyapunov:
         pairs = tuple(solution.pair for solution in solutions)
         p, errors = np.array([pair.p for pair in pairs]), np.array([solution.error for solution in solutions])
         value = np.array([pair.value for pair in pairs])
@@ -272,6 +285,7 @@ class ExponentSolver:
             residual=np.array([pair.residual for pair in pairs]),
             pairs=pairs,
             warnings=(*self.missed(p, value, errors), *self.misplaced(pairs)),
+            failures=tuple(failures),
         )
 
     def missed(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[str, ...]:

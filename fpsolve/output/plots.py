@@ -8,12 +8,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.exponent.quantities import Quantity
 from fpsolve.files import atomic
+
+if TYPE_CHECKING:
+    from fpsolve.simulation.response import Response
 
 SYMBOLS = {
     "p": "$p$",
@@ -35,11 +39,7 @@ TITLES = {
     "noise.D0": "noise intensity $D_0$",
     "noise.tau0": r"correlation time $\tau_0$ (time)",
     "noise.r0": "departure from Gaussian noise $r_0$",
-    "moment": r"moment Lyapunov exponent $\Lambda(p)$ (1/time)",
-    "lyapunov_exponent": r"largest Lyapunov exponent $\lambda$ (1/time)",
-    "stability_index": r"stability index $\delta_p$",
 }
-EQUATIONS = {"moment": "(37)", "lyapunov_exponent": "(39)", "stability_index": "(38)"}
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
@@ -63,68 +63,69 @@ class Series:
 
 
 def write_figure(
-    series: Sequence[Series], x: str, y: str, title: str, paths: Sequence[Path], *, is_reduced: bool = False
+    series: Sequence[Series], x: str, y: Quantity, title: str, paths: Sequence[Path], *, is_reduced: bool = False
 ) -> None:
     """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
 
     Args:
         series: the curves.
         x: "p" or the dotted key of a parameter.
-        y: "moment", "lyapunov_exponent" or "stability_index".
+        y: what is drawn.
         title: stands above the axes.
         paths: .png, .pdf or what else matplotlib writes.
         is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
     with _canvas(paths) as figure:
-        axes = figure.add_subplot(xlabel=TITLES.get(x, SYMBOLS.get(x, x)), ylabel=TITLES[y])
+        axes = figure.add_subplot(xlabel=TITLES.get(x, SYMBOLS.get(x, x)), ylabel=y.title)
         axes.set_title(fill(title, 80), parse_math=False)
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
             _draw(axes, item, i)
         is_simulated = any(item.simulated is not None for item in series)
-        _add_legend(axes, EQUATIONS[y] + (", reduced noise" if is_reduced else ""), is_simulated)
+        _add_legend(axes, y.equation + (", reduced noise" if is_reduced else ""), is_simulated)
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         axes.margins(x=0.03)
 
 
-def write_response_figure(
-    x_edges: FloatArray,
-    v_edges: FloatArray,
-    density: FloatArray,
-    amplitude_edges: FloatArray,
-    amplitude_density: FloatArray,
-    amplitude_error: FloatArray,
-    title: str,
-    paths: Sequence[Path],
-) -> None:
+def write_response_figure(response: Response, title: str, paths: Sequence[Path]) -> None:
     """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors.
 
     Args:
-        x_edges, v_edges, density: shapes (n + 1,), (m + 1,) and (n, m).
-        amplitude_edges, amplitude_density, amplitude_error: shapes (k + 1,), (k,) and (k,).
+        response: its histograms.
         title: stands above.
         paths: .png, .pdf or what else matplotlib writes.
     """
-    from matplotlib.colors import LogNorm
-
+    share = np.cumsum(response.amplitude_density * np.diff(response.amplitude_edges))
+    seen = float(response.amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
     with _canvas(paths, width=10.5) as figure:
         figure.suptitle(fill(title, 100), fontsize=12, parse_math=False)
         plane, radial = figure.subplots(1, 2)
-        scale = LogNorm(max(density[density > 0].min(), density.max() * 1e-4), density.max())
-        visited = np.ma.masked_equal(density.T, 0)
-        picture = plane.pcolormesh(x_edges, v_edges, visited, cmap="viridis", norm=scale, rasterized=True)
-        share = np.cumsum(amplitude_density * np.diff(amplitude_edges))
-        seen = float(amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
-        velocity = seen * v_edges[-1] / x_edges[-1]
-        plane.set(xlabel="$x$", ylabel=r"$\dot{x}$ (1/time)", xlim=(0, seen), ylim=(-velocity, velocity))
+        picture = _draw_plane(plane, response, seen)
         figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$")
-        middle = (amplitude_edges[1:] + amplitude_edges[:-1]) / 2
-        low, high = amplitude_density - 2 * amplitude_error, amplitude_density + 2 * amplitude_error
-        radial.fill_between(middle, low, high, color=_COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")
-        radial.plot(middle, amplitude_density, color=_COLOURS[0], linewidth=1.6, label="simulation")
-        radial.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", ylabel="density of $A$", xlim=(0, seen))
-        radial.set_ylim(0, 1.25 * high.max())
-        radial.legend(frameon=False, fontsize=11, loc="upper right")
+        _draw_amplitude(radial, response, seen)
+
+
+def _draw_plane(axes: Any, response: Response, seen: float) -> Any:
+    """The density of x and ẋ in colours, which are returned, up to the amplitude `seen`."""
+    from matplotlib.colors import LogNorm
+
+    x, v, density = response.x_edges, response.v_edges, response.density
+    scale = LogNorm(max(density[density > 0].min(), density.max() * 1e-4), density.max())
+    visited = np.ma.masked_equal(density.T, 0)
+    velocity = seen * v[-1] / x[-1]
+    axes.set(xlabel="$x$", ylabel=r"$\dot{x}$ (1/time)", xlim=(0, seen), ylim=(-velocity, velocity))
+    return axes.pcolormesh(x, v, visited, cmap="viridis", norm=scale, rasterized=True)
+
+
+def _draw_amplitude(axes: Any, response: Response, seen: float) -> None:
+    """The density of the amplitude as a line in a band."""
+    edges, density, error = response.amplitude_edges, response.amplitude_density, response.amplitude_error
+    middle, low, high = (edges[1:] + edges[:-1]) / 2, density - 2 * error, density + 2 * error
+    axes.fill_between(middle, low, high, color=_COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")
+    axes.plot(middle, density, color=_COLOURS[0], linewidth=1.6, label="simulation")
+    axes.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", ylabel="density of $A$", xlim=(0, seen))
+    axes.set_ylim(0, 1.25 * high.max())
+    axes.legend(frameon=False, fontsize=11, loc="upper right")
 
 
 @contextmanager

@@ -11,10 +11,9 @@ from rich.table import Table
 from rich.text import Text
 
 from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
 from fpsolve.exponent.error import Estimate
-from fpsolve.study.simulate import SimulatedCurve
-from fpsolve.study.solve import Comparison, CurveResult
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, VARIANCE_RATE, Quantity
+from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.theory.second_order import second_order
 
 
@@ -33,15 +32,15 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
 def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
     """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
     for result in results:
-        failures = {line for failure in result.failures for line in failure.splitlines()}
-        place = _place(case, result.curve)
-        kinds = [
-            ("not converged", "bold red") if text in failures else ("warning", "yellow") for text in result.warnings
-        ]
-        for (kind, style), text in zip(kinds, result.warnings, strict=True):
-            Console(stderr=True).print(Text(f"{kind}: {place}: {text}"), style=style, soft_wrap=True)
-        for text in result.notes:
-            Console(stderr=True).print(Text(f"note: {place}: {text}"), style="cyan", soft_wrap=True)
+        place = case.place(result.curve)
+        reasons = [failure.reason for failure in result.failures]
+        for kind, style, texts in (
+            ("warning", "yellow", result.warnings),
+            ("not converged", "bold red", reasons),
+            ("note", "cyan", result.notes),
+        ):
+            for text in texts:
+                Console(stderr=True).print(Text(f"{kind}: {place}: {text}"), style=style, soft_wrap=True)
 
 
 def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:
@@ -61,10 +60,10 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
                 f"{name} = {sampled(value, error)} ± {error:.1e}"
                 for name, (value, error) in each.response.means.items()
             )
-            text = f"{_place(case, each.curve)}: stationary means: {means}\n"
+            text = f"{case.place(each.curve)}: stationary means: {means}\n"
             console.print(text, highlight=False, soft_wrap=True)
         for warning in each.warnings:
-            line = Text(f"warning: {_place(case, each.curve)}: {warning}")
+            line = Text(f"warning: {case.place(each.curve)}: {warning}")
             Console(stderr=True).print(line, style="yellow", soft_wrap=True)
 
 
@@ -72,19 +71,19 @@ def _simulation_line(simulated: SimulatedCurve, result: CurveResult | None) -> s
     """λ, Λ″(0) and the size of the simulation."""
     found = simulated.result
     value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
-    text = f"λ = {sampled(value, error)} ± {error:.1e}"
+    text = f"{LYAPUNOV_EXPONENT.symbol} = {sampled(value, error)} ± {error:.1e}"
     if result and result.lyapunov_exponent:
         exact = result.lyapunov_exponent.value
         text += f" (finite elements {exact:.6g}, {_deviation(value, error, exact)} s.e. away)"
     rate, rate_error = found.variance_rate, found.variance_rate_error
-    text += f"   Λ″(0) = {sampled(rate, rate_error)} ± {rate_error:.1e}"
+    text += f"   {VARIANCE_RATE.symbol} = {sampled(rate, rate_error)} ± {rate_error:.1e}"
     return f"{text}\n{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}\n"
 
 
 def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Table:
     """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
     table = Table(
-        "p", "Λ(p)", "± s.e.", *(("finite elements", "s.e. away") if result else ()), "effective paths",
+        "p", MOMENT.symbol, "± s.e.", *(("finite elements", "s.e. away") if result else ()), "effective paths",
         title=Text(case.heading(simulated.curve)), title_justify="left",
     )  # fmt: skip
     _align(table)
@@ -103,7 +102,8 @@ def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult
 def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Table:
     """One row for each parameter set: λ by simulation and by finite elements."""
     names = (key.partition(".")[2] for key in case.vary)
-    table = Table(*names, "λ", "± s.e.", "finite elements", "s.e. away", title=Text(case.title), title_justify="left")
+    headings = (LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away")
+    table = Table(*names, *headings, title=Text(case.title), title_justify="left")
     _align(table)
     for each, result in pairs:
         value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
@@ -126,21 +126,12 @@ def _deviation(value: float, error: float, exact: float) -> str:
     return f"{(value - exact) / error:+.1f}"
 
 
-def _place(case: Case, curve: Curve) -> str:
-    return f"{case.name}, {curve.label}" if curve.varied else case.name
-
-
 def _moment_table(case: Case, result: CurveResult) -> Table:
     """p, Λ(p), Eq. (37) and the difference."""
     table = Table(
-        "p",
-        "Λ(p)",
-        "± error",
-        _theory(case, "(37)"),
-        "difference",
-        title=Text(case.heading(result.curve)),
+        "p", MOMENT.symbol, "± error", _theory(case, MOMENT), "difference", title=Text(case.heading(result.curve)),
         title_justify="left",
-    )
+    )  # fmt: skip
     _align(table)
     _explain_star(table, case)
     moments = result.moments
@@ -154,39 +145,32 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
 def _indices(result: CurveResult) -> str:
     """λ, δ_p and Λ″(0) in a line."""
     parts = []
-    for name, estimate in (
-        ("λ", result.lyapunov_exponent),
-        ("δ_p", result.stability_index),
-        ("Λ″(0)", result.variance_rate),
-    ):
+    for name, estimate in result.estimates.items():
         error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
-        parts.append(f"{name} = {_digits_of(estimate, most=9)}{error}")
+        parts.append(f"{INDICES[name].symbol} = {_digits_of(estimate, most=9)}{error}")
     return "   ".join(parts) + "\n"
 
 
 def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     """One row for each parameter set: λ, Eq. (39), δ_p and Eq. (38)."""
+    indices = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
     names = (key.partition(".")[2] for key in case.vary)
-    table = Table(
-        *names, "λ", _theory(case, "(39)"), "δ_p", _theory(case, "(38)"), title=Text(case.title), title_justify="left"
-    )
+    headings = (text for index in indices for text in (index.symbol, _theory(case, index)))
+    table = Table(*names, *headings, title=Text(case.title), title_justify="left")
     _align(table)
     _explain_star(table, case)
     for result in results:
-        curve = result.curve
-        table.add_row(
-            *(f"{value:g}" for value in curve.varied.values()),
-            _digits_of(result.lyapunov_exponent, most=7),
-            f"{second_order(curve.problem).lyapunov_exponent:.6g}",
-            _digits_of(result.stability_index, most=7),
-            f"{second_order(curve.problem).stability_index:.6g}",
-        )
+        theory = second_order(result.curve.problem)
+        row = [f"{value:g}" for value in result.curve.varied.values()]
+        for index in indices:
+            row += [_digits_of(result.estimates[index.name], most=7), f"{index.theory(theory):.6g}"]
+        table.add_row(*row)
     return table
 
 
-def _theory(case: Case, equation: str) -> str:
+def _theory(case: Case, quantity: Quantity) -> str:
     """Heading of a column of perturbation theory, starred where it has another noise than the solution."""
-    return f"Eq. {equation}*" if case.is_exact else f"Eq. {equation}"
+    return f"Eq. {quantity.equation}*" if case.is_exact else f"Eq. {quantity.equation}"
 
 
 def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:

@@ -25,6 +25,7 @@ from fpsolve.exponent.fields import Fields, fields, xi_marginal
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_space import DiffusionSpace, Samples
 from fpsolve.files import atomic
+from fpsolve.study.results import CurveResult, SimulatedCurve
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals written; elements of a higher degree are cut into several of them."""
@@ -74,25 +75,38 @@ def write_density(path: Path, stationary: PrincipalPair) -> Path:
     return path
 
 
-def write_response(path: Path, x_edges: FloatArray, v_edges: FloatArray, density: FloatArray) -> Path:
-    """Write the joint density of x and ẋ on a uniform grid of cells to a `.vti` file, as the cell data `density`.
+def write_curve(result: CurveResult, folder: Path) -> set[Path]:
+    """Write the eigenfunctions of a curve, and return their files; with the first curve the stationary density too."""
+    stationary, curve = result.stationary, result.curve
+    if stationary is not None and curve.number == 1:
+        write_density(folder / "density.vtu", stationary)
+    if stationary is None or not result.eigenpairs:
+        return set()
+    copy_show_script(folder)
+    return set(write_eigenfunctions(folder, result.eigenpairs, stationary, stem=f"eigenfunctions{curve.suffix}"))
 
-    Args:
-        path: the file.
-        x_edges, v_edges: uniform, shapes (n + 1,) and (m + 1,).
-        density: shape (n, m).
+
+def write_response(simulated: SimulatedCurve, folder: Path) -> set[Path]:
+    """Write the joint density of x and ẋ, if there is a response, as the cell data `density` of response.vti.
+
+    Returns:
+        The file.
     """
     import pyvista
 
+    response = simulated.response
+    if response is None:
+        return set()
+    path, x, v = folder / f"response{simulated.curve.suffix}.vti", response.x_edges, response.v_edges
     grid = pyvista.ImageData(
-        dimensions=(x_edges.size, v_edges.size, 1),
-        spacing=(x_edges[1] - x_edges[0], v_edges[1] - v_edges[0], 1.0),
-        origin=(x_edges[0], v_edges[0], 0.0),
+        dimensions=(x.size, v.size, 1),
+        spacing=(x[1] - x[0], v[1] - v[0], 1.0),
+        origin=(x[0], v[0], 0.0),
     )
-    grid.cell_data["density"] = density.ravel(order="F")
+    grid.cell_data["density"] = response.density.ravel(order="F")
     with atomic(path) as temporary:
         grid.save(temporary)
-    return path
+    return {path}
 
 
 def copy_show_script(directory: Path) -> Path:

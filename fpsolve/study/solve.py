@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.case.remedies import in_words_of_a_case
@@ -17,77 +15,30 @@ from fpsolve.case.sections import Expectation
 from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.function import SEARCH_INTERVAL, solve_moments, stability_index
+from fpsolve.exponent.moments import solve_moments
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
+from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
 from fpsolve.theory.second_order import second_order
 
 UNRESOLVED = 0.1
 """The share of an eigenfunction with the wrong sign from which on its picture misleads."""
-Advance = Callable[[], None]
-Found = TypeVar("Found")
 
 
-@dataclass(frozen=True, eq=False)
-class CurveResult:
-    """What was computed for one parameter set.
-
-    Attributes:
-        curve: the parameters, the oscillator and the noise.
-        moments: Λ(p); where some p failed, of the others.
-        moments_perturbation: Eq. (37) at the same p.
-        lyapunov_exponent, variance_rate: λ and Λ″(0); None where p = 0 did not converge.
-        stability_index: δ_p; None where there is none in the interval searched, or it did not converge.
-        eigenpairs: those whose eigenfunctions are written; none once they are no longer needed.
-        stationary: the eigenpair at p = 0; None once it is no longer needed.
-        mesh: what was used for the p of the largest size, ξ in noise units; None where no p was solved.
-        warnings: what limits these numbers.
-        notes: where the theories compared with are not valid.
-        failures: why some p are missing.
-    """
-
-    curve: Curve
-    moments: MomentLyapunov
-    moments_perturbation: FloatArray
-    lyapunov_exponent: Estimate | None
-    stability_index: Estimate | None
-    variance_rate: Estimate | None
-    eigenpairs: tuple[PrincipalPair, ...]
-    stationary: PrincipalPair | None
-    mesh: dict[str, Any] | None
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]
-    failures: tuple[str, ...] = ()
-
-    def without_pairs(self) -> CurveResult:
-        """The numbers without the eigenpairs, whose matrices take some 20 MB a curve."""
-        return replace(self, moments=replace(self.moments, pairs=()), eigenpairs=(), stationary=None)
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One expectation of a case and what was computed; `met` says whether they agree."""
-
-    expectation: Expectation
-    varied: dict[str, float]
-    value: float | None
-    tolerance: float
-    met: bool
-
-
-def work(case: Case) -> int:
-    """How many moments a case has in all its curves."""
+def solving_work(case: Case) -> int:
+    """How often `solve_curves` reports progress: once for each moment of each curve."""
     return len(case.curves()) * case.p.size
 
 
-def solve(case: Case, *, advance: Advance = lambda: None) -> Iterator[CurveResult]:
+def solve_curves(case: Case, *, progress: Callable[[], None] = lambda: None) -> Iterator[CurveResult]:
     """Solve the curves of a case one after the other; what did not converge is in their `failures`."""
     mesh = case.cylinder_mesh()
     for curve in case.curves():
         try:
-            yield _solve_curve(case, curve, mesh, advance)
+            yield _solve_curve(case, curve, mesh, progress)
         except MeshError as failure:
             raise MeshError(f"{case.path}: mesh, or the finer one that measures its error: {failure}") from failure
 
@@ -102,64 +53,45 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
     ]
 
 
-def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, advance: Advance) -> CurveResult:
+def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: Callable[[], None]) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
-    moments, root, failures = _solve_moments(solver, case.p, advance)
-    warnings = list(moments.warnings)
-    index, obstacle = _attempt(lambda: stability_index(solver, guess=root))
-    if index is None and not obstacle:
-        low, high = np.clip(SEARCH_INTERVAL, *curve.noise.moments)
-        warnings.append(f"no stability index: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]")
-    exponent, no_exponent = _attempt(solver.lyapunov_exponent)
-    rate, no_rate = _attempt(solver.variance_rate)
-    stationary, _ = _attempt(lambda: solver.pair(0.0))
-    warnings += [f"no stability index: {obstacle}"] * bool(obstacle) + [no_exponent] * bool(no_exponent)
-    warnings += [no_rate] * bool(no_rate)
-    warnings += _imprecise({"λ": exponent, "δ_p": index, "Λ″(0)": rate}, case.rtol, mesh is None)
-    attempts = (_attempt(partial(solver.pair, float(p)))[0] for p in case.shown if np.any(moments.p == p))
+    moments = solve_moments(solver, case.p, progress=progress)
+    estimates, missing = _solve_indices(solver, moments.root)
+    attempts = (_pair(solver, float(p)) for p in case.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
-    warnings += _unresolved(pairs)
-    lines = (line for failure in failures for line in failure.splitlines())
     return CurveResult(
         curve=curve,
         moments=moments,
         moments_perturbation=second_order(curve.problem).moment_exponent(moments.p),
-        lyapunov_exponent=exponent,
-        stability_index=index,
-        variance_rate=rate,
+        estimates=estimates,
         eigenpairs=pairs,
-        stationary=stationary,
+        stationary=_pair(solver, 0.0),
         mesh=None if (space := solver.largest()) is None else _mesh(space),
-        warnings=tuple(map(in_words_of_a_case, (*warnings, *lines))),
+        warnings=tuple(
+            map(
+                in_words_of_a_case,
+                (*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None), *_unresolved(pairs)),
+            )
+        ),
         notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments))),
-        failures=tuple(map(in_words_of_a_case, failures)),
+        failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),
     )
 
 
-def _solve_moments(
-    solver: ExponentSolver, p: FloatArray, advance: Advance
-) -> tuple[MomentLyapunov, float | None, tuple[str, ...]]:
-    """Λ at all p; its root other than 0, where that is known; and why some p failed.
-
-    `advance` is called once for each p, whatever the number of solves.
-    """
-    left = p.size
-
-    def step() -> None:
-        nonlocal left
-        if left:
-            left -= 1
-            advance()
-
-    root: float | None = None
-    failures: tuple[str, ...] = ()
-    try:
-        moments, root = solve_moments(solver, p, advance=step)
-    except NotConverged as failure:
-        moments, failures = failure.partial, (str(failure),)
-    for _ in range(left):
-        step()
-    return moments, root, failures
+def _solve_indices(solver: ExponentSolver, root: float | None) -> tuple[dict[str, Estimate | None], list[str]]:
+    """All indices, δ_p first, and why some are missing."""
+    estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
+    missing = []
+    for index in (STABILITY_INDEX, LYAPUNOV_EXPONENT, VARIANCE_RATE):
+        low, high = np.clip(index.interval, *solver.problem.noise.moments)
+        try:
+            estimates[index.name] = index.solve(solver, root)
+            reason = f"Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]"
+        except NotConverged as failure:
+            reason = str(failure)
+        if estimates[index.name] is None:
+            missing.append(f"no stability index: {reason}" if index is STABILITY_INDEX else reason)
+    return estimates, missing
 
 
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov) -> tuple[str, ...]:
@@ -183,22 +115,21 @@ def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
     ]
 
 
-def _imprecise(estimates: dict[str, Estimate | None], rtol: float, is_adaptive: bool) -> list[str]:
-    """Which of some named numbers miss rtol."""
+def _imprecise(estimates: Mapping[str, Estimate | None], rtol: float, is_adaptive: bool) -> list[str]:
+    """Which indices miss rtol."""
     return [
-        f"rtol = {rtol:g} is not met by {name}: {estimate.value:.6g} has an estimated error of "
+        f"rtol = {rtol:g} is not met by {INDICES[name].symbol}: {estimate.value:.6g} has an estimated error of "
         f"{estimate.error_estimate:.1e}; {'' if is_adaptive else Remedy.MESH + ', or '}use a larger rtol"
         for name, estimate in estimates.items()
         if estimate and estimate.relative_error > rtol
     ]
 
 
-def _attempt(compute: Callable[[], Found]) -> tuple[Found | None, str]:
-    """What is computed, or why it did not converge."""
+def _pair(solver: ExponentSolver, p: float) -> PrincipalPair | None:
     try:
-        return compute(), ""
-    except NotConverged as failure:
-        return None, str(failure)
+        return solver.pair(p)
+    except NotConverged:
+        return None
 
 
 def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
@@ -206,7 +137,7 @@ def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
         found = np.isclose(result.moments.p, expectation.p, rtol=0, atol=1e-12)
         value = float(result.moments.value[found][0]) if np.any(found) else None
     else:
-        estimate = getattr(result, expectation.quantity)
+        estimate = result.estimates[expectation.quantity]
         value = None if estimate is None else estimate.value
     tolerance = max(expectation.atol or 0.0, (expectation.rtol or 0.0) * abs(expectation.value))
     met = value is not None and abs(value - expectation.value) <= tolerance

@@ -7,7 +7,8 @@ import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import second_derivative
-from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov, stability_index
+from fpsolve.exponent.function import MomentLyapunovFunction, nonzero_root
+from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
@@ -146,7 +147,7 @@ def test_stability_index_is_a_root_and_lambda_the_slope():
     for c1 in (-0.2, 0.1, 0.4):
         oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=c1, epsilon=0.1)
         solver = ExponentSolver(Problem(oscillator, WEAK_NOISE), rtol=1e-11)
-        index = stability_index(solver)
+        index = nonzero_root(solver)
         assert abs(solver.pair(index.value).value) < 1e-14
         assert math.copysign(1, index.value) == -math.copysign(1, solver.lyapunov_exponent().value)
 
@@ -157,7 +158,7 @@ def test_stability_index_near_zero():
     for c1 in np.linspace(-0.1172, -0.1168, 5):
         oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=float(c1), epsilon=0.1)
         solver = ExponentSolver(Problem(oscillator, WEAK_NOISE), rtol=1e-10)
-        indices.append(stability_index(solver).value)
+        indices.append(nonzero_root(solver).value)
         expected = -2 * solver.lyapunov_exponent().value / solver.variance_rate().value
         assert indices[-1] == pytest.approx(expected, abs=1e-6)
     assert np.all(np.abs(np.diff(indices, 2)) < 1e-6)
@@ -165,13 +166,13 @@ def test_stability_index_near_zero():
 
 def test_no_stability_index_within_the_interval_is_none():
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
-    assert stability_index(ExponentSolver(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)))) is None
+    assert nonzero_root(ExponentSolver(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)))) is None
 
 
 @pytest.mark.parametrize("epsilon", [1e-2, 1e-4, 1e-5])
 def test_stability_index_of_the_weakest_noise(epsilon):
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=-0.3, epsilon=epsilon)
-    index = stability_index(ExponentSolver(Problem(oscillator, WEAK_NOISE)))
+    index = nonzero_root(ExponentSolver(Problem(oscillator, WEAK_NOISE)))
     theory = perturbation.stability_index(oscillator, WEAK_NOISE)
     assert abs(index.value - theory) <= index.error_estimate + 10 * epsilon**2
     assert index.error_estimate < 1e-5

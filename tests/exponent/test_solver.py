@@ -7,7 +7,7 @@ import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import principal_pair, second_derivative
-from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh

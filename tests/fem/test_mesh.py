@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fpsolve.errors import MeshError
-from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.fem.mesh_file import MARKERS, read_mesh, write_mesh

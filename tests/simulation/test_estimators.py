@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fpsolve.errors import NoSuchExponent
-from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem

@@ -9,7 +9,7 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.study import solve as solving
+from fpsolve.study.solve import compare, solve_curves
 from tests.oracles import perturbation
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -19,7 +19,7 @@ NAMES = sorted(path.stem for path in CASES.glob("*.toml"))
 @cache
 def solved(name):
     case = load_case(CASES / f"{name}.toml")
-    return case, [result.without_pairs() for result in solving.solve(case)]
+    return case, [result.without_pairs() for result in solve_curves(case)]
 
 
 def index(result):
@@ -42,7 +42,7 @@ def test_there_is_a_case_for_every_figure():
 @pytest.mark.parametrize("name", NAMES)
 def test_every_case_meets_its_expectations(name):
     case, results = solved(name)
-    comparisons = solving.compare(case, results)
+    comparisons = compare(case, results)
     assert comparisons
     assert [item for item in comparisons if not item.met] == []
 

@@ -9,7 +9,7 @@ import pytest
 
 import fpsolve
 from fpsolve.errors import CaseError, NotConverged, OutputError
-from fpsolve.study import solve as curves
+from fpsolve.study.solve import UNRESOLVED, compare, solve_curves, solving_work
 
 TEXT = """
 title = "A test"
@@ -149,7 +149,7 @@ def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        fpsolve.run(case, tmp_path / "out", advance=interrupt)
+        fpsolve.run(case, tmp_path / "out", progress=interrupt)
     summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
     assert [curve["varied"]["noise.D0"] for curve in summary["curves"]] == [0.1]
     assert "eigenfunctions.pvd" in files(tmp_path / "out/test")
@@ -205,8 +205,8 @@ def test_a_place_that_cannot_be_written_is_an_output_error(case, tmp_path):
 
 def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
     case = write(tmp_path, TEXT, ["noise.treatment='exact'"])
-    result = next(curves.solve(case))
-    reduced = next(curves.solve(write(tmp_path, TEXT)))
+    result = next(solve_curves(case))
+    reduced = next(solve_curves(write(tmp_path, TEXT)))
     np.testing.assert_array_equal(result.moments_perturbation, reduced.moments_perturbation)
     assert case.is_exact
 
@@ -215,14 +215,14 @@ def test_an_unwritable_folder_is_refused_before_solving(case, tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     calls = []
     with pytest.raises(OutputError, match=r"file/test cannot be made: .*choose another folder"):
-        fpsolve.run(case, tmp_path / "file", advance=lambda: calls.append(1))
+        fpsolve.run(case, tmp_path / "file", progress=lambda: calls.append(1))
     assert calls == []
 
 
-def test_advance_is_called_once_for_each_moment(case, tmp_path):
+def test_progress_is_called_once_for_each_moment(case, tmp_path):
     calls = []
-    fpsolve.run(case, tmp_path, advance=lambda: calls.append(1))
-    assert len(calls) == curves.work(case) == 6
+    fpsolve.run(case, tmp_path, progress=lambda: calls.append(1))
+    assert len(calls) == solving_work(case) == 6
 
 
 def test_expectations_are_compared_where_they_select(tmp_path):
@@ -241,7 +241,7 @@ atol = 1e-3
 source = "wrong on purpose"
 """
     case = write(tmp_path, TEXT + expect)
-    comparisons = curves.compare(case, list(curves.solve(case)))
+    comparisons = compare(case, list(solve_curves(case)))
     assert [(item.varied["noise.D0"], item.met) for item in comparisons] == [(1.0, True), (0.1, False), (1.0, False)]
 
 
@@ -258,8 +258,8 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
         TEXT,
         [*sets, "moments.p=[4.0]", "output.eigenfunctions=[4.0]", "moments.rtol=1e-5", 'vary={"noise.D0"=[0.5]}'],
     )
-    (result,) = curves.solve(case)
+    (result,) = solve_curves(case)
     pair = result.eigenpairs[0]
     told = [text for text in result.warnings if "do not read its picture" in text]
-    assert len(told) == sum(defect > curves.UNRESOLVED for defect in pair.sign_defects) == 1
+    assert len(told) == sum(defect > UNRESOLVED for defect in pair.sign_defects) == 1
     assert min(pair.sign_defects) < 1e-4
