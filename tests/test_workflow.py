@@ -10,6 +10,7 @@ import pytest
 import fpsolve
 from fpsolve.errors import CaseError, NotConverged, OutputError
 from fpsolve.study.solve import UNRESOLVED, compare, solve_curves, solving_work
+from fpsolve.workflow import check_case, run_case
 
 TEXT = """
 title = "A test"
@@ -138,6 +139,20 @@ def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
     assert len(summary["curves"][1]["moments"]) < 3
     assert "use more cells" in summary["curves"][1]["warnings"][-1]
     assert {"figure.png", "moments.csv"} <= files(tmp_path / "out/test")
+
+
+def test_failures_are_values(tmp_path):
+    text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
+    case = write(tmp_path, text, [HOPELESS])
+    outcome, checked = run_case(case, tmp_path / "out"), check_case(case)
+    for results in (outcome.results, checked.results):
+        assert [[failure.p for failure in result.failures] for result in results] == [[], [2.0]]
+        assert not {failure.reason for failure in results[1].failures} & set(results[1].warnings)
+    assert len(outcome.failures) == len(checked.failures) == 1
+    assert not outcome.interrupted
+    curves = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    assert curves[1]["warnings"] == [*outcome.results[1].warnings, *outcome.failures]
+    assert files(tmp_path) == {"test.toml", *(f"out/test/{name}" for name in files(tmp_path / "out/test"))}
 
 
 def test_an_interruption_keeps_the_finished_curves(case, tmp_path):

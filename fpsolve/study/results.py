@@ -76,12 +76,14 @@ class SimulatedCurve:
         result: λ and Λ(p) of the linear system.
         response: the stationary response of the nonlinear system; None where c₂ = c₃ = 0 or there is none.
         warnings: what limits these numbers.
+        interrupted: whether the simulation was stopped early.
     """
 
     curve: Curve
     result: MonteCarlo
     response: Response | None
     warnings: tuple[str, ...]
+    interrupted: bool = False
 
     @property
     def estimates(self) -> dict[str, tuple[float, float]]:
@@ -91,11 +93,6 @@ class SimulatedCurve:
             LYAPUNOV_EXPONENT.name: (found.lyapunov_exponent, found.lyapunov_exponent_error),
             VARIANCE_RATE.name: (found.variance_rate, found.variance_rate_error),
         }
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether the simulation was stopped early."""
-        return self.result.interrupted or (self.response is not None and self.response.interrupted)
 
 
 @dataclass(frozen=True)

@@ -66,15 +66,18 @@ def _simulate_curve(case: Case, curve: Curve, progress: Callable[[], None]) -> S
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
     if not _is_nonlinear(curve) or result.interrupted:
-        return SimulatedCurve(curve, result, None, result.warnings)
-    response, warnings = _respond(case, curve, result, progress)
-    return SimulatedCurve(curve, result, response, (*result.warnings, *warnings))
+        return SimulatedCurve(curve, result, None, result.warnings, result.interrupted)
+    try:
+        response, warnings = _respond(curve, result, progress)
+    except KeyboardInterrupt:
+        warning = "no stationary response: stopped before it was reached"
+        return SimulatedCurve(curve, result, None, (*result.warnings, warning), interrupted=True)
+    interrupted = response is not None and response.interrupted
+    return SimulatedCurve(curve, result, response, (*result.warnings, *warnings), interrupted)
 
 
-def _respond(
-    case: Case, curve: Curve, result: MonteCarlo, progress: Callable[[], None]
-) -> tuple[Response | None, list[str]]:
-    """The stationary response, or why there is none."""
+def _respond(curve: Curve, result: MonteCarlo, progress: Callable[[], None]) -> tuple[Response | None, list[str]]:
+    """The stationary response, or why there is none. Raises KeyboardInterrupt before it is stationary."""
     from fpsolve.simulation.response import stationary_response
 
     value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
@@ -86,13 +89,10 @@ def _respond(
             f"no stationary response: λ = {value:.3g} ± {error:.1e} {reason}, "
             "and with λ < 0 almost every path comes to rest"
         ]
-    try:
-        response = stationary_response(
-            curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
-            time=result.time, step=result.step, seed=result.seed, progress=progress,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        return None, ["no stationary response: stopped before it was reached"]
+    response = stationary_response(
+        curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
+        time=result.time, step=result.step, seed=result.seed, progress=progress,
+    )  # fmt: skip
     warnings = [f"the response was stopped early, after {response.time:.3g}"] if response.interrupted else []
     return response, warnings
 

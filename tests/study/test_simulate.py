@@ -14,7 +14,9 @@ import pytest
 import pyvista
 
 from fpsolve.cli import main
+from fpsolve.errors import NotConverged
 from fpsolve.output import figures
+from fpsolve.simulation import response
 from fpsolve.study import simulate as simulated
 
 CASE = """
@@ -52,6 +54,13 @@ def out(tmp_path):
 
 def simulate(*arguments):
     return main(["simulate", *map(str, arguments)])
+
+
+def raising(exception):
+    def fail(*_, **__):
+        raise exception
+
+    return fail
 
 
 def read(path):
@@ -157,6 +166,47 @@ def test_run_adds_markers_over_a_parameter(case, out):
     assert main(["run", str(case), "--out", str(out), "--monte-carlo", *arguments]) == 0
     assert (out / "quick/figure.png").stat().st_size > 10_000
     assert (out / "quick/monte_carlo-2.json").exists()
+
+
+def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, out, capsys, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(simulated, "_simulate_curve", raising(KeyboardInterrupt))
+    monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo"]) == 130
+    ((series,),) = drawn
+    assert series.simulated is None
+    assert (out / "quick/summary.json").exists()
+    printed = capsys.readouterr()
+    assert "δ_p" in printed.out
+    assert "interrupted" in printed.err
+
+
+def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, monkeypatch):
+    drawn, original = [], simulated._simulate_curve
+
+    def failing_later(case, curve, progress):
+        if curve.number == 2:
+            raise NotConverged("the simulation overflowed")
+        return original(case, curve, progress)
+
+    monkeypatch.setattr(simulated, "_simulate_curve", failing_later)
+    monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
+    sets = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", "monte_carlo.time=100.0"]
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *sets]) == 3
+    (series,) = drawn
+    assert [item.simulated is not None for item in series] == [True, False]
+    assert (out / "quick/monte_carlo.json").exists()
+    assert "the simulation overflowed" in capsys.readouterr().err
+
+
+def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys, monkeypatch):
+    monkeypatch.setattr(response, "stationary_response", raising(KeyboardInterrupt))
+    sets = ["oscillator.c2=0.5", "oscillator.c1=0.8", 'vary."noise.D0"=[0.1, 0.2]']
+    assert simulate(case, "--out", out, *(f"--set={text}" for text in sets)) == 130
+    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+    found = read(out / "quick/monte_carlo.json")
+    assert "no stationary response: stopped before it was reached" in found["warnings"]
+    assert "what was done is kept" in capsys.readouterr().err
 
 
 def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
