@@ -29,7 +29,7 @@ from fpsolve.errors import MeshError, NoPerturbationTheory, NoSuchExponent
 from fpsolve.model.noise import ColouredNoise, check_existence
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.setup import obstacles
-from fpsolve.theory.second_order import second_order
+from fpsolve.theory.perturbation import second_order
 
 MAX_CURVES = 10_000
 _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"

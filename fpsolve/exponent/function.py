@@ -51,9 +51,6 @@ class MomentLyapunovFunction:
         NotConverged: some p failed, or Λ(p) is not convex, so that a wrong eigenvalue is among the values.
     """
 
-    nodes: FloatArray
-    interpolation_error: float
-
     @of_problem_too
     def __init__(
         self,
@@ -77,7 +74,7 @@ class MomentLyapunovFunction:
         for count in LEVELS:
             last = self.interpolation_error
             self._interpolate(count, progress)
-            if self.is_converged or self._nodes_needed(last) > most:
+            if self.is_converged or _nodes_needed(count, last, self.interpolation_error, self._allowed) > most:
                 break
         self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
         if obstacle := broken_convexity(self._pairs, np.abs(self.nodes) * self._errors):
@@ -152,33 +149,17 @@ class MomentLyapunovFunction:
             raise ValueError(f"p must lie in [{low:g}, {high:g}], the interval of this function; make a wider one")
         return points
 
-    def _nodes_needed(self, last: float) -> float:
-        """How many nodes convergence may take, from the error with half as many, if it falls exponentially."""
-        count = self.nodes.size
-        if not math.isfinite(last) or self.is_converged:
-            return 2 * count - 1
-        rate = math.log(max(last / self.interpolation_error, 1.1)) / (count // 2)
-        return max(2 * count - 1, count + math.log(self.interpolation_error / self._allowed) / rate)
-
     def _interpolate(self, count: int, progress: Callable[[], None]) -> None:
         """Solve at so many Chebyshev points, the outermost first, and interpolate."""
-        low, high = self.interval
-        middle, half = 0.5 * (low + high), 0.5 * (high - low)
         x = -np.cos(np.pi * np.arange(count) / (count - 1))
-        nodes = middle + half * x
-        nodes[[0, -1]] = low, high
-        nodes[np.abs(nodes) < 1e-12 * half] = 0.0
+        self.nodes = _scaled(x, *self.interval)
         ratios = np.empty((count, 3))
-        for i in best_order(nodes):
-            ratios[i] = self.solver.ratio(float(nodes[i]))
+        for i in best_order(self.nodes):
+            ratios[i] = self.solver.ratio(float(self.nodes[i]))
             progress()
-        values, slopes, errors = ratios.T
-        basis = np.eye(2 * count)
-        conditions = np.concatenate([chebval(x, basis).T, chebval(x, chebder(basis, axis=0)).T / count])
-        coefficients = np.linalg.solve(conditions, np.concatenate([values, slopes * half / count]))
-        self._series = Chebyshev(coefficients, domain=self.interval)
-        self.nodes, self._errors = nodes, errors
-        self.interpolation_error = 2 * float(np.max(np.abs(coefficients[-3:])))
+        values, slopes, self._errors = ratios.T
+        self._series = _hermite_interpolant(x, values, slopes, self.interval)
+        self.interpolation_error = 2 * float(np.max(np.abs(self._series.coef[-3:])))
 
     @property
     def is_converged(self) -> bool:
@@ -190,6 +171,34 @@ class MomentLyapunovFunction:
     def _allowed(self) -> float:
         """The share of the tolerance of Λ(p)/p that is left to the interpolation."""
         return 0.4 * self.solver.rtol * self.solver.scales.linear
+
+
+def _nodes_needed(count: int, last: float, error: float, allowed: float) -> float:
+    """How many nodes convergence may take, if the error falls exponentially, as from half as many to `count`."""
+    if not math.isfinite(last):
+        return 2 * count - 1
+    rate = math.log(max(last / error, 1.1)) / (count // 2)
+    return max(2 * count - 1, count + math.log(error / allowed) / rate)
+
+
+def _scaled(x: FloatArray, low: float, high: float) -> FloatArray:
+    """Points of [-1, 1] in another interval; its ends and 0 exactly."""
+    half = 0.5 * (high - low)
+    points = 0.5 * (low + high) + half * x
+    points[[0, -1]] = low, high
+    points[np.abs(points) < 1e-12 * half] = 0.0
+    return points
+
+
+def _hermite_interpolant(
+    x: FloatArray, values: FloatArray, slopes: FloatArray, interval: tuple[float, float]
+) -> Chebyshev:
+    """The polynomial with these values and slopes at points that stand for x in [-1, 1]."""
+    count, half = x.size, 0.5 * (interval[1] - interval[0])
+    basis = np.eye(2 * count)
+    conditions = np.concatenate([chebval(x, basis).T, chebval(x, chebder(basis, axis=0)).T / count])
+    coefficients = np.linalg.solve(conditions, np.concatenate([values, slopes * half / count]))
+    return Chebyshev(coefficients, domain=interval)
 
 
 def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str | None:

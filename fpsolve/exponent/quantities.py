@@ -13,7 +13,7 @@ from fpsolve.exponent.function import SEARCH_INTERVAL, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.theory.second_order import SecondOrder
+from fpsolve.theory.perturbation import SecondOrder
 
 DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
 QuantityName = Literal[DrawnName, "variance_rate"]

@@ -22,7 +22,7 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
 from fpsolve.model.noise import Noise, check_existence, has_algebraic_tails
 from fpsolve.model.problem import Problem
-from fpsolve.theory.second_order import Scale, scale_of
+from fpsolve.theory.perturbation import Scale, scale_of
 
 SMALL_P = 1e-2
 """Below it the discretisation is chosen at this p, as Λ and its error go to zero together."""

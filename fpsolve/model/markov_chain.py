@@ -33,6 +33,8 @@ class MarkovChain:
     states: Sequence[float]
     rates: Sequence[Sequence[float]]
 
+    moments = (-math.inf, math.inf)
+
     def __post_init__(self) -> None:
         states, rates = np.array(self.states, dtype=float), np.array(self.rates, dtype=float)
         if states.ndim != 1 or states.size < 2 or rates.shape != 2 * states.shape:
@@ -77,11 +79,6 @@ class MarkovChain:
     def correlation_time(self) -> float:
         """∫ C(t) dt/C(0) over t > 0."""
         return 0.5 * self.spectral_density(0.0) / self.standard_deviation**2
-
-    @property
-    def moments(self) -> tuple[float, float]:
-        """All."""
-        return -math.inf, math.inf
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) = 2 Re π(ξ − ⟨ξ⟩)ᵀ (iω − Q + 1π)⁻¹ (ξ − ⟨ξ⟩), from C(t) = π(ξ − ⟨ξ⟩)ᵀ exp(Qt) (ξ − ⟨ξ⟩)."""

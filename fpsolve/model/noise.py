@@ -87,9 +87,7 @@ class OrnsteinUhlenbeck:
     alpha: Positive
     sigma: Positive
 
-    @property
-    def mean(self) -> float:
-        return 0.0
+    mean, half_width, end_exponent, moments = 0.0, math.inf, 0.0, (-math.inf, math.inf)
 
     @property
     def diffusion(self) -> float:
@@ -104,19 +102,6 @@ class OrnsteinUhlenbeck:
     def correlation_time(self) -> float:
         """1/α₀."""
         return 1 / self.alpha
-
-    @property
-    def moments(self) -> tuple[float, float]:
-        """All."""
-        return -math.inf, math.inf
-
-    @property
-    def half_width(self) -> float:
-        return math.inf
-
-    @property
-    def end_exponent(self) -> float:
-        return 0.0
 
     def drift(self, xi: ArrayLike) -> FloatArray:
         """−α₀ ξ."""
@@ -160,9 +145,7 @@ class NonGaussianNoise:
         """b in 1 + b ξ², the bracket of Eqs. (8)-(9): b = τ₀(r₀ − 1)/(2D₀)."""
         return self.tau0 * (self.r0 - 1) / (2 * self.D0)
 
-    @property
-    def mean(self) -> float:
-        return 0.0
+    mean = 0.0
 
     @property
     def diffusion(self) -> float:

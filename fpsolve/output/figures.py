@@ -12,7 +12,7 @@ from fpsolve.case.case import Case
 from fpsolve.exponent.quantities import INDICES, QUANTITIES, Index
 from fpsolve.output.plots import Series, write_figure, write_response_figure
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.theory.second_order import second_order
+from fpsolve.theory.perturbation import second_order
 
 Pair = tuple[CurveResult, SimulatedCurve | None]
 

@@ -15,7 +15,7 @@ from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.files import atomic, write_json
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.theory.second_order import second_order
+from fpsolve.theory.perturbation import second_order
 
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response

@@ -14,7 +14,7 @@ from fpsolve.case.case import Case
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, VARIANCE_RATE, Quantity
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
-from fpsolve.theory.second_order import second_order
+from fpsolve.theory.perturbation import second_order
 
 
 def print_results(case: Case, results: Sequence[CurveResult]) -> None:

@@ -22,7 +22,7 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
 from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
-from fpsolve.theory.second_order import second_order
+from fpsolve.theory.perturbation import second_order
 
 UNRESOLVED = 0.1
 """The share of an eigenfunction with the wrong sign from which on its picture misleads."""

@@ -1,6 +1,6 @@
 from .frozen import frozen_rate as frozen_rate
-from .second_order import Scale as Scale
-from .second_order import SecondOrder as SecondOrder
-from .second_order import first_order_eigenfunction as first_order_eigenfunction
-from .second_order import scale_of as scale_of
-from .second_order import second_order as second_order
+from .perturbation import Scale as Scale
+from .perturbation import SecondOrder as SecondOrder
+from .perturbation import first_order_eigenfunction as first_order_eigenfunction
+from .perturbation import scale_of as scale_of
+from .perturbation import second_order as second_order

@@ -9,7 +9,7 @@ from fpsolve.errors import Remedy
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.theory.second_order import second_order
+from fpsolve.theory.perturbation import second_order
 
 NEAR_GAUSSIAN = 0.1
 WEAK = 0.05

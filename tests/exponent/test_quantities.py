@@ -9,7 +9,7 @@ from fpsolve.exponent.quantities import INDICES, QUANTITIES, DrawnName, Quantity
 from fpsolve.model.noise import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.theory.second_order import second_order
+from fpsolve.theory.perturbation import second_order
 from tests.conftest import FIG1, FIG1_NOISE
 from tests.oracles import perturbation
 

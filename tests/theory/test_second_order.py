@@ -13,7 +13,7 @@ from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.model.plane import Drive, Kick, PlaneSystem
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.theory.second_order import first_order_eigenfunction, scale_of, second_order
+from fpsolve.theory.perturbation import first_order_eigenfunction, scale_of, second_order
 from tests.oracles import perturbation
 
 ROTATION = ((0.0, 1.0), (-1.0, 0.0))
