@@ -75,7 +75,7 @@ class LineSpace:
         element = _element(degree)
         dofs = skfem.Dofs(skfem.MeshLine(lines), skfem.ElementDG(element) if discontinuous else element)
         self._dofs, self.size = dofs.element_dofs.T, int(dofs.N)
-        self.cells, self.modes = self._hierarchy()
+        self.cells, self.modes = _hierarchy(self._dofs, self.size)
         rules = self._rules(end_exponents)
         local = np.stack([rule.points for rule in rules])
         points, weights = self._global(local), np.stack([rule.weights for rule in rules]) * self._sizes[:, None]
@@ -84,7 +84,7 @@ class LineSpace:
         tables = [_reference(degree, rule.points.tobytes()) for rule in rules]
         values = np.stack([table[0] for table in tables])
         slopes = np.stack([table[1] for table in tables]) / self._sizes[:, None, None]
-        self._transform = self._orthogonalised(slopes)
+        self._transform = _orthogonalised(slopes, self._measure)
         squares = np.einsum("cq,cqi->ci", self._measure, (values @ self._transform) ** 2)
         self._norms = np.sqrt(np.bincount(self._dofs.ravel(), squares.ravel(), minlength=self.size))
         self._transform /= self._norms[self._dofs][:, None, :]
@@ -166,14 +166,6 @@ class LineSpace:
         scaled = diags(self._measure.ravel() * factor(self.points)) @ other.at(self.points)
         return np.asarray(solve(self.mass().toarray(), (self.values.T @ scaled).toarray(), assume_a="pos"), dtype=float)
 
-    def _hierarchy(self) -> tuple[Any, Any]:
-        """`cells` and `modes`: skfem numbers two vertex functions, then bubbles of rising degree, in each cell."""
-        cells, modes = np.full(self.size, -2), np.ones(self.size, dtype=int)
-        for j, dofs in enumerate(self._dofs):
-            cells[dofs] = np.where(cells[dofs] == -2, j, -1)
-            modes[dofs[2:]] = np.arange(2, dofs.size)
-        return cells, modes
-
     def _form(self, left: FloatArray, f: Coefficient, right: FloatArray) -> csr_matrix:
         """∫ w f (right) (left), without what is zero but for rounding."""
         measure = self._measure * f(self.points).reshape(self._measure.shape)
@@ -185,28 +177,6 @@ class LineSpace:
         matrix.eliminate_zeros()
         return matrix
 
-    def _orthogonalised(self, slopes: FloatArray) -> FloatArray:
-        """New functions in the elements' own, shape (m, k + 1, k + 1), so that in every cell ∫ w u′v′ is diagonal.
-
-        The bubbles are orthonormalised by QR, and the vertex functions are made orthogonal to them. All functions
-        keep their values at the vertices: bubbles have no trace.
-        """
-        slopes = np.sqrt(self._measure)[..., None] * slopes
-        scale = np.linalg.norm(slopes, axis=1)
-        if not np.all(scale > 1e-150):
-            raise MeshError("P_s underflows in a cell of the noise; use a narrower interval")
-        q, r = np.linalg.qr(slopes[:, :, 2:] / scale[:, None, 2:])
-        if np.min(np.abs(np.diagonal(r, axis1=1, axis2=2)), initial=1.0) < 1e-14:
-            raise MeshError(
-                f"elements of degree {self.degree} are linearly dependent to rounding, as P_s falls too far within "
-                "a cell of the noise; use more or lower-degree cells, or a narrower interval"
-            )
-        inverse = np.linalg.solve(r, np.broadcast_to(np.eye(r.shape[1]), r.shape)) / scale[:, 2:, None]
-        transform = np.broadcast_to(np.eye(slopes.shape[2]), (len(slopes), *2 * slopes.shape[2:])).copy()
-        transform[:, 2:, 2:] = inverse
-        transform[:, 2:, :2] = -inverse @ (q.transpose(0, 2, 1) @ slopes[:, :, :2])
-        return transform
-
     def _scattered(self, values: FloatArray) -> csr_matrix:
         """Values of each cell's functions, shape (m, n, k + 1), as a matrix of shape (m·n, size)."""
         m, n, k = values.shape
@@ -217,6 +187,39 @@ class LineSpace:
         """The quadrature rule of each cell."""
         count, last, (left, right) = self.degree + _EXTRA_POINTS, self.lines.size - 2, end_exponents
         return [_gauss_rule(count, left * (j == 0), right * (j == last)) for j in range(last + 1)]
+
+
+def _hierarchy(dofs_of_cells: Any, size: int) -> tuple[Any, Any]:
+    """Cell and degree of each unknown: skfem numbers two vertex functions, then bubbles of rising degree, in each cell."""
+    cells, modes = np.full(size, -2), np.ones(size, dtype=int)
+    for j, dofs in enumerate(dofs_of_cells):
+        cells[dofs] = np.where(cells[dofs] == -2, j, -1)
+        modes[dofs[2:]] = np.arange(2, dofs.size)
+    return cells, modes
+
+
+def _orthogonalised(slopes: FloatArray, measure: FloatArray) -> FloatArray:
+    """New functions in the elements' own, shape (m, k + 1, k + 1), so that in every cell ∫ w u′v′ is diagonal.
+
+    `slopes` are those of the elements' own at points with the weights `measure`, shapes (m, n, k + 1) and (m, n). The
+    bubbles are orthonormalised by QR, and the vertex functions are made orthogonal to them. All functions
+    keep their values at the vertices: bubbles have no trace.
+    """
+    slopes = np.sqrt(measure)[..., None] * slopes
+    scale = np.linalg.norm(slopes, axis=1)
+    if not np.all(scale > 1e-150):
+        raise MeshError("P_s underflows in a cell of the noise; use a narrower interval")
+    q, r = np.linalg.qr(slopes[:, :, 2:] / scale[:, None, 2:])
+    if np.min(np.abs(np.diagonal(r, axis1=1, axis2=2)), initial=1.0) < 1e-14:
+        raise MeshError(
+            f"elements of degree {slopes.shape[2] - 1} are linearly dependent to rounding, as P_s falls too far within "
+            "a cell of the noise; use more or lower-degree cells, or a narrower interval"
+        )
+    inverse = np.linalg.solve(r, np.broadcast_to(np.eye(r.shape[1]), r.shape)) / scale[:, 2:, None]
+    transform = np.broadcast_to(np.eye(slopes.shape[2]), (len(slopes), *2 * slopes.shape[2:])).copy()
+    transform[:, 2:, 2:] = inverse
+    transform[:, 2:, :2] = -inverse @ (q.transpose(0, 2, 1) @ slopes[:, :, :2])
+    return transform
 
 
 def _element(degree: int) -> Any:
