@@ -190,7 +190,7 @@ class LineSpace:
 
 
 def _hierarchy(dofs_of_cells: Any, size: int) -> tuple[Any, Any]:
-    """Cell and degree of each unknown: skfem numbers two vertex functions, then bubbles of rising degree, in each cell."""
+    """Cell and degree of each unknown: in each cell skfem numbers two vertex functions, then bubbles by degree."""
     cells, modes = np.full(size, -2), np.ones(size, dtype=int)
     for j, dofs in enumerate(dofs_of_cells):
         cells[dofs] = np.where(cells[dofs] == -2, j, -1)
