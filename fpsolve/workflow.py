@@ -33,11 +33,9 @@ class Watch:
         simulated: takes a case, its simulated curves, and those that are solved too.
     """
 
-    bar: Callable[[str, int], AbstractContextManager[Progress]] = lambda name, total: nullcontext(lambda: None)
-    solved: Callable[[Case, Sequence[CurveResult]], None] = lambda case, results: None
-    simulated: Callable[[Case, Sequence[SimulatedCurve], Sequence[CurveResult]], None] = (
-        lambda case, simulated, results: None
-    )
+    bar: Callable[[str, int], AbstractContextManager[Progress]] = lambda *_: nullcontext(lambda: None)
+    solved: Callable[[Case, Sequence[CurveResult]], None] = lambda *_: None
+    simulated: Callable[[Case, Sequence[SimulatedCurve], Sequence[CurveResult]], None] = lambda *_: None
 
 
 NOBODY = Watch()
@@ -79,7 +77,7 @@ def run(case: Case, out: str | Path = "results", *, progress: Progress = lambda:
         OutputError: the folder cannot be made or written to; nothing is solved.
         NotConverged: some p failed; everything else is written, and `partial` holds it.
     """
-    outcome = run_case(case, out, watch=Watch(bar=lambda name, total: nullcontext(progress)))
+    outcome = run_case(case, out, watch=Watch(bar=lambda *_: nullcontext(progress)))
     if outcome.failures:
         raise NotConverged("\n".join(outcome.failures), outcome.results)
     return outcome.results

@@ -16,6 +16,7 @@ from fpsolve.model.problem import Problem, of_problem
 from fpsolve.theory.perturbation import SecondOrder
 
 DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
+"""What a figure can show."""
 QuantityName = Literal[DrawnName, "variance_rate"]
 
 

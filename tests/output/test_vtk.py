@@ -258,6 +258,7 @@ def test_writing_loads_nothing_that_draws(tmp_path):
 import sys
 from pathlib import Path
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.problem import Problem
 from fpsolve.output.vtk import write_eigenfunctions
 from tests.conftest import FIG1, UNIT_NOISE
 assert "pyvista" not in sys.modules
