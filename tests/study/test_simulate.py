@@ -226,16 +226,26 @@ def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
     assert "64 paths" in printed.out
 
 
+def heed_interrupts():
+    """What runs in the background inherits that SIGINT is ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def test_a_real_interrupt(case, out):
     """SIGINT in the middle of a long slice ends the process soon, with the exit code 130 and a whole file."""
     command = [sys.executable, "-m", "fpsolve.cli", "simulate", str(case), "--out", str(out), "--paths", "64"]
     subprocess.run(command, check=True, capture_output=True)  # compiles
     command[-1] = "400000"
-    with subprocess.Popen([*command, "--time", "4000"], stderr=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-        time.sleep(12)
-        begun = time.monotonic()
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=60)
+    with subprocess.Popen(
+        [*command, "--time", "4000"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, preexec_fn=heed_interrupts
+    ) as process:
+        try:
+            time.sleep(12)
+            begun = time.monotonic()
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=60)
+        finally:
+            process.kill()
         assert process.returncode == 130
         assert time.monotonic() - begun < 20
     found = read(out / "quick/monte_carlo.json")
