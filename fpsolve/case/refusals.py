@@ -1,9 +1,13 @@
-"""What the sections of a case say about each other: every contradiction, with the value and the remedy."""
+"""What the sections of a case say about each other: every contradiction, with the value and the remedy.
+
+Each section is judged by what is valid of those before it, and by the context: the folder of the case file, and
+whether the case varies anything.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -22,6 +26,7 @@ from fpsolve.case.sections import (
     Moments,
     MonteCarloSection,
     NoiseSection,
+    OutputSection,
     Values,
     same,
 )
@@ -31,22 +36,26 @@ from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.setup import obstacles
 from fpsolve.theory.second_order import second_order
 
+Known = Mapping[str, Any]
 MAX_CURVES = 10_000
 _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
 
 
-def vary_refusals(valid: Mapping[str, Any], vary: Mapping[str, Values]) -> Iterator[Refusal]:
+def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
+    is_varied = context.get("varies", False)  # then the curves decide which moments exist
+    return _of_curves({**valid, "moments": moments}, {}, with_existence=not is_varied)
+
+
+def _of_vary(vary: Mapping[str, Values], valid: Known, context: Known) -> Iterator[Refusal]:
     """Too many curves, or one that cannot be solved."""
     number = math.prod(map(len, vary.values()))
     if number > MAX_CURVES:
         yield (), None, f"makes {number} curves; must be at most {MAX_CURVES}; list fewer values"
     else:
-        yield from curve_refusals(valid, vary)
+        yield from _of_curves(valid, vary)
 
 
-def curve_refusals(
-    valid: Mapping[str, Any], vary: Mapping[str, Values], *, with_existence: bool = True
-) -> Iterator[Refusal]:
+def _of_curves(valid: Known, vary: Mapping[str, Values], *, with_existence: bool = True) -> Iterator[Refusal]:
     """The first combination whose parameters contradict each other or overflow, or whose moments are infinite."""
     if not {"oscillator", "noise", "moments"} <= valid.keys():
         return
@@ -74,10 +83,7 @@ def _obstacle(
         with np.errstate(all="ignore"):
             theory = second_order(curve.problem)
             factors = [curve.oscillator.impact_factor(float(extreme)) for extreme in (p.max(), p.min())]
-            sizes = np.append(
-                theory.scale.moment(p),
-                [theory.stability_index, *factors],
-            )
+            sizes = np.append(theory.scale.moment(p), [theory.stability_index, *factors])
     except ValidationError as error:
         context = error.errors()[0].get("ctx", {})
         return str(context.get("error", f"the noise has no finite strength; {_MODERATE}"))
@@ -96,19 +102,21 @@ def _infinite(noise: ColouredNoise, p: FloatArray) -> str:
     return ""
 
 
-def mesh_refusals(mesh: MeshSection, folder: Path) -> Iterator[Refusal]:
+def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """A mesh that cannot be read or made."""
     try:
         with np.errstate(all="ignore"):
-            mesh.mesh(folder)
+            mesh.mesh(context.get("folder", Path()))
     except (MeshError, OSError, ValueError) as error:
         reason = in_words_of_a_case(str(error))
         text = f"got {shown(mesh.file)}; {reason}" if mesh.file else reason
         yield ("file",) if mesh.file else (), mesh.file, text
 
 
-def simulation_refusals(valid: Mapping[str, Any], section: MonteCarloSection) -> Iterator[Refusal]:
+def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """The first parameter set for which the time, the step or a p of the simulation is not right."""
+    if not {"oscillator", "noise", "vary"} <= valid.keys():
+        return
     p = np.array(section.p or (0.0,))
     for varied in combinations(valid["vary"]):
         reason, faults = _obstacle(valid["oscillator"], valid["noise"], varied, p), {}
@@ -125,7 +133,7 @@ def simulation_refusals(valid: Mapping[str, Any], section: MonteCarloSection) ->
             return
 
 
-def figure_refusals(valid: Mapping[str, Any], figure: FigureSection) -> Iterator[Refusal]:
+def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """An abscissa that is not varied."""
     known = ("p", *valid.get("vary", (figure.x,)))
     if figure.x not in known:
@@ -134,9 +142,17 @@ def figure_refusals(valid: Mapping[str, Any], figure: FigureSection) -> Iterator
         yield ("x",), figure.x, text
 
 
-def moment_refusals(
-    valid: Mapping[str, Any], wanted: Iterable[tuple[tuple[str | int, ...], float]]
-) -> Iterator[Refusal]:
+def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    return _of_orders(valid, ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ())))
+
+
+def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
+    yield from _of_orders(valid, (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None))
+    for i, item in enumerate(expect if "vary" in valid else ()):
+        yield from _of_where(i, item.where, valid["vary"])
+
+
+def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float]]) -> Iterator[Refusal]:
     """Each wanted p, with its path, that is not among the moments."""
     moments: Moments | None = valid.get("moments")
     for path, p in wanted:
@@ -146,16 +162,24 @@ def moment_refusals(
             yield path, p, f"got {p}; must be among {known}; add it there, or choose one of them"
 
 
-def where_refusals(valid: Mapping[str, Any], expect: Sequence[Expectation]) -> Iterator[Refusal]:
+def _of_where(i: int, where: Mapping[str, float], vary: Mapping[str, Values]) -> Iterator[Refusal]:
     """Each key of a `where` that is not varied, or not with that value."""
-    vary: Mapping[str, Values] | None = valid.get("vary")
-    if vary is None:
-        return
-    stated = ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items())
-    for i, key, value in stated:
+    for key, value in where.items():
         if key not in vary:
             guess, known = nearest(key, vary), ", ".join(vary) or "none"
             yield (i, "where", key), value, f"is not varied;{guess} varied keys: {known}; add it to [vary]"
         elif not any(same(value, other) for other in vary[key]):
             known = shown(vary[key])
             yield (i, "where", key), value, f"got {value}; must be one of {known}; add it to [vary]"
+
+
+REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
+    "moments": _of_moments,
+    "vary": _of_vary,
+    "mesh": _of_mesh,
+    "monte_carlo": _of_monte_carlo,
+    "figure": _of_figure,
+    "output": _of_output,
+    "expect": _of_expect,
+}
+"""What is wrong with each section."""
