@@ -29,7 +29,6 @@ from fpsolve.study.results import CurveResult, SimulatedCurve
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals written; elements of a higher degree are cut into several of them."""
-_SHOW = "show.py"
 
 
 def write_eigenfunctions(
@@ -117,7 +116,7 @@ def write_response(simulated: SimulatedCurve, folder: Path) -> set[Path]:
 
 def copy_show_script(directory: Path) -> Path:
     """Put `show.py`, which draws the collection in ParaView, into the folder; it remembers which one that was."""
-    target, text = directory / _SHOW, files("fpsolve.output").joinpath(_SHOW).read_text(encoding="utf-8")
+    target, text = directory / "show.py", files("fpsolve.output").joinpath("show.py").read_text(encoding="utf-8")
     write_text(target, text.replace('FOLDER = ""', f"FOLDER = {str(directory.resolve())!r}", 1))
     return target
 
@@ -153,10 +152,6 @@ class _Grid:
         """z of the nodes, each once."""
         return np.append(self.z_cells[:, :-1], self.z_cells[-1, -1])
 
-    @property
-    def xi(self) -> FloatArray:
-        return self.unit * self.z
-
     def fields(self, pair: PrincipalPair) -> Fields:
         """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
         return fields(pair, self.phase_table(pair), self.samples(pair))
@@ -176,7 +171,7 @@ class _Grid:
 
     def points(self) -> FloatArray:
         """(φ, ξ, 0), φ slowest, shape (points, 3)."""
-        phi, xi = np.meshgrid(self.phi.ravel(), self.xi, indexing="ij")
+        phi, xi = np.meshgrid(self.phi.ravel(), self.unit * self.z, indexing="ij")
         return np.stack([phi.ravel(), xi.ravel(), np.zeros(phi.size)], axis=1)
 
     def cells(self) -> Any:
