@@ -25,14 +25,12 @@ from fpsolve.case.sections import (
     MeshSection,
     Moments,
     MonteCarloSection,
-    NoiseSection,
     OutputSection,
     Values,
     same,
 )
 from fpsolve.errors import MeshError, NoPerturbationTheory, NoSuchExponent
-from fpsolve.model.noise import ColouredNoise, check_existence
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noise import check_existence
 from fpsolve.simulation.setup import obstacles
 from fpsolve.theory.second_order import second_order
 
@@ -61,9 +59,7 @@ def _of_curves(valid: Known, vary: Mapping[str, Values], *, with_existence: bool
         return
     p = valid["moments"].values
     for varied in combinations(vary):
-        reason = _obstacle(valid["oscillator"], valid["noise"], varied, p)
-        if not reason and with_existence:
-            reason = _infinite(make_curve(valid["oscillator"], valid["noise"], varied).noise, p)
+        reason = _obstacle(valid, varied, p, with_existence=with_existence)
         if reason:
             yield (), varied, _with(varied) + reason
             return
@@ -74,29 +70,25 @@ def _with(varied: Mapping[str, float]) -> str:
     return f"with {assignments(varied)}: " if varied else ""
 
 
-def _obstacle(
-    oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Mapping[str, float], p: FloatArray
-) -> str:
-    """Why there is no such curve, or nothing."""
+def _obstacle(valid: Known, varied: Mapping[str, float], p: FloatArray, *, with_existence: bool = True) -> str:
+    """Why there is no such curve, or why some Λ(p) of it is infinite, or nothing."""
+    extremes = [float(p.max()), float(p.min())]
     try:
-        curve = make_curve(oscillator, noise, varied)
+        curve = make_curve(valid["oscillator"], valid["noise"], varied)
         with np.errstate(all="ignore"):
             theory = second_order(curve.problem)
-            factors = [curve.oscillator.impact_factor(float(extreme)) for extreme in (p.max(), p.min())]
+            factors = [curve.oscillator.impact_factor(extreme) for extreme in extremes]
             sizes = np.append(theory.scale.moment(p), [theory.stability_index, *factors])
     except ValidationError as error:
         context = error.errors()[0].get("ctx", {})
         return str(context.get("error", f"the noise has no finite strength; {_MODERATE}"))
     except (ArithmeticError, NoPerturbationTheory):  # the square of omega may be too small for a number
         sizes = np.array([math.inf])
-    return "" if np.all(np.isfinite(sizes)) else f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
-
-
-def _infinite(noise: ColouredNoise, p: FloatArray) -> str:
-    """Why some Λ(p) is infinite, or nothing."""
+    if not np.all(np.isfinite(sizes)):
+        return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
     try:
-        for extreme in (p.max(), p.min()):
-            check_existence(noise, float(extreme))
+        for extreme in extremes if with_existence else ():
+            check_existence(curve.noise, extreme)
     except NoSuchExponent as error:
         return in_words_of_a_case(str(error))
     return ""
@@ -119,11 +111,10 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
         return
     p = np.array(section.p or (0.0,))
     for varied in combinations(valid["vary"]):
-        reason, faults = _obstacle(valid["oscillator"], valid["noise"], varied, p), {}
+        reason, faults = _obstacle(valid, varied, p), {}
         with suppress(ArithmeticError, ValidationError):  # of parameters that are the reason
             curve = make_curve(valid["oscillator"], valid["noise"], varied)
             faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
-            reason = reason or _infinite(curve.noise, p)
         for name, text in faults.items():
             if getattr(section, name) is not None:
                 yield (name,), getattr(section, name), _with(varied) + text
@@ -147,9 +138,19 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
 
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
+    """Each p that is not among the moments, and each key of a `where` that is not varied, or not with that value."""
     yield from _of_orders(valid, (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None))
-    for i, item in enumerate(expect if "vary" in valid else ()):
-        yield from _of_where(i, item.where, valid["vary"])
+    vary: Mapping[str, Values] | None = valid.get("vary")
+    if vary is None:
+        return
+    stated = ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items())
+    for i, key, value in stated:
+        if key not in vary:
+            guess, known = nearest(key, vary), ", ".join(vary) or "none"
+            yield (i, "where", key), value, f"is not varied;{guess} varied keys: {known}; add it to [vary]"
+        elif not any(same(value, other) for other in vary[key]):
+            known = shown(vary[key])
+            yield (i, "where", key), value, f"got {value}; must be one of {known}; add it to [vary]"
 
 
 def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float]]) -> Iterator[Refusal]:
@@ -160,17 +161,6 @@ def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float
             first, last = moments.values[[0, -1]]
             known = f"moments.p ({moments.values.size} values, {first:g} to {last:g})"
             yield path, p, f"got {p}; must be among {known}; add it there, or choose one of them"
-
-
-def _of_where(i: int, where: Mapping[str, float], vary: Mapping[str, Values]) -> Iterator[Refusal]:
-    """Each key of a `where` that is not varied, or not with that value."""
-    for key, value in where.items():
-        if key not in vary:
-            guess, known = nearest(key, vary), ", ".join(vary) or "none"
-            yield (i, "where", key), value, f"is not varied;{guess} varied keys: {known}; add it to [vary]"
-        elif not any(same(value, other) for other in vary[key]):
-            known = shown(vary[key])
-            yield (i, "where", key), value, f"got {value}; must be one of {known}; add it to [vary]"
 
 
 REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {

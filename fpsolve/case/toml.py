@@ -61,8 +61,8 @@ class _Scanner:
             raise ValueError(f"cannot read the text from character {self.at} on")
         return match
 
-    def _skip(self, marks: str) -> bool:
-        found = self._peek() != "" and self._peek() in marks
+    def _skip(self, mark: str) -> bool:
+        found = self._peek() == mark
         self.at += found
         return found
 
@@ -114,29 +114,19 @@ class _Scanner:
         return path
 
     def _value(self, path: tuple[str | int, ...]) -> None:
-        opening = self._peek()
-        if opening == "[":
-            self._list(path)
-        elif opening == "{":
-            self._inline_table(path)
+        if self._skip("["):
+            index = 0
+            while not self._skip("]"):
+                self._note((*path, index))
+                self._value((*path, index))
+                self._skip(",")
+                index += 1
+        elif self._skip("{"):
+            while not self._skip("}"):
+                self._assignment(path)
+                self._skip(",")
         else:
-            self.at = self._match(_STRING if opening and opening in "\"'" else _SCALAR).end()
-
-    def _list(self, path: tuple[str | int, ...]) -> None:
-        self.at += 1
-        index = 0
-        while not self._skip("]"):
-            self._peek()
-            self._note((*path, index))
-            self._value((*path, index))
-            self._skip(",")
-            index += 1
-
-    def _inline_table(self, path: tuple[str | int, ...]) -> None:
-        self.at += 1
-        while not self._skip("}"):
-            self._assignment(path)
-            self._skip(",")
+            self.at = self._match(_STRING if self._peek() in ("'", '"') else _SCALAR).end()
 
 
 @dataclass

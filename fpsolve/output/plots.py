@@ -49,10 +49,7 @@ def write_figure(
     """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
 
     Args:
-        series: the curves.
         x: "p" or the dotted key of a parameter.
-        y: what is drawn.
-        title: stands above the axes.
         paths: .png, .pdf or what else matplotlib writes.
         is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
@@ -69,13 +66,7 @@ def write_figure(
 
 
 def write_response_figure(response: Response, title: str, paths: Sequence[Path]) -> None:
-    """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors.
-
-    Args:
-        response: its histograms.
-        title: stands above.
-        paths: .png, .pdf or what else matplotlib writes.
-    """
+    """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors."""
     share = np.cumsum(response.amplitude_density * np.diff(response.amplitude_edges))
     seen = float(response.amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
     with _canvas(paths, width=10.5) as figure:

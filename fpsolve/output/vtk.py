@@ -95,11 +95,7 @@ def write_curve(result: CurveResult, folder: Path) -> set[Path]:
 
 
 def write_response(simulated: SimulatedCurve, folder: Path) -> set[Path]:
-    """Write the joint density of x and ẋ, if there is a response, as the cell data `density` of response.vti.
-
-    Returns:
-        The file.
-    """
+    """Write the joint density of x and ẋ, if there is one, as cell data `density` of response.vti; return the file."""
     import pyvista
 
     response = simulated.response
