@@ -16,7 +16,7 @@ from rich.text import Text
 
 from fpsolve import __version__
 from fpsolve.case.remedies import in_words_of_a_case
-from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve.errors import CaseError, FpsolveError, NotConverged
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
@@ -64,20 +64,16 @@ def run(
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
     from fpsolve.exponent.quantities import STABILITY_INDEX
-    from fpsolve.study.simulate import refuse_obstacles
     from fpsolve.workflow import run_case
 
-    loaded = _load(cases, overrides)
-    _refuse_namesakes(loaded)
-    for case in loaded if monte_carlo else ():
-        refuse_obstacles(case)
     code = 0
-    for case in loaded:
+    for case in _load_to_write(cases, overrides, monte_carlo=monte_carlo):
         outcome = run_case(case, out, monte_carlo=monte_carlo, watch=_watch())
         if outcome.interrupted:
             _print_error(KEPT)
         if monte_carlo and case.figure.y == STABILITY_INDEX.name:
-            _stderr().print("note: a simulation gives no stability index, so that the figure has no dots", style="cyan")
+            note = "note: a simulation gives no stability index, so that the figure has no dots"
+            Console(stderr=True).print(note, style="cyan")
         print(f"written: {out / case.name}")
         if outcome.interrupted:
             return INTERRUPTED
@@ -106,16 +102,11 @@ def simulate(
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
-    from fpsolve.study.simulate import refuse_obstacles
     from fpsolve.workflow import simulate_case
 
     options = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
     stated = [f"monte_carlo.{name}={value}" for name, value in options.items() if value is not None]
-    loaded = _load(cases, [*(overrides or ()), *stated])
-    _refuse_namesakes(loaded)
-    for case in loaded:
-        refuse_obstacles(case)
-    for case in loaded:
+    for case in _load_to_write(cases, [*(overrides or ()), *stated], monte_carlo=True):
         outcome = simulate_case(case, out, watch=_watch())
         if outcome.interrupted:
             _print_error(KEPT)
@@ -191,33 +182,25 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
     try:
-        code = app(argv, result_action="return_value", exit_on_error=False, error_console=_stderr())
+        code = app(argv, result_action="return_value", exit_on_error=False, error_console=Console(stderr=True))
     except CycloptsError:  # cyclopts has said what is wrong
         return BAD_INPUT
-    except NotConverged as failure:
-        _print_error(str(failure))
-        return NOT_CONVERGED
     except FpsolveError as failure:
         _print_error(str(failure))
-        return BAD_INPUT
+        return NOT_CONVERGED if isinstance(failure, NotConverged) else BAD_INPUT
     except KeyboardInterrupt:
         _print_error("interrupted")
         return INTERRUPTED
     return code if isinstance(code, int) else 0
 
 
-def _stderr() -> Console:
-    return Console(stderr=True)
-
-
 def _print_error(text: str) -> None:
-    _stderr().print(Text(in_words_of_a_case(text)), style="bold red", soft_wrap=True)
+    Console(stderr=True).print(Text(in_words_of_a_case(text)), style="bold red", soft_wrap=True)
 
 
 def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
     """All cases, or one error that lists the faults of all of them."""
     from fpsolve.case.case import load_case
-    from fpsolve.errors import CaseError
 
     cases, errors = [], []
     for path in paths:
@@ -230,11 +213,18 @@ def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
     return cases
 
 
-def _refuse_namesakes(cases: Sequence[Case]) -> None:
+def _load_to_write(paths: Sequence[Path], overrides: Sequence[str] | None, *, monte_carlo: bool) -> list[Case]:
+    """All cases, or an error where two would write into one folder, or one that shall be simulated cannot be."""
+    from fpsolve.study.simulate import refuse_obstacles
+
+    cases = _load(paths, overrides)
     names = [case.name for case in cases]
     for name in names:
         if names.count(name) > 1:
             raise FpsolveError(f'several cases are called "{name}" and would overwrite each other; run them apart')
+    for case in cases if monte_carlo else ():
+        refuse_obstacles(case)
+    return cases
 
 
 def _watch() -> Watch:
@@ -248,7 +238,7 @@ def _watch() -> Watch:
 @contextmanager
 def _bar(name: str, total: int) -> Iterator[Callable[[], None]]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=_stderr(), transient=True) as progress:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(name, total=total)
         yield lambda: progress.advance(task)
 

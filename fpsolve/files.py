@@ -55,9 +55,13 @@ def writable(folder: Path) -> Iterator[None]:
 
 def write_json(path: Path, data: Any) -> None:
     """Data without NaN or infinities as JSON."""
+    write_text(path, json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Text as UTF-8."""
     with atomic(path) as temporary:
-        text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _umask() -> int:

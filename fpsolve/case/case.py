@@ -12,15 +12,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, Valid
 from fpsolve.arrays import FloatArray
 from fpsolve.case.curves import Curve, combinations, make_curve
 from fpsolve.case.messages import explain, refuse
-from fpsolve.case.refusals import (
-    curve_refusals,
-    figure_refusals,
-    mesh_refusals,
-    moment_refusals,
-    simulation_refusals,
-    vary_refusals,
-    where_refusals,
-)
+from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
     Expectation,
     FigureSection,
@@ -31,7 +23,6 @@ from fpsolve.case.sections import (
     OutputSection,
     Section,
     Text,
-    Values,
 )
 from fpsolve.case.toml import Document, read_document
 from fpsolve.case.vary import Vary
@@ -42,12 +33,8 @@ from fpsolve.model.parameters import parameter
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 
 
-def _oscillator(value: Any) -> Any:
-    return VibroImpactOscillator(**value) if isinstance(value, dict) else value
-
-
-def _budget(value: Any) -> Any:
-    return Budget(**value) if isinstance(value, dict) else value
+def _from_table(kind: Any) -> BeforeValidator:
+    return BeforeValidator(lambda value: kind(**value) if isinstance(value, dict) else value)
 
 
 class Case(Section):
@@ -58,23 +45,19 @@ class Case(Section):
     """
 
     title: Annotated[Text, parameter("the heading of its results", 'title = "Fig. 1"')]
-    oscillator: Annotated[VibroImpactOscillator, BeforeValidator(_oscillator), parameter("Eq. (3)", "[oscillator]")]
+    oscillator: Annotated[
+        VibroImpactOscillator, _from_table(VibroImpactOscillator), parameter("Eq. (3)", "[oscillator]")
+    ]
     noise: Annotated[NoiseSection, parameter("Eqs. (7)-(8)", "[noise]")]
     moments: Annotated[Moments, parameter("which p", "[moments]")]
-    budget: Annotated[
-        Budget,
-        BeforeValidator(_budget),
-        parameter("what one p may cost", "[budget]"),
-    ] = Field(default_factory=Budget)
-    vary: Annotated[
-        Vary,
-        parameter("one curve for each value", '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'),
-    ] = Field(default_factory=dict)
+    budget: Annotated[Budget, _from_table(Budget), parameter("what one p may cost", "[budget]")] = Budget()
+    vary: Annotated[Vary, parameter("one curve for each value", '[vary] with "noise.D0" = [0.1, 0.5, 1.0]')] = Field(
+        default_factory=dict
+    )
     mesh: Annotated[MeshSection, parameter("the finite elements", "[mesh]")] = MeshSection()
-    monte_carlo: Annotated[
-        MonteCarloSection,
-        parameter("how the system is simulated", "[monte_carlo]"),
-    ] = MonteCarloSection()
+    monte_carlo: Annotated[MonteCarloSection, parameter("how the system is simulated", "[monte_carlo]")] = (
+        MonteCarloSection()
+    )
     figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
     output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
     expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
@@ -141,51 +124,11 @@ class Case(Section):
         """The mesh that the case states; None leaves it to the solver."""
         return self.mesh.mesh(self.path.parent)
 
-    @field_validator("moments")
+    @field_validator(*REFUSALS)
     @classmethod
-    def _is_computable(cls, moments: Moments, info: ValidationInfo) -> Moments:
-        is_varied = (info.context or {}).get("varies", False)  # then the curves decide which moments exist
-        refuse(curve_refusals(info.data | {"moments": moments}, {}, with_existence=not is_varied))
-        return moments
-
-    @field_validator("vary")
-    @classmethod
-    def _makes_curves(cls, vary: dict[str, Values], info: ValidationInfo) -> dict[str, Values]:
-        refuse(vary_refusals(info.data, vary))
-        return vary
-
-    @field_validator("mesh")
-    @classmethod
-    def _can_be_made(cls, mesh: MeshSection, info: ValidationInfo) -> MeshSection:
-        refuse(mesh_refusals(mesh, (info.context or {}).get("folder", Path())))
-        return mesh
-
-    @field_validator("monte_carlo")
-    @classmethod
-    def _can_be_simulated(cls, section: MonteCarloSection, info: ValidationInfo) -> MonteCarloSection:
-        if {"oscillator", "noise", "vary"} <= info.data.keys():
-            refuse(simulation_refusals(info.data, section))
+    def _agrees_with_those_before(cls, section: Any, info: ValidationInfo) -> Any:
+        refuse(REFUSALS[str(info.field_name)](section, info.data, info.context or {}))
         return section
-
-    @field_validator("figure")
-    @classmethod
-    def _is_varied(cls, figure: FigureSection, info: ValidationInfo) -> FigureSection:
-        refuse(figure_refusals(info.data, figure))
-        return figure
-
-    @field_validator("output")
-    @classmethod
-    def _are_computed(cls, output: OutputSection, info: ValidationInfo) -> OutputSection:
-        wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
-        refuse(moment_refusals(info.data, wanted))
-        return output
-
-    @field_validator("expect")
-    @classmethod
-    def _can_be_checked(cls, expect: tuple[Expectation, ...], info: ValidationInfo) -> Any:
-        wanted = (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None)
-        refuse([*moment_refusals(info.data, wanted), *where_refusals(info.data, expect)])
-        return expect
 
 
 def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:

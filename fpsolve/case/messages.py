@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from fractions import Fraction
 from itertools import chain
@@ -24,14 +24,7 @@ LIST, TABLE = "<list>", "<table>"
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 _BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _NOUNS: dict[Any, str] = {float: "finite number", int: "whole number", str: "string"}
-_KINDS = {
-    bool: "a boolean",
-    str: "a string",
-    list: "a list",
-    dict: "a table",
-    int: "a number",
-    float: "a number",
-}
+_KINDS = {bool: "a boolean", str: "a string", list: "a list", dict: "a table", int: "a number", float: "a number"}
 
 Path = tuple[str | int, ...]
 Refusal = tuple[Path, Any, str]
@@ -97,14 +90,13 @@ def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
     if detail["type"] == "value_error":
         return str(detail["ctx"]["error"])
     if detail["type"] in _UNKNOWN:
-        known = list(_fields(model, path[:-1]))
+        known = list(_model_and_field(path[:-1], model)[0].__pydantic_fields__)
         guess = nearest(str(path[-1]), known)
         return f"unknown key;{guess} known keys: {', '.join(known)}; rename or remove it"
-    *section, name = _schema_names(path, model)
-    field = _fields(model, section)[name]
+    field = _model_and_field(path, model)[1]
     must, example = f"must be {_accepted(field)} ({field.description})", example_of(field)
     if path[0] == "vary" and len(path) > 1:
-        example = example_of(_fields(model, ())["vary"])
+        example = example_of(model.__pydantic_fields__["vary"])
         must = must.replace("be", "be a non-empty list, each entry", 1) if len(path) == 2 else must
     if detail["type"] == "missing":
         return f"missing; {must}; add it, for example {example}"
@@ -120,26 +112,14 @@ def _kind(value: Any, error_type: str) -> str:
     return f" ({_KINDS.get(type(value), 'a date or time')})"
 
 
-def _schema_names(path: Path, model: Any) -> tuple[str, ...]:
-    """The deepest key on the path that the schema names; a value of [vary] obeys the range of its own key."""
-    if path[0] == "vary" and len(path) > 1:
-        return tuple(str(path[1]).split("."))
-    names: list[str] = []
-    for part in (part for part in path if isinstance(part, str)):
-        if part not in getattr(model, "__pydantic_fields__", ()):
-            break
-        model = _nested(model.__pydantic_fields__[part].annotation)
-        names.append(part)
-    return tuple(names)
-
-
-def _fields(model: Any, path: Sequence[str | int]) -> Mapping[str, FieldInfo]:
-    """The fields of the model that stands at this path."""
-    for name in path:
-        if isinstance(name, str):
-            model = _nested(model.__pydantic_fields__[name].annotation)
-    fields: Mapping[str, FieldInfo] = model.__pydantic_fields__
-    return fields
+def _model_and_field(path: Path, model: Any) -> tuple[Any, FieldInfo]:
+    """The deepest field on the path and the model in it; a value of [vary] obeys the range of its own key."""
+    field = FieldInfo()
+    for name in str(path[1]).split(".") if path[:1] == ("vary",) and len(path) > 1 else path:
+        if name in getattr(model, "__pydantic_fields__", ()):
+            field = model.__pydantic_fields__[name]
+            model = _nested(field.annotation)
+    return model, field
 
 
 def _nested(annotation: Any) -> Any:

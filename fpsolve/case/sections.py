@@ -11,15 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-    model_validator,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
@@ -28,7 +20,7 @@ from fpsolve.exponent.quantities import DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh
 from fpsolve.fem.mesh_file import read_mesh
 from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.parameters import parameter
+from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
@@ -59,7 +51,7 @@ def flat(value: Any) -> Any:
 class Section(BaseModel):
     """A table of a case file: immutable, no unknown keys, no conversions, finite numbers only."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+    model_config = STRICT | ConfigDict(frozen=True)
 
 
 class NoiseSection(Section):
@@ -69,8 +61,7 @@ class NoiseSection(Section):
     tau0: CorrelationTime
     r0: Annotated[Departure, Field(lt=5 / 3)]
     treatment: Annotated[
-        Literal["ou-reduction", "exact"],
-        parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"'),
+        Literal["ou-reduction", "exact"], parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"')
     ] = "ou-reduction"
 
     def original(self) -> NonGaussianNoise:
@@ -160,10 +151,11 @@ class MeshSection(Section):
 
     def mesh(self, folder: Path) -> CylinderMesh | None:
         """The mesh, its file sought from `folder`; None where nothing is stated."""
-        stated = self.model_dump(exclude_none=True)
-        if "file" not in stated:
+        if self.file is None:
+            stated = self.model_dump(exclude_none=True)
             return make_mesh(**stated) if stated else None
-        mesh, path = read_mesh(folder / stated["file"]), folder / stated["file"]
+        path = folder / self.file
+        mesh = read_mesh(path)
         try:
             mesh.vertices_at(math.pi / 2)
         except MeshError as failure:
@@ -183,10 +175,9 @@ class MonteCarloSection(Section):
     """[monte_carlo]: how the system is simulated; time and step are chosen where they are not stated."""
 
     paths: Annotated[int, parameter("how many paths", "paths = 32768", ge=BATCHES, le=MAX_PATHS)] = PATHS
-    time: Annotated[
-        float | None,
-        parameter("length of the paths, in the units of 1/omega", "time = 400.0", gt=0),
-    ] = None
+    time: Annotated[float | None, parameter("length of the paths, in the units of 1/omega", "time = 400.0", gt=0)] = (
+        None
+    )
     step: Annotated[float | None, parameter("time step", "step = 0.05", gt=0)] = None
     seed: Annotated[int, parameter("seed of the random numbers", "seed = 0", ge=0)] = 0
     estimator: Annotated[Estimator, parameter("how moments are estimated", 'estimator = "population"')] = "direct"

@@ -18,8 +18,6 @@ _KEY = re.compile(r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')
 _STRING = re.compile(r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'', re.DOTALL)
 _SCALAR = re.compile(r"[^,\]}\n#]+")
 
-_OVERRIDE_EXAMPLES = "--set oscillator.omega=2.0 or --set 'oscillator.impact=\"delta\"'"
-
 
 def dotted(path: Sequence[str | int]) -> str:
     """("expect", 0, "p") as expect.0.p; the same name for a quoted "noise.D0" and a dotted noise.D0."""
@@ -63,8 +61,8 @@ class _Scanner:
             raise ValueError(f"cannot read the text from character {self.at} on")
         return match
 
-    def _skip(self, marks: str) -> bool:
-        found = self._peek() != "" and self._peek() in marks
+    def _skip(self, mark: str) -> bool:
+        found = self._peek() == mark
         self.at += found
         return found
 
@@ -116,29 +114,19 @@ class _Scanner:
         return path
 
     def _value(self, path: tuple[str | int, ...]) -> None:
-        opening = self._peek()
-        if opening == "[":
-            self._list(path)
-        elif opening == "{":
-            self._inline_table(path)
+        if self._skip("["):
+            index = 0
+            while not self._skip("]"):
+                self._note((*path, index))
+                self._value((*path, index))
+                self._skip(",")
+                index += 1
+        elif self._skip("{"):
+            while not self._skip("}"):
+                self._assignment(path)
+                self._skip(",")
         else:
-            self.at = self._match(_STRING if opening and opening in "\"'" else _SCALAR).end()
-
-    def _list(self, path: tuple[str | int, ...]) -> None:
-        self.at += 1
-        index = 0
-        while not self._skip("]"):
-            self._peek()
-            self._note((*path, index))
-            self._value((*path, index))
-            self._skip(",")
-            index += 1
-
-    def _inline_table(self, path: tuple[str | int, ...]) -> None:
-        self.at += 1
-        while not self._skip("}"):
-            self._assignment(path)
-            self._skip(",")
+            self.at = self._match(_STRING if self._peek() in ("'", '"') else _SCALAR).end()
 
 
 @dataclass
@@ -170,11 +158,13 @@ class Document:
         try:
             text_as_toml = _quoted_if_bare(text)
             path = _override_path(text_as_toml)
-            value = _at(tomllib.loads(text_as_toml), path)
+            value: Any = tomllib.loads(text_as_toml)
+            for key in path:
+                value = value[key]
             _assign(self.data, dotted(path).split("."), value)
         except (ValueError, RecursionError) as error:
-            sentence = f"{error}; write it as in {_OVERRIDE_EXAMPLES}"
-            self.faults.append(Fault(f"--set {text}", None, sentence))
+            examples = "--set oscillator.omega=2.0 or --set 'oscillator.impact=\"delta\"'"
+            self.faults.append(Fault(f"--set {text}", None, f"{error}; write it as in {examples}"))
         else:
             inside = dotted(path) + "."
             self.places = {key: place for key, place in self.places.items() if not key.startswith(inside)}
@@ -185,14 +175,9 @@ class Document:
 
 def _quoted_if_bare(text: str) -> str:
     """key=word as key="word": a shell takes the quotes away."""
-    key, equals, value = text.partition("=")
-    is_word = re.fullmatch(r"[A-Za-z./~][\w./~ -]*", value.strip()) and value.strip() not in (
-        "true",
-        "false",
-        "nan",
-        "inf",
-    )
-    return f'{key}{equals}"{value.strip()}"' if is_word else text
+    key, _, value = map(str.strip, text.partition("="))
+    is_word = re.fullmatch(r"[A-Za-z./~][\w./~ -]*", value) and value not in ("true", "false", "nan", "inf")
+    return f'{key}="{value}"' if is_word else text
 
 
 def _override_path(text: str) -> tuple[str | int, ...]:
@@ -200,12 +185,6 @@ def _override_path(text: str) -> tuple[str | int, ...]:
     if len(assigned) != 1:
         raise ValueError(f"must be one key=value, but {len(assigned)} stand here")
     return assigned[0]
-
-
-def _at(data: Any, path: Sequence[str | int]) -> Any:
-    for key in path:
-        data = data[key]
-    return data
 
 
 def _assign(table: dict[str, Any], path: Sequence[str], value: Any) -> None:
@@ -226,14 +205,13 @@ def read_document(path: str | Path, overrides: Sequence[str] = ()) -> Document:
     Raises:
         CaseError: the file cannot be read or is not TOML.
     """
-    text = _read(Path(path), str(path))
+    text = _read(path)
     try:
         data = tomllib.loads(text)
         document = Document(str(path), data, dict(_Scanner(text).scan().lines))
     except RecursionError:
-        raise CaseError(
-            str(path), [Fault("", None, "lists or tables are nested too deeply; a case needs three levels")]
-        ) from None
+        fault = Fault("", None, "lists or tables are nested too deeply; a case needs three levels")
+        raise CaseError(str(path), [fault]) from None
     except ValueError as error:
         raise CaseError(str(path), [_syntax_fault(text, str(error))]) from None
     for override in overrides:
@@ -241,16 +219,16 @@ def read_document(path: str | Path, overrides: Sequence[str] = ()) -> Document:
     return document
 
 
-def _read(path: Path, file: str) -> str:
+def _read(path: str | Path) -> str:
     def refuse(sentence: str, line: int | None = None) -> CaseError:
-        return CaseError(file, [Fault("", line, sentence)])
+        return CaseError(str(path), [Fault("", line, sentence)])
 
     try:
-        if path.is_dir():
+        if Path(path).is_dir():
             raise refuse("is a directory; name a case file in it, such as fig1.toml")
-        content = path.read_bytes()
+        content = Path(path).read_bytes()
     except FileNotFoundError:
-        raise refuse(f"no such file; look in {path.parent.resolve()} or give the full path") from None
+        raise refuse(f"no such file; look in {Path(path).parent.resolve()} or give the full path") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise refuse(f"cannot be read ({reason}); check its name and permissions") from None

@@ -13,33 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.case.vary import ABSCISSAE
 from fpsolve.exponent.quantities import Quantity
 from fpsolve.files import atomic
+from fpsolve.model.parameters import axis_title, symbol_of
 
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
 
-SYMBOLS = {
-    "p": "$p$",
-    "oscillator.epsilon": r"$\varepsilon$",
-    "oscillator.omega": r"$\omega$",
-    "oscillator.restitution": "$r$",
-    "oscillator.c1": "$c_1$",
-    "oscillator.c2": "$c_2$",
-    "oscillator.c3": "$c_3$",
-    "noise.D0": "$D_0$",
-    "noise.tau0": r"$\tau_0$",
-    "noise.r0": "$r_0$",
-}
-TITLES = {
-    "p": "order of the moment $p$",
-    "oscillator.omega": r"natural frequency $\omega$ (rad/time)",
-    "oscillator.restitution": "coefficient of restitution $r$",
-    "oscillator.c1": "damping coefficient $c_1$ (1/time)",
-    "noise.D0": "noise intensity $D_0$",
-    "noise.tau0": r"correlation time $\tau_0$ (time)",
-    "noise.r0": "departure from Gaussian noise $r_0$",
-}
+_BY_SYMBOL = ("oscillator.epsilon", "oscillator.c2", "oscillator.c3")
+"""Parameters that stand at an axis without their names."""
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
@@ -68,15 +51,13 @@ def write_figure(
     """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
 
     Args:
-        series: the curves.
         x: "p" or the dotted key of a parameter.
-        y: what is drawn.
-        title: stands above the axes.
         paths: .png, .pdf or what else matplotlib writes.
         is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
     with _canvas(paths) as figure:
-        axes = figure.add_subplot(xlabel=TITLES.get(x, SYMBOLS.get(x, x)), ylabel=y.title)
+        title_of = symbol_of if x in _BY_SYMBOL else axis_title
+        axes = figure.add_subplot(xlabel=title_of(ABSCISSAE[x]), ylabel=y.title)
         axes.set_title(fill(title, 80), parse_math=False)
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
@@ -88,13 +69,7 @@ def write_figure(
 
 
 def write_response_figure(response: Response, title: str, paths: Sequence[Path]) -> None:
-    """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors.
-
-    Args:
-        response: its histograms.
-        title: stands above.
-        paths: .png, .pdf or what else matplotlib writes.
-    """
+    """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors."""
     share = np.cumsum(response.amplitude_density * np.diff(response.amplitude_edges))
     seen = float(response.amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
     with _canvas(paths, width=10.5) as figure:
@@ -150,7 +125,7 @@ def _canvas(paths: Sequence[Path], width: float = 7.2) -> Iterator[Any]:
 def _draw(axes: Any, item: Series, i: int) -> None:
     colour, marker = _COLOURS[i % len(_COLOURS)], _MARKERS[i % len(_MARKERS)]
     every = max(1, item.x.size // 25)
-    label = ", ".join(f"{SYMBOLS.get(key, key)} = {value:g}" for key, value in item.varied.items())
+    label = ", ".join(f"{symbol_of(ABSCISSAE[key])} = {value:g}" for key, value in item.varied.items())
     axes.plot(item.line_x, item.line_y, color=colour, linewidth=1.6)
     axes.plot(
         item.x, item.y, marker, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6,

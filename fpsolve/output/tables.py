@@ -35,8 +35,11 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> set
     write_json(summary, {**_head(case), **_simulation_summary(simulated)})
     if simulated.response is None:
         return {summary}
-    table = folder / f"response{simulated.curve.suffix}.csv"
-    _write_response(table, simulated.response)
+    table, response = folder / f"response{simulated.curve.suffix}.csv", simulated.response
+    edges = response.amplitude_edges
+    columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
+    rows = (map(float, row) for row in zip(*columns, strict=True))
+    _write_csv(table, ["amplitude_from", "amplitude_to", "density", "standard_error"], rows)
     return {summary, table}
 
 
@@ -106,14 +109,6 @@ def _response_summary(response: Response) -> dict[str, Any]:
 
 def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
     return {name: {"value": value, "standard_error": error} for name, (value, error) in numbers.items()}
-
-
-def _write_response(path: Path, response: Response) -> None:
-    """The histogram of the amplitude."""
-    edges = response.amplitude_edges
-    columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
-    rows = (map(float, row) for row in zip(*columns, strict=True))
-    _write_csv(path, ["amplitude_from", "amplitude_to", "density", "standard_error"], rows)
 
 
 def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, VARIANCE_RATE, Quantity
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
@@ -32,15 +33,14 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
 def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
     """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
     for result in results:
-        place = case.place(result.curve)
-        reasons = [failure.reason for failure in result.failures]
-        for kind, style, texts in (
-            ("warning", "yellow", result.warnings),
-            ("not converged", "bold red", reasons),
-            ("note", "cyan", result.notes),
-        ):
-            for text in texts:
-                Console(stderr=True).print(Text(f"{kind}: {place}: {text}"), style=style, soft_wrap=True)
+        _remark(case, result.curve, "warning", "yellow", result.warnings)
+        _remark(case, result.curve, "not converged", "bold red", [failure.reason for failure in result.failures])
+        _remark(case, result.curve, "note", "cyan", result.notes)
+
+
+def _remark(case: Case, curve: Curve, kind: str, style: str, texts: Sequence[str]) -> None:
+    for text in texts:
+        Console(stderr=True).print(Text(f"{kind}: {case.place(curve)}: {text}"), style=style, soft_wrap=True)
 
 
 def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:
@@ -56,37 +56,28 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
         console.print(_exponent_table(case, pairs))
     for each in simulated:
         if each.response:
-            means = "   ".join(
-                f"{name} = {sampled(value, error)} ± {error:.1e}"
-                for name, (value, error) in each.response.means.items()
-            )
+            means = "   ".join(f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items())
             text = f"{case.place(each.curve)}: stationary means: {means}\n"
             console.print(text, highlight=False, soft_wrap=True)
-        for warning in each.warnings:
-            line = Text(f"warning: {case.place(each.curve)}: {warning}")
-            Console(stderr=True).print(line, style="yellow", soft_wrap=True)
+        _remark(case, each.curve, "warning", "yellow", each.warnings)
 
 
 def _simulation_line(simulated: SimulatedCurve, result: CurveResult | None) -> str:
     """λ, Λ″(0) and the size of the simulation."""
     found = simulated.result
     value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
-    text = f"{LYAPUNOV_EXPONENT.symbol} = {sampled(value, error)} ± {error:.1e}"
+    text = f"{LYAPUNOV_EXPONENT.symbol} = {_with_error(value, error)}"
     if result and result.lyapunov_exponent:
         exact = result.lyapunov_exponent.value
         text += f" (finite elements {exact:.6g}, {_deviation(value, error, exact)} s.e. away)"
-    rate, rate_error = found.variance_rate, found.variance_rate_error
-    text += f"   {VARIANCE_RATE.symbol} = {sampled(rate, rate_error)} ± {rate_error:.1e}"
+    text += f"   {VARIANCE_RATE.symbol} = {_with_error(found.variance_rate, found.variance_rate_error)}"
     return f"{text}\n{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}\n"
 
 
 def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Table:
     """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
-    table = Table(
-        "p", MOMENT.symbol, "± s.e.", *(("finite elements", "s.e. away") if result else ()), "effective paths",
-        title=Text(case.heading(simulated.curve)), title_justify="left",
-    )  # fmt: skip
-    _align(table)
+    compared = ("finite elements", "s.e. away") if result else ()
+    table = _table(case.heading(simulated.curve), "p", MOMENT.symbol, "± s.e.", *compared, "effective paths")
     exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
     for estimate in simulated.result.estimates:
         value, error = estimate.value, estimate.standard_error
@@ -102,9 +93,7 @@ def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult
 def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Table:
     """One row for each parameter set: λ by simulation and by finite elements."""
     names = (key.partition(".")[2] for key in case.vary)
-    headings = (LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away")
-    table = Table(*names, *headings, title=Text(case.title), title_justify="left")
-    _align(table)
+    table = _table(case.title, *names, LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away")
     for each, result in pairs:
         value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
         known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
@@ -112,6 +101,10 @@ def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResul
         varied = (f"{number:g}" for number in each.curve.varied.values())
         table.add_row(*varied, sampled(value, error), f"{error:.1e}", *exact)
     return table
+
+
+def _with_error(value: float, error: float) -> str:
+    return f"{sampled(value, error)} ± {error:.1e}"
 
 
 def sampled(value: float, error: float) -> str:
@@ -128,11 +121,7 @@ def _deviation(value: float, error: float, exact: float) -> str:
 
 def _moment_table(case: Case, result: CurveResult) -> Table:
     """p, Λ(p), Eq. (37) and the difference."""
-    table = Table(
-        "p", MOMENT.symbol, "± error", _theory(case, MOMENT), "difference", title=Text(case.heading(result.curve)),
-        title_justify="left",
-    )  # fmt: skip
-    _align(table)
+    table = _table(case.heading(result.curve), "p", MOMENT.symbol, "± error", _theory(case, MOMENT), "difference")
     _explain_star(table, case)
     moments = result.moments
     for p, value, error, theory in zip(
@@ -156,8 +145,7 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     indices = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
     names = (key.partition(".")[2] for key in case.vary)
     headings = (text for index in indices for text in (index.symbol, _theory(case, index)))
-    table = Table(*names, *headings, title=Text(case.title), title_justify="left")
-    _align(table)
+    table = _table(case.title, *names, *headings)
     _explain_star(table, case)
     for result in results:
         theory = second_order(result.curve.problem)
@@ -170,7 +158,7 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
 
 def _theory(case: Case, quantity: Quantity) -> str:
     """Heading of a column of perturbation theory, starred where it has another noise than the solution."""
-    return f"Eq. {quantity.equation}*" if case.is_exact else f"Eq. {quantity.equation}"
+    return f"Eq. {quantity.equation}{'*' if case.is_exact else ''}"
 
 
 def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
@@ -179,10 +167,9 @@ def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
     if not comparisons:
         console.print(f"{case.name}: nothing is expected; add [[expect]] to the case", markup=False)
         return
-    table = Table("quantity", "expected", "computed", "difference", "", title=Text(f"{case.name}: {case.title}"))
-    table.title_justify = "left"
-    _align(table)
-    table.columns[0].justify, table.columns[0].no_wrap, table.columns[0].overflow = "left", False, "fold"
+    table = _table(
+        f"{case.name}: {case.title}", Column("quantity", overflow="fold"), "expected", "computed", "difference", ""
+    )
     for item in comparisons:
         expectation = item.expectation
         name = expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
@@ -198,9 +185,10 @@ def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
     console.print(f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok")
 
 
-def _align(table: Table) -> None:
-    for column in table.columns:
-        column.justify, column.no_wrap = "right", True
+def _table(title: str, *columns: str | Column) -> Table:
+    """An empty table; of a column with its heading alone the entries stand on the right."""
+    aligned = (Column(each, justify="right", no_wrap=True) if isinstance(each, str) else each for each in columns)
+    return Table(*aligned, title=Text(title), title_justify="left")
 
 
 def _explain_star(table: Table, case: Case) -> None:

@@ -24,12 +24,11 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import Fields, fields, xi_marginal
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_space import DiffusionSpace, Samples
-from fpsolve.files import atomic
+from fpsolve.files import atomic, write_text
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals written; elements of a higher degree are cut into several of them."""
-_SHOW = "show.py"
 
 
 def write_eigenfunctions(
@@ -52,9 +51,18 @@ def write_eigenfunctions(
     """
     names = {pair.p: f"{stem}/p{pair.p + 0.0:+}.vtu" for pair in sorted(pairs, key=lambda pair: pair.p)}
     for pair in pairs:
-        _write_grid(directory / names[pair.p], *_eigenfunction_data(pair, stationary))
+        grid = _Grid.of(pair)
+        found = grid.fields(pair)
+        data = {
+            "T": found.right,
+            "T_adjoint": found.adjoint,
+            "tilted_density": found.product,
+            "stationary_density": grid.fields(stationary).adjoint,
+            "z": grid.z,
+        }
+        _write_grid(directory / names[pair.p], grid, data, {"p": pair.p, "Lambda": pair.value})
     collection = directory / f"{stem}.pvd"
-    _write_text(collection, _collection(names))
+    write_text(collection, _collection(names))
     return [collection, *(directory / name for name in names.values())]
 
 
@@ -87,22 +95,15 @@ def write_curve(result: CurveResult, folder: Path) -> set[Path]:
 
 
 def write_response(simulated: SimulatedCurve, folder: Path) -> set[Path]:
-    """Write the joint density of x and ẋ, if there is a response, as the cell data `density` of response.vti.
-
-    Returns:
-        The file.
-    """
+    """Write the joint density of x and ẋ, if there is one, as cell data `density` of response.vti; return the file."""
     import pyvista
 
     response = simulated.response
     if response is None:
         return set()
     path, x, v = folder / f"response{simulated.curve.suffix}.vti", response.x_edges, response.v_edges
-    grid = pyvista.ImageData(
-        dimensions=(x.size, v.size, 1),
-        spacing=(x[1] - x[0], v[1] - v[0], 1.0),
-        origin=(x[0], v[0], 0.0),
-    )
+    size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
+    grid = pyvista.ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
     grid.cell_data["density"] = response.density.ravel(order="F")
     with atomic(path) as temporary:
         grid.save(temporary)
@@ -111,17 +112,9 @@ def write_response(simulated: SimulatedCurve, folder: Path) -> set[Path]:
 
 def copy_show_script(directory: Path) -> Path:
     """Put `show.py`, which draws the collection in ParaView, into the folder; it remembers which one that was."""
-    target, text = directory / _SHOW, files("fpsolve.output").joinpath(_SHOW).read_text(encoding="utf-8")
-    _write_text(target, text.replace('FOLDER = ""', f"FOLDER = {str(directory.resolve())!r}", 1))
+    target, text = directory / "show.py", files("fpsolve.output").joinpath("show.py").read_text(encoding="utf-8")
+    write_text(target, text.replace('FOLDER = ""', f"FOLDER = {str(directory.resolve())!r}", 1))
     return target
-
-
-def _line(pair: PrincipalPair) -> DiffusionSpace:
-    """The functions of ξ. Raises `OutputError` where the noise has states and no line of values."""
-    xi = pair.generator.space.xi
-    if not isinstance(xi, DiffusionSpace):
-        raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
-    return xi
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,10 +148,6 @@ class _Grid:
         """z of the nodes, each once."""
         return np.append(self.z_cells[:, :-1], self.z_cells[-1, -1])
 
-    @property
-    def xi(self) -> FloatArray:
-        return self.unit * self.z
-
     def fields(self, pair: PrincipalPair) -> Fields:
         """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
         return fields(pair, self.phase_table(pair), self.samples(pair))
@@ -170,13 +159,15 @@ class _Grid:
         return pair.generator.space.phi.at((self.phi - turned).ravel(), (inside - turned).ravel())
 
     def samples(self, pair: PrincipalPair) -> Samples:
-        """The functions of ξ at the nodes, each seen from inside its cell."""
-        inside = _inward(self.z_cells)
-        return _line(pair).at(self.z, np.append(inside[:, :-1], inside[-1, -1]))
+        """The functions of ξ at the nodes, each seen from inside its cell; of states there are none."""
+        xi, inside = pair.generator.space.xi, _inward(self.z_cells)
+        if not isinstance(xi, DiffusionSpace):
+            raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
+        return xi.at(self.z, np.append(inside[:, :-1], inside[-1, -1]))
 
     def points(self) -> FloatArray:
         """(φ, ξ, 0), φ slowest, shape (points, 3)."""
-        phi, xi = np.meshgrid(self.phi.ravel(), self.xi, indexing="ij")
+        phi, xi = np.meshgrid(self.phi.ravel(), self.unit * self.z, indexing="ij")
         return np.stack([phi.ravel(), xi.ravel(), np.zeros(phi.size)], axis=1)
 
     def cells(self) -> Any:
@@ -220,22 +211,6 @@ def _vtk_order(k: int) -> list[tuple[int, int]]:
     return [*corners, *edges, *((i, j) for j in inner for i in inner)]
 
 
-def _eigenfunction_data(
-    pair: PrincipalPair, stationary: PrincipalPair
-) -> tuple[_Grid, dict[str, FloatArray], dict[str, float]]:
-    """Grid, point data and field data of one p."""
-    grid = _Grid.of(pair)
-    found = grid.fields(pair)
-    data = {
-        "T": found.right,
-        "T_adjoint": found.adjoint,
-        "tilted_density": found.product,
-        "stationary_density": grid.fields(stationary).adjoint,
-        "z": grid.z,
-    }
-    return grid, data, {"p": pair.p, "Lambda": pair.value}
-
-
 def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: Mapping[str, float]) -> None:
     """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes)."""
     import pyvista
@@ -254,7 +229,7 @@ def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: 
     writer.SetInputData(output)
     writer.WriteToOutputStringOn()
     writer.Write()
-    _write_text(path, writer.GetOutputString())
+    write_text(path, writer.GetOutputString())
 
 
 def _collection(names: Mapping[float, str]) -> str:
@@ -262,8 +237,3 @@ def _collection(names: Mapping[float, str]) -> str:
     sets = [f'    <DataSet timestep="{p}" file={quoteattr(name)}/>' for p, name in names.items()]
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>'
     return "\n".join([head, *sets, "  </Collection>", "</VTKFile>", ""])
-
-
-def _write_text(path: Path, text: str) -> None:
-    with atomic(path) as draft:
-        draft.write_text(text, encoding="utf-8")

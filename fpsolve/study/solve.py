@@ -59,6 +59,7 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: 
     estimates, missing = _solve_indices(solver, moments.root)
     attempts = (_pair(solver, float(p)) for p in case.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
+    warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None), *_unresolved(pairs)]
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -67,12 +68,7 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: 
         eigenpairs=pairs,
         stationary=_pair(solver, 0.0),
         mesh=None if (space := solver.largest()) is None else _mesh(space),
-        warnings=tuple(
-            map(
-                in_words_of_a_case,
-                (*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None), *_unresolved(pairs)),
-            )
-        ),
+        warnings=tuple(map(in_words_of_a_case, warnings)),
         notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments))),
         failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),
     )
