@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from threading import Event
-from typing import Protocol
 
 import numpy as np
 from numpy.random import SeedSequence, default_rng
@@ -24,6 +23,8 @@ STEP_SECONDS = 2e-8
 """For one step of one path, about."""
 _EXPONENT = 0.5
 """Between two looks at the weights of a population, p times the growth that the noise brings about typically."""
+Advance = Callable[[int, Event], None]
+"""Goes on by so many units, or fewer if told to stop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,6 @@ class Plan:
         noise: the process.
         motion, noise_step, step: the motion, one step of the noise, and its length.
         p: orders of the moments, shape (n,).
-        estimator: "direct" or "population".
         paths: in one batch.
         slice_steps: steps in one slice, the unit in which batches are advanced: one transient.
         settling: slices before the estimate begins.
@@ -83,11 +83,8 @@ class _Paths:
         self.plan, self.rng = plan, default_rng(seed)
         self.x, self.u, self.xi = starting_state(plan.noise, plan.paths, self.rng)
         self.log_norm, self.push = np.zeros((2, plan.paths))
+        self.state = self.x, self.u, self.xi, self.log_norm, self.push
         self.slices = -plan.settling
-
-    @property
-    def state(self) -> tuple[FloatArray, ...]:
-        return self.x, self.u, self.xi, self.log_norm, self.push
 
     def advance(self, slices: int, stop: Event) -> None:
         """Go on by so many slices, or fewer if told to stop; one that was begun then does not count."""
@@ -182,18 +179,9 @@ class Population(_Paths):
             self.expected = growth
             self.tallies[:] = 0
         if self._is_biased and 2 - self.plan.settling <= self.slices < -2:
-            self.bias = self._slope()
-
-    def _slope(self) -> float:
-        """⟨ξ⟩/2⟨ξ²⟩₀, that is α₀⟨ξ⟩/σ², the b under which Ornstein-Uhlenbeck noise has this mean."""
-        weights = np.exp(self._log_weights - self._log_weights.max())
-        return float(np.average(self.xi, weights=weights)) / (2 * self.plan.noise.standard_deviation**2)
-
-
-class Batch(Protocol):
-    """Something that can be advanced by so many units, and told to stop."""
-
-    def advance(self, count: int, stop: Event, /) -> None: ...
+            # α₀⟨ξ⟩/σ², under which Ornstein-Uhlenbeck noise has this mean
+            weights = np.exp(self._log_weights - self._log_weights.max())
+            self.bias = float(np.average(self.xi, weights=weights)) / (2 * self.plan.noise.standard_deviation**2)
 
 
 def _pool() -> ThreadPoolExecutor:
@@ -202,7 +190,7 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(count)
 
 
-def advance_all(batches: Sequence[Batch], wanted: int, seconds: float, progress: Callable[[], None]) -> bool:
+def advance_all(advances: Sequence[Advance], wanted: int, seconds: float, progress: Callable[[], None]) -> bool:
     """Advance batches side by side by the wanted number of units, each of which takes some `seconds`.
 
     `progress` is called 100 times in all. An interrupt ends this early; returns whether it did.
@@ -214,8 +202,8 @@ def advance_all(batches: Sequence[Batch], wanted: int, seconds: float, progress:
             count = min(portion, wanted - done)
             futures: list[Future[None]] = []
             try:
-                for batch in batches:
-                    futures.append(pool.submit(batch.advance, count, stop))
+                for each in advances:
+                    futures.append(pool.submit(each, count, stop))
                 wait(futures)
                 for _ in range(PROGRESS_STEPS * (done + count) // wanted - PROGRESS_STEPS * done // wanted):
                     progress()

@@ -23,9 +23,7 @@ from scipy.special import logsumexp
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
-from fpsolve.model.noise import ColouredNoise
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.simulation.kernels import TALLIES
 from fpsolve.simulation.setup import (
@@ -33,7 +31,6 @@ from fpsolve.simulation.setup import (
     PATHS,
     TRANSIENTS,
     Estimator,
-    check_orders,
     check_settings,
     default_step,
     obstacles,
@@ -135,26 +132,20 @@ def simulate(
         NoSuchExponent: some Λ(p) is infinite.
     """
     oscillator, noise = simulated_parts(problem)
-    check_orders(noise, p)
+    check_settings(noise, p, estimator, paths, seed)
     for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
         raise ValueError(f"{name}: {sentence}")
-    check_settings(estimator, paths, seed)
-    plan = _plan(oscillator, noise, p, estimator, paths, time, step)
+    plan = _plan(problem, p, estimator, paths, time, step)
     plain, populations = _start(plan, seed)
-    interrupted = advance_all([*plain, *populations], plan.settling + plan.wanted, plan.slice_seconds, progress)
+    advances = [batch.advance for batch in (*plain, *populations)]
+    interrupted = advance_all(advances, plan.settling + plan.wanted, plan.slice_seconds, progress)
     return _result(plan, plain, populations, seed, interrupted)
 
 
 def _plan(
-    oscillator: VibroImpactOscillator,
-    noise: ColouredNoise,
-    p: Sequence[float],
-    estimator: Estimator,
-    paths: int,
-    time: float | None,
-    step: float | None,
+    problem: Problem, p: Sequence[float], estimator: Estimator, paths: int, time: float | None, step: float | None
 ) -> Plan:
-    """What the batches need."""
+    oscillator, noise = simulated_parts(problem)
     h = default_step(oscillator, noise) if step is None else step
     settling = transient(oscillator, noise)
     wanted = TRANSIENTS if time is None else max(2, round(time / settling))
@@ -204,9 +195,10 @@ def _result(
     if not np.all(np.isfinite(exponents)):
         raise NotConverged("the simulation overflowed: some ξ is too large for this step; use a smaller step")
     if plan.estimator == "direct":
-        estimates, warnings = direct_estimates(plan, plain)
+        estimates, drifts = direct_estimates(plan, plain)
     else:
-        estimates, warnings = population_estimates(plan, populations)
+        estimates, drifts = population_estimates(plan, populations)
+    warnings = [*_missing(plan, estimates), *drifts]
     if interrupted:
         warnings.append(f"stopped early, after {slices.mean() / plan.wanted:.0%} of the time")
     return MonteCarlo(
@@ -243,11 +235,11 @@ def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[Mo
         usable = np.flatnonzero((share[1:, k] >= _KEPT) & (effective[1:, k] >= FEW["direct"]))
         j = int(usable[-1]) if usable.size else 0
         found = _jackknife(slopes[j, k], rests[:, j, k])
-        estimates.append(_estimate(plan, p, found, "direct", float(effective[j + 1, k])))
+        estimates.append(_estimate(plan, p, found, float(effective[j + 1, k])))
         if j > 0:
             change, uncertainty = _jackknife(slopes[j, k] - slopes[j - 1, k], rests[:, j, k] - rests[:, j - 1, k])
             _warn_of_drift(p, change, uncertainty, "a longer window", warnings)
-    return estimates, [*_missing(plan, estimates), *warnings]
+    return estimates, warnings
 
 
 def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple[list[MomentEstimate], list[str]]:
@@ -280,21 +272,19 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
             )
         value = float(growth[used, k].mean() + rate[used, k].mean() / 2)
         carrying = float(np.sum(tallies["effective"][used, k] / count[used, k]))
-        estimates.append(_estimate(plan, p, (value, standard_error(growth[used, k])), "population", carrying))
+        estimates.append(_estimate(plan, p, (value, standard_error(growth[used, k])), carrying))
         _warn_of_drift(p, float(trends[used, k].mean()), standard_error(trends[used, k]), "more time", warnings)
-    return estimates, [*_missing(plan, estimates), *warnings]
+    return estimates, warnings
 
 
-def _estimate(
-    plan: Plan, p: float, found: tuple[float, float], estimator: Estimator, effective: float
-) -> MomentEstimate:
+def _estimate(plan: Plan, p: float, found: tuple[float, float], effective: float) -> MomentEstimate:
     """An estimate, without a value where too few paths carry the mean. Λ(0) = 0 needs none of them."""
     if p == 0:
-        return MomentEstimate(0.0, 0.0, 0.0, estimator, effective)
+        return MomentEstimate(0.0, 0.0, 0.0, plan.estimator, effective)
     is_finite = bool(np.all(np.isfinite(found))) and math.isfinite(effective)
-    if is_finite and effective >= FEW[estimator] and _has_variance(plan, p):
-        return MomentEstimate(float(p), *found, estimator, effective)
-    return MomentEstimate(float(p), None, None, estimator, effective if is_finite else 0.0)
+    if is_finite and effective >= FEW[plan.estimator] and _has_variance(plan, p):
+        return MomentEstimate(float(p), *found, plan.estimator, effective)
+    return MomentEstimate(float(p), None, None, plan.estimator, effective if is_finite else 0.0)
 
 
 def _has_variance(plan: Plan, p: float) -> bool:
@@ -316,11 +306,10 @@ def _missing(plan: Plan, estimates: Sequence[MomentEstimate]) -> list[str]:
     if few:
         low, high = (pick(each.effective_paths for each in few) for pick in (min, max))
         number = f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
-        estimator = few[0].estimator
-        remedy = 'use estimator = "population", or more paths' if estimator == "direct" else "use more paths"
+        remedy = 'use estimator = "population", or more paths' if plan.estimator == "direct" else "use more paths"
         warnings.append(
             f"no estimate of Λ(p) at {_orders(few)}: too few effective paths carry the mean, {number} of the "
-            f"{FEW[estimator]} that are needed; {remedy}"
+            f"{FEW[plan.estimator]} that are needed; {remedy}"
         )
     return warnings
 

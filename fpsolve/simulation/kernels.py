@@ -171,8 +171,8 @@ def move(m, h, x, u, mean, rise, x_end, u_end, is_plain):  # type: ignore[no-unt
 
     Args:
         m: a `Motion`.
-        x, u: the state, shape (n,); m.bounce < 0 needs x ≥ 0.
-        mean, rise: ξ in the step is mean + rise (2t/h − 1); shape (n,).
+        x, u: the state; m.bounce < 0 needs x ≥ 0.
+        mean, rise: ξ in the step is mean + rise (2t/h − 1).
         x_end, u_end, is_plain: room for as many numbers, and as many booleans.
     """
     half = 0.5 * m.omega * h
@@ -226,27 +226,17 @@ def advance(m, noise, h, x, u, xi, log_norm, push, steps, interval, rng):  # typ
 
 @_compiled
 def add_windows(log_norm, starts, number, p, log_sums, log_squares):  # type: ignore[no-untyped-def]
-    """Add the windows of 2ʲ slices that end with this number of slices to the sums of a batch."""
+    """Add Σ w and Σ w² of the windows of 2ʲ slices that end with this number of slices to sums kept as logarithms."""
     for j in range(starts.shape[0]):
         if number % (1 << j) == 0:
             for k in range(p.size):
-                _add_powers(log_norm, starts[j], p[k], log_sums[j], log_squares[j], k)
+                exponents = p[k] * (log_norm - starts[j])
+                largest = exponents.max()
+                weights = np.exp(exponents - largest)
+                log_sums[j, k] = np.logaddexp(log_sums[j, k], largest + math.log(weights.sum()))
+                square = (weights * weights).sum()
+                log_squares[j, k] = np.logaddexp(log_squares[j, k], 2 * largest + math.log(square))
             starts[j] = log_norm
-
-
-@_compiled
-def _add_powers(log_norm, start, p, log_sums, log_squares, k):  # type: ignore[no-untyped-def]
-    """Add Σ exp(p growth) and the sum of the squares to two sums that are kept as logarithms."""
-    largest = -np.inf
-    for i in range(start.size):
-        largest = max(largest, p * (log_norm[i] - start[i]))
-    total, square = 0.0, 0.0
-    for i in range(start.size):
-        w = math.exp(p * (log_norm[i] - start[i]) - largest)
-        total += w
-        square += w * w
-    log_sums[k] = np.logaddexp(log_sums[k], largest + math.log(total))
-    log_squares[k] = np.logaddexp(log_squares[k], 2 * largest + math.log(square))
 
 
 @_compiled
@@ -267,7 +257,7 @@ def advance_population(  # type: ignore[no-untyped-def]
 
 @_compiled
 def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: ignore[no-untyped-def]
-    """Tally a slice of a population, and begin the next one; returns the growth of ln Z in it."""
+    """Add a slice of a population to its `TALLIES`, and begin the next one; returns the growth of ln Z in it."""
     n = log_weights.size
     largest = log_weights.max()
     shares = np.zeros(n)
@@ -275,25 +265,20 @@ def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: igno
         shares[ancestors[i]] += math.exp(log_weights[i] - largest)
     now = log_z[0] + largest + math.log(shares.sum() / n)
     growth = now - log_z[1]
-    _tally(tallies[0], growth - expected, shares.sum() ** 2 / (shares * shares).sum())
+    excess, record = growth - expected, tallies[0]
+    if record.count == 0:
+        record.first = excess
+    else:
+        record.products += excess * record.last
+    record.numbered += excess * record.count
+    record.count += 1
+    record.excess += excess
+    record.squares += excess * excess
+    record.effective += shares.sum() ** 2 / (shares * shares).sum()
+    record.last = excess
     log_z[1] = now
     ancestors[:] = np.arange(n)
     return growth
-
-
-@_compiled
-def _tally(tallies, excess, effective):  # type: ignore[no-untyped-def]
-    """Add a slice to a record of `TALLIES`."""
-    if tallies.count == 0:
-        tallies.first = excess
-    else:
-        tallies.products += excess * tallies.last
-    tallies.numbered += excess * tallies.count
-    tallies.count += 1
-    tallies.excess += excess
-    tallies.squares += excess * excess
-    tallies.effective += effective
-    tallies.last = excess
 
 
 @_compiled
@@ -325,7 +310,7 @@ def advance_and_count(  # type: ignore[no-untyped-def]
 ):
     """Advance paths, and after every `steps` steps count the states with an amplitude below `reach`, if that is > 0."""
     impacts = 0
-    bins = radial.size
+    scale = radial.size / reach if reach > 0 else 0.0
     for _ in range(looks):
         impacts += advance(m, noise, h, x, u, xi, spare[0], spare[1], steps, 0, rng)
         if reach <= 0:
@@ -338,7 +323,6 @@ def advance_and_count(  # type: ignore[no-untyped-def]
             sums[3] += amplitude
             sums[4] += 1
             if amplitude < reach:
-                scale = bins / reach
                 radial[int(amplitude * scale)] += 1
                 plane[int(x[i] * scale), int((u[i] + reach) * scale)] += 1
     return impacts

@@ -10,7 +10,6 @@ from threading import Event
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.noise import ColouredNoise
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
@@ -57,10 +56,12 @@ class Response:
 class _Batch:
     """Paths of the nonlinear system, and what has been counted of them."""
 
-    def __init__(self, setting: _Setting, seed: np.random.SeedSequence) -> None:
-        self.setting, self.rng = setting, np.random.default_rng(seed)
-        self.x, self.u, self.xi = starting_state(setting.noise, setting.paths, self.rng, setting.amplitude)
-        self.spare = np.zeros((2, setting.paths))
+    def __init__(
+        self, laws: tuple[Motion, NoiseStep, float], steps: int, state: tuple[FloatArray, ...], rng: np.random.Generator
+    ) -> None:
+        self.laws, self.steps, self.rng = laws, steps, rng
+        self.x, self.u, self.xi = state
+        self.spare = np.zeros((2, self.x.size))
         self.plane, self.radial = np.zeros((BINS, 2 * BINS)), np.zeros(BINS)
         self.sums = np.zeros(len(MEANS))
         self.impacts, self.reach = 0, 0.0
@@ -69,22 +70,10 @@ class _Batch:
         """Go on for some looks; with reach > 0 count the states up to this amplitude."""
         if stop.is_set():
             return
-        s = self.setting
         self.impacts += advance_and_count(
-            s.motion, s.noise_step, s.step, self.x, self.u, self.xi, self.spare, s.steps, looks, self.reach, self.plane,
-            self.radial, self.sums, self.rng,
+            *self.laws, self.x, self.u, self.xi, self.spare, self.steps, looks, self.reach, self.plane, self.radial,
+            self.sums, self.rng,
         )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class _Setting:
-    noise: ColouredNoise
-    motion: Motion
-    noise_step: NoiseStep
-    step: float
-    steps: int
-    paths: int
-    amplitude: float
 
 
 @of_problem
@@ -115,21 +104,21 @@ def stationary_response(
     oscillator, noise = simulated_parts(problem)
     steps = max(1, round(math.pi / (oscillator.omega * step * _LOOKS)))
     damping = oscillator.epsilon**2 * (oscillator.c2 + 3 * oscillator.omega**2 * oscillator.c3) / 8
-    setting = _Setting(
-        noise, motion(oscillator), noise_step(noise, step), step, steps, math.ceil(paths / BATCHES),
-        math.sqrt(exponent / damping),
-    )  # fmt: skip
     between = steps * step
     memory = max(1 / exponent, 2 * variance_rate / exponent**2)
     settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
-    batches = [_Batch(setting, each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
-    seconds = STEP_SECONDS * setting.paths * setting.steps
-    if advance_all(batches, settling, seconds, progress):
+    laws, size = (motion(oscillator), noise_step(noise, step), step), math.ceil(paths / BATCHES)
+    amplitude = math.sqrt(exponent / damping)
+    rngs = [np.random.default_rng(each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
+    batches = [_Batch(laws, steps, starting_state(noise, size, rng, amplitude), rng) for rng in rngs]
+    seconds = STEP_SECONDS * size * steps
+    advances = [batch.advance for batch in batches]
+    if advance_all(advances, settling, seconds, progress):
         raise KeyboardInterrupt
     reach = _MARGIN * max(float(np.max(np.hypot(batch.x, batch.u))) for batch in batches)
     for batch in batches:
         batch.impacts, batch.reach = 0, reach
-    interrupted = advance_all(batches, looks, seconds, progress)
+    interrupted = advance_all(advances, looks, seconds, progress)
     return _collect(oscillator, batches, between, reach, interrupted)
 
 
@@ -142,13 +131,7 @@ def _collect(
     sums = np.array([batch.sums[:-1] for batch in batches]) / count[:, None]
     x, xx, uu, amplitude = sums.T
     square = oscillator.omega**2
-    values = {
-        "x": x,
-        "x_squared": xx,
-        "v_squared": square * uu,
-        "amplitude": amplitude,
-        "energy": square * (xx + uu) / 2,
-    }
+    values = dict(zip(MEANS, (x, xx, square * uu, amplitude, square * (xx + uu) / 2), strict=True))
     edges = np.linspace(0, reach, BINS + 1)
     radial = np.array([batch.radial for batch in batches]) / count[:, None] / (reach / BINS)
     plane = sum(batch.plane for batch in batches)

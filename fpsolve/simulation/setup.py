@@ -40,25 +40,17 @@ def simulated_parts(problem: Problem) -> tuple[VibroImpactOscillator, ColouredNo
     )
 
 
-def check_orders(noise: ColouredNoise, p: Sequence[float]) -> None:
-    """Refuse a noise without variance, and orders of moments that are not finite numbers or whose Λ(p) is not.
+def check_settings(noise: ColouredNoise, p: Sequence[float], estimator: Estimator, paths: int, seed: int) -> None:
+    """Refuse what lengths and steps have no part in, see `obstacles`.
 
     Raises:
-        ValueError: the variance or an order is not finite.
+        ValueError: the variance of the noise or an order is not finite, or a setting is out of its range.
         NoSuchExponent: some Λ(p) is infinite.
     """
     if not (math.isfinite(noise.standard_deviation) and np.all(np.isfinite(np.array(p, dtype=float)))):
         raise ValueError(f"got p = {p} and a noise of variance {noise.standard_deviation**2:g}; all must be finite")
     for order in p:
         check_existence(noise, order)
-
-
-def check_settings(estimator: Estimator, paths: int, seed: int) -> None:
-    """Refuse an unknown estimator, too few or too many paths, and a negative seed.
-
-    Raises:
-        ValueError: one of them.
-    """
     if estimator not in get_args(Estimator) or not BATCHES <= paths <= MAX_PATHS or seed < 0:
         raise ValueError(
             f"got estimator = {estimator!r}, paths = {paths}, seed = {seed}; must be one of "
