@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad_vec
 from scipy.stats import kstest
@@ -98,6 +98,7 @@ def test_constant_noise_has_order_four(gain):
 
 
 @settings(max_examples=200, deadline=None)
+@example(phase=2.4453125, size=0.0, mean=175.078125, rise=0.029296875, h=1.0, cubic=0.3)  # a stiff limit cycle
 @given(
     phase=st.floats(0, math.pi),
     size=st.floats(-8, 8),
