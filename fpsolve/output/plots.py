@@ -21,8 +21,6 @@ from fpsolve.model.parameters import axis_title, symbol_of
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
 
-_BY_SYMBOL = ("oscillator.epsilon", "oscillator.c2", "oscillator.c3")
-"""Parameters that stand at an axis without their names."""
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
@@ -56,8 +54,7 @@ def write_figure(
         is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
     with _canvas(paths) as figure:
-        title_of = symbol_of if x in _BY_SYMBOL else axis_title
-        axes = figure.add_subplot(xlabel=title_of(ABSCISSAE[x]), ylabel=y.title)
+        axes = figure.add_subplot(xlabel=axis_title(ABSCISSAE[x]), ylabel=y.title)
         axes.set_title(fill(title, 80), parse_math=False)
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):

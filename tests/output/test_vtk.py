@@ -164,10 +164,10 @@ def test_nodes_are_on_the_polynomials(tmp_path):
     solver = ExponentSolver(Problem(HARD, UNIT_NOISE), make_mesh(phi_cells=3, phi_degree=4, xi_cells=6, xi_degree=4))
     pair, grid = solver.pair(1.0), written(tmp_path, solver, [1.0])[1.0]
     space, half = pair.generator.space, np.array([0.5])
-    phi, z = space.phi.evaluation(half)[0], space.xi.line.evaluation(half)[0]
-    values = space.values(pair.right, half, half)
+    (phi, at_phi), at_xi = space.phi.evaluation(half), space.xi.samples(half)
+    values = space.evaluate(pair.right, at_phi, at_xi.values)
     for turn in (0, np.pi):
-        x, y = np.meshgrid((phi + turn) % (2 * np.pi), z * UNIT_NOISE.standard_deviation, indexing="ij")
+        x, y = np.meshgrid((phi + turn) % (2 * np.pi), at_xi.xi, indexing="ij")
         points = pyvista.PolyData(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3))
         np.testing.assert_allclose(points.sample(grid)["T"].reshape(values.shape), values, rtol=1e-7)
 
