@@ -31,7 +31,7 @@ def exact(oscillator, noise, p):
 
 def test_agrees_with_finite_elements():
     """90 combinations by both estimators, see tests/agreement.py; those without an estimate say so themselves."""
-    table = list(rows(paths=8192, transients=8))
+    table = list(rows(paths=8192, transients=4))
     assert len(table) == 180
     given = [row for row in table if row.simulated.value is not None]
     assert sum(row.simulated.estimator == "population" for row in given) >= 78
@@ -41,13 +41,13 @@ def test_agrees_with_finite_elements():
     assert np.max(deviations) <= 5
 
 
-@pytest.mark.parametrize(("estimator", "paths"), [("direct", 2048), ("population", 3072)])
-def test_standard_errors_are_honest(estimator, paths):
+@pytest.mark.parametrize(("estimator", "paths", "time"), [("direct", 2048, 100.0), ("population", 3072, 50.0)])
+def test_standard_errors_are_honest(estimator, paths, time):
     """Over 200 seeds the estimates deviate by their standard error, within 20 %, and their mean is Λ(p)."""
     orders = [1.0] if estimator == "population" else [-1.0, 0.5, 1.0]
     reference = exact(MODERATE, REDUCED, orders)
     runs = [
-        simulate(MODERATE, REDUCED, orders, estimator=estimator, paths=paths, time=100.0, seed=seed)
+        simulate(MODERATE, REDUCED, orders, estimator=estimator, paths=paths, time=time, seed=seed)
         for seed in range(200)
     ]
     exponent = ExponentSolver(Problem(MODERATE, REDUCED)).lyapunov_exponent().value
@@ -83,12 +83,12 @@ def test_three_digits_in_seconds():
     assert abs(estimate.value - reference) < 4 * estimate.standard_error
 
 
-def biases(monkeypatch, oscillator, noise, p, steps, paths):
+def biases(monkeypatch, oscillator, noise, p, steps, paths, time=None):
     """Relative bias of Λ(p) and its standard error for each step."""
     monkeypatch.setattr(estimators, "obstacles", lambda *_, **__: {})
     reference = exact(oscillator, noise, [p])[0]
     found = [
-        simulate(oscillator, noise, [p], estimator="population", paths=paths, step=step, seed=4).estimates[0]
+        simulate(oscillator, noise, [p], estimator="population", paths=paths, time=time, step=step, seed=4).estimates[0]
         for step in steps
     ]
     return [(estimate.value / reference - 1, estimate.standard_error / abs(reference)) for estimate in found]
@@ -97,7 +97,7 @@ def biases(monkeypatch, oscillator, noise, p, steps, paths):
 def test_weak_order_of_the_exact_noise(monkeypatch):
     """Halving the step divides the bias by 4; the steps are four and two times the largest that is allowed."""
     noise = NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
-    (coarse, error), (fine, fine_error) = biases(monkeypatch, STRONG, noise, 4.0, (0.2, 0.1), 28672)
+    (coarse, error), (fine, fine_error) = biases(monkeypatch, STRONG, noise, 4.0, (0.2, 0.1), 28672, 400.0)
     assert abs(coarse) > 20 * error
     assert abs(fine) > 5 * fine_error
     assert coarse / fine == pytest.approx(4, abs=0.3 + 4 * (coarse / fine) * fine_error / fine)

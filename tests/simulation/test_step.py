@@ -185,7 +185,7 @@ def test_noise_has_its_stationary_law(r0, origin):
     noise = NonGaussianNoise(D0=0.8, tau0=1.3, r0=r0)
     rng = np.random.default_rng([7, int(100 * r0), len(origin)])
     xi = stationary_noise(noise, 100_000, rng) if origin == "stationary" else np.zeros(100_000)
-    xi = noise_after(noise, xi, noise.tau0 * (2 if origin == "stationary" else 12), rng)
+    xi = noise_after(noise, xi, noise.tau0 * (2 if origin == "stationary" else 6), rng)
     assert np.all(np.abs(xi) < noise.half_width)
     reach = min(noise.half_width, 60 * noise.standard_deviation)
     nodes = reach * np.sin(np.linspace(-math.pi / 2, math.pi / 2, 20_001))
