@@ -36,6 +36,8 @@ _EPS = float(np.finfo(float).eps)
 MAX_ITERATIONS = 12
 STEPS_PER_FACTOR = 3
 MAX_DENSE_UNKNOWNS = 4000
+SURVEYED_UNKNOWNS = 600
+"""Up to so many, a chain is checked by all eigenvalues."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +106,7 @@ def principal_pair(
             continue
         found.append(_rayleigh_iteration(generator, p, *vectors))
         if found[-1].residual <= BACKWARD_ERROR_LIMIT and min(found[-1].sign_defects) <= SURELY_POSITIVE:
-            return found[-1]
+            return _rightmost(found[-1])
     pair = min(found, key=lambda pair: (pair.residual > BACKWARD_ERROR_LIMIT, min(pair.sign_defects)))
     if not (pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= POSITIVE):
         raise NotConverged(
@@ -113,6 +115,23 @@ def principal_pair(
             f"T* has the wrong sign (at most {POSITIVE:g}); use more cells, in the phase and in the noise",
             pair,
         )
+    return _rightmost(pair)
+
+
+def _rightmost(pair: PrincipalPair) -> PrincipalPair:
+    """The pair; for a chain and few unknowns only after a look at the whole spectrum.
+
+    States may hardly mix, or the phase not leave a ray: then other pairs have a positive T, or T*, too.
+    """
+    generator = pair.generator
+    if isinstance(generator.problem.noise, MarkovChain) and generator.space.size <= SURVEYED_UNKNOWNS:
+        rightmost = spectrum(generator, pair.p, 1)[0]
+        if abs(rightmost - pair.value) > 1e-6 * max(abs(rightmost), generator.unit_rate):
+            raise NotConverged(
+                f"at p = {pair.p:g} the eigenvalue {rightmost:.6g} lies right of {pair.value:.6g}, though that has "
+                "eigenfunctions of one sign; use more cells in the phase",
+                pair,
+            )
     return pair
 
 

@@ -64,7 +64,7 @@ class MomentLyapunovFunction:
         solver: ExponentSolver | None = None,
         progress: Callable[[], None] = lambda: None,
     ) -> None:
-        low, high = (float(end) for end in checked_moments(list(interval), problem.noise))
+        low, high = (float(end) for end in checked_moments(list(interval), problem))
         if not low < high:
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
@@ -106,7 +106,7 @@ class MomentLyapunovFunction:
 
     def moments(self, p: ArrayLike) -> MomentLyapunov:
         """Λ(p) at several p; the residual is the largest of the nodes."""
-        points = checked_moments(p, self.solver.problem.noise)
+        points = checked_moments(p, self.solver.problem)
         value, error = self(points), self.error_estimate(points)
         for point, each, bound in zip(points, value, error, strict=True):
             if point != 0:

@@ -64,7 +64,7 @@ def solve_moments(
     Raises:
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
-    points = checked_moments(p, solver.problem.noise)
+    points = checked_moments(p, solver.problem)
     reports = repeat(progress, points.size)
 
     def report() -> None:

@@ -20,8 +20,8 @@ from fpsolve.exponent.error import Estimate, Solution, Stage, checked
 from fpsolve.exponent.rival import rival
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
-from fpsolve.model.noise import Noise, check_existence, has_algebraic_tails
-from fpsolve.model.problem import Problem
+from fpsolve.model.noise import has_algebraic_tails
+from fpsolve.model.problem import Problem, refuse_infinite
 from fpsolve.theory.perturbation import Scale, scale_of
 
 SMALL_P = 1e-2
@@ -121,7 +121,7 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite.
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
         """
-        check_existence(self.problem.noise, p)
+        refuse_infinite(self.problem, p)
         if p in self._failed:
             raise self._failed[p]
         if p not in self._known:
@@ -172,7 +172,7 @@ class ExponentSolver:
         Raises:
             NoSuchExponent: Λ(p) is infinite for one of the p.
         """
-        points = checked_moments(p, self.problem.noise)
+        points = checked_moments(p, self.problem)
         solutions, failures = {}, []
         for i in best_order(points):
             try:
@@ -326,11 +326,11 @@ def best_order(p: FloatArray) -> Any:
     return np.lexsort((-np.abs(p), p < 0))
 
 
-def checked_moments(p: ArrayLike, noise: Noise) -> FloatArray:
+def checked_moments(p: ArrayLike, problem: Problem) -> FloatArray:
     """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
     points = np.atleast_1d(np.asarray(p, dtype=float))
     if points.ndim != 1 or points.size == 0 or not np.all(np.isfinite(points)):
         raise ValueError(f"p must be a finite number or a non-empty list of finite numbers, got {p!r}")
     for point in points:
-        check_existence(noise, float(point))
+        refuse_infinite(problem, float(point))
     return points

@@ -14,7 +14,8 @@ from fpsolve.fem.kronecker import KroneckerPattern, KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import CylinderSpace
 from fpsolve.fem.terms import Jump, Power, Term, power_of_epsilon, terms_of
-from fpsolve.model.plane import angular_frequency, growth_rate, phase_speed
+from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rate, phase_speed
 from fpsolve.model.problem import Problem
 
 _ALL = slice(None)
@@ -96,9 +97,17 @@ class Generator:
         return all(drive.h.amplitude == 0 and drive.q.vanishes for drive in free)
 
     def upper_bound(self, p: float) -> float:
-        """A number right of Λ(p): the supremum of p q over φ and ξ, and of the kicks spread evenly over φ."""
-        system, xi = self.problem.system, self.space.xi.support
+        """A number right of Λ(p): the supremum of p q over φ and ξ, and of the kicks spread evenly over φ.
+
+        Where states of a chain move the phase over a ray to and fro, each jump between them may bring a kick more.
+        """
+        system, noise, xi = self.problem.system, self.problem.noise, self.space.xi.support
         q, speed = growth_rate(system, xi), phase_speed(system, xi)
         growth = max(0.0, float(np.max(p * q.mean + abs(p) * q.amplitude)))
         fastest = float(np.max(np.abs(speed.mean) + speed.amplitude))
-        return growth + sum(max(0.0, p * kick.log_factor) for kick in system.kicks) * fastest / math.pi
+        for kick in system.kicks:
+            gain = max(0.0, p * kick.log_factor)
+            growth += gain * fastest / math.pi
+            if isinstance(noise, MarkovChain) and crosses_both_ways(system, kick, xi):
+                growth += float(-np.min(noise.rates)) * math.expm1(gain)
+        return growth

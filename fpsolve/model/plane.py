@@ -78,10 +78,11 @@ class Drive:
 
     def __post_init__(self) -> None:
         entries = np.array(self.matrix, dtype=float)
-        if entries.shape != (2, 2) or not np.all(np.isfinite(entries)) or self.order < 0:
+        is_order = isinstance(self.order, int) and self.order >= 0
+        if entries.shape != (2, 2) or not np.all(np.isfinite(entries)) or not is_order:
             raise ValueError(
-                f"got order = {self.order} and matrix = {self.matrix}; must be order >= 0 and two rows of two finite "
-                "numbers, such as ((0.0, 0.0), (0.0, 1.0))"
+                f"got order = {self.order} and matrix = {self.matrix}; must be a whole number >= 0 and two rows of two "
+                "finite numbers, such as ((0.0, 0.0), (0.0, 1.0))"
             )
         object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
 
@@ -191,6 +192,12 @@ def phase_speed(system: System, xi: ArrayLike) -> Harmonics:
 def growth_rate(system: System, xi: ArrayLike) -> Harmonics:
     """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
     return _total(system, [drive.q for drive in system.drives], xi)
+
+
+def crosses_both_ways(system: System, kick: Kick, xi: ArrayLike) -> bool:
+    """Whether the phase passes the ray of a kick forward for some of the ξ and backward for others."""
+    speed = phase_speed(system, xi)(kick.phase)
+    return bool(np.min(speed) < 0 < np.max(speed))
 
 
 def _total(system: System, parts: Sequence[Harmonics], xi: ArrayLike) -> Harmonics:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
+import numpy as np
+
+from fpsolve.errors import NoSuchExponent
 from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import Diffusion
-from fpsolve.model.plane import System
+from fpsolve.model.noise import Diffusion, check_existence
+from fpsolve.model.plane import System, crosses_both_ways
 
 AnyNoise = Diffusion | MarkovChain
 P = ParamSpec("P")
@@ -27,6 +31,32 @@ class Problem:
 
     system: System
     noise: AnyNoise
+
+
+def refuse_infinite(problem: Problem, p: float) -> None:
+    """Refuse a p for which E‖x‖^p is infinite, or carried by a layer that no mesh resolves.
+
+    Where the noise moves the phase to and fro over a ray at which ‖x‖^p grows by R^p, crossings add up. The speed of a
+    diffusing noise changes between them by a factor u with E u^s = ½/sin(π(2s + 5)/6), H. P. McKean, J. Math. Kyoto
+    Univ. 2, 1963, so that they have a finite mean only for R^p < 2 = 1/min E u^s. For a chain the layer is thin for
+    R^p > e.
+
+    Raises:
+        NoSuchExponent: p is not among the `moments` of the noise, or there is such a ray.
+    """
+    noise, system = problem.noise, problem.system
+    check_existence(noise, p)
+    if isinstance(noise, MarkovChain):
+        xi, most = np.array(noise.states), math.e
+    else:
+        xi, most = min(noise.half_width, 1e6 * noise.standard_deviation) * np.linspace(-1, 1, 1001), 2.0
+    for kick in system.kicks:
+        if p * kick.log_factor > math.log(most) and crosses_both_ways(system, kick, xi):
+            raise NoSuchExponent(
+                f"Λ({p:g}) is infinite or out of reach: the noise moves the phase to and fro over the ray at "
+                f"{kick.phase:.6g}, where ‖x‖^p grows by a factor > {most:.3g} each time; choose a p nearer to 0, or a "
+                "ray on which no noise acts"
+            )
 
 
 class OfProblem(Protocol[P, R_co]):

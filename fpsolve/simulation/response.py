@@ -126,6 +126,8 @@ def _collect(
     oscillator: VibroImpactOscillator, batches: list[_Batch], between: float, reach: float, interrupted: bool
 ) -> Response:
     count = np.array([batch.sums[-1] for batch in batches])
+    if count.min() == 0:
+        raise KeyboardInterrupt
     time = float(count.mean() / batches[0].x.size * between)
     paths = sum(batch.x.size for batch in batches)
     sums = np.array([batch.sums[:-1] for batch in batches]) / count[:, None]

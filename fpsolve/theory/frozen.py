@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -26,11 +25,11 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
 
 
 def frozen_rate(problem: Problem, p: float) -> tuple[FloatArray, FloatArray] | None:
-    """z on the side to which p tilts, and the growth rate of ‖x‖^p on paths that hold the noise there.
+    """z on both sides, and the growth rate of ‖x‖^p on paths that hold the noise there.
 
     F = p G(ξ) − ⅛σ²((ln P_s)′)². G is the growth rate of ln ‖x‖ with ξ frozen, the largest real part of an eigenvalue
     of A(ξ): for the paper's oscillator εξ/2 while it oscillates, |εξ| < 2ω, the rate of the faster real mode beyond.
-    For p < −1 the paths that stay on the other real mode carry more: (p + 1)·fast − slow. The second term is what
+    For p < −1 the paths that stay on the other real mode carry more: (p + 1)·slow − fast. The second term is what
     holding ξ costs. Slow noise has its tilted density where F is largest, and more than one such place.
 
     None for a chain.
@@ -40,7 +39,8 @@ def frozen_rate(problem: Problem, p: float) -> tuple[FloatArray, FloatArray] | N
         return None
     unit = noise.standard_deviation
     furthest = 2.5 * abs(p) * 2 * unit * noise_strength(system) * noise.correlation_time
-    z = math.copysign(min(max(furthest, 1e-3), 0.999 * noise.half_width / unit), p) * np.linspace(0, 1, SAMPLES)
+    side = min(max(furthest, 1e-3), 0.999 * noise.half_width / unit) * np.linspace(0, 1, SAMPLES)
+    z = np.concatenate([-side[:0:-1], side])
     faster, slower, turns = eigenvalues_at(problem, unit * z)
     growth = p * faster
     if p < -1:

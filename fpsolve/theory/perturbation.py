@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, identity, one
 from fpsolve.errors import NoPerturbationTheory
-from fpsolve.model.plane import Harmonics, System, angular_frequency, matrix_at, stretching
+from fpsolve.model.plane import Harmonics, System, angular_frequency, matrix_at, stretching, turning
 from fpsolve.model.problem import Problem
 
 
@@ -118,10 +118,12 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
     Raises:
         NoPerturbationTheory: as `second_order`; or the order 0 does not rotate uniformly in these coordinates.
     """
+    second_order(problem)
     frame, omega = _rotating_frame(problem.system)
     if not np.array_equal(frame, np.eye(2)):
         raise NoPerturbationTheory("T₁ is for a uniform rotation; choose coordinates in which the order 0 is one")
     q = stretching(matrix_at(problem.system, 1.0, slice(1, 2)))
+    omega = math.copysign(omega, turning(matrix_at(problem.system, 0.0, slice(0, 1))).mean)
     alpha, xi = 1 / problem.noise.correlation_time, np.asarray(xi, dtype=float)
     wave = (q.cosine - 1j * q.sine) * np.exp(2j * np.asarray(phi, dtype=float)) / (alpha - 2j * omega)
     return p / problem.system.epsilon * xi * (q.mean / alpha + wave.real)

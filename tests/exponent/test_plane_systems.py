@@ -8,7 +8,7 @@ import pytest
 
 from fpsolve.analysis.density import furstenberg_khasminskii, stationary_density
 from fpsolve.arrays import identity
-from fpsolve.errors import MeshError, NotConverged
+from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import principal_pair, spectrum
 from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
@@ -199,3 +199,61 @@ def test_problems_of_chains_pickle():
 def test_a_chain_refuses_a_mesh_with_lines():
     with pytest.raises(MeshError, match="noise with states needs a mesh without z_lines"):
         Generator(Problem(oscillator(), TELEGRAPH), make_mesh())
+
+
+ROTATION = ((0.0, 1.0), (-1.0, 0.0))
+
+
+def test_slow_noise_is_sought_on_both_sides():
+    """Symmetric noise does not know the sign of its drive: the far place may lie at ξ < 0 although p > 0."""
+    noise = OrnsteinUhlenbeck(alpha=0.05, sigma=0.05)
+    values = []
+    for sign in (1, -1):
+        driven = Drive(1, ((0.0, 0.0), (0.0, sign * 1.0)), identity)
+        drives = [Drive(0, ROTATION), driven, Drive(2, ((0.0, 0.0), (0.0, 0.1)))]
+        system = PlaneSystem(drives, [Kick(math.pi / 2, math.log(0.8))])
+        values.append(moment_lyapunov(Problem(system, noise), [2.0]).value[0])
+    assert values[0] == pytest.approx(values[1], rel=1e-7)
+    assert values[0] == pytest.approx(1.12906, rel=1e-4)  # populations: 1.12902 ± 2e-5
+
+
+def test_a_ray_that_is_crossed_to_and_fro():
+    """T lives at the ray: with k jumps in unit time each brings R^p or R^−p, Λ = k (cosh(p ln R) − 1) but for e^−2π…"""
+    system = PlaneSystem([Drive(0, ROTATION, identity)], [Kick(0.3, 0.5)])
+    result = moment_lyapunov(Problem(system, MarkovChain.telegraph(1.0, 5.0)), [2.0])
+    assert result.value[0] == pytest.approx(5 * (math.cosh(1.0) - 1), rel=1e-6)
+    with pytest.raises(NoSuchExponent, match=r"to and fro over the ray at 0\.3"):
+        moment_lyapunov(Problem(system, MarkovChain.telegraph(1.0, 50.0)), [4.0])
+    moved = PlaneSystem([Drive(0, ROTATION), Drive(1, ((0.0, 0.0), (-1.0, 0.0)), identity)], [Kick(0.4, 0.5)])
+    with pytest.raises(NoSuchExponent, match="is infinite or out of reach"):
+        moment_lyapunov(Problem(moved, UNIT_NOISE), [1.5])
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+def test_a_ray_that_all_matrices_keep(rtol):
+    """On x₂ = 0 the growth is 0.3 for ever, and no other motion grows faster in the mean."""
+    system = PlaneSystem([Drive(0, ((0.3, 1.0), (0.0, -0.5))), Drive(1, ((0.0, 0.0), (0.0, 1.0)), identity)])
+    result = moment_lyapunov(Problem(system, MarkovChain.telegraph(1.0, 1.0)), [1.0], rtol=rtol)
+    assert result.value[0] == pytest.approx(0.3, abs=1e-6)
+
+
+def square(xi):
+    return xi**2
+
+
+def cube(xi):
+    return xi**3
+
+
+def test_fast_elliptic_rotation_does_not_hide_the_principal_eigenvalue():
+    """A wrong eigenvalue has eigenfunctions of nearly one sign on a coarse mesh and on a finer one."""
+    drives = [
+        Drive(0, ((0.742, -1.834), (-0.300, 1.384))),
+        Drive(0, ((0.0, -1.5), (1.0, 0.3))),
+        Drive(0, ((-1.719, -0.581), (-1.235, -1.086)), square),
+        Drive(3, ((-1.172, 1.896), (-1.741, 1.163)), cube),
+    ]
+    chain = MarkovChain((-2.466, -1.282, -3.378), ((0, 3.053, 0), (0, 0, 1.328), (1.661, 0, 0)))
+    problem = Problem(PlaneSystem(drives, epsilon=1.5), chain)
+    for rtol in (1e-7, 1e-8):
+        assert moment_lyapunov(problem, [4.0], rtol=rtol).value[0] == pytest.approx(exact(problem, 4), rel=1e-6)

@@ -65,7 +65,8 @@ def test_the_unit_of_rates():
     [
         (lambda: Drive(0, ((1, 2), (3,))), "inhomogeneous|two rows of two finite numbers"),
         (lambda: Drive(0, ((1, 2), (3, math.nan))), "two rows of two finite numbers"),
-        (lambda: Drive(-1, ROTATION), "order >= 0"),
+        (lambda: Drive(-1, ROTATION), "a whole number >= 0"),
+        (lambda: Drive(0.5, ROTATION), "a whole number >= 0"),
         (lambda: Kick(math.inf, 0.0), "both must be finite"),
         (lambda: Kick(0.0, -math.inf), "both must be finite"),
         (lambda: PlaneSystem([]), "needs one at least"),

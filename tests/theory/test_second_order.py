@@ -79,3 +79,16 @@ def test_where_the_theory_does_not_apply_it_says_so_and_errors_have_a_scale(driv
         second_order(problem)
     scale = scale_of(problem)
     assert 0 <= scale.quadratic <= scale.linear < math.inf
+
+
+@pytest.mark.parametrize("turn", [1.3, -1.3])
+def test_the_first_order_eigenfunction_solves_its_equation(turn):
+    """L₀T₁ = −p q ξ, Eq. (32), forward and backward rotation alike."""
+    drives = [Drive(0, ((0.0, turn), (-turn, 0.0))), Drive(1, ((0.2, -0.7), (0.4, 1.0)), identity)]
+    problem = Problem(PlaneSystem(drives), OrnsteinUhlenbeck(alpha=0.7, sigma=1.0))
+    phi, h = np.linspace(0, 3, 7), 1e-5
+    at, after, before = (first_order_eigenfunction(problem, 1.4, x, 0.9) for x in (phi, phi + h, phi - h))
+    residual = -0.7 * at + turn * (after - before) / (2 * h) + 1.4 * 0.9 * drives[1].q(phi)
+    np.testing.assert_allclose(residual, 0, atol=1e-8)
+    with pytest.raises(NoPerturbationTheory):
+        first_order_eigenfunction(Problem(PlaneSystem([*drives, Drive(1, ROTATION)]), problem.noise), 1.4, phi, 0.9)
