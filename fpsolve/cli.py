@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,21 +14,23 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve import __version__
+from fpsolve.case.remedies import in_words_of_a_case
+from fpsolve.errors import CaseError, FpsolveError, NotConverged
 
 if TYPE_CHECKING:
-    from fpsolve.case import Case
-    from fpsolve.curves import CurveResult
-    from fpsolve.simulated import SimulatedCurve
+    from fpsolve.case.case import Case
+    from fpsolve.workflow import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
+KEPT = "interrupted; what was done is kept"
 
 app = App(
     name="fpsolve",
     help="""Moment Lyapunov exponents of a vibro-impact oscillator under coloured noise, by finite elements.
 
     Example: fpsolve run cases/fig1.toml""",
-    version=lambda: f"fpsolve {version('fpsolve')}",
+    version=lambda: f"fpsolve {__version__}",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
 )
@@ -62,32 +63,22 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
-    from fpsolve import curves, report
-    from fpsolve.simulated import refuse_obstacles
-    from fpsolve.tables import print_results
+    from fpsolve.exponent.quantities import STABILITY_INDEX
+    from fpsolve.workflow import run_case
 
-    loaded = _load(cases, overrides)
-    _refuse_namesakes(loaded)
-    for case in loaded if monte_carlo else ():
-        refuse_obstacles(case)
     code = 0
-    for case in loaded:
-        try:
-            with _progress(case.name, curves.work(case)) as advance:
-                results = report.run(case, out, advance=advance)
-        except NotConverged as failure:
-            results, code = failure.partial, NOT_CONVERGED
-        print_results(case, results)
-        if monte_carlo:
-            simulated, is_interrupted = _simulate(case, out, results)
-            if case.figure.y == "stability_index":
-                _stderr().print(
-                    "note: a simulation gives no stability index, so that the figure has no dots", style="cyan"
-                )
-            report.draw(case, results, out / case.name, simulated)
+    for case in _load_to_write(cases, overrides, monte_carlo=monte_carlo):
+        outcome = run_case(case, out, monte_carlo=monte_carlo, watch=_watch())
+        if outcome.interrupted:
+            _print_error(KEPT)
+        if monte_carlo and case.figure.y == STABILITY_INDEX.name:
+            note = "note: a simulation gives no stability index, so that the figure has no dots"
+            Console(stderr=True).print(note, style="cyan")
         print(f"written: {out / case.name}")
-        if monte_carlo and is_interrupted:
+        if outcome.interrupted:
             return INTERRUPTED
+        if outcome.failures:
+            code = NOT_CONVERGED
     return code
 
 
@@ -111,18 +102,16 @@ def simulate(
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
-    from fpsolve.simulated import refuse_obstacles
+    from fpsolve.workflow import simulate_case
 
     options = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
     stated = [f"monte_carlo.{name}={value}" for name, value in options.items() if value is not None]
-    loaded = _load(cases, [*(overrides or ()), *stated])
-    _refuse_namesakes(loaded)
-    for case in loaded:
-        refuse_obstacles(case)
-    for case in loaded:
-        _, is_interrupted = _simulate(case, out)
+    for case in _load_to_write(cases, [*(overrides or ()), *stated], monte_carlo=True):
+        outcome = simulate_case(case, out, watch=_watch())
+        if outcome.interrupted:
+            _print_error(KEPT)
         print(f"written: {out / case.name}")
-        if is_interrupted:
+        if outcome.interrupted:
             return INTERRUPTED
     return 0
 
@@ -133,19 +122,17 @@ def check(cases: Cases, *, overrides: Overrides = None) -> int:
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
-    from fpsolve import curves
-    from fpsolve.tables import print_comparisons, print_warnings
+    from fpsolve.output.terminal import print_comparisons, print_warnings
+    from fpsolve.workflow import check_case
 
     code = 0
     for case in _load(cases, overrides):
-        with _progress(case.name, curves.work(case)) as advance:
-            results = [result.without_pairs() for result in curves.solve(case, advance=advance)]
-        comparisons = curves.compare(case, results)
-        print_comparisons(case, comparisons)
-        print_warnings(case, results)
-        if any(result.failures for result in results):
+        outcome = check_case(case, watch=_watch())
+        print_comparisons(case, outcome.comparisons)
+        print_warnings(case, outcome.results)
+        if outcome.failures:
             code = NOT_CONVERGED
-        elif not all(comparison.met for comparison in comparisons):
+        elif not all(comparison.met for comparison in outcome.comparisons):
             code = max(code, CHECK_FAILED)
     return code
 
@@ -169,7 +156,8 @@ def mesh(
 
     Example: fpsolve mesh meshes/graded.vtu --phi-cells 3 --xi-cells 8 --grading 2
     """
-    from fpsolve.mesh import make_mesh, write_mesh
+    from fpsolve.fem.mesh import make_mesh
+    from fpsolve.fem.mesh_file import write_mesh
 
     made = make_mesh(
         phi_cells=phi_cells,
@@ -194,33 +182,25 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
     try:
-        code = app(argv, result_action="return_value", exit_on_error=False, error_console=_stderr())
+        code = app(argv, result_action="return_value", exit_on_error=False, error_console=Console(stderr=True))
     except CycloptsError:  # cyclopts has said what is wrong
         return BAD_INPUT
-    except NotConverged as failure:
-        _print_error(str(failure))
-        return NOT_CONVERGED
     except FpsolveError as failure:
         _print_error(str(failure))
-        return BAD_INPUT
+        return NOT_CONVERGED if isinstance(failure, NotConverged) else BAD_INPUT
     except KeyboardInterrupt:
         _print_error("interrupted")
         return INTERRUPTED
     return code if isinstance(code, int) else 0
 
 
-def _stderr() -> Console:
-    return Console(stderr=True)
-
-
 def _print_error(text: str) -> None:
-    _stderr().print(Text(text), style="bold red", soft_wrap=True)
+    Console(stderr=True).print(Text(in_words_of_a_case(text)), style="bold red", soft_wrap=True)
 
 
 def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
     """All cases, or one error that lists the faults of all of them."""
-    from fpsolve.case import load_case
-    from fpsolve.errors import CaseError
+    from fpsolve.case.case import load_case
 
     cases, errors = [], []
     for path in paths:
@@ -233,30 +213,32 @@ def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
     return cases
 
 
-def _simulate(case: Case, out: Path, results: Sequence[CurveResult] = ()) -> tuple[Sequence[SimulatedCurve], bool]:
-    """Simulate a case, write it, print it; and whether an interrupt ended it."""
-    from fpsolve.simulated import simulate_case, simulation_work
-    from fpsolve.tables import print_simulation
+def _load_to_write(paths: Sequence[Path], overrides: Sequence[str] | None, *, monte_carlo: bool) -> list[Case]:
+    """All cases, or an error where two would write into one folder, or one that shall be simulated cannot be."""
+    from fpsolve.study.simulate import refuse_obstacles
 
-    with _progress(f"{case.name}, simulation", simulation_work(case)) as tick:
-        simulated, is_interrupted = simulate_case(case, out, tick=tick)
-    print_simulation(case, simulated, results)
-    if is_interrupted:
-        _print_error("interrupted; what was done is kept")
-    return simulated, is_interrupted
-
-
-def _refuse_namesakes(cases: Sequence[Case]) -> None:
+    cases = _load(paths, overrides)
     names = [case.name for case in cases]
     for name in names:
         if names.count(name) > 1:
             raise FpsolveError(f'several cases are called "{name}" and would overwrite each other; run them apart')
+    for case in cases if monte_carlo else ():
+        refuse_obstacles(case)
+    return cases
+
+
+def _watch() -> Watch:
+    """Shows bars, and prints what is found."""
+    from fpsolve.output.terminal import print_results, print_simulation
+    from fpsolve.workflow import Watch
+
+    return Watch(_bar, print_results, print_simulation)
 
 
 @contextmanager
-def _progress(name: str, total: int) -> Iterator[Callable[[], None]]:
+def _bar(name: str, total: int) -> Iterator[Callable[[], None]]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=_stderr(), transient=True) as progress:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(name, total=total)
         yield lambda: progress.advance(task)
 

@@ -4,7 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
+
+
+class Remedy(StrEnum):
+    """What to do about a failure, as it ends a message; those who work with case files are told in their own words."""
+
+    MESH = "use more cells or a wider noise interval, or let the mesh be chosen"
+    CELLS = "use a smaller rtol, or more cells in the mesh"
+    REACH = "use a mesh that reaches there, or let it be chosen"
+    BUDGET = "use a larger rtol or a larger budget"
+    MESH_FILE = "make one with `write_mesh`"
+    REDUCTION = "or the Ornstein-Uhlenbeck reduction of the noise"
+    NO_REDUCTION = "the unreduced noise keeps Eq. (7)"
+    FOLDER = "choose another folder"
 
 
 class FpsolveError(Exception):
@@ -13,6 +27,10 @@ class FpsolveError(Exception):
 
 class NoSuchExponent(FpsolveError):
     """Λ(p) does not exist for this noise and this p: it is infinite."""
+
+
+class NoPerturbationTheory(FpsolveError):
+    """Second-order perturbation theory does not apply to this motion or this noise."""
 
 
 class MeshError(FpsolveError):

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fpsolve.errors import OutputError
+from fpsolve.errors import OutputError, Remedy
 
 
 @contextmanager
@@ -34,25 +34,34 @@ def atomic(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def prepare_folder(folder: Path) -> None:
-    """Make a folder for results, with those around it.
+@contextmanager
+def writable(folder: Path) -> Iterator[None]:
+    """Make a folder for results, with those around it, for a body that writes into it.
 
     Raises:
-        OutputError: it cannot be made or written to.
+        OutputError: it cannot be made, or something in it cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as failure:
-        raise OutputError(f"{folder} cannot be made: {failure.strerror}; choose another --out") from failure
+        raise OutputError(f"{folder} cannot be made: {failure.strerror}; {Remedy.FOLDER}") from failure
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder} cannot be written to; choose another --out")
+        raise OutputError(f"{folder} cannot be written to; {Remedy.FOLDER}")
+    try:
+        yield
+    except OSError as failure:
+        raise OutputError(f"{failure.filename or folder} cannot be written: {failure.strerror}") from failure
 
 
 def write_json(path: Path, data: Any) -> None:
     """Data without NaN or infinities as JSON."""
+    write_text(path, json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Text as UTF-8."""
     with atomic(path) as temporary:
-        text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _umask() -> int:

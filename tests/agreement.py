@@ -14,11 +14,11 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from fpsolve.function import moment_lyapunov
-from fpsolve.montecarlo import MomentEstimate, simulate
-from fpsolve.noise import NonGaussianNoise
-from fpsolve.oscillator import VibroImpactOscillator
-from fpsolve.sampling import transient
+from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.simulation.estimators import MomentEstimate, simulate
+from fpsolve.simulation.setup import transient
 
 ORDERS = (-1.0, 0.5, 1.0, 2.0, 4.0)
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9)

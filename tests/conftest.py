@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import os
+
+if "PYTEST_XDIST_WORKER" in os.environ:  # one worker for each processor: more threads would only wait for each other
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 
-from fpsolve.exponent import ExponentSolver
-from fpsolve.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
 
 FIG1 = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 FIG1_NOISE = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
@@ -16,7 +23,7 @@ UNIT_NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
 
 @pytest.fixture(scope="session")
 def fig1_solver() -> ExponentSolver:
-    return ExponentSolver(FIG1, FIG1_NOISE.ou_reduction())
+    return ExponentSolver(Problem(FIG1, FIG1_NOISE.ou_reduction()))
 
 
 @pytest.fixture

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fpsolve.eigen import principal_pair
+import fpsolve
 from fpsolve.errors import NotConverged
-from fpsolve.exponent import ExponentSolver
-from fpsolve.generator import TiltedGenerator
-from fpsolve.noise import AnyNoise, NonGaussianNoise
-from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.generator import Generator
+from fpsolve.model.noise import ColouredNoise, NonGaussianNoise
+from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.oracles import fourier_hermite
 
 RTOL = 1e-8
@@ -30,8 +31,12 @@ class Problem:
     """One parameter set."""
 
     oscillator: VibroImpactOscillator
-    noise: AnyNoise
+    noise: ColouredNoise
     p: float
+
+    @property
+    def solved(self) -> fpsolve.Problem:
+        return fpsolve.Problem(self.oscillator, self.noise)
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,7 @@ def problems(count: int, seed: int = 2026) -> list[Problem]:
 def solve(problem: Problem) -> Outcome | str:
     """The outcome, or why fpsolve refused."""
     started = time.perf_counter()
-    solver = ExponentSolver(problem.oscillator, problem.noise, rtol=RTOL)
+    solver = ExponentSolver(problem.solved, rtol=RTOL)
     try:
         solution = solver.solution(problem.p)
     except NotConverged as failure:
@@ -116,14 +121,12 @@ def _oracle(problem: Problem, size: float) -> tuple[float, float] | None:
     return None
 
 
-def _finer(generator: TiltedGenerator, p: float, guess: float) -> tuple[float, float]:
+def _finer(generator: Generator, p: float, guess: float) -> tuple[float, float]:
     """Λ with six degrees more each way, and its distance from that with four more."""
     mesh = generator.space.mesh
     finer = [replace(mesh, phi_degree=mesh.phi_degree + more, xi_degree=mesh.xi_degree + more) for more in (4, 6)]
     values = [
-        principal_pair(
-            TiltedGenerator(generator.oscillator, generator.noise, each, generator.space.tilt), p, guess=guess
-        ).value
+        principal_pair(Generator(generator.problem, each, generator.space.xi.tilt), p, guess=guess).value
         for each in finer
     ]
     return values[1], abs(values[1] - values[0])

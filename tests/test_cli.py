@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, NOT_CONVERGED, main
-from fpsolve.tables import digits
-from tests.test_report import HOPELESS, TEXT, files
+from fpsolve.output.terminal import digits
+from tests.test_workflow import HOPELESS, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
 

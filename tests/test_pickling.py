@@ -6,13 +6,15 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from fpsolve.eigen import principal_pair
 from fpsolve.errors import CaseError, Fault, NotConverged
-from fpsolve.exponent import ExponentSolver
-from fpsolve.function import MomentLyapunovFunction, moment_lyapunov
-from fpsolve.generator import TiltedGenerator
-from fpsolve.mesh import make_mesh
-from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.function import MomentLyapunovFunction
+from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.mesh import make_mesh
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.9, c1=0.0, epsilon=1.5)
@@ -26,14 +28,14 @@ def copied(thing):
 def strong_pair():
     """On a mesh where the phase runs backwards at some vertices for some ξ."""
     mesh = make_mesh(phi_cells=12, phi_degree=10, xi_cells=6, xi_degree=9, xi_min=-8, xi_max=10)
-    return principal_pair(TiltedGenerator(STRONG, UNIT_NOISE, mesh), 1.0)
+    return principal_pair(Generator(Problem(STRONG, UNIT_NOISE), mesh), 1.0)
 
 
 def test_a_pair_of_strong_noise_is_little_more_than_its_vectors(strong_pair):
     assert len(pickle.dumps(strong_pair)) < strong_pair.right.nbytes + strong_pair.left.nbytes + 5000 < 200_000
     pair = copied(strong_pair)
     assert np.array_equal(pair.right, strong_pair.right)
-    residual = pair.generator.at(1.0) @ pair.right - pair.value * (pair.generator.mass @ pair.right)
+    residual = pair.generator.matrix(1.0) @ pair.right - pair.value * (pair.generator.mass @ pair.right)
     assert np.linalg.norm(residual) < 1e-9 * np.linalg.norm(pair.right)
 
 
@@ -42,7 +44,7 @@ def test_releasing_and_assembling_again_keeps_no_memory(strong_pair):
 
     def assemble():
         generator.release()
-        generator.at(1.0)
+        generator.matrix(1.0)
 
     assemble()
     tracemalloc.start()
@@ -61,7 +63,7 @@ def test_results_pickle():
     again = copied(result)
     assert np.array_equal(again.value, result.value)
     assert again.pairs[0].generator is again.pairs[1].generator
-    solver = copied(ExponentSolver(FIG1, noise))
+    solver = copied(ExponentSolver(Problem(FIG1, noise)))
     assert solver.solution(2.0).pair.value == pytest.approx(result.value[1], rel=1e-10)
     function = MomentLyapunovFunction(FIG1, noise, (-1.0, 2.0))
     assert copied(function)(0.7) == function(0.7)

@@ -19,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.exponent import ExponentSolver
-from fpsolve.function import solve_moments
+from fpsolve.exponent.moments import solve_moments
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.problem import Problem
 from tests.benchmarks import ngsolve_code
 from tests.benchmarks.finite_volume import FiniteVolume
 from tests.benchmarks.fourier_hermite import FourierHermite
@@ -87,8 +88,8 @@ def measure(method: str, case: str, size: Any = None, timeout: float | None = No
 
 def fpsolve_curve(case: Case) -> tuple[FloatArray, int]:
     """Λ at the p of the case by fpsolve, and the unknowns of its largest mesh but for error estimates."""
-    solver = ExponentSolver(case.oscillator, case.noise, rtol=case.rtol)
-    result, _ = solve_moments(solver, case.p)
+    solver = ExponentSolver(Problem(case.oscillator, case.noise), rtol=case.rtol)
+    result = solve_moments(solver, case.p)
     return result.value, solver.largest().size
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, VibroImpactOscillator
-from fpsolve.perturbation import moment_scale
+from tests.oracles.perturbation import moment_scale
 
 if TYPE_CHECKING:
     from tests.benchmarks.pencil import Pencil
@@ -112,7 +112,7 @@ class Peer:
 class Case:
     """A curve Λ(p) with the accuracy that is demanded of it: |error| ≤ rtol · max(|Λ|, scale) at every p.
 
-    The scale is `fpsolve.perturbation.moment_scale`, the terms of Eq. (37) before they cancel; at p = 0, where all
+    The scale is `perturbation.moment_scale`, the terms of Eq. (37) before they cancel; at p = 0, where all
     vanish, it is that of the smallest other |p|.
     """
 

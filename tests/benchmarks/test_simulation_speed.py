@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from fpsolve.montecarlo import simulate
-from fpsolve.noise import NonGaussianNoise
-from fpsolve.oscillator import VibroImpactOscillator
+from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.simulation.estimators import simulate
 
 OSCILLATOR = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 NOISE = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)

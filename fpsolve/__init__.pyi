@@ -1,0 +1,26 @@
+from .analysis.density import adjoint_density as adjoint_density
+from .analysis.density import furstenberg_khasminskii as furstenberg_khasminskii
+from .analysis.density import stationary_density as stationary_density
+from .analysis.density import tilted_density as tilted_density
+from .case.case import load_case as load_case
+from .errors import CaseError as CaseError
+from .errors import FpsolveError as FpsolveError
+from .errors import NotConverged as NotConverged
+from .exponent.eigen import principal_pair as principal_pair
+from .exponent.eigen import spectrum as spectrum
+from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
+from .exponent.moments import moment_lyapunov as moment_lyapunov
+from .exponent.quantities import lyapunov_exponent as lyapunov_exponent
+from .exponent.quantities import stability_index as stability_index
+from .exponent.solver import ExponentSolver as ExponentSolver
+from .fem.mesh import CylinderMesh as CylinderMesh
+from .fem.mesh import make_mesh as make_mesh
+from .model.noise import NonGaussianNoise as NonGaussianNoise
+from .model.noise import OrnsteinUhlenbeck as OrnsteinUhlenbeck
+from .model.plane import PlaneSystem as PlaneSystem
+from .model.problem import Problem as Problem
+from .model.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
+from .simulation.estimators import simulate as simulate
+from .workflow import run as run
+
+__version__: str

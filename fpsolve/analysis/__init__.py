@@ -1,0 +1,5 @@
+"""What Λ, T and T* answer: densities and their means."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

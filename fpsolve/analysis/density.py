@@ -1,0 +1,102 @@
+"""Probability densities of (φ, ξ) on the full circle: stationary, adjoint and tilted, and their means."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fpsolve.arrays import FloatArray
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.fields import fields
+from fpsolve.model.plane import growth_rate, phase_speed
+
+
+@dataclass(frozen=True, eq=False)
+class Density:
+    """A probability density on the cylinder, known at the points of a quadrature rule.
+
+    Attributes:
+        phi: points on the full circle, shape (m,), increasing.
+        xi: points on the noise axis, shape (n,), increasing.
+        phi_weights, xi_weights: weights of the rule, so that ∫f dφ dξ = phi_weights @ f @ xi_weights.
+        values: the density, per radian and unit of ξ, shape (m, n).
+    """
+
+    phi: FloatArray
+    xi: FloatArray
+    phi_weights: FloatArray
+    xi_weights: FloatArray
+    values: FloatArray
+
+    def mean(self, f: Callable[[FloatArray, FloatArray], ArrayLike]) -> float:
+        """∫ f(φ, ξ) ρ dφ dξ; f gets φ as a column and ξ as a row, and may return either, or a number."""
+        return float(
+            self.phi_weights @ (np.asarray(f(self.phi[:, None], self.xi[None])) * self.values) @ self.xi_weights
+        )
+
+    def phi_marginal(self) -> FloatArray:
+        """∫ρ dξ at `phi`, shape (m,)."""
+        return self.values @ self.xi_weights
+
+    def xi_marginal(self) -> FloatArray:
+        """∫ρ dφ at `xi`, shape (n,)."""
+        return self.phi_weights @ self.values
+
+
+def stationary_density(pair: PrincipalPair) -> Density:
+    """ρ(φ, ξ), solution of the Fokker-Planck equation L*(0)ρ = 0.
+
+    Raises:
+        ValueError: the pair is not the one at p = 0.
+    """
+    if pair.p != 0:
+        raise ValueError(
+            f"the stationary density is the adjoint eigenfunction at p = 0, but the pair has p = {pair.p:g}"
+        )
+    return adjoint_density(pair)
+
+
+def adjoint_density(pair: PrincipalPair) -> Density:
+    """T*(φ, ξ; p) normalised to 1."""
+    return _density(pair, "adjoint")
+
+
+def tilted_density(pair: PrincipalPair) -> Density:
+    """T T*: how phase and noise are distributed along the paths that carry the p-th moment."""
+    return _density(pair, "product")
+
+
+def furstenberg_khasminskii(pair: PrincipalPair) -> float:
+    """λ = ∫(ε q₁ξ + ε² q₂) ρ dφ dξ + ω ln R ∫[ρ(π/2, ξ) + ρ(3π/2, ξ)] dξ, with ρ from the pair at p = 0.
+
+    ω ρ, or |dφ/dt| ρ where the noise moves the phase there, is the probability flux through an impact, where the
+    log-amplitude jumps by ln R; it is taken on the side from where the impact is met.
+    """
+    space, system = pair.generator.space, pair.generator.problem.system
+    growth = stationary_density(pair).mean(lambda phi, xi: growth_rate(system, xi)(phi))
+    turns, table = 2 * math.pi / space.mesh.span, space.table(pair.left)
+    for kick in system.kicks:
+        at = space.mesh.vertices_at(kick.phase)
+        for traces, direction in ((space.left_trace[at], 1), (space.right_trace[at], -1)):
+
+            def flux(xi: Any, phi: float = kick.phase, sign: int = direction) -> Any:
+                return np.maximum(sign * phase_speed(system, xi)(phi), 0)
+
+            density = np.sum(traces @ table, axis=0)
+            growth += turns * kick.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant()))
+    return growth
+
+
+def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Density:
+    """One of the `Fields`, normalised, repeated from a half circle to the full one."""
+    space, at = pair.generator.space, pair.generator.space.xi.samples()
+    turns = round(2 * math.pi / space.mesh.span)
+    values = np.tile(getattr(fields(pair, space.phi.values, at), name), (turns, 1))
+    phi = np.concatenate([space.phi.points + k * space.mesh.span for k in range(turns)])
+    phi_weights = np.tile(space.phi.weights, turns)
+    return Density(phi, at.xi, phi_weights, at.measure, values / (phi_weights @ values @ at.measure))

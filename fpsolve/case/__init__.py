@@ -1,0 +1,5 @@
+"""A file becomes a `Case`, or one message for each of its faults."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

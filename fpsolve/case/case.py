@@ -1,0 +1,171 @@
+"""A case file: TOML in, a validated `Case` out, or one message for each fault of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.curves import Curve, combinations, make_curve
+from fpsolve.case.messages import explain, refuse
+from fpsolve.case.refusals import REFUSALS
+from fpsolve.case.sections import (
+    Expectation,
+    FigureSection,
+    MeshSection,
+    Moments,
+    MonteCarloSection,
+    NoiseSection,
+    OutputSection,
+    Section,
+    Text,
+)
+from fpsolve.case.toml import Document, read_document
+from fpsolve.case.vary import Vary
+from fpsolve.errors import CaseError, Fault
+from fpsolve.exponent.adapt import Budget
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model.parameters import parameter
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+
+
+def _from_table(kind: Any) -> BeforeValidator:
+    return BeforeValidator(lambda value: kind(**value) if isinstance(value, dict) else value)
+
+
+class Case(Section):
+    """What one case file says; made by `load_case`.
+
+    Raises:
+        pydantic.ValidationError: with every fault of the sections and of what they say about each other.
+    """
+
+    title: Annotated[Text, parameter("the heading of its results", 'title = "Fig. 1"')]
+    oscillator: Annotated[
+        VibroImpactOscillator, _from_table(VibroImpactOscillator), parameter("Eq. (3)", "[oscillator]")
+    ]
+    noise: Annotated[NoiseSection, parameter("Eqs. (7)-(8)", "[noise]")]
+    moments: Annotated[Moments, parameter("which p", "[moments]")]
+    budget: Annotated[Budget, _from_table(Budget), parameter("what one p may cost", "[budget]")] = Budget()
+    vary: Annotated[Vary, parameter("one curve for each value", '[vary] with "noise.D0" = [0.1, 0.5, 1.0]')] = Field(
+        default_factory=dict
+    )
+    mesh: Annotated[MeshSection, parameter("the finite elements", "[mesh]")] = MeshSection()
+    monte_carlo: Annotated[MonteCarloSection, parameter("how the system is simulated", "[monte_carlo]")] = (
+        MonteCarloSection()
+    )
+    figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
+    output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
+    expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
+    _path: Path = PrivateAttr(default=Path("case.toml"))
+
+    @property
+    def path(self) -> Path:
+        return self._path
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending."""
+        return self._path.stem
+
+    @property
+    def p(self) -> FloatArray:
+        """The orders of the moments, shape (n,)."""
+        return self.moments.values
+
+    @property
+    def rtol(self) -> float:
+        return self.moments.rtol
+
+    @property
+    def shown(self) -> FloatArray:
+        """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread."""
+        if self.output.eigenfunctions is not None:
+            wanted = np.array(self.output.eigenfunctions)
+            return self.p[[int(np.argmin(np.abs(self.p - each))) for each in wanted]] if wanted.size else wanted
+        return _spread(self.p)
+
+    @property
+    def simulated(self) -> FloatArray:
+        """The p that are simulated: those of [monte_carlo], or else all, or of populations at most nine."""
+        if self.monte_carlo.p is not None:
+            return np.array(self.monte_carlo.p)
+        return self.p if self.monte_carlo.estimator == "direct" else _spread(self.p)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the noise is Eq. (7) as it stands; perturbation theory then has its reduction only."""
+        return self.noise.treatment == "exact"
+
+    def curves(self) -> tuple[Curve, ...]:
+        """One curve for each combination of the varied values, the last key varying fastest."""
+        return tuple(
+            make_curve(self.oscillator, self.noise, varied, number)
+            for number, varied in enumerate(combinations(self.vary), start=1)
+        )
+
+    def curve(self, varied: Mapping[str, float]) -> Curve:
+        """The case's parameter set with some parameters replaced, by their dotted keys."""
+        return make_curve(self.oscillator, self.noise, varied)
+
+    def heading(self, curve: Curve) -> str:
+        """The title, and which of the curves."""
+        return f"{self.title}: {curve.label}" if curve.varied else self.title
+
+    def place(self, curve: Curve) -> str:
+        """The name of the case, and which of the curves."""
+        return f"{self.name}, {curve.label}" if curve.varied else self.name
+
+    def cylinder_mesh(self) -> CylinderMesh | None:
+        """The mesh that the case states; None leaves it to the solver."""
+        return self.mesh.mesh(self.path.parent)
+
+    @field_validator(*REFUSALS)
+    @classmethod
+    def _agrees_with_those_before(cls, section: Any, info: ValidationInfo) -> Any:
+        refuse(REFUSALS[str(info.field_name)](section, info.data, info.context or {}))
+        return section
+
+
+def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
+    """Read and check a case file.
+
+    Args:
+        path: a TOML file.
+        overrides: texts such as "oscillator.omega=2.0", each a key with its sections and a TOML value.
+
+    Raises:
+        CaseError: with every fault of the file and of the overrides, each with its line and its remedy.
+    """
+    document = read_document(path, overrides)
+    faults = list(document.faults)
+    try:
+        case = Case.model_validate(
+            document.data, context={"folder": Path(path).parent, "varies": bool(document.data.get("vary"))}
+        )
+        faults += _hidden_overrides(case, document)
+    except ValidationError as error:
+        faults += [document.fault(*fault) for fault in explain(error, Case)]
+    except RecursionError:
+        faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
+    if faults:
+        raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
+    case._path = Path(path)
+    return case
+
+
+def _hidden_overrides(case: Case, document: Document) -> Iterator[Fault]:
+    """Values of the command line that [vary] would replace."""
+    for key in case.vary:
+        if isinstance(document.places.get(key), str):
+            remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
+            yield document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}")
+
+
+def _spread(p: FloatArray) -> FloatArray:
+    """At most nine of the p, evenly."""
+    return np.sort(p)[np.unique(np.linspace(0, p.size - 1, min(p.size, 9)).round().astype(int))]

@@ -1,0 +1,85 @@
+"""The curves of a case: one parameter set for each combination of the varied values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import Any
+
+from fpsolve.case.sections import NoiseSection, Values, flat
+from fpsolve.model.noise import ColouredNoise, NonGaussianNoise
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One parameter set of a case.
+
+    Attributes:
+        oscillator, noise: what the solver takes.
+        parameters: every parameter by its dotted key, such as "noise.D0".
+        varied: those of them that [vary] names.
+        number: its place among the curves of its case, from 1 on.
+    """
+
+    oscillator: VibroImpactOscillator
+    noise: ColouredNoise
+    parameters: Mapping[str, float | str]
+    varied: Mapping[str, float]
+    number: int = 1
+
+    @property
+    def problem(self) -> Problem:
+        """What is solved."""
+        return Problem(self.oscillator, self.noise)
+
+    @property
+    def key(self) -> tuple[tuple[str, float], ...]:
+        """What tells it from the other curves of its case."""
+        return tuple(self.varied.items())
+
+    @property
+    def label(self) -> str:
+        """The same for the eye: "noise.D0 = 0.1, noise.r0 = 0.9"."""
+        return assignments(self.varied, "g")
+
+    @property
+    def suffix(self) -> str:
+        """What the names of its files end in: nothing for the first curve, "-2" for the second."""
+        return "" if self.number == 1 else f"-{self.number}"
+
+    @property
+    def original_noise(self) -> NonGaussianNoise:
+        """The noise of Eq. (7), whatever its treatment."""
+        return NoiseSection(**_section("noise", self.parameters)).original()
+
+
+def make_curve(
+    oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Mapping[str, float], number: int = 1
+) -> Curve:
+    """The curve on which some parameters are replaced, by their dotted keys."""
+    system = asdict(oscillator) | {"impact": oscillator.impact.value}
+    parameters: dict[str, Any] = flat({"oscillator": system, "noise": noise.model_dump()}) | varied
+    return Curve(
+        oscillator=VibroImpactOscillator(**_section("oscillator", parameters)),
+        noise=NoiseSection(**_section("noise", parameters)).process(),
+        parameters=parameters,
+        varied=varied,
+        number=number,
+    )
+
+
+def combinations(vary: Mapping[str, Values]) -> Iterator[dict[str, float]]:
+    """The varied values of each curve, the last key varying fastest."""
+    return (dict(zip(vary, values, strict=True)) for values in product(*vary.values()))
+
+
+def assignments(varied: Mapping[str, float], style: str = "") -> str:
+    """Keys with their values, these in a format: "noise.D0 = 0.1, noise.r0 = 0.9"."""
+    return ", ".join(f"{key} = {value:{style}}" for key, value in varied.items())
+
+
+def _section(name: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    return {key.partition(".")[2]: value for key, value in parameters.items() if key.startswith(f"{name}.")}

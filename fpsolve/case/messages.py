@@ -1,0 +1,177 @@
+"""From pydantic's errors to sentences that name the value, the accepted range and the remedy."""
+
+from __future__ import annotations
+
+import enum
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from difflib import get_close_matches
+from fractions import Fraction
+from itertools import chain
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from fpsolve.model.parameters import example_of
+
+_OWN, _RANGE = "own sentence", "range"
+LIST, TABLE = "<list>", "<table>"
+"""Tags of a discriminated union: parts of pydantic's error locations that are no keys."""
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+_BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+_NOUNS: dict[Any, str] = {float: "finite number", int: "whole number", str: "string"}
+_KINDS = {bool: "a boolean", str: "a string", list: "a list", dict: "a table", int: "a number", float: "a number"}
+
+Path = tuple[str | int, ...]
+Refusal = tuple[Path, Any, str]
+"""Where, which value, and why; an empty sentence stands for "not what this key accepts"."""
+
+
+def refuse(refusals: Iterable[Refusal]) -> None:
+    """Raise all refusals of a validator at once; without any, do nothing."""
+    details = [
+        InitErrorDetails(type=PydanticCustomError(_OWN if text else _RANGE, text), loc=path, input=value)
+        for path, value, text in refusals
+    ]
+    if details:
+        raise ValidationError.from_exception_data("case", details)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """' did you mean "omega"?' or nothing; a key without its section finds the key with it."""
+    keys = {key.lower(): key for key in known}
+    name = name.lower()
+    found = [key for key in keys if key.endswith(f".{name}")] or get_close_matches(name, keys, n=1)
+    return f' did you mean "{keys[found[0]]}"?' if found else ""
+
+
+def shown(value: Any) -> str:
+    """A value as TOML writes it, cut to a readable length."""
+    try:
+        text = _toml(value)
+    except (ValueError, RecursionError):
+        text = "a value too long to show"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool | str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
+    return str(value)
+
+
+def explain(error: ValidationError, model: Any) -> Iterator[tuple[Path, str, str]]:
+    """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence."""
+    for detail in error.errors(include_url=False):
+        path = tuple(part for part in detail["loc"] if part not in (LIST, TABLE))
+        yield path, _key(path), _sentence(path, dict(detail), model)
+
+
+def _key(path: Path) -> str:
+    """("expect", 0, "p") as expect[0].p."""
+    text = ""
+    for part in path:
+        quoted = str(part) if re.fullmatch(r"[\w-]+", str(part)) else json.dumps(part, ensure_ascii=False)
+        text += f"[{part}]" if isinstance(part, int) else f".{quoted}" if text else quoted
+    return text
+
+
+def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
+    if detail["type"] == _OWN:
+        return str(detail["msg"])
+    if detail["type"] == "value_error":
+        return str(detail["ctx"]["error"])
+    if detail["type"] in _UNKNOWN:
+        known = list(_model_and_field(path[:-1], model)[0].__pydantic_fields__)
+        guess = nearest(str(path[-1]), known)
+        return f"unknown key;{guess} known keys: {', '.join(known)}; rename or remove it"
+    field = _model_and_field(path, model)[1]
+    must, example = f"must be {_accepted(field)} ({field.description})", example_of(field)
+    if path[0] == "vary" and len(path) > 1:
+        example = example_of(model.__pydantic_fields__["vary"])
+        must = must.replace("be", "be a non-empty list, each entry", 1) if len(path) == 2 else must
+    if detail["type"] == "missing":
+        return f"missing; {must}; add it, for example {example}"
+    value = detail["input"]
+    guess = nearest(value, _choices(field.annotation)) if isinstance(value, str) else ""
+    return f"got {shown(value)}{_kind(value, detail['type'])}; {must};{guess} write, for example, {example}"
+
+
+def _kind(value: Any, error_type: str) -> str:
+    is_range = error_type == _RANGE and type(value) in (int, float)
+    if is_range or not error_type.endswith((_RANGE, "_type", "_not_found")):
+        return ""
+    return f" ({_KINDS.get(type(value), 'a date or time')})"
+
+
+def _model_and_field(path: Path, model: Any) -> tuple[Any, FieldInfo]:
+    """The deepest field on the path and the model in it; a value of [vary] obeys the range of its own key."""
+    field = FieldInfo()
+    for name in str(path[1]).split(".") if path[:1] == ("vary",) and len(path) > 1 else path:
+        if name in getattr(model, "__pydantic_fields__", ()):
+            field = model.__pydantic_fields__[name]
+            model = _nested(field.annotation)
+    return model, field
+
+
+def _nested(annotation: Any) -> Any:
+    """The model inside an annotation such as `tuple[Expectation, ...] | None`."""
+    if hasattr(annotation, "__pydantic_fields__"):
+        return annotation
+    return next(filter(None, map(_nested, get_args(annotation))), None)
+
+
+def _accepted(field: FieldInfo) -> str:
+    """The range of a key, read off its field: "a finite number > 0 and <= 1"."""
+    choices = _choices(field.annotation)
+    if choices:
+        return "one of " + ", ".join(f'"{choice}"' for choice in choices)
+    bounds = (
+        f"{sign} {_number(getattr(constraint, name))}"
+        for constraint in field.metadata
+        for name, sign in _BOUNDS.items()
+        if hasattr(constraint, name)
+    )
+    return f"a {_not_empty(field.metadata)}{_noun(field.annotation)} {' and '.join(bounds)}".rstrip()
+
+
+def _not_empty(metadata: Iterable[Any]) -> str:
+    return "non-empty " if any(hasattr(constraint, "min_length") for constraint in metadata) else ""
+
+
+def _number(bound: float) -> str:
+    """5/3 as 5/3, not as 1.6666666666666667."""
+    fraction = Fraction(bound).limit_denominator(99)
+    return str(fraction) if float(fraction) == bound else f"{bound:g}"
+
+
+def _choices(annotation: Any) -> list[str]:
+    if get_origin(annotation) is Literal:
+        return list(get_args(annotation))
+    is_enum = isinstance(annotation, type) and issubclass(annotation, enum.Enum)
+    return [member.value for member in annotation] if is_enum else []
+
+
+def _noun(annotation: Any, plural: str = "") -> str:
+    """An annotation in words: tuple[float, ...] as "list of finite numbers"."""
+    if hasattr(annotation, "__pydantic_fields__"):
+        return f"table{plural} with the keys {', '.join(annotation.__pydantic_fields__)}"
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        inner = chain.from_iterable(getattr(extra, "metadata", ()) for extra in arguments[1:])
+        return _not_empty(inner) + _noun(arguments[0], plural)
+    if origin in (Union, UnionType):
+        return " or a ".join(_noun(argument, plural) for argument in arguments if argument is not NoneType)
+    if origin is tuple:
+        return f"list{plural} of {_noun(arguments[0], 's')}"
+    if origin is dict:
+        return f"table{plural} of {_noun(arguments[1], 's')}"
+    return _NOUNS[annotation] + plural

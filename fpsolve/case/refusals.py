@@ -1,0 +1,175 @@
+"""What the sections of a case say about each other: every contradiction, with the value and the remedy.
+
+Each section is judged by what is valid of those before it, and by the context: the folder of the case file, and
+whether the case varies anything.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.curves import assignments, combinations, make_curve
+from fpsolve.case.messages import Refusal, nearest, shown
+from fpsolve.case.remedies import in_words_of_a_case
+from fpsolve.case.sections import (
+    Expectation,
+    FigureSection,
+    MeshSection,
+    Moments,
+    MonteCarloSection,
+    OutputSection,
+    Values,
+    same,
+)
+from fpsolve.errors import MeshError, NoPerturbationTheory, NoSuchExponent
+from fpsolve.model.noise import check_existence
+from fpsolve.simulation.setup import obstacles
+from fpsolve.theory.perturbation import second_order
+
+Known = Mapping[str, Any]
+MAX_CURVES = 10_000
+_MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
+
+
+def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
+    is_varied = context.get("varies", False)  # then the curves decide which moments exist
+    return _of_curves({**valid, "moments": moments}, {}, with_existence=not is_varied)
+
+
+def _of_vary(vary: Mapping[str, Values], valid: Known, context: Known) -> Iterator[Refusal]:
+    """Too many curves, or one that cannot be solved."""
+    number = math.prod(map(len, vary.values()))
+    if number > MAX_CURVES:
+        yield (), None, f"makes {number} curves; must be at most {MAX_CURVES}; list fewer values"
+    else:
+        yield from _of_curves(valid, vary)
+
+
+def _of_curves(valid: Known, vary: Mapping[str, Values], *, with_existence: bool = True) -> Iterator[Refusal]:
+    """The first combination whose parameters contradict each other or overflow, or whose moments are infinite."""
+    if not {"oscillator", "noise", "moments"} <= valid.keys():
+        return
+    p = valid["moments"].values
+    for varied in combinations(vary):
+        reason = _obstacle(valid, varied, p, with_existence=with_existence)
+        if reason:
+            yield (), varied, _with(varied) + reason
+            return
+
+
+def _with(varied: Mapping[str, float]) -> str:
+    """Beginning of a sentence on one of several curves."""
+    return f"with {assignments(varied)}: " if varied else ""
+
+
+def _obstacle(valid: Known, varied: Mapping[str, float], p: FloatArray, *, with_existence: bool = True) -> str:
+    """Why there is no such curve, or why some Λ(p) of it is infinite, or nothing."""
+    extremes = [float(p.max()), float(p.min())]
+    try:
+        curve = make_curve(valid["oscillator"], valid["noise"], varied)
+        with np.errstate(all="ignore"):
+            theory = second_order(curve.problem)
+            factors = [curve.oscillator.impact_factor(extreme) for extreme in extremes]
+            sizes = np.append(theory.scale.moment(p), [theory.stability_index, *factors])
+    except ValidationError as error:
+        context = error.errors()[0].get("ctx", {})
+        return str(context.get("error", f"the noise has no finite strength; {_MODERATE}"))
+    except (ArithmeticError, NoPerturbationTheory):  # the square of omega may be too small for a number
+        sizes = np.array([math.inf])
+    if not np.all(np.isfinite(sizes)):
+        return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
+    try:
+        for extreme in extremes if with_existence else ():
+            check_existence(curve.noise, extreme)
+    except NoSuchExponent as error:
+        return in_words_of_a_case(str(error))
+    return ""
+
+
+def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    """A mesh that cannot be read or made."""
+    try:
+        with np.errstate(all="ignore"):
+            mesh.mesh(context.get("folder", Path()))
+    except (MeshError, OSError, ValueError) as error:
+        reason = in_words_of_a_case(str(error))
+        text = f"got {shown(mesh.file)}; {reason}" if mesh.file else reason
+        yield ("file",) if mesh.file else (), mesh.file, text
+
+
+def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    """The first parameter set for which the time, the step or a p of the simulation is not right."""
+    if not {"oscillator", "noise", "vary"} <= valid.keys():
+        return
+    p = np.array(section.p or (0.0,))
+    for varied in combinations(valid["vary"]):
+        reason, faults = _obstacle(valid, varied, p), {}
+        with suppress(ArithmeticError, ValidationError):  # of parameters that are the reason
+            curve = make_curve(valid["oscillator"], valid["noise"], varied)
+            faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
+        for name, text in faults.items():
+            if getattr(section, name) is not None:
+                yield (name,), getattr(section, name), _with(varied) + text
+        if reason:
+            yield ("p",), section.p, _with(varied) + reason
+        if faults or reason:
+            return
+
+
+def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    """An abscissa that is not varied."""
+    known = ("p", *valid.get("vary", (figure.x,)))
+    if figure.x not in known:
+        guess = nearest(figure.x, known)
+        text = f"got {shown(figure.x)};{guess} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
+        yield ("x",), figure.x, text
+
+
+def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    return _of_orders(valid, ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ())))
+
+
+def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
+    """Each p that is not among the moments, and each key of a `where` that is not varied, or not with that value."""
+    yield from _of_orders(valid, (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None))
+    vary: Mapping[str, Values] | None = valid.get("vary")
+    if vary is None:
+        return
+    stated = ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items())
+    for i, key, value in stated:
+        if key not in vary:
+            guess, known = nearest(key, vary), ", ".join(vary) or "none"
+            yield (i, "where", key), value, f"is not varied;{guess} varied keys: {known}; add it to [vary]"
+        elif not any(same(value, other) for other in vary[key]):
+            known = shown(vary[key])
+            yield (i, "where", key), value, f"got {value}; must be one of {known}; add it to [vary]"
+
+
+def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float]]) -> Iterator[Refusal]:
+    """Each wanted p, with its path, that is not among the moments."""
+    moments: Moments | None = valid.get("moments")
+    for path, p in wanted:
+        if moments is not None and not moments.has(p):
+            first, last = moments.values[[0, -1]]
+            known = f"moments.p ({moments.values.size} values, {first:g} to {last:g})"
+            yield path, p, f"got {p}; must be among {known}; add it there, or choose one of them"
+
+
+REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
+    "moments": _of_moments,
+    "vary": _of_vary,
+    "mesh": _of_mesh,
+    "monte_carlo": _of_monte_carlo,
+    "figure": _of_figure,
+    "output": _of_output,
+    "expect": _of_expect,
+}
+"""What is wrong with each section."""

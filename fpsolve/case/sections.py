@@ -1,0 +1,255 @@
+"""The sections of a case file, each with the rules that it can check by itself.
+
+What keys of the oscillator, the noise and the budget mean stands where these do; the others stand here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
+from fpsolve.errors import MeshError
+from fpsolve.exponent.quantities import DrawnName, QuantityName
+from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh
+from fpsolve.fem.mesh_file import read_mesh
+from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
+
+MAX_MOMENTS = 100_000
+_SAME = 1e-12
+"""p that differ by no more are one p; values of a varied key, relative to their size."""
+
+Values = tuple[float, ...]
+NonEmpty = Annotated[Values, Field(strict=False, min_length=1)]
+Text = Annotated[str, Field(min_length=1)]
+Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
+Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
+
+
+def flat(value: Any) -> Any:
+    """Nested tables as one: noise.D0 = 1.0 means the same as "noise.D0" = 1.0."""
+    if not isinstance(value, dict):
+        return value
+    result: dict[str, Any] = {}
+    for key, item in value.items():
+        is_nested = isinstance(item, dict) and item
+        entries = {f"{key}.{name}": entry for name, entry in flat(item).items()} if is_nested else {key: item}
+        for name in entries.keys() & result.keys():
+            raise ValueError(f"{name} stands twice, once with quotes and once without; remove one of them")
+        result |= entries
+    return result
+
+
+class Section(BaseModel):
+    """A table of a case file: immutable, no unknown keys, no conversions, finite numbers only."""
+
+    model_config = STRICT | ConfigDict(frozen=True)
+
+
+class NoiseSection(Section):
+    """[noise]: the parameters of Eqs. (7)-(8), and whether the paper's reduction (12)-(14) replaces them."""
+
+    D0: Intensity
+    tau0: CorrelationTime
+    r0: Annotated[Departure, Field(lt=5 / 3)]
+    treatment: Annotated[
+        Literal["ou-reduction", "exact"], parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"')
+    ] = "ou-reduction"
+
+    def original(self) -> NonGaussianNoise:
+        """The noise of Eq. (7), whatever the treatment."""
+        return NonGaussianNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
+
+    def process(self) -> OrnsteinUhlenbeck | NonGaussianNoise:
+        """The noise that is solved for."""
+        return self.original() if self.treatment == "exact" else self.original().ou_reduction()
+
+
+class Sweep(Section):
+    """{ start, stop, num }: equidistant numbers, both ends included."""
+
+    start: Annotated[float, parameter("first p", "start = -2.0")]
+    stop: Annotated[float, parameter("last p", "stop = 6.0")]
+    num: Annotated[int, parameter("how many p", "num = 33", ge=2, le=MAX_MOMENTS)]
+
+    @model_validator(mode="after")
+    def _increases(self) -> Self:
+        if not 0 < self.stop - self.start < math.inf:
+            raise ValueError(
+                f"got start = {self.start}, stop = {self.stop}; must be start < stop, a finite way apart; "
+                "exchange the two, or list a single p as in p = [2.0]"
+            )
+        return self
+
+
+def _list_or_table(value: Any) -> str | None:
+    return LIST if isinstance(value, list | tuple) else TABLE if isinstance(value, dict | Sweep) else None
+
+
+class Moments(Section):
+    """[moments]: the orders p, and the relative error wanted of Λ(p)."""
+
+    p: Annotated[
+        Annotated[NonEmpty, Tag(LIST)] | Annotated[Sweep, Tag(TABLE)],
+        Discriminator(_list_or_table),
+        parameter(
+            "orders of the moments",
+            "p = [1.0, 2.0] or p = { start = -2.0, stop = 6.0, num = 33 }",
+            "$p$",
+            name="order of the moment",
+        ),
+    ]
+    rtol: Annotated[float, parameter("wanted relative error", "rtol = 1e-8", gt=1e-13, lt=1)] = 1e-8
+
+    @property
+    def values(self) -> FloatArray:
+        """All p, in the file's order."""
+        if isinstance(self.p, Sweep):
+            return np.linspace(self.p.start, self.p.stop, self.p.num)
+        return np.array(self.p)
+
+    def has(self, p: float) -> bool:
+        with np.errstate(over="ignore"):
+            return bool(np.any(np.abs(self.values - p) <= _SAME))
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Self:
+        values = np.sort(self.values)
+        with np.errstate(over="ignore"):
+            close = values[1:][np.diff(values) <= _SAME]
+        if close.size:
+            text = f"{close[0]} stands twice; p must differ by more than {_SAME:g}; remove one of them"
+            refuse([(("p",), self.p, text)])
+        return self
+
+
+class MeshSection(Section):
+    """[mesh]: a mesh file, or some of the numbers that make one; ξ in noise units."""
+
+    file: Annotated[
+        str | None,
+        parameter("a mesh file, by its path from the case file", 'file = "../meshes/default.vtu"', min_length=1),
+    ] = None
+    phi_cells: Annotated[Cells, parameter("cells around the phase", "phi_cells = 2")] = None
+    phi_degree: Annotated[Degree, parameter("degree of the elements in the phase", "phi_degree = 10")] = None
+    xi_cells: Annotated[Cells, parameter("cells along the noise", "xi_cells = 4")] = None
+    xi_degree: Annotated[Degree, parameter("degree of the elements along the noise", "xi_degree = 9")] = None
+    xi_min: Annotated[
+        float | None, parameter("lower end of the noise, in standard deviations", "xi_min = -8.0", lt=0)
+    ] = None
+    xi_max: Annotated[
+        float | None, parameter("upper end of the noise, in standard deviations", "xi_max = 8.0", gt=0)
+    ] = None
+
+    def mesh(self, folder: Path) -> CylinderMesh | None:
+        """The mesh, its file sought from `folder`; None where nothing is stated."""
+        if self.file is None:
+            stated = self.model_dump(exclude_none=True)
+            return make_mesh(**stated) if stated else None
+        path = folder / self.file
+        mesh = read_mesh(path)
+        try:
+            mesh.vertices_at(math.pi / 2)
+        except MeshError as failure:
+            raise MeshError(f"{path}: {failure}") from failure
+        return mesh
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        numbers = ", ".join(self.model_dump(exclude_none=True, exclude={"file"}))
+        if self.file is not None and numbers:
+            text = f"a mesh must be either a file or made from numbers; remove file, or remove {numbers}"
+            refuse([(("file",), self.file, text)])
+        return self
+
+
+class MonteCarloSection(Section):
+    """[monte_carlo]: how the system is simulated; time and step are chosen where they are not stated."""
+
+    paths: Annotated[int, parameter("how many paths", "paths = 32768", ge=BATCHES, le=MAX_PATHS)] = PATHS
+    time: Annotated[float | None, parameter("length of the paths, in the units of 1/omega", "time = 400.0", gt=0)] = (
+        None
+    )
+    step: Annotated[float | None, parameter("time step", "step = 0.05", gt=0)] = None
+    seed: Annotated[int, parameter("seed of the random numbers", "seed = 0", ge=0)] = 0
+    estimator: Annotated[Estimator, parameter("how moments are estimated", 'estimator = "population"')] = "direct"
+    p: Annotated[NonEmpty | None, parameter("orders of the moments that are simulated", "p = [1.0, 2.0]")] = None
+
+
+class FigureSection(Section):
+    """[figure]: the axes; x is "p" or a varied key."""
+
+    x: Annotated[Text, parameter("the abscissa", 'x = "p"')] = "p"
+    y: Annotated[DrawnName, parameter("the ordinate", 'y = "moment"')] = "moment"
+
+    @model_validator(mode="after")
+    def _y_fits_x(self) -> Self:
+        if self.x == "p" and self.y != "moment":
+            remedy = 'must be "moment" where x = "p"; write y = "moment", or set x to a key of [vary]'
+        elif self.x != "p" and self.y == "moment":
+            remedy = 'must be "lyapunov_exponent" or "stability_index" where x is not "p"; write one of these'
+        else:
+            return self
+        refuse([(("y",), self.y, f'got "{self.y}"; {remedy}')])
+        return self
+
+
+class OutputSection(Section):
+    """[output]: the p whose eigenfunctions are written; None is all of them."""
+
+    eigenfunctions: Annotated[
+        Values | None, parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False)
+    ] = None
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Self:
+        wanted = self.eigenfunctions or ()
+        twice = ((i, p) for i, p in enumerate(wanted) if p in wanted[:i])
+        refuse((("eigenfunctions", i), p, f"got {p} twice; values must be distinct; remove one") for i, p in twice)
+        return self
+
+
+class Expectation(Section):
+    """[[expect]]: a value that the result must have, on the curves that `where` selects."""
+
+    quantity: Annotated[QuantityName, parameter("what is checked", 'quantity = "moment"')]
+    p: Annotated[float | None, parameter("order of the moment", "p = 2.0")] = None
+    value: Annotated[float, parameter("the expected value", "value = 0.01416")]
+    rtol: Annotated[float | None, parameter("relative tolerance", "rtol = 1e-3", gt=0)] = None
+    atol: Annotated[float | None, parameter("absolute tolerance", "atol = 1e-6", gt=0)] = None
+    source: Annotated[Text, parameter("where the value comes from", 'source = "Eq. (37), second order"')]
+    where: Annotated[
+        dict[str, float],
+        BeforeValidator(flat),
+        parameter("which curves: some of the varied keys", 'where = { "noise.D0" = 1.0 }'),
+    ] = Field(default_factory=dict)
+
+    def selects(self, varied: Mapping[str, float]) -> bool:
+        """Whether this is about the curve with these varied values; without `where`, about all curves."""
+        return all(same(varied[key], value) for key, value in self.where.items())
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        refusals: list[Refusal] = []
+        if self.quantity == "moment" and self.p is None:
+            refusals.append((("p",), None, "missing; a moment needs its order; add, for example, p = 2.0"))
+        if self.quantity != "moment" and self.p is not None:
+            text = f"got {self.p}; {self.quantity} does not depend on p; remove p, or check the moment"
+            refusals.append((("p",), self.p, text))
+        if self.rtol is None and self.atol is None:
+            refusals.append((("rtol",), None, "missing, and so is atol; add, for example, rtol = 1e-3"))
+        refuse(refusals)
+        return self
+
+
+def same(value: float, other: float) -> bool:
+    """Whether two values of a varied key are one."""
+    return math.isclose(value, other, rel_tol=_SAME)

@@ -1,0 +1,276 @@
+"""A TOML file as data together with the place of every key, which `tomllib` does not tell."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from bisect import bisect_left
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fpsolve.errors import CaseError, Fault
+
+_BLANK = re.compile(r"(?:\s|#[^\n]*)*")
+_KEY = re.compile(r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')
+_STRING = re.compile(r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'', re.DOTALL)
+_SCALAR = re.compile(r"[^,\]}\n#]+")
+
+
+def dotted(path: Sequence[str | int]) -> str:
+    """("expect", 0, "p") as expect.0.p; the same name for a quoted "noise.D0" and a dotted noise.D0."""
+    return ".".join(map(str, path))
+
+
+class _Scanner:
+    """Walks TOML that `tomllib` has accepted, or all that comes before its error.
+
+    Attributes:
+        lines: line of each dotted key, table and list entry.
+        assigned: path of each `key = value` outside inline tables, in order.
+        repeated: the dotted key that is set twice first, and its second line; None where there is none.
+    """
+
+    def __init__(self, text: str) -> None:
+        self.text, self.at = text, 0
+        self.lines: dict[str, int] = {}
+        self.assigned: list[tuple[str | int, ...]] = []
+        self.repeated: tuple[str, int] | None = None
+        self._newlines = [match.start() for match in re.finditer("\n", text)]
+        self._explicit: set[str] = set()
+        self._tables: dict[tuple[str | int, ...], int] = {}
+
+    def scan(self) -> _Scanner:
+        base: tuple[str | int, ...] = ()
+        while self._peek():
+            if self._peek() == "[":
+                base = self._header()
+            else:
+                self.assigned.append(self._assignment(base))
+        return self
+
+    def _peek(self) -> str:
+        self.at = self._match(_BLANK).end()
+        return self.text[self.at : self.at + 1]
+
+    def _match(self, pattern: re.Pattern[str]) -> re.Match[str]:
+        match = pattern.match(self.text, self.at)
+        if match is None:
+            raise ValueError(f"cannot read the text from character {self.at} on")
+        return match
+
+    def _skip(self, mark: str) -> bool:
+        found = self._peek() == mark
+        self.at += found
+        return found
+
+    def _note(self, path: Sequence[str | int]) -> None:
+        line, key = bisect_left(self._newlines, self.at) + 1, dotted(path)
+        for end in range(1, len(path)):
+            self.lines.setdefault(dotted(path[:end]), line)
+        if key not in self._explicit:
+            self._explicit.add(key)
+            self.lines[key] = line
+        elif self.repeated is None:
+            self.repeated = key, line
+
+    def _key(self) -> tuple[str, ...]:
+        parts: list[str] = []
+        while not parts or self._skip("."):
+            self._peek()  # past blanks
+            token = self._match(_KEY).group()
+            self.at += len(token)
+            parts.append(tomllib.loads(f"key = {token}")["key"] if token[0] in "\"'" else token)
+        return tuple(parts)
+
+    def _header(self) -> tuple[str | int, ...]:
+        self._skip("[")
+        is_list = self.text.startswith("[", self.at)
+        self.at += is_list
+        path: tuple[str | int, ...] = ()
+        *parents, last = self._key()
+        for part in parents:
+            path = self._entry((*path, part))
+        path = (*path, last)
+        if is_list:
+            self._tables[path] = self._tables.get(path, -1) + 1
+        path = self._entry(path)
+        self._note(path)
+        self.at += 1 + is_list
+        return path
+
+    def _entry(self, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
+        """The last table of a list of tables, or the path itself."""
+        return (*path, self._tables[path]) if path in self._tables else path
+
+    def _assignment(self, base: tuple[str | int, ...]) -> tuple[str | int, ...]:
+        path = (*base, *self._key())
+        self._note(path)
+        if not self._skip("="):
+            raise ValueError("a key without a value")
+        self._value(path)
+        return path
+
+    def _value(self, path: tuple[str | int, ...]) -> None:
+        if self._skip("["):
+            index = 0
+            while not self._skip("]"):
+                self._note((*path, index))
+                self._value((*path, index))
+                self._skip(",")
+                index += 1
+        elif self._skip("{"):
+            while not self._skip("}"):
+                self._assignment(path)
+                self._skip(",")
+        else:
+            self.at = self._match(_STRING if self._peek() in ("'", '"') else _SCALAR).end()
+
+
+@dataclass
+class Document:
+    """The data of a TOML file and of the command line's changes to it.
+
+    Attributes:
+        file: its name, for messages.
+        data: what `tomllib` made of it.
+        places: the line of each dotted key, or the text of the `--set` that gave it.
+        faults: what is wrong with the changes.
+    """
+
+    file: str
+    data: dict[str, Any]
+    places: dict[str, int | str]
+    faults: list[Fault] = field(default_factory=list)
+
+    def fault(self, path: Sequence[str | int], key: str, sentence: str) -> Fault:
+        """A fault at the place of this path, or of the nearest table around it that has one."""
+        around = (dotted(path[:end]) for end in range(len(path), 0, -1))
+        place = next((self.places[table] for table in around if table in self.places), None)
+        if isinstance(place, str):
+            return Fault(f"{place}: {key}", None, sentence)
+        return Fault(key, place, sentence)
+
+    def override(self, text: str) -> None:
+        """Apply one `key=value` of the command line; what is wrong with it joins the faults."""
+        try:
+            text_as_toml = _quoted_if_bare(text)
+            path = _override_path(text_as_toml)
+            value: Any = tomllib.loads(text_as_toml)
+            for key in path:
+                value = value[key]
+            _assign(self.data, dotted(path).split("."), value)
+        except (ValueError, RecursionError) as error:
+            examples = "--set oscillator.omega=2.0 or --set 'oscillator.impact=\"delta\"'"
+            self.faults.append(Fault(f"--set {text}", None, f"{error}; write it as in {examples}"))
+        else:
+            inside = dotted(path) + "."
+            self.places = {key: place for key, place in self.places.items() if not key.startswith(inside)}
+            self.places[dotted(path)] = f"--set {text}"
+            for end in range(1, len(path)):
+                self.places.setdefault(dotted(path[:end]), f"--set {text}")
+
+
+def _quoted_if_bare(text: str) -> str:
+    """key=word as key="word": a shell takes the quotes away."""
+    key, _, value = map(str.strip, text.partition("="))
+    is_word = re.fullmatch(r"[A-Za-z./~][\w./~ -]*", value) and value not in ("true", "false", "nan", "inf")
+    return f'{key}="{value}"' if is_word else text
+
+
+def _override_path(text: str) -> tuple[str | int, ...]:
+    assigned = _Scanner(text).scan().assigned
+    if len(assigned) != 1:
+        raise ValueError(f"must be one key=value, but {len(assigned)} stand here")
+    return assigned[0]
+
+
+def _assign(table: dict[str, Any], path: Sequence[str], value: Any) -> None:
+    """Set a key that stands in nested tables or, with its dots, quoted in one."""
+    rest = ".".join(path)
+    if len(path) == 1 or rest in table:
+        table[rest] = value
+        return
+    child = table.setdefault(path[0], {})
+    if not isinstance(child, dict):
+        raise ValueError(f"{path[0]} is not a table, so it has no key {path[1]}")
+    _assign(child, path[1:], value)
+
+
+def read_document(path: str | Path, overrides: Sequence[str] = ()) -> Document:
+    """Read a TOML file and apply the command line's `key=value` texts.
+
+    Raises:
+        CaseError: the file cannot be read or is not TOML.
+    """
+    text = _read(path)
+    try:
+        data = tomllib.loads(text)
+        document = Document(str(path), data, dict(_Scanner(text).scan().lines))
+    except RecursionError:
+        fault = Fault("", None, "lists or tables are nested too deeply; a case needs three levels")
+        raise CaseError(str(path), [fault]) from None
+    except ValueError as error:
+        raise CaseError(str(path), [_syntax_fault(text, str(error))]) from None
+    for override in overrides:
+        document.override(override)
+    return document
+
+
+def _read(path: str | Path) -> str:
+    def refuse(sentence: str, line: int | None = None) -> CaseError:
+        return CaseError(str(path), [Fault("", line, sentence)])
+
+    try:
+        if Path(path).is_dir():
+            raise refuse("is a directory; name a case file in it, such as fig1.toml")
+        content = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise refuse(f"no such file; look in {Path(path).parent.resolve()} or give the full path") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise refuse(f"cannot be read ({reason}); check its name and permissions") from None
+    if content.startswith(b"\xef\xbb\xbf"):
+        raise refuse('starts with a byte order mark; save it as "UTF-8", not "UTF-8 with BOM"', 1)
+    if b"\0" in content:
+        raise refuse("is binary or UTF-16, not UTF-8 text; name a TOML file, or save it as UTF-8")
+    try:
+        text = content.decode()
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise refuse(f"is not UTF-8 text: byte 0x{content[error.start]:02x}; save it as UTF-8", line) from None
+    if not text.strip():
+        raise refuse("is empty; start from a copy of cases/minimal.toml")
+    return text
+
+
+def _syntax_fault(text: str, message: str) -> Fault:
+    """tomllib's own message with its line; for a key that is set twice, which one and where."""
+    where = re.search(r" \(at (?:line (\d+), column \d+|end of document)\)", message)
+    line = int(where[1]) if where and where[1] else text.count("\n") + 1 if where else None
+    if re.search("overwrite|twice|[Dd]uplicate", message):
+        scanner = _Scanner(text)
+        with suppress(ValueError, RecursionError):
+            scanner.scan()
+        if scanner.repeated:
+            key, second = scanner.repeated
+            first, key = scanner.lines[key], re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", key)
+            return Fault(key, second, f"set twice, first on line {first}; remove one of them")
+    shown = text.splitlines()[line - 1].strip() if line and line <= text.count("\n") + 1 else ""
+    return Fault("", line, f"not valid TOML: {message}; {_syntax_remedy(shown)}")
+
+
+def _syntax_remedy(line: str) -> str:
+    """What a line that is no TOML probably lacks."""
+    key, _, value = (part.strip() for part in line.partition("="))
+    if re.search(r"[^\x00-\x7f]", key):
+        return f"{key} needs plain letters, as in omega = 1.0"
+    if re.fullmatch(r"-?\d+,\d+", value):
+        return f"write the decimal point as in {key} = {value.replace(',', '.')}"
+    if re.fullmatch(r"-?[\d.]+(e-?\d+)?\s*[A-Za-z/]+.*", value):
+        return f"write the number alone, without a unit: {line}"
+    if re.fullmatch(r"[A-Za-z][\w./-]*", value):
+        return f'write a text in quotes, as in {key} = "{value}"'
+    return f"mend the syntax{' of: ' + line if line else ''}, see https://toml.io"

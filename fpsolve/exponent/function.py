@@ -1,0 +1,248 @@
+"""Λ as a function of p: a Chebyshev interpolant of Λ(p)/p, with λ, Λ″(0) and the stability index from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.polynomial import Chebyshev
+from numpy.polynomial.chebyshev import chebder, chebval
+from numpy.typing import ArrayLike
+
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import NotConverged, Remedy
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.error import Estimate, checked
+from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, checked_moments
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model.problem import Problem, of_problem_too
+
+SEARCH_INTERVAL = (-20.0, 20.0)
+LEVELS = (3, 5, 9, 17, 33, 65)
+"""Numbers of nodes tried; each has the nodes of the one before, and new ones between them."""
+
+
+class MomentLyapunovFunction:
+    """Λ(p) on an interval of p, callable on arrays.
+
+    Λ(p)/p is interpolated at Chebyshev points, value and slope (Hermite), as the eigenvectors give both, with
+    Λ′ = ⟨T*, L′T⟩. There are as many points as rtol needs: the last coefficients of the Chebyshev series are the error.
+
+    Args:
+        problem: a motion and its noise, in one argument or two.
+        interval: the smallest and the largest p.
+        mesh: a mesh for all p; None chooses one for each p that meets rtol.
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
+        budget: what the choice of a mesh may cost for one p; None for the default one.
+        most: the largest number of nodes.
+        solver: one of the same problem, to go on with; it decides the mesh, rtol and the budget.
+        progress: called after each solve.
+
+    Attributes:
+        nodes: the p that were solved, increasing, shape (n + 1,).
+        interpolation_error: estimate of the largest |error| of Λ(p)/p between the nodes.
+        solver: what solved them; its pairs are the eigenfunctions.
+
+    Raises:
+        ValueError: the interval is empty or not finite.
+        NoSuchExponent: Λ(p) is infinite in the interval.
+        NotConverged: some p failed, or Λ(p) is not convex, so that a wrong eigenvalue is among the values.
+    """
+
+    @of_problem_too
+    def __init__(
+        self,
+        problem: Problem,
+        interval: tuple[float, float],
+        mesh: CylinderMesh | None = None,
+        *,
+        rtol: float = 1e-8,
+        budget: Budget | None = None,
+        most: int = LEVELS[-1],
+        solver: ExponentSolver | None = None,
+        progress: Callable[[], None] = lambda: None,
+    ) -> None:
+        low, high = (float(end) for end in checked_moments(list(interval), problem))
+        if not low < high:
+            raise ValueError(f"the interval of p is {interval}; its ends must increase")
+        self.interval = low, high
+        given = solver or ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+        self.solver = given.uniformly()
+        self.interpolation_error = math.inf
+        for count in LEVELS:
+            last = self.interpolation_error
+            self._interpolate(count, progress)
+            if self.is_converged or _nodes_needed(count, last, self.interpolation_error, self._allowed) > most:
+                break
+        self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
+        if obstacle := broken_convexity(self._pairs, np.abs(self.nodes) * self._errors):
+            raise NotConverged(obstacle)
+
+    def __call__(self, p: ArrayLike) -> FloatArray:
+        """Λ(p), per unit time, of the shape of p. Raises `ValueError` outside the interval."""
+        p = self._inside(p)
+        return p * self._series(p)
+
+    def derivative(self, p: ArrayLike) -> FloatArray:
+        """Λ′(p)."""
+        p = self._inside(p)
+        return self._series(p) + p * self._series.deriv()(p)
+
+    def second_derivative(self, p: ArrayLike) -> FloatArray:
+        """Λ″(p)."""
+        p = self._inside(p)
+        return 2 * self._series.deriv()(p) + p * self._series.deriv(2)(p)
+
+    def error_estimate(self, p: ArrayLike) -> FloatArray:
+        """Estimate of |error of Λ(p)|: |p| times that of the interpolation and that of the nodes.
+
+        On one mesh the errors at the nodes change smoothly with p, on several the largest counts.
+        """
+        p = self._inside(p)
+        at_nodes = np.max(self._errors) if self.solver.mesh is None else np.interp(p, self.nodes, self._errors)
+        return np.abs(p) * (self.interpolation_error + at_nodes)
+
+    def moments(self, p: ArrayLike) -> MomentLyapunov:
+        """Λ(p) at several p; the residual is the largest of the nodes."""
+        points = checked_moments(p, self.solver.problem)
+        value, error = self(points), self.error_estimate(points)
+        for point, each, bound in zip(points, value, error, strict=True):
+            if point != 0:
+                checked(f"Λ({point:g})", Estimate(float(each), float(bound), self.solver.scale(float(point))))
+        return MomentLyapunov(
+            p=points,
+            value=value,
+            derivative=self.derivative(points),
+            error_estimate=error,
+            residual=np.full(points.size, max(pair.residual for pair in self._pairs)),
+            pairs=(),
+            warnings=(*self.solver.missed(points, value, error), *self.solver.misplaced(self._pairs)),
+            root=self.root(),
+        )
+
+    def root(self) -> float | None:
+        """Where Λ(p)/p changes its sign in the interval, or None."""
+        p = np.linspace(*self.interval, 201)
+        values = self._series(p)
+        sides = np.flatnonzero((values[:-1] <= 0) & (values[1:] > 0))
+        return float(p[sides[0]] - values[sides[0]] * (p[1] - p[0]) / np.diff(values)[sides[0]]) if sides.size else None
+
+    def lyapunov_exponent(self) -> Estimate:
+        """λ = Λ′(0), Eq. (2), solved at p = 0. Raises `NotConverged`."""
+        return self.solver.lyapunov_exponent()
+
+    def variance_rate(self) -> Estimate:
+        """Λ″(0), solved at p = 0. Raises `NotConverged`."""
+        return self.solver.variance_rate()
+
+    def stability_index(self, search: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | None:
+        """δ_p, see `nonzero_root`, from `root` on. Raises `NotConverged`."""
+        return nonzero_root(self.solver, search, self.root())
+
+    def _inside(self, p: ArrayLike) -> FloatArray:
+        points = np.asarray(p, dtype=float)
+        low, high = self.interval
+        slack = 1e-9 * (high - low)
+        if not np.all((points >= low - slack) & (points <= high + slack)):
+            raise ValueError(f"p must lie in [{low:g}, {high:g}], the interval of this function; make a wider one")
+        return points
+
+    def _interpolate(self, count: int, progress: Callable[[], None]) -> None:
+        """Solve at so many Chebyshev points, the outermost first, and interpolate."""
+        x = -np.cos(np.pi * np.arange(count) / (count - 1))
+        self.nodes = _scaled(x, *self.interval)
+        ratios = np.empty((count, 3))
+        for i in best_order(self.nodes):
+            ratios[i] = self.solver.ratio(float(self.nodes[i]))
+            progress()
+        values, slopes, self._errors = ratios.T
+        self._series = _hermite_interpolant(x, values, slopes, self.interval)
+        self.interpolation_error = 2 * float(np.max(np.abs(self._series.coef[-3:])))
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether more nodes would add nothing that rtol, or the errors of the nodes, leave visible."""
+        at_nodes = np.max(self._errors) if self.solver.mesh is None else np.min(self._errors)
+        return self.interpolation_error <= max(self._allowed, float(at_nodes))
+
+    @property
+    def _allowed(self) -> float:
+        """The share of the tolerance of Λ(p)/p that is left to the interpolation."""
+        return 0.4 * self.solver.rtol * self.solver.scales.linear
+
+
+def _nodes_needed(count: int, last: float, error: float, allowed: float) -> float:
+    """How many nodes convergence may take, if the error falls exponentially, as from half as many to `count`."""
+    if not math.isfinite(last):
+        return 2 * count - 1
+    rate = math.log(max(last / error, 1.1)) / (count // 2)
+    return max(2 * count - 1, count + math.log(error / allowed) / rate)
+
+
+def _scaled(x: FloatArray, low: float, high: float) -> FloatArray:
+    """Points of [-1, 1] in another interval; its ends and 0 exactly."""
+    half = 0.5 * (high - low)
+    points = 0.5 * (low + high) + half * x
+    points[[0, -1]] = low, high
+    points[np.abs(points) < 1e-12 * half] = 0.0
+    return points
+
+
+def _hermite_interpolant(
+    x: FloatArray, values: FloatArray, slopes: FloatArray, interval: tuple[float, float]
+) -> Chebyshev:
+    """The polynomial with these values and slopes at points that stand for x in [-1, 1]."""
+    count, half = x.size, 0.5 * (interval[1] - interval[0])
+    basis = np.eye(2 * count)
+    conditions = np.concatenate([chebval(x, basis).T, chebval(x, chebder(basis, axis=0)).T / count])
+    coefficients = np.linalg.solve(conditions, np.concatenate([values, slopes * half / count]))
+    return Chebyshev(coefficients, domain=interval)
+
+
+def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str | None:
+    """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex."""
+    p, value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("p", "value", "derivative"))
+    value[p == 0] = 0.0  # but for rounding
+    above = np.append(value, 0.0)[None] - (value[:, None] + slope[:, None] * (np.append(p, 0.0)[None] - p[:, None]))
+    slack = 10 * (errors[:, None] + np.append(errors, 0.0)[None]) + 1e-6 * np.abs(np.append(value, 0.0)[None])
+    i, j = np.unravel_index(np.argmin(above + slack), above.shape)
+    if not above[i, j] < -slack[i, j]:
+        return None
+    return (
+        f"Λ(p) is not convex between p = {p[i]:g} and p = {np.append(p, 0.0)[j]:g}, which the exponent always is: "
+        f"a wrong eigenvalue was found; {Remedy.CELLS}"
+    )
+
+
+def nonzero_root(
+    solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
+) -> Estimate | None:
+    """δ_p, the non-zero root of Λ(p); None where Λ has no such root in the interval.
+
+    Λ is convex, so Λ(p)/p increases and has one root at most: a safeguarded Newton iteration on it.
+
+    Raises:
+        NotConverged: some p on the way is not resolved.
+    """
+    low, high = (float(end) for end in np.clip(interval, *solver.problem.noise.moments))
+    if guess is None:
+        ratio, slope, _ = solver.ratio(0.0)
+        guess = -ratio / slope
+    p, tried = min(max(guess, low), high), set()
+    for _ in range(60):
+        tried.add(p)
+        ratio, slope, error = solver.ratio(p)
+        if not slope > 0:
+            raise NotConverged(f"Λ(p)/p does not increase at p = {p:g}, as convexity demands; use a smaller rtol")
+        low, high = (p, high) if ratio < 0 else (low, p)
+        new = p - ratio / slope
+        if abs(new - p) <= max(1e-13 * max(1.0, abs(p)), 0.1 * error / slope):
+            return checked("the stability index", Estimate(p, error / slope + abs(new - p), scale=1.0))
+        if low == high:
+            return None
+        if not low < new < high:
+            new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
+        p = new
+    raise NotConverged(f"the stability index did not settle, last near p = {p:g}; use a smaller rtol")

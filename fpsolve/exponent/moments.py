@@ -1,0 +1,94 @@
+"""Λ at several p, one by one or by interpolation, and what did not converge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import repeat
+
+from numpy.typing import ArrayLike
+
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import NotConverged
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.function import MomentLyapunovFunction, broken_convexity
+from fpsolve.exponent.solver import ExponentSolver, Failure, MomentLyapunov, checked_moments
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model.problem import Problem, of_problem
+
+FEW_MOMENTS = 9
+"""Up to so many p are solved one by one."""
+
+
+@of_problem
+def moment_lyapunov(
+    problem: Problem,
+    p: ArrayLike,
+    *,
+    rtol: float = 1e-8,
+    mesh: CylinderMesh | None = None,
+    budget: Budget | None = None,
+) -> MomentLyapunov:
+    """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
+
+    Args:
+        problem: a motion and its noise, in one argument or two.
+        p: one moment, or an array of shape (n,).
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
+        mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
+        budget: what the choice of a mesh may cost; None for the default one.
+
+    Many p are interpolated, see `MomentLyapunovFunction`, where that saves solves; the result then has no `pairs`.
+
+    Raises:
+        ValueError: p is not finite, or empty, or rtol is not positive.
+        NoSuchExponent: Λ(p) is infinite.
+        NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
+    """
+    result = solve_moments(ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()), p)
+    if result.failures:
+        raise NotConverged("\n".join(failure.reason for failure in result.failures), result)
+    return result
+
+
+def solve_moments(
+    solver: ExponentSolver, p: ArrayLike, *, progress: Callable[[], None] = lambda: None
+) -> MomentLyapunov:
+    """Λ at several p, by interpolation where that saves solves; what did not converge is in its `failures`.
+
+    Args:
+        solver: of the problem.
+        p: one moment, or an array of shape (n,).
+        progress: called once for each p, whatever the number of solves.
+
+    Raises:
+        NoSuchExponent: Λ(p) is infinite for one of the p.
+    """
+    points = checked_moments(p, solver.problem)
+    reports = repeat(progress, points.size)
+
+    def report() -> None:
+        next(reports, lambda: None)()
+
+    result = _interpolated(solver, points, report) or _one_by_one(solver, points, report)
+    for each in reports:
+        each()
+    return result
+
+
+def _interpolated(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov | None:
+    """Λ at many p; None where that takes as many solves, or does not converge."""
+    if p.size <= FEW_MOMENTS:
+        return None
+    ends = float(p.min()), float(p.max())
+    try:
+        function = MomentLyapunovFunction(solver.problem, ends, solver=solver, most=p.size // 2, progress=progress)
+        return function.moments(p) if function.is_converged else None
+    except NotConverged:
+        return None
+
+
+def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov:
+    result = solver.moments(p, progress=progress)
+    obstacle = None if result.failures else broken_convexity(result.pairs, result.error_estimate)
+    return replace(result, failures=(Failure(None, obstacle),)) if obstacle else result

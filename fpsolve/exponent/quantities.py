@@ -1,0 +1,117 @@
+"""The quantities: what each is called, how it is written and drawn, what solves it, and its perturbation theory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.function import SEARCH_INTERVAL, nonzero_root
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model.problem import Problem, of_problem
+from fpsolve.theory.perturbation import SecondOrder
+
+DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
+"""What a figure can show."""
+QuantityName = Literal[DrawnName, "variance_rate"]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something that is computed of a problem.
+
+    Attributes:
+        name: in case files and results.
+        symbol: in sentences and tables.
+        title: of an axis, in LaTeX, with the unit.
+        equation: the number of its perturbation theory.
+    """
+
+    name: QuantityName
+    symbol: str
+    title: str
+    equation: str
+
+
+@dataclass(frozen=True)
+class Index(Quantity):
+    """A quantity that is one number, and not one for each p.
+
+    Attributes:
+        solve: finds it, from a solver and the `root` of its `MomentLyapunov`; None where there is none in `interval`.
+            Raises `NotConverged`.
+        theory: what perturbation theory makes of it.
+        interval: where it is sought.
+    """
+
+    solve: Callable[[ExponentSolver, float | None], Estimate | None]
+    theory: Callable[[SecondOrder], float]
+    interval: tuple[float, float] = (-math.inf, math.inf)
+
+
+MOMENT = Quantity("moment", "Λ(p)", r"moment Lyapunov exponent $\Lambda(p)$ (1/time)", "(37)")
+LYAPUNOV_EXPONENT = Index(
+    "lyapunov_exponent",
+    "λ",
+    r"largest Lyapunov exponent $\lambda$ (1/time)",
+    "(39)",
+    solve=lambda solver, _: solver.lyapunov_exponent(),
+    theory=lambda theory: theory.lyapunov_exponent,
+)
+STABILITY_INDEX = Index(
+    "stability_index",
+    "δ_p",
+    r"stability index $\delta_p$",
+    "(38)",
+    solve=lambda solver, root: nonzero_root(solver, guess=root),
+    theory=lambda theory: theory.stability_index,
+    interval=SEARCH_INTERVAL,
+)
+VARIANCE_RATE = Index(
+    "variance_rate",
+    "Λ″(0)",
+    r"growth rate of the variance $\Lambda''(0)$ (1/time)",
+    "(37)",
+    solve=lambda solver, _: solver.variance_rate(),
+    theory=lambda theory: theory.variance_rate,
+)
+INDICES: Mapping[str, Index] = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
+QUANTITIES: Mapping[str, Quantity] = {MOMENT.name: MOMENT, **INDICES}
+
+
+@of_problem
+def lyapunov_exponent(
+    problem: Problem, *, rtol: float = 1e-8, mesh: CylinderMesh | None = None, budget: Budget | None = None
+) -> Estimate:
+    """The largest Lyapunov exponent λ = Λ′(0), Eq. (2): how fast almost every path grows.
+
+    Args:
+        problem: a motion and its noise, in one argument or two.
+        rtol, mesh, budget: as for `moment_lyapunov`.
+
+    Raises:
+        ValueError: rtol is not positive.
+        NotConverged: it is not resolved on the mesh, or within the budget.
+    """
+    return ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()).lyapunov_exponent()
+
+
+@of_problem
+def stability_index(
+    problem: Problem, *, rtol: float = 1e-8, mesh: CylinderMesh | None = None, budget: Budget | None = None
+) -> Estimate | None:
+    """The stability index δ_p, the non-zero root of Λ(p); None where there is none from -20 to 20.
+
+    Args:
+        problem: a motion and its noise, in one argument or two.
+        rtol, mesh, budget: as for `moment_lyapunov`.
+
+    Raises:
+        ValueError: rtol is not positive.
+        NotConverged: some p on the way to it is not resolved on the mesh, or within the budget.
+    """
+    return nonzero_root(ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()))

@@ -1,0 +1,12 @@
+from .markov_chain import MarkovChain as MarkovChain
+from .noise import Diffusion as Diffusion
+from .noise import Noise as Noise
+from .noise import NonGaussianNoise as NonGaussianNoise
+from .noise import OrnsteinUhlenbeck as OrnsteinUhlenbeck
+from .plane import Drive as Drive
+from .plane import Kick as Kick
+from .plane import PlaneSystem as PlaneSystem
+from .plane import System as System
+from .problem import Problem as Problem
+from .vibro_impact import ImpactLaw as ImpactLaw
+from .vibro_impact import VibroImpactOscillator as VibroImpactOscillator

@@ -1,0 +1,89 @@
+"""Noise that jumps between states: telegraph noise and its kin."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+
+_BALANCED = 1e-12
+
+
+@dataclass(frozen=True)
+class MarkovChain:
+    """ξ(t) with values among some states, from one of which to another it jumps at given rates.
+
+    >>> MarkovChain.telegraph(amplitude=0.5, rate=1.0).correlation_time  # ξ = ±0.5, each state left at rate 1
+    0.5
+
+    Args:
+        states: the values of ξ, shape (n,), n ≥ 2.
+        rates: Q, shape (n, n): rates[i][j] ≥ 0 from state i to state j; the diagonal is minus the sum of its row, or 0,
+            which then stands for it.
+
+    Raises:
+        ValueError: the shapes or signs are not as stated, all states have one value, or some state cannot be reached
+            from another one.
+    """
+
+    states: Sequence[float]
+    rates: Sequence[Sequence[float]]
+
+    moments = (-math.inf, math.inf)
+
+    def __post_init__(self) -> None:
+        states, rates = np.array(self.states, dtype=float), np.array(self.rates, dtype=float)
+        if states.ndim != 1 or states.size < 2 or rates.shape != 2 * states.shape:
+            raise ValueError(f"got {states.shape} states and {rates.shape} rates; must be (n,) and (n, n), n >= 2")
+        if not (np.all(np.isfinite(states)) and np.all(np.isfinite(rates)) and np.ptp(states) > 0):
+            raise ValueError(f"got the states {self.states}; must be finite numbers that differ, with finite rates")
+        jumps = rates - np.diag(np.diagonal(rates))
+        leaving = jumps.sum(axis=1)
+        stated = -np.diagonal(rates)
+        if np.any(jumps < 0) or np.any((stated != 0) & (np.abs(stated - leaving) > _BALANCED * leaving.max())):
+            raise ValueError(
+                "rates from one state to another must be >= 0, and each diagonal entry 0 or minus the sum of its row"
+            )
+        reached = np.linalg.matrix_power(np.eye(states.size) + (jumps > 0), states.size - 1) > 0
+        if not np.all(reached):
+            raise ValueError("every state must be reached from every other one; leave out those that are not")
+        object.__setattr__(self, "states", tuple(states.tolist()))
+        object.__setattr__(self, "rates", tuple(map(tuple, (jumps - np.diag(leaving)).tolist())))
+
+    @classmethod
+    def telegraph(cls, amplitude: float, rate: float) -> MarkovChain:
+        """ξ = ±amplitude, each state left at this rate."""
+        return cls((-amplitude, amplitude), ((-rate, rate), (rate, -rate)))
+
+    @property
+    def probabilities(self) -> FloatArray:
+        """π, the stationary probabilities: πQ = 0, shape (n,)."""
+        rates = np.array(self.rates)
+        equations = np.vstack([rates.T / np.abs(rates).max(), np.ones(len(self.states))])
+        solution = np.linalg.lstsq(equations, np.append(np.zeros(len(self.states)), 1.0), rcond=None)[0]
+        return np.asarray(solution / solution.sum(), dtype=float)
+
+    @property
+    def mean(self) -> float:
+        return float(self.probabilities @ self.states)
+
+    @property
+    def standard_deviation(self) -> float:
+        return math.sqrt(self.probabilities @ (np.array(self.states) - self.mean) ** 2)
+
+    @property
+    def correlation_time(self) -> float:
+        """∫ C(t) dt/C(0) over t > 0."""
+        return 0.5 * self.spectral_density(0.0) / self.standard_deviation**2
+
+    def spectral_density(self, omega: float) -> float:
+        """S(ω) = 2 Re π(ξ − ⟨ξ⟩)ᵀ (iω − Q + 1π)⁻¹ (ξ − ⟨ξ⟩), from C(t) = π(ξ − ⟨ξ⟩)ᵀ exp(Qt) (ξ − ⟨ξ⟩)."""
+        weights, deviations = self.probabilities, np.array(self.states) - self.mean
+        resolvent = (
+            1j * omega * np.eye(deviations.size) - np.array(self.rates) + np.outer(np.ones_like(weights), weights)
+        )
+        return float(2 * np.real((weights * deviations) @ np.linalg.solve(resolvent, deviations)))

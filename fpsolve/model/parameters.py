@@ -1,0 +1,55 @@
+"""What all parameters have in common: strict types, ranges, and words for messages, tables and figures."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field
+from pydantic.fields import FieldInfo
+
+Positive = Annotated[float, Field(gt=0)]
+STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+
+def parameter(
+    meaning: str, example: str, symbol: str = "", unit: str = "", *, name: str | None = None, **rules: Any
+) -> FieldInfo:
+    """All that is said about a parameter, to stand beside its type.
+
+    Args:
+        meaning: what it is, and after a semicolon a remark.
+        example: a line of TOML that states it.
+        symbol: in LaTeX, with dollars.
+        unit: such as "rad/time".
+        name: what an axis calls it; None for the meaning without the remark.
+        rules: its range, by `gt`, `ge`, `lt` and `le`, and what else pydantic's `Field` takes.
+    """
+    return Field(
+        title=name or meaning.partition(";")[0],
+        description=meaning,
+        examples=[example],
+        json_schema_extra={"symbol": symbol, "unit": unit},
+        **rules,
+    )
+
+
+def example_of(field: FieldInfo) -> str:
+    """The line of TOML that states a `parameter`, or nothing."""
+    [example] = field.examples or [""]
+    return str(example)
+
+
+def symbol_of(field: FieldInfo) -> str:
+    """The symbol of a `parameter` in LaTeX, or nothing."""
+    return _extra(field, "symbol")
+
+
+def axis_title(field: FieldInfo) -> str:
+    r"""A `parameter` on an axis: "natural frequency $\omega$ (rad/time)"."""
+    unit = _extra(field, "unit")
+    return f"{field.title} {symbol_of(field)}" + (f" ({unit})" if unit else "")
+
+
+def _extra(field: FieldInfo, name: str) -> str:
+    extra = field.json_schema_extra
+    return str(extra[name]) if isinstance(extra, dict) else ""

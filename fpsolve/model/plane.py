@@ -1,0 +1,231 @@
+"""Linear motion in the plane, driven by noise and stretched at rays; the paper's oscillator is one instance.
+
+    ẋ = Σ_k ε^n_k g_k(ξ) A_k x,      x⁺ = R x⁻ where the phase passes a ray
+
+In polar coordinates x = a e, e = (cos φ, −sin φ), as in Eq. (17), where x = (displacement, velocity/ω), every A gives
+dφ = h dt and d ln a = q dt with h = e′ᵀA e, q = eᵀA e, e′ = de/dφ: a mean and a wave in 2φ each, so that everything is
+π-periodic in φ.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fpsolve.arrays import Coefficient, FloatArray, one
+
+Matrix = Sequence[Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Harmonics:
+    """mean + cosine cos 2φ + sine sin 2φ."""
+
+    mean: Any
+    cosine: Any
+    sine: Any
+
+    def __call__(self, phi: ArrayLike) -> FloatArray:
+        twice = 2 * np.asarray(phi, dtype=float)
+        return self.mean + self.cosine * np.cos(twice) + self.sine * np.sin(twice)
+
+    @property
+    def amplitude(self) -> Any:
+        """Of the wave in 2φ."""
+        return np.hypot(self.cosine, self.sine)
+
+    @property
+    def vanishes(self) -> bool:
+        return not np.any([self.mean, self.cosine, self.sine])
+
+
+def turning(a: FloatArray) -> Harmonics:
+    """e′ᵀA e, dφ/dt, for matrices of shape (…, 2, 2)."""
+    return Harmonics(
+        (a[..., 0, 1] - a[..., 1, 0]) / 2, -(a[..., 0, 1] + a[..., 1, 0]) / 2, (a[..., 1, 1] - a[..., 0, 0]) / 2
+    )
+
+
+def stretching(a: FloatArray) -> Harmonics:
+    """eᵀA e, d ln a/dt, for matrices of shape (…, 2, 2)."""
+    return Harmonics(
+        (a[..., 0, 0] + a[..., 1, 1]) / 2, (a[..., 0, 0] - a[..., 1, 1]) / 2, -(a[..., 0, 1] + a[..., 1, 0]) / 2
+    )
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One term of the motion, ε^order g(ξ) A x.
+
+    Args:
+        order: n ≥ 0, the power of ε.
+        matrix: A, two rows of two numbers.
+        g: a function of ξ from arrays to arrays; a function of a module, so that results can be pickled.
+
+    Raises:
+        ValueError: the matrix is not 2×2 and finite, or the order is negative.
+    """
+
+    order: int
+    matrix: Matrix
+    g: Coefficient = one
+
+    def __post_init__(self) -> None:
+        entries = np.array(self.matrix, dtype=float)
+        is_order = isinstance(self.order, int) and self.order >= 0
+        if entries.shape != (2, 2) or not np.all(np.isfinite(entries)) or not is_order:
+            raise ValueError(
+                f"got order = {self.order} and matrix = {self.matrix}; must be a whole number >= 0 and two rows of two "
+                "finite numbers, such as ((0.0, 0.0), (0.0, 1.0))"
+            )
+        object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
+
+    @cached_property
+    def h(self) -> Harmonics:
+        """h(φ) = e′ᵀA e, the phase speed."""
+        return turning(np.array(self.matrix))
+
+    @cached_property
+    def q(self) -> Harmonics:
+        """q(φ) = eᵀA e, the growth rate of ln a."""
+        return stretching(np.array(self.matrix))
+
+
+@dataclass(frozen=True)
+class Kick:
+    """x⁺ = R x⁻ where the phase passes φ or φ + π, in either direction.
+
+    Args:
+        phase: φ of the ray, in radians.
+        log_factor: ln R.
+        leading: its part of the order ε², by which perturbation theory replaces it; ln R itself if None.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+
+    phase: float
+    log_factor: float
+    leading: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.phase) and math.isfinite(self.log_factor)):
+            raise ValueError(f"got phase = {self.phase}, log_factor = {self.log_factor}; both must be finite")
+
+    @property
+    def second_order(self) -> float:
+        return self.log_factor if self.leading is None else self.leading
+
+
+class System(Protocol):
+    """What solvers ask of a motion."""
+
+    @property
+    def epsilon(self) -> float:
+        """ε."""
+
+    @property
+    def drives(self) -> Sequence[Drive]:
+        """The terms of the motion."""
+
+    @property
+    def kicks(self) -> Sequence[Kick]:
+        """The rays at which the state is stretched."""
+
+
+@dataclass(frozen=True)
+class PlaneSystem:
+    """A linear motion in the plane from its parts, see `System`.
+
+    >>> from fpsolve.arrays import identity
+    >>> rotation, stiffness = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))
+    >>> PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity)]).epsilon  # ẍ + (1 + ξ) x = 0
+    1.0
+
+    Args:
+        drives: one at least.
+        kicks: stretches at rays.
+        epsilon: ε > 0.
+
+    Raises:
+        ValueError: there is no drive, or ε is not a positive number.
+    """
+
+    drives: Sequence[Drive]
+    kicks: Sequence[Kick] = ()
+    epsilon: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "drives", tuple(self.drives))
+        object.__setattr__(self, "kicks", tuple(self.kicks))
+        rays = np.sort(np.mod([kick.phase for kick in self.kicks], math.pi))
+        if np.any(np.diff(np.append(rays, rays[:1] + math.pi)) < 1e-6) and rays.size > 1:
+            raise ValueError(f"got kicks at {[kick.phase for kick in self.kicks]}; their phases must differ modulo pi")
+        if not self.drives or not (math.isfinite(self.epsilon) and self.epsilon > 0):
+            raise ValueError(
+                f"got {len(self.drives)} drives and epsilon = {self.epsilon}; needs one at least, and a positive number"
+            )
+
+
+def matrix_at(system: System, xi: ArrayLike, orders: slice = slice(None)) -> FloatArray:
+    """A(ξ) = Σ ε^n g(ξ) A over the drives of some orders, shape (*ξ.shape, 2, 2)."""
+    xi = np.asarray(xi, dtype=float)
+    total = np.zeros((*xi.shape, 2, 2))
+    wanted = range(1 + max(drive.order for drive in system.drives))[orders]
+    for drive in system.drives:
+        if drive.order in wanted:
+            total += system.epsilon**drive.order * drive.g(xi)[..., None, None] * np.array(drive.matrix)
+    return total
+
+
+def phase_speed(system: System, xi: ArrayLike) -> Harmonics:
+    """dφ/dt at ξ as a function of φ: in Eq. (17) ω + ε h₁ξ + ε² h₂."""
+    return _total(system, [drive.h for drive in system.drives], xi)
+
+
+def growth_rate(system: System, xi: ArrayLike) -> Harmonics:
+    """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
+    return _total(system, [drive.q for drive in system.drives], xi)
+
+
+def crosses_both_ways(system: System, kick: Kick, xi: ArrayLike) -> bool:
+    """Whether the phase passes the ray of a kick forward for some of the ξ and backward for others."""
+    speed = phase_speed(system, xi)(kick.phase)
+    return bool(np.min(speed) < 0 < np.max(speed))
+
+
+def _total(system: System, parts: Sequence[Harmonics], xi: ArrayLike) -> Harmonics:
+    """Σ ε^n g(ξ) of the harmonics of all drives."""
+    xi = np.asarray(xi, dtype=float)
+    sizes = [system.epsilon**drive.order * drive.g(xi) for drive in system.drives]
+    return Harmonics(
+        *(
+            sum((size * getattr(part, name) for size, part in zip(sizes, parts, strict=True)), start=np.zeros_like(xi))
+            for name in ("mean", "cosine", "sine")
+        )
+    )
+
+
+def angular_frequency(system: System) -> float:
+    """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0, or of all without one.
+
+    ω is the imaginary part of the eigenvalues of the matrix of order 0.
+    """
+    a = matrix_at(system, 0.0, slice(0, 1))
+    square = float(a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0] - np.trace(a) ** 2 / 4)
+    if square > 0:
+        return math.sqrt(square)
+    sizes = [system.epsilon**drive.order * float(np.linalg.norm(drive.matrix)) for drive in system.drives]
+    return float(np.linalg.norm(a)) or max(sizes) or 1.0
+
+
+def noise_strength(system: System) -> float:
+    """Σ ε^n max|q| over what the noise drives: the size of d ln a/dt for ξ = 1; for the paper's oscillator ε."""
+    driven = (drive for drive in system.drives if drive.g is not one)
+    return float(sum(system.epsilon**drive.order * (abs(drive.q.mean) + drive.q.amplitude) for drive in driven))

@@ -1,0 +1,118 @@
+"""The vibro-impact oscillator: Eqs. (3)-(6) and the coefficients of the polar form, Eqs. (17)-(18)."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from functools import cached_property
+from typing import Annotated, Self
+
+from numpy.typing import ArrayLike
+from pydantic import model_validator
+from pydantic.dataclasses import dataclass
+
+from fpsolve.arrays import FloatArray, identity
+from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.model.plane import Drive, Kick
+
+IMPACT_PHASES = (math.pi / 2, 3 * math.pi / 2)
+"""φ in [0, 2π] where cos φ = 0: the mass is at the wall."""
+
+
+class ImpactLaw(StrEnum):
+    """How the amplitude changes at an impact.
+
+    DELTA: R = exp(−ε²(1 − r)), the limit of the smoothed δ(cos φ) of Eqs. (17)-(18).
+    RESTITUTION: R = 1 − ε²(1 − r), the bounce of Eq. (3) with the loss scaled as in Eq. (6).
+    """
+
+    DELTA = "delta"
+    RESTITUTION = "restitution"
+
+
+DAMPING = ((0.0, 0.0), (0.0, 1.0))
+"""A of the force on the velocity alone, which damps or, multiplied by noise, drives."""
+
+
+def h1(phi: ArrayLike) -> FloatArray:
+    """h₁(φ) = ½ sin 2φ, Eq. (18), e′ᵀA e of `DAMPING`."""
+    return Drive(1, DAMPING).h(phi)
+
+
+def q1(phi: ArrayLike) -> FloatArray:
+    """q₁(φ) = ½(1 − cos 2φ), Eq. (18), eᵀA e of `DAMPING`."""
+    return Drive(1, DAMPING).q(phi)
+
+
+@dataclass(frozen=True, config=STRICT)
+class VibroImpactOscillator:
+    """Rayleigh-Van der Pol oscillator that bounces off a wall at x = 0, Eqs. (3) and (6).
+
+    Args:
+        omega: natural frequency ω > 0, in radians per unit time.
+        restitution: coefficient of restitution, 0 < r ≤ 1; 1 is no loss.
+        c1: linear damping coefficient, any sign; positive feeds energy in.
+        epsilon: ε > 0 of Eq. (6); 1 is the unscaled system (3).
+        c2, c3: nonlinear damping coefficients ≥ 0; the linear theory does not use them.
+        impact: one of `ImpactLaw`, or its name.
+
+    Raises:
+        pydantic.ValidationError: a parameter is not a finite number in its range, or the restitution law
+            would reverse the velocity: 1 − ε²(1 − r) ≤ 0.
+    """
+
+    omega: Annotated[float, parameter("natural frequency", "omega = 1.0", r"$\omega$", "rad/time", gt=0)]
+    restitution: Annotated[
+        float, parameter("coefficient of restitution; 1 means no loss", "restitution = 0.8", "$r$", gt=0, le=1)
+    ]
+    c1: Annotated[
+        float, parameter("linear damping coefficient", "c1 = 0.1", "$c_1$", "1/time", name="damping coefficient")
+    ]
+    epsilon: Annotated[
+        float,
+        parameter("small parameter of Eq. (6); 1 is the unscaled system", "epsilon = 0.1", r"$\varepsilon$", gt=0),
+    ]
+    c2: Annotated[float, parameter("nonlinear damping coefficient", "c2 = 0.0", "$c_2$", ge=0)] = 0.0
+    c3: Annotated[float, parameter("nonlinear damping coefficient", "c3 = 0.0", "$c_3$", ge=0)] = 0.0
+    impact: Annotated[ImpactLaw, parameter("impact law", 'impact = "delta"', strict=False)] = ImpactLaw.DELTA
+
+    @model_validator(mode="after")
+    def _restitution_law_keeps_the_direction(self) -> Self:
+        if self.impact == ImpactLaw.RESTITUTION and self._loss >= 1:
+            raise ValueError(
+                f"the restitution law needs 1 - epsilon^2 (1 - restitution) > 0, but it is {1 - self._loss:.6g}; "
+                'use a smaller epsilon, a larger restitution, or impact = "delta"'
+            )
+        return self
+
+    @property
+    def _loss(self) -> float:
+        return self.epsilon**2 * (1 - self.restitution)
+
+    @property
+    def log_impact_factor(self) -> float:
+        """ln R, the jump of the log-amplitude ρ at one impact."""
+        return -self._loss if self.impact == ImpactLaw.DELTA else math.log1p(-self._loss)
+
+    def impact_factor(self, p: float = 1.0) -> float:
+        """R^p: the eigenfunction obeys T(φ⁻, ξ) = R^p T(φ⁺, ξ) at φ = π/2 and 3π/2."""
+        return math.exp(p * self.log_impact_factor)
+
+    @cached_property
+    def drives(self) -> tuple[Drive, ...]:
+        """Free oscillation, noise and damping in (x, ẋ/ω): dφ = ω dt; ε ξ (h₁, q₁); ε² c₁ (h₁, q₁), Eqs. (17)-(18)."""
+        rotation = ((0.0, self.omega), (-self.omega, 0.0))
+        return Drive(0, rotation), Drive(1, DAMPING, identity), Drive(2, ((0.0, 0.0), (0.0, self.c1)))
+
+    @property
+    def kicks(self) -> tuple[Kick, ...]:
+        """The impacts, where cos φ = 0; to the order ε² both laws lose 1 − r."""
+        return (Kick(math.pi / 2, self.log_impact_factor, -self._loss),)
+
+    def h2(self, phi: ArrayLike) -> FloatArray:
+        """h₂(φ) = c₁ h₁(φ); the impact adds nothing, as sin 2φ vanishes where it acts."""
+        return self.drives[2].h(phi)
+
+    def q2(self, phi: ArrayLike) -> FloatArray:
+        """q₂(φ) = c₁ q₁(φ) between impacts; the impact itself is `log_impact_factor`."""
+        return self.drives[2].q(phi)

@@ -1,0 +1,72 @@
+"""What the figures of a case show: solved curves beside perturbation theory and simulated ones; responses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case
+from fpsolve.exponent.quantities import INDICES, QUANTITIES, Index
+from fpsolve.output.plots import Series, write_figure, write_response_figure
+from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.theory.perturbation import second_order
+
+Pair = tuple[CurveResult, SimulatedCurve | None]
+
+
+def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path) -> None:
+    """Draw figure.png and figure.pdf: finite elements, perturbation theory, and what is simulated as dots."""
+    samples = {each.curve.key: each for each in simulated}
+    pairs = [(result, samples.get(result.curve.key)) for result in results]
+    series = [_moment_series(*pair) for pair in pairs] if case.figure.x == "p" else _over_parameter(case, pairs)
+    pictures = [folder / "figure.png", folder / "figure.pdf"]
+    quantity = QUANTITIES[case.figure.y]
+    write_figure(series, case.figure.x, quantity, case.title, pictures, is_reduced=case.is_exact)
+
+
+def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> set[Path]:
+    """Draw response.png and response.pdf of a curve, if it has a response; returns the files."""
+    if simulated.response is None:
+        return set()
+    pictures = [folder / f"response{simulated.curve.suffix}.{ending}" for ending in ("png", "pdf")]
+    write_response_figure(simulated.response, case.heading(simulated.curve), pictures)
+    return set(pictures)
+
+
+def _moment_series(result: CurveResult, sample: SimulatedCurve | None) -> Series:
+    moments = result.moments
+    line = np.linspace(moments.p.min(), moments.p.max(), 200) if moments.p.size else moments.p
+    theory = second_order(result.curve.problem).moment_exponent(line)
+    estimates = sample.result.estimates if sample else ()
+    dots = [(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]
+    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, _columns(dots))
+
+
+def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
+    """One series for each set of the other parameters that vary."""
+    groups: dict[tuple[tuple[str, float], ...], list[Pair]] = {}
+    for pair in pairs:
+        others = tuple((key, value) for key, value in pair[0].curve.key if key != case.figure.x)
+        groups.setdefault(others, []).append(pair)
+    return [_index_series(case, INDICES[case.figure.y], dict(others), group) for others, group in groups.items()]
+
+
+def _index_series(case: Case, index: Index, others: dict[str, float], group: Sequence[Pair]) -> Series:
+    """λ or δ_p over the parameter; its perturbation theory, which has poles, where the index is sought."""
+    x = np.array([result.curve.varied[case.figure.x] for result, _ in group])
+    found = [result.estimates[index.name] for result, _ in group]
+    y = np.array([np.nan if estimate is None else estimate.value for estimate in found])
+    line = np.linspace(x.min(), x.max(), 200)
+    curves = [case.curve({**others, case.figure.x: float(value)}) for value in line]
+    line_y = np.array([index.theory(second_order(curve.problem)) for curve in curves])
+    line_y[(line_y < index.interval[0]) | (line_y > index.interval[1])] = np.nan
+    samples = [(each, sample.estimates.get(index.name)) for each, (_, sample) in zip(x, group, strict=True) if sample]
+    return Series(others, x, y, line, line_y, _columns([(each, *sample) for each, sample in samples if sample]))
+
+
+def _columns(dots: Sequence[tuple[float | None, ...]]) -> FloatArray | None:
+    """x, y and the errors of some dots; None where there are none."""
+    return np.array(dots, dtype=float).T if dots else None

@@ -1,0 +1,146 @@
+"""Figures for print: finite-element results as markers, perturbation theory as lines, as in the paper."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.vary import ABSCISSAE
+from fpsolve.exponent.quantities import Quantity
+from fpsolve.files import atomic
+from fpsolve.model.parameters import axis_title, symbol_of
+
+if TYPE_CHECKING:
+    from fpsolve.simulation.response import Response
+
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
+_DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
+_MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One curve of a figure: markers at (x, y), a line through (line_x, line_y).
+
+    Attributes:
+        varied: the parameters that tell it from the others, for the legend.
+        simulated: x, y and the standard errors of y from a simulation, shape (3, n).
+    """
+
+    varied: dict[str, float]
+    x: FloatArray
+    y: FloatArray
+    line_x: FloatArray
+    line_y: FloatArray
+    simulated: FloatArray | None = None
+
+
+def write_figure(
+    series: Sequence[Series], x: str, y: Quantity, title: str, paths: Sequence[Path], *, is_reduced: bool = False
+) -> None:
+    """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
+
+    Args:
+        x: "p" or the dotted key of a parameter.
+        paths: .png, .pdf or what else matplotlib writes.
+        is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
+    """
+    with _canvas(paths) as figure:
+        axes = figure.add_subplot(xlabel=axis_title(ABSCISSAE[x]), ylabel=y.title)
+        axes.set_title(fill(title, 80), parse_math=False)
+        axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+        for i, item in enumerate(series):
+            _draw(axes, item, i)
+        is_simulated = any(item.simulated is not None for item in series)
+        _add_legend(axes, y.equation + (", reduced noise" if is_reduced else ""), is_simulated)
+        axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+        axes.margins(x=0.03)
+
+
+def write_response_figure(response: Response, title: str, paths: Sequence[Path]) -> None:
+    """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors."""
+    share = np.cumsum(response.amplitude_density * np.diff(response.amplitude_edges))
+    seen = float(response.amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
+    with _canvas(paths, width=10.5) as figure:
+        figure.suptitle(fill(title, 100), fontsize=12, parse_math=False)
+        plane, radial = figure.subplots(1, 2)
+        picture = _draw_plane(plane, response, seen)
+        figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$")
+        _draw_amplitude(radial, response, seen)
+
+
+def _draw_plane(axes: Any, response: Response, seen: float) -> Any:
+    """The density of x and ẋ in colours, which are returned, up to the amplitude `seen`."""
+    from matplotlib.colors import LogNorm
+
+    x, v, density = response.x_edges, response.v_edges, response.density
+    scale = LogNorm(max(density[density > 0].min(), density.max() * 1e-4), density.max())
+    visited = np.ma.masked_equal(density.T, 0)
+    velocity = seen * v[-1] / x[-1]
+    axes.set(xlabel="$x$", ylabel=r"$\dot{x}$ (1/time)", xlim=(0, seen), ylim=(-velocity, velocity))
+    return axes.pcolormesh(x, v, visited, cmap="viridis", norm=scale, rasterized=True)
+
+
+def _draw_amplitude(axes: Any, response: Response, seen: float) -> None:
+    """The density of the amplitude as a line in a band."""
+    edges, density, error = response.amplitude_edges, response.amplitude_density, response.amplitude_error
+    middle, low, high = (edges[1:] + edges[:-1]) / 2, density - 2 * error, density + 2 * error
+    axes.fill_between(middle, low, high, color=_COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")
+    axes.plot(middle, density, color=_COLOURS[0], linewidth=1.6, label="simulation")
+    axes.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", ylabel="density of $A$", xlim=(0, seen))
+    axes.set_ylim(0, 1.25 * high.max())
+    axes.legend(frameon=False, fontsize=11, loc="upper right")
+
+
+@contextmanager
+def _canvas(paths: Sequence[Path], width: float = 7.2) -> Iterator[Any]:
+    """An empty figure in the house style, which is written to the paths in the end."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
+    with rc_context({"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12, "pdf.fonttype": 42}):
+        figure = Figure(figsize=(width, 5.0), dpi=160, layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+        figure.draw_without_rendering()  # lays it out, once for all formats
+        figure.set_layout_engine("none")
+        for path in paths:
+            with atomic(path) as temporary:
+                figure.savefig(temporary, metadata={"CreationDate": None} if path.suffix == ".pdf" else None)
+
+
+def _draw(axes: Any, item: Series, i: int) -> None:
+    colour, marker = _COLOURS[i % len(_COLOURS)], _MARKERS[i % len(_MARKERS)]
+    every = max(1, item.x.size // 25)
+    label = ", ".join(f"{symbol_of(ABSCISSAE[key])} = {value:g}" for key, value in item.varied.items())
+    axes.plot(item.line_x, item.line_y, color=colour, linewidth=1.6)
+    axes.plot(
+        item.x, item.y, marker, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6,
+        markevery=every, label=label or None,
+    )  # fmt: skip
+    if item.simulated is not None:
+        x, y, error = item.simulated[:, :: max(1, item.simulated.shape[1] // 16)]
+        axes.errorbar(x, y, 2 * error, **_DOT)
+
+
+def _add_legend(axes: Any, equation: str, is_simulated: bool) -> None:
+    """Colours tell the curves apart; two or three grey entries tell the method."""
+    handles, labels = axes.get_legend_handles_labels()
+    grey = {"color": "0.35"}
+    methods = {
+        "finite elements": axes.plot([], [], "o", markersize=7, markerfacecolor="none", markeredgewidth=1.6, **grey)[0],
+        f"perturbation, Eq. {equation}": axes.plot([], [], "-", linewidth=1.6, **grey)[0],
+    }
+    if is_simulated:
+        methods["Monte Carlo ± 2 standard errors"] = axes.errorbar([], [], [], **_DOT)
+    axes.legend([*handles, *methods.values()], [*labels, *methods], frameon=False, fontsize=11)

@@ -1,0 +1,118 @@
+"""Results as tables: summary.json and moments.csv; of simulated curves monte_carlo.json and response.csv."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fpsolve import __version__
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
+from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.quantities import INDICES
+from fpsolve.files import atomic, write_json
+from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.theory.perturbation import second_order
+
+if TYPE_CHECKING:
+    from fpsolve.simulation.response import Response
+
+
+def write_results(case: Case, results: Sequence[CurveResult], folder: Path) -> None:
+    """summary.json and moments.csv."""
+    write_json(folder / "summary.json", {**_head(case), "curves": [_summary(result) for result in results]})
+    columns = ["p", "value", "derivative", "perturbation", "error_estimate", "residual"]
+    rows = ([*result.curve.varied.values(), *row.values()] for result in results for row in _rows(result))
+    _write_csv(folder / "moments.csv", [*case.vary, *columns], rows)
+
+
+def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> set[Path]:
+    """monte_carlo.json of a curve, and response.csv where there is a response; returns the files."""
+    summary = folder / f"monte_carlo{simulated.curve.suffix}.json"
+    write_json(summary, {**_head(case), **_simulation_summary(simulated)})
+    if simulated.response is None:
+        return {summary}
+    table, response = folder / f"response{simulated.curve.suffix}.csv", simulated.response
+    edges = response.amplitude_edges
+    columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
+    rows = (map(float, row) for row in zip(*columns, strict=True))
+    _write_csv(table, ["amplitude_from", "amplitude_to", "density", "standard_error"], rows)
+    return {summary, table}
+
+
+def _head(case: Case) -> dict[str, str]:
+    return {"case": case.name, "title": case.title, "fpsolve_version": __version__}
+
+
+def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
+    return {"parameters": dict(curve.parameters), "varied": dict(curve.varied)}
+
+
+def _summary(result: CurveResult) -> dict[str, Any]:
+    theory = second_order(result.curve.problem)
+    return {
+        **_parameters(result.curve),
+        "moments": _rows(result),
+        **{name: _estimate(result.estimates[name], index.theory(theory)) for name, index in INDICES.items()},
+        "mesh": result.mesh,
+        "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
+        "notes": list(result.notes),
+    }
+
+
+def _rows(result: CurveResult) -> list[dict[str, float]]:
+    moments = result.moments
+    columns = {
+        "p": moments.p,
+        "value": moments.value,
+        "derivative": moments.derivative,
+        "perturbation": result.moments_perturbation,
+        "error_estimate": moments.error_estimate,
+        "residual": moments.residual,
+    }
+    return [{name: float(values[i]) for name, values in columns.items()} for i in range(moments.p.size)]
+
+
+def _estimate(estimate: Estimate | None, theory: float) -> dict[str, float] | None:
+    if estimate is None:
+        return None
+    return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": theory}
+
+
+def _simulation_summary(simulated: SimulatedCurve) -> dict[str, Any]:
+    result, response = simulated.result, simulated.response
+    return {
+        **_parameters(simulated.curve),
+        "estimates": [asdict(estimate) for estimate in result.estimates],
+        **_with_errors(simulated.estimates),
+        "paths": result.paths,
+        "time": result.time,
+        "step": result.step,
+        "seed": result.seed,
+        "impacts": result.impacts,
+        "response": None if response is None else _response_summary(response),
+        "warnings": list(simulated.warnings),
+    }
+
+
+def _response_summary(response: Response) -> dict[str, Any]:
+    return {
+        "means": _with_errors(response.means),
+        "impact_rate": response.impact_rate,
+        "outside": response.outside,
+        "time": response.time,
+    }
+
+
+def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
+    return {name: {"value": value, "standard_error": error} for name, (value, error) in numbers.items()}
+
+
+def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
+    with atomic(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(columns)
+        table.writerows(rows)

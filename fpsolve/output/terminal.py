@@ -1,0 +1,208 @@
+"""Results as tables on the terminal; what limits them goes to the standard error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Column, Table
+from rich.text import Text
+
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
+from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, VARIANCE_RATE, Quantity
+from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
+from fpsolve.theory.perturbation import second_order
+
+
+def print_results(case: Case, results: Sequence[CurveResult]) -> None:
+    """Λ(p), or λ and δ_p over a parameter, beside perturbation theory."""
+    console = Console()
+    if case.figure.x == "p":
+        for result in results:
+            console.print(_moment_table(case, result))
+            console.print(_indices(result), highlight=False)
+    else:
+        console.print(_curve_table(case, results))
+    print_warnings(case, results)
+
+
+def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
+    """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
+    for result in results:
+        _remark(case, result.curve, "warning", "yellow", result.warnings)
+        _remark(case, result.curve, "not converged", "bold red", [failure.reason for failure in result.failures])
+        _remark(case, result.curve, "note", "cyan", result.notes)
+
+
+def _remark(case: Case, curve: Curve, kind: str, style: str, texts: Sequence[str]) -> None:
+    for text in texts:
+        Console(stderr=True).print(Text(f"{kind}: {case.place(curve)}: {text}"), style=style, soft_wrap=True)
+
+
+def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:
+    """Λ(p) and λ by simulation, with the finite elements beside them where these have been solved."""
+    console = Console()
+    solved = {result.curve.key: result for result in results}
+    pairs = [(each, solved.get(each.curve.key)) for each in simulated]
+    if case.figure.x == "p":
+        for each, result in pairs:
+            console.print(_simulation_table(case, each, result))
+            console.print(_simulation_line(each, result), highlight=False, soft_wrap=True)
+    else:
+        console.print(_exponent_table(case, pairs))
+    for each in simulated:
+        if each.response:
+            means = "   ".join(f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items())
+            text = f"{case.place(each.curve)}: stationary means: {means}\n"
+            console.print(text, highlight=False, soft_wrap=True)
+        _remark(case, each.curve, "warning", "yellow", each.warnings)
+
+
+def _simulation_line(simulated: SimulatedCurve, result: CurveResult | None) -> str:
+    """λ, Λ″(0) and the size of the simulation."""
+    found = simulated.result
+    value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
+    text = f"{LYAPUNOV_EXPONENT.symbol} = {_with_error(value, error)}"
+    if result and result.lyapunov_exponent:
+        exact = result.lyapunov_exponent.value
+        text += f" (finite elements {exact:.6g}, {_deviation(value, error, exact)} s.e. away)"
+    text += f"   {VARIANCE_RATE.symbol} = {_with_error(found.variance_rate, found.variance_rate_error)}"
+    return f"{text}\n{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}\n"
+
+
+def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Table:
+    """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
+    compared = ("finite elements", "s.e. away") if result else ()
+    table = _table(case.heading(simulated.curve), "p", MOMENT.symbol, "± s.e.", *compared, "effective paths")
+    exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
+    for estimate in simulated.result.estimates:
+        value, error = estimate.value, estimate.standard_error
+        row = ["none", ""] if value is None or error is None else [sampled(value, error), f"{error:.1e}"]
+        if result:
+            known = exact.get(estimate.p) if estimate.p else 0.0
+            row += ["" if known is None else f"{known:.6g}"]
+            row += ["" if known is None or value is None or not error else _deviation(value, error, known)]
+        table.add_row(f"{estimate.p:g}", *row, f"{estimate.effective_paths:.0f}")
+    return table
+
+
+def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Table:
+    """One row for each parameter set: λ by simulation and by finite elements."""
+    names = (key.partition(".")[2] for key in case.vary)
+    table = _table(case.title, *names, LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away")
+    for each, result in pairs:
+        value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
+        known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
+        exact = ("", "") if known is None else (f"{known:.6g}", _deviation(value, error, known))
+        varied = (f"{number:g}" for number in each.curve.varied.values())
+        table.add_row(*varied, sampled(value, error), f"{error:.1e}", *exact)
+    return table
+
+
+def _with_error(value: float, error: float) -> str:
+    return f"{sampled(value, error)} ± {error:.1e}"
+
+
+def sampled(value: float, error: float) -> str:
+    """A number with as many decimals as two digits of its standard error have."""
+    if error <= 0:
+        return f"{value:g}"
+    decimals = 1 - math.floor(math.log10(error))
+    return f"{value:.{decimals}f}" if 0 <= decimals <= 9 else f"{value:.3g}"
+
+
+def _deviation(value: float, error: float, exact: float) -> str:
+    return f"{(value - exact) / error:+.1f}"
+
+
+def _moment_table(case: Case, result: CurveResult) -> Table:
+    """p, Λ(p), Eq. (37) and the difference."""
+    table = _table(case.heading(result.curve), "p", MOMENT.symbol, "± error", _theory(case, MOMENT), "difference")
+    _explain_star(table, case)
+    moments = result.moments
+    for p, value, error, theory in zip(
+        moments.p, moments.value, moments.error_estimate, result.moments_perturbation, strict=True
+    ):
+        table.add_row(f"{p:g}", digits(value, error), f"{error:.0e}", f"{theory + 0.0:.6g}", f"{value - theory:.2e}")
+    return table
+
+
+def _indices(result: CurveResult) -> str:
+    """λ, δ_p and Λ″(0) in a line."""
+    parts = []
+    for name, estimate in result.estimates.items():
+        error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
+        parts.append(f"{INDICES[name].symbol} = {_digits_of(estimate, most=9)}{error}")
+    return "   ".join(parts) + "\n"
+
+
+def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
+    """One row for each parameter set: λ, Eq. (39), δ_p and Eq. (38)."""
+    indices = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
+    names = (key.partition(".")[2] for key in case.vary)
+    headings = (text for index in indices for text in (index.symbol, _theory(case, index)))
+    table = _table(case.title, *names, *headings)
+    _explain_star(table, case)
+    for result in results:
+        theory = second_order(result.curve.problem)
+        row = [f"{value:g}" for value in result.curve.varied.values()]
+        for index in indices:
+            row += [_digits_of(result.estimates[index.name], most=7), f"{index.theory(theory):.6g}"]
+        table.add_row(*row)
+    return table
+
+
+def _theory(case: Case, quantity: Quantity) -> str:
+    """Heading of a column of perturbation theory, starred where it has another noise than the solution."""
+    return f"Eq. {quantity.equation}{'*' if case.is_exact else ''}"
+
+
+def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
+    """What a case expects beside what was computed."""
+    console = Console()
+    if not comparisons:
+        console.print(f"{case.name}: nothing is expected; add [[expect]] to the case", markup=False)
+        return
+    table = _table(
+        f"{case.name}: {case.title}", Column("quantity", overflow="fold"), "expected", "computed", "difference", ""
+    )
+    for item in comparisons:
+        expectation = item.expectation
+        name = expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
+        where = "".join(f"\n{key} = {value:g}" for key, value in item.varied.items())
+        table.add_row(
+            f"{name}{where}\n[dim]{escape(expectation.source)}[/dim]",
+            f"{expectation.value:.12g}\n± {item.tolerance:.0e}",
+            "none" if item.value is None else f"{item.value:.12g}",
+            "" if item.value is None else f"{item.value - expectation.value:.1e}",
+            "[green]ok[/green]" if item.met else "[bold red]differs[/bold red]",
+        )
+    console.print(table)
+    console.print(f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok")
+
+
+def _table(title: str, *columns: str | Column) -> Table:
+    """An empty table; of a column with its heading alone the entries stand on the right."""
+    aligned = (Column(each, justify="right", no_wrap=True) if isinstance(each, str) else each for each in columns)
+    return Table(*aligned, title=Text(title), title_justify="left")
+
+
+def _explain_star(table: Table, case: Case) -> None:
+    if case.is_exact:
+        table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
+
+
+def _digits_of(estimate: Estimate | None, most: int) -> str:
+    return digits(estimate.value, estimate.error_estimate, most) if estimate else "none found"
+
+
+def digits(value: float, error: float, most: int = 13) -> str:
+    """A number with the digits that its error leaves, at most so many significant ones; 0 where it leaves none."""
+    if abs(value) <= error:
+        return "0"
+    count = most if error <= 0 else math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
+    return f"{value:#.{min(max(count, 1), most)}g}".rstrip(".")

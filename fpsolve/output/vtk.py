@@ -1,0 +1,239 @@
+"""Eigenfunctions and densities as ParaView files: Lagrange quadrilaterals on the full circle, x = φ, y = ξ.
+
+A file shows the elements' polynomials, not an interpolation through shared nodes: points are doubled at every
+φ-line of the mesh and carry the one-sided limits there, so that the jump T(φ⁻) = R^p T(φ⁺) of an impact stands in
+it. A half circle is repeated, as everything in Eq. (19) is π-periodic, and its cells are cut at φ = 0 and 2π.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import OutputError
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.fields import Fields, fields, xi_marginal
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.noise_space import DiffusionSpace, Samples
+from fpsolve.files import atomic, write_text
+from fpsolve.study.results import CurveResult, SimulatedCurve
+
+MAX_ORDER = 4
+"""Largest degree of the quadrilaterals written; elements of a higher degree are cut into several of them."""
+
+
+def write_eigenfunctions(
+    directory: Path, pairs: Sequence[PrincipalPair], stationary: PrincipalPair, stem: str = "eigenfunctions"
+) -> list[Path]:
+    """Write `<stem>.pvd`, a time series over p, and `<stem>/p….vtu`, one file for each p.
+
+    Point data: `T`; `T_adjoint`, T*; `tilted_density`, T T*; `stationary_density`, T* at p = 0; `z` = ξ/std.
+    T has mean 1 over P_s(ξ)/2π, or where its factor exp(s z) is large, over what that makes of P_s, and is cut off
+    beyond e^±600; ∫T T* dφ dξ = 1. Field data: `p` and `Lambda`, Λ(p).
+
+    Args:
+        directory: the folder, made where it is missing.
+        pairs: the eigenpairs, at most one of them written for each p.
+        stationary: the pair at p = 0 of the same oscillator and noise, on any mesh.
+        stem: name of the collection and of the folder of its files.
+
+    Returns:
+        The files written, the collection first.
+    """
+    names = {pair.p: f"{stem}/p{pair.p + 0.0:+}.vtu" for pair in sorted(pairs, key=lambda pair: pair.p)}
+    for pair in pairs:
+        grid = _Grid.of(pair)
+        found = grid.fields(pair)
+        data = {
+            "T": found.right,
+            "T_adjoint": found.adjoint,
+            "tilted_density": found.product,
+            "stationary_density": grid.fields(stationary).adjoint,
+            "z": grid.z,
+        }
+        _write_grid(directory / names[pair.p], grid, data, {"p": pair.p, "Lambda": pair.value})
+    collection = directory / f"{stem}.pvd"
+    write_text(collection, _collection(names))
+    return [collection, *(directory / name for name in names.values())]
+
+
+def write_density(path: Path, stationary: PrincipalPair) -> Path:
+    """Write the stationary density of (φ, ξ), per radian and unit of ξ, with its marginals, to a `.vtu` file.
+
+    Point data: `stationary_density`, `phi_marginal`, `xi_marginal`, `z`. Field data: `lyapunov_exponent`, λ.
+    """
+    grid, space = _Grid.of(stationary), stationary.generator.space
+    over_xi = space.table(stationary.left) @ (space.xi.mass() @ space.xi.constant())
+    data = {
+        "stationary_density": grid.fields(stationary).adjoint,
+        "phi_marginal": grid.phase_table(stationary) @ over_xi[:, None],
+        "xi_marginal": 2 * math.pi / space.mesh.span * xi_marginal(stationary, grid.samples(stationary)),
+        "z": grid.z,
+    }
+    _write_grid(path, grid, data, {"lyapunov_exponent": stationary.derivative})
+    return path
+
+
+def write_curve(result: CurveResult, folder: Path) -> set[Path]:
+    """Write the eigenfunctions of a curve, and return their files; with the first curve the stationary density too."""
+    stationary, curve = result.stationary, result.curve
+    if stationary is not None and curve.number == 1:
+        write_density(folder / "density.vtu", stationary)
+    if stationary is None or not result.eigenpairs:
+        return set()
+    copy_show_script(folder)
+    return set(write_eigenfunctions(folder, result.eigenpairs, stationary, stem=f"eigenfunctions{curve.suffix}"))
+
+
+def write_response(simulated: SimulatedCurve, folder: Path) -> set[Path]:
+    """Write the joint density of x and ẋ, if there is one, as cell data `density` of response.vti; return the file."""
+    import pyvista
+
+    response = simulated.response
+    if response is None:
+        return set()
+    path, x, v = folder / f"response{simulated.curve.suffix}.vti", response.x_edges, response.v_edges
+    size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
+    grid = pyvista.ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
+    grid.cell_data["density"] = response.density.ravel(order="F")
+    with atomic(path) as temporary:
+        grid.save(temporary)
+    return {path}
+
+
+def copy_show_script(directory: Path) -> Path:
+    """Put `show.py`, which draws the collection in ParaView, into the folder; it remembers which one that was."""
+    target, text = directory / "show.py", files("fpsolve.output").joinpath("show.py").read_text(encoding="utf-8")
+    write_text(target, text.replace('FOLDER = ""', f"FOLDER = {str(directory.resolve())!r}", 1))
+    return target
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Nodes of the quadrilaterals: a block of them for each φ-cell or part of one, continuous in ξ.
+
+    Attributes:
+        phi: φ of the nodes, shape (blocks, nodes of a block); the ends are the φ-lines, 0 and 2π.
+        z_cells: z of the nodes, shape (ξ-cells, nodes of a cell), with the ends of neighbours equal.
+        unit: ξ/z.
+        order: degree of the quadrilaterals.
+    """
+
+    phi: FloatArray
+    z_cells: FloatArray
+    unit: float
+    order: int
+
+    @classmethod
+    def of(cls, pair: PrincipalPair) -> _Grid:
+        """Nodes that show a pair; P_s in the adjoint also asks for quadrilaterals of one noise unit at most."""
+        mesh = pair.generator.space.mesh
+        order = min(MAX_ORDER, max(mesh.phi_degree, mesh.xi_degree))
+        tall = math.ceil(np.max(np.diff(mesh.z_lines)) - 1e-9)
+        phi = _nodes(_phi_breaks(mesh), order, _parts(mesh.phi_degree, order))
+        z = _nodes(mesh.z_lines, order, max(tall, _parts(mesh.xi_degree, order)))
+        return cls(phi, z, pair.generator.problem.noise.standard_deviation, order)
+
+    @property
+    def z(self) -> FloatArray:
+        """z of the nodes, each once."""
+        return np.append(self.z_cells[:, :-1], self.z_cells[-1, -1])
+
+    def fields(self, pair: PrincipalPair) -> Fields:
+        """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
+        return fields(pair, self.phase_table(pair), self.samples(pair))
+
+    def phase_table(self, pair: PrincipalPair) -> csr_matrix:
+        """Values of the φ-elements at the nodes, shape (φ-nodes, φ-unknowns)."""
+        mesh, inside = pair.generator.space.mesh, _inward(self.phi)
+        turned = mesh.span * np.floor((inside - mesh.phi_lines[0]) / mesh.span)
+        return pair.generator.space.phi.at((self.phi - turned).ravel(), (inside - turned).ravel())
+
+    def samples(self, pair: PrincipalPair) -> Samples:
+        """The functions of ξ at the nodes, each seen from inside its cell; of states there are none."""
+        xi, inside = pair.generator.space.xi, _inward(self.z_cells)
+        if not isinstance(xi, DiffusionSpace):
+            raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
+        return xi.at(self.z, np.append(inside[:, :-1], inside[-1, -1]))
+
+    def points(self) -> FloatArray:
+        """(φ, ξ, 0), φ slowest, shape (points, 3)."""
+        phi, xi = np.meshgrid(self.phi.ravel(), self.unit * self.z, indexing="ij")
+        return np.stack([phi.ravel(), xi.ravel(), np.zeros(phi.size)], axis=1)
+
+    def cells(self) -> Any:
+        """Points of each quadrilateral in VTK's order, shape (cells, (order + 1)²)."""
+        k, (blocks, nodes) = self.order, self.phi.shape
+        columns = (np.arange(blocks)[:, None] * nodes + np.arange(0, nodes - 1, k)).ravel()
+        corners = columns[:, None] * self.z.size + np.arange(0, self.z.size - 1, k)
+        i, j = np.transpose(_vtk_order(k))
+        return corners.reshape(-1, 1) + i * self.z.size + j
+
+
+def _phi_breaks(mesh: CylinderMesh) -> FloatArray:
+    """0, 2π and the φ-lines between them, those of a half circle repeated."""
+    lines = np.sort(np.mod(mesh.phi_lines[:-1], mesh.span))
+    lines = np.concatenate([lines + k * mesh.span for k in range(round(2 * math.pi / mesh.span))])
+    inside = lines[(lines > 1e-9) & (lines < 2 * math.pi - 1e-9)]
+    return np.concatenate([[0.0], inside, [2 * math.pi]])
+
+
+def _parts(degree: int, order: int) -> int:
+    """Into how many polynomials of degree `order` one of `degree` is cut: one where that is exact."""
+    return 1 if degree <= order else math.ceil(degree / order) + 1
+
+
+def _nodes(breaks: FloatArray, order: int, parts: int) -> FloatArray:
+    """Equidistant nodes in each interval, shape (intervals, parts·order + 1)."""
+    t = np.linspace(0, 1, parts * order + 1)
+    return breaks[:-1, None] * (1 - t) + breaks[1:, None] * t
+
+
+def _inward(x: FloatArray) -> FloatArray:
+    """Each row of x, contracted a little: at a line of a mesh it tells from which side the line is seen."""
+    return x + 1e-6 * (x.mean(axis=1, keepdims=True) - x)
+
+
+def _vtk_order(k: int) -> list[tuple[int, int]]:
+    """Nodes (i, j) of VTK's Lagrange quadrilateral of degree k: corners, edges, interior."""
+    inner = range(1, k)
+    corners = [(0, 0), (k, 0), (k, k), (0, k)]
+    edges = [*((i, 0) for i in inner), *((k, j) for j in inner), *((i, k) for i in inner), *((0, j) for j in inner)]
+    return [*corners, *edges, *((i, j) for j in inner for i in inner)]
+
+
+def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: Mapping[str, float]) -> None:
+    """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes)."""
+    import pyvista
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    connectivity = grid.cells()
+    count, size = connectivity.shape
+    cells = np.column_stack([np.full(count, size), connectivity]).ravel()
+    kinds = np.full(count, pyvista.CellType.LAGRANGE_QUADRILATERAL, dtype=np.uint8)
+    output = pyvista.UnstructuredGrid(cells, kinds, grid.points())
+    for name, values in data.items():
+        output.point_data[name] = np.broadcast_to(values, (grid.phi.size, grid.z.size)).ravel()
+    for name, value in facts.items():
+        output.field_data[name] = [value]
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(output)
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    write_text(path, writer.GetOutputString())
+
+
+def _collection(names: Mapping[float, str]) -> str:
+    """The XML of a ParaView collection: a file for each time, which is p."""
+    sets = [f'    <DataSet timestep="{p}" file={quoteattr(name)}/>' for p, name in names.items()]
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>'
+    return "\n".join([head, *sets, "  </Collection>", "</VTKFile>", ""])

@@ -1,0 +1,221 @@
+"""Batches of simulated paths, and the sums over them from which Λ(p) and λ are estimated."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from threading import Event
+
+import numpy as np
+from numpy.random import SeedSequence, default_rng
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.noise import ColouredNoise, has_algebraic_tails, relaxation_time
+from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
+from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator
+from fpsolve.simulation.step import Motion, NoiseStep, noise_step, starting_state
+
+_PORTION_SECONDS = 0.1
+STEP_SECONDS = 2e-8
+"""For one step of one path, about."""
+_EXPONENT = 0.5
+"""Between two looks at the weights of a population, p times the growth that the noise brings about typically."""
+Advance = Callable[[int, Event], None]
+"""Goes on by so many units, or fewer if told to stop."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What all batches of a simulation share.
+
+    Attributes:
+        noise: the process.
+        motion, noise_step, step: the motion, one step of the noise, and its length.
+        p: orders of the moments, shape (n,).
+        paths: in one batch.
+        slice_steps: steps in one slice, the unit in which batches are advanced: one transient.
+        settling: slices before the estimate begins.
+        wanted: slices for the estimate.
+        levels: the direct estimator has windows of 2⁰ … 2^(levels − 1) slices.
+    """
+
+    noise: ColouredNoise
+    motion: Motion
+    noise_step: NoiseStep
+    step: float
+    p: FloatArray
+    estimator: Estimator
+    paths: int
+    slice_steps: int
+    settling: int
+    wanted: int
+    levels: int
+
+    @property
+    def length(self) -> float:
+        """The time of one slice."""
+        return self.slice_steps * self.step
+
+    @property
+    def slice_seconds(self) -> float:
+        """How long a batch computes for one slice, about."""
+        return STEP_SECONDS * self.paths * self.slice_steps
+
+    @property
+    def pieces(self) -> list[int]:
+        """The steps of a slice in pieces, between which a batch looks whether it shall stop."""
+        count = min(self.slice_steps, math.ceil(self.slice_seconds / _PORTION_SECONDS))
+        size, longer = divmod(self.slice_steps, count)
+        return [size + 1] * longer + [size] * (count - longer)
+
+
+class _Paths:
+    """Paths of a batch; in its first slices, numbered from −`settling`, they reach the law that they shall have.
+
+    Attributes:
+        slices: how many are done after those.
+    """
+
+    def __init__(self, plan: Plan, seed: SeedSequence) -> None:
+        self.plan, self.rng = plan, default_rng(seed)
+        self.x, self.u, self.xi = starting_state(plan.noise, plan.paths, self.rng)
+        self.log_norm, self.push = np.zeros((2, plan.paths))
+        self.state = self.x, self.u, self.xi, self.log_norm, self.push
+        self.slices = -plan.settling
+
+    def advance(self, slices: int, stop: Event) -> None:
+        """Go on by so many slices, or fewer if told to stop; one that was begun then does not count."""
+        pieces = self.plan.pieces
+        for _ in range(slices):
+            for steps in pieces:
+                if stop.is_set():
+                    return
+                self._move(steps)
+            self._close()
+            self.slices += 1
+
+    def _move(self, steps: int) -> None:
+        """Some steps of a slice."""
+        raise NotImplementedError
+
+    def _close(self) -> None:
+        """What is done at the end of a slice."""
+        raise NotImplementedError
+
+
+class PlainBatch(_Paths):
+    """Paths without weights: the growth of ln‖x‖, and the sums of ‖x‖^p over windows of 2ʲ slices.
+
+    Attributes:
+        log_sums, log_squares: ln Σ w and ln Σ w² over paths and windows, w = ‖x(end)‖^p/‖x(start)‖^p, of shape
+            (levels, p).
+        impacts: how many bounces there were.
+        growth, variance: mean and variance of ln‖x‖ over the paths at the end of the last slice.
+    """
+
+    def __init__(self, plan: Plan, seed: SeedSequence) -> None:
+        super().__init__(plan, seed)
+        self.starts = np.zeros((plan.levels, plan.paths))
+        self.log_sums = np.full((plan.levels, plan.p.size), -math.inf)
+        self.log_squares = self.log_sums.copy()
+        self.impacts, self.growth, self.variance = 0, 0.0, 0.0
+
+    def _move(self, steps: int) -> None:
+        plan = self.plan
+        impacts = advance(plan.motion, plan.noise_step, plan.step, *self.state, steps, RENORMALISED, self.rng)
+        self.impacts += impacts if self.slices >= 0 else 0
+
+    def _close(self) -> None:
+        if self.slices < 0:
+            self.log_norm[:] = 0
+            return
+        add_windows(self.log_norm, self.starts, self.slices + 1, self.plan.p, self.log_sums, self.log_squares)
+        self.growth, self.variance = float(np.mean(self.log_norm)), float(np.var(self.log_norm))
+
+
+class Population(_Paths):
+    """Paths with the weights ‖x‖^p, drawn anew when these differ too much.
+
+    So that they seldom do, the noise is pushed to where the moment is carried: with T₀(ξ) = exp(b ξ) the paths obey
+    dξ = (f(ξ) + σ² b) dt + σ dW, and the weights are ‖x‖^p exp(∫(L_ξ T₀)/T₀ dt), L_ξ T₀/T₀ = b f(ξ) + ½σ² b², which
+    gives the same Λ(p) for every b (Girsanov). b is sought while settling: it is the one that belongs to the mean of ξ.
+
+    Slow noise may carry a moment in two places, between which a population does not pass in any time: so some start
+    with the b that T has where the oscillator does not turn, ln ‖x‖ growing by ε ξ, b = p ε/α₀.
+
+    Attributes:
+        bias: b, which stays 0 where exp(b ξ) has no mean.
+        expected: growth of ln Z in a slice, about.
+        tallies: of the slices after settling, one record of `TALLIES`, shape (1,).
+    """
+
+    def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
+        super().__init__(plan, seed)
+        self.p, self.bias, self.expected = p, 0.0, 0.0
+        self._is_biased = p != 0 and not has_algebraic_tails(plan.noise)
+        if is_far and self._is_biased:
+            self.bias = p * plan.motion.strength * relaxation_time(plan.noise)
+        self.tallies = np.zeros(1, TALLIES)
+        self._log_weights, self._ancestors = np.zeros(plan.paths), np.arange(plan.paths)
+        self._log_z = np.zeros(2)  # of the weights that have been reset, and of all at the last slice
+        exponent = abs(p) * plan.motion.strength * plan.noise.standard_deviation * plan.step
+        self._interval = max(1, min(plan.slice_steps // 16, int(_EXPONENT / max(exponent, 1e-300))))
+
+    def _move(self, steps: int) -> None:
+        plan = self.plan
+        bonus = 0.5 * (plan.noise.diffusion * self.bias) ** 2 * plan.step
+        advance_population(
+            plan.motion, noise_step(plan.noise, plan.step, bias=self.bias), plan.step, *self.state, self._log_weights,
+            self._ancestors, (self.p, self.bias, bonus), steps, self._interval, self._log_z, self.rng,
+        )  # fmt: skip
+
+    def _close(self) -> None:
+        expected = self.expected if self.slices >= 0 else 0.0
+        growth = close_slice(self._log_weights, self._ancestors, self._log_z, expected, self.tallies)
+        if self.slices < 0:
+            self.expected = growth
+            self.tallies[:] = 0
+        if self._is_biased and 2 - self.plan.settling <= self.slices < -2:
+            # α₀⟨ξ⟩/σ², under which Ornstein-Uhlenbeck noise has this mean
+            weights = np.exp(self._log_weights - self._log_weights.max())
+            self.bias = float(np.average(self.xi, weights=weights)) / (2 * self.plan.noise.standard_deviation**2)
+
+
+def _pool() -> ThreadPoolExecutor:
+    """One thread for each processor that this process may use; compiled code runs in them side by side."""
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return ThreadPoolExecutor(count)
+
+
+def advance_all(advances: Sequence[Advance], wanted: int, seconds: float, progress: Callable[[], None]) -> bool:
+    """Advance batches side by side by the wanted number of units, each of which takes some `seconds`.
+
+    `progress` is called 100 times in all. An interrupt ends this early; returns whether it did.
+    """
+    portion = max(1, min(math.ceil(wanted / PROGRESS_STEPS), round(_PORTION_SECONDS / seconds)))
+    stop = Event()
+    with _pool() as pool:
+        for done in range(0, wanted, portion):
+            count = min(portion, wanted - done)
+            futures: list[Future[None]] = []
+            try:
+                for each in advances:
+                    futures.append(pool.submit(each, count, stop))
+                wait(futures)
+                for _ in range(PROGRESS_STEPS * (done + count) // wanted - PROGRESS_STEPS * done // wanted):
+                    progress()
+            except KeyboardInterrupt:
+                stop.set()
+                wait(futures)
+                return True
+            for future in futures:
+                future.result()
+    return False
+
+
+def standard_error(values: FloatArray) -> float:
+    """Of the mean of independent values, one from each batch."""
+    return float(np.std(values, ddof=1) / math.sqrt(values.size))

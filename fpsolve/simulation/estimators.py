@@ -1,0 +1,333 @@
+"""Moment Lyapunov exponents by Monte Carlo simulation of the system (3), with errors from independent batches.
+
+All estimates start in the stationary law of phase and noise. The linear system is simulated, c₂ = c₃ = 0.
+
+Direct (W.-C. Xie, J. Appl. Mech. 72, 2005): M(t) = E‖x(t)‖^p over paths that are normalised again and again, and
+Λ(p) = (ln M(2t) − ln M(t))/t. One set of paths serves all p and all t = 2ʲ × transient; each p takes the longest t
+after which many paths still carry the mean, and λ is the time average of the growth.
+
+Population dynamics (P. Del Moral, Feynman-Kac Formulae, 2004): for each p the paths of a batch carry weights ‖x‖^p;
+when these differ too much, paths are drawn anew in proportion to them. The product Z of the mean weights has
+E Z = E‖x‖^p, and its logarithm is normal for many paths (J. Bérard, P. Del Moral, A. Doucet, Electron. J. Probab. 19,
+2014), so that Λ(p) = (E ln Z + ½ Var ln Z)/time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import NotConverged
+from fpsolve.model.problem import Problem, of_problem
+from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
+from fpsolve.simulation.kernels import TALLIES
+from fpsolve.simulation.setup import (
+    BATCHES,
+    PATHS,
+    TRANSIENTS,
+    Estimator,
+    check_settings,
+    default_step,
+    obstacles,
+    simulated_parts,
+    transient,
+)
+from fpsolve.simulation.step import motion, noise_step
+
+FEW: Mapping[Estimator, int] = {"direct": 5000, "population": 1000}
+"""With fewer effective paths there is no estimate. Direct runs that miss the rare large ‖x‖^p have both more effective
+paths and a smaller mean, so that estimates near a lower bound would be too small."""
+DRIFT = 4.0
+"""Standard errors by which two parts of the same estimate may differ."""
+_KEPT = 0.3
+"""The share of effective paths that a long window of the direct estimator must leave."""
+_LEVELS = 12
+_SETTLING = 9
+"""Slices in which a population finds its law."""
+
+
+@dataclass(frozen=True)
+class MomentEstimate:
+    """Λ(p) by simulation.
+
+    Attributes:
+        p: order of the moment.
+        value, standard_error: Λ(p) and the standard deviation of this estimate; None where too few paths carry it.
+        estimator: "direct" or "population".
+        effective_paths: how many paths carry the mean. Direct: (Σw)²/Σw² over all windows with the weights w = ‖x‖^p
+            at their ends. Population: the same for the paths of a transient ago with the weights of their descendants.
+    """
+
+    p: float
+    value: float | None
+    standard_error: float | None
+    estimator: Estimator
+    effective_paths: float
+
+
+@dataclass(frozen=True)
+class MonteCarlo:
+    """What a simulation of one parameter set found.
+
+    Attributes:
+        estimates: Λ(p), in the order of p.
+        lyapunov_exponent, lyapunov_exponent_error: λ and its standard error.
+        variance_rate, variance_rate_error: Λ″(0), from the variance of ln‖x‖ over the paths, and its standard error.
+        paths, time, step, seed: how many paths, their length after the transient, the time step, the seed.
+        impacts: how many bounces the paths without weights had.
+        warnings: what limits these numbers, each with its criterion.
+        interrupted: whether the simulation was stopped early.
+    """
+
+    estimates: tuple[MomentEstimate, ...]
+    lyapunov_exponent: float
+    lyapunov_exponent_error: float
+    variance_rate: float
+    variance_rate_error: float
+    paths: int
+    time: float
+    step: float
+    seed: int
+    impacts: int
+    warnings: tuple[str, ...]
+    interrupted: bool = False
+
+
+@of_problem
+def simulate(
+    problem: Problem,
+    p: Sequence[float],
+    *,
+    estimator: Estimator = "direct",
+    paths: int = PATHS,
+    time: float | None = None,
+    step: float | None = None,
+    seed: int = 0,
+    progress: Callable[[], None] = lambda: None,
+) -> MonteCarlo:
+    """Simulate paths of the linear system and estimate λ and Λ(p) from them.
+
+    The result depends on the seed only, not on the number of processors. An interrupt (Ctrl-C) ends the simulation
+    early and gives the estimates of what is done, marked as `interrupted`; before two transients are done there are
+    none, and KeyboardInterrupt is raised.
+
+    Args:
+        problem: the oscillator and its noise, in one argument or two; c₂ and c₃ are not used.
+        p: orders of the moments.
+        estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
+        paths: how many; a multiple of 32 is used.
+        time: length of the paths after the transient; 64 transients if None. Whole transients are used.
+        step: time step; None chooses one.
+        seed: ≥ 0.
+        progress: called 100 times in all.
+
+    Raises:
+        FpsolveError: the motion is no `VibroImpactOscillator`, or the noise not that of the paper.
+        ValueError: an argument is out of its range, or the step is too large; the text names the largest good one.
+        NoSuchExponent: some Λ(p) is infinite.
+    """
+    oscillator, noise = simulated_parts(problem)
+    check_settings(noise, p, estimator, paths, seed)
+    for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
+        raise ValueError(f"{name}: {sentence}")
+    plan = _plan(problem, p, estimator, paths, time, step)
+    plain, populations = _start(plan, seed)
+    advances = [batch.advance for batch in (*plain, *populations)]
+    interrupted = advance_all(advances, plan.settling + plan.wanted, plan.slice_seconds, progress)
+    return _result(plan, plain, populations, seed, interrupted)
+
+
+def _plan(
+    problem: Problem, p: Sequence[float], estimator: Estimator, paths: int, time: float | None, step: float | None
+) -> Plan:
+    oscillator, noise = simulated_parts(problem)
+    h = default_step(oscillator, noise) if step is None else step
+    settling = transient(oscillator, noise)
+    wanted = TRANSIENTS if time is None else max(2, round(time / settling))
+    return Plan(
+        noise=noise,
+        motion=motion(replace(oscillator, c2=0.0, c3=0.0)),
+        noise_step=noise_step(noise, h),
+        step=h,
+        p=np.array(p, dtype=float),
+        estimator=estimator,
+        paths=math.ceil(paths / BATCHES),
+        slice_steps=round(settling / h),
+        settling=1 if estimator == "direct" else _SETTLING,
+        wanted=wanted,
+        levels=min(_LEVELS, wanted.bit_length()) if estimator == "direct" else 0,
+    )
+
+
+def _start(plan: Plan, seed: int) -> tuple[list[PlainBatch], list[Population]]:
+    """The batches, each with a stream of random numbers of its own."""
+    seeds = [each.spawn(1 + plan.p.size) for each in np.random.SeedSequence(seed).spawn(BATCHES)]
+    orders = plan.p if plan.estimator == "population" else ()
+    plain = [PlainBatch(plan, each[0]) for each in seeds]
+    weighted = [
+        Population(plan, each[1 + k], float(p), is_far=bool(i % 2))
+        for i, each in enumerate(seeds)
+        for k, p in enumerate(orders)
+    ]
+    return plain, weighted
+
+
+def _result(
+    plan: Plan, plain: Sequence[PlainBatch], populations: Sequence[Population], seed: int, interrupted: bool
+) -> MonteCarlo:
+    """What the batches have found.
+
+    Raises:
+        KeyboardInterrupt: that is nothing yet.
+        NotConverged: the numbers overflowed.
+    """
+    slices = np.array([batch.slices for batch in (*plain, *populations)])
+    if slices.min() < 2:
+        raise KeyboardInterrupt
+    times = plan.length * np.array([batch.slices for batch in plain])
+    exponents = np.array([batch.growth for batch in plain]) / times
+    variance_rates = np.array([batch.variance for batch in plain]) / times
+    if not np.all(np.isfinite(exponents)):
+        raise NotConverged("the simulation overflowed: some ξ is too large for this step; use a smaller step")
+    if plan.estimator == "direct":
+        estimates, drifts = direct_estimates(plan, plain)
+    else:
+        estimates, drifts = population_estimates(plan, populations)
+    warnings = [*_missing(plan, estimates), *drifts]
+    if interrupted:
+        warnings.append(f"stopped early, after {slices.mean() / plan.wanted:.0%} of the time")
+    return MonteCarlo(
+        estimates=tuple(estimates),
+        lyapunov_exponent=float(exponents.mean()),
+        lyapunov_exponent_error=standard_error(exponents),
+        variance_rate=float(variance_rates.mean()),
+        variance_rate_error=standard_error(variance_rates),
+        paths=plan.paths * BATCHES,
+        time=float(slices.mean()) * plan.length,
+        step=plan.step,
+        seed=seed,
+        impacts=sum(batch.impacts for batch in plain),
+        warnings=tuple(warnings),
+        interrupted=interrupted,
+    )
+
+
+def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[MomentEstimate], list[str]]:
+    """Λ(p) by the slope of ln M between t and 2t; its error by the jackknife over batches; and warnings."""
+    levels = min(plan.levels, min(batch.slices for batch in batches).bit_length())
+    windows = np.array([[batch.slices >> j for j in range(levels)] for batch in batches], dtype=float)[:, :, None]
+    log_sums = np.array([batch.log_sums[:levels] for batch in batches])
+    total, squares = logsumexp(log_sums, axis=0), logsumexp([batch.log_squares[:levels] for batch in batches], axis=0)
+    log_rest = total + np.log(-np.expm1(np.minimum(log_sums - total, -1e-15)))
+    effective = np.exp(2 * total - squares)
+    share = effective / (windows.sum(axis=0) * plan.paths)
+    times = plan.length * 2.0 ** np.arange(levels - 1)[:, None]
+    slopes = np.diff(total - np.log(windows.sum(axis=0)), axis=0) / times
+    rests = np.diff(log_rest - np.log(windows.sum(axis=0) - windows), axis=1) / times
+    estimates: list[MomentEstimate] = []
+    warnings: list[str] = []
+    for k, p in enumerate(plan.p):
+        usable = np.flatnonzero((share[1:, k] >= _KEPT) & (effective[1:, k] >= FEW["direct"]))
+        j = int(usable[-1]) if usable.size else 0
+        found = _jackknife(slopes[j, k], rests[:, j, k])
+        estimates.append(_estimate(plan, p, found, float(effective[j + 1, k])))
+        if j > 0:
+            change, uncertainty = _jackknife(slopes[j, k] - slopes[j - 1, k], rests[:, j, k] - rests[:, j - 1, k])
+            _warn_of_drift(p, change, uncertainty, "a longer window", warnings)
+    return estimates, warnings
+
+
+def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple[list[MomentEstimate], list[str]]:
+    """Λ(p) by the mean growth of ln Z, corrected by half its variance; its error by batches; and warnings.
+
+    Every second batch has started far away, see `Population`. Where the two kinds disagree the moment has two places;
+    each batch then gives the growth of one of them, which is a lower bound, and the larger growth counts.
+    """
+    tallies = np.array([each.tallies[0] for each in populations], TALLIES).reshape(BATCHES, plan.p.size)
+    expected = np.array([each.expected for each in populations]).reshape(BATCHES, plan.p.size)
+    count, excess = tallies["count"], tallies["excess"]
+    mean = excess / count
+    variance = tallies["squares"] / count - mean**2
+    neighbours = 2 * excess - tallies["first"] - tallies["last"]
+    covariance = (tallies["products"] - mean * neighbours) / (count - 1) + mean**2
+    rate = np.maximum(variance + 2 * covariance, 0) / plan.length
+    growth = (expected + mean) / plan.length
+    trends = (tallies["numbered"] - (count - 1) / 2 * excess) / count
+    estimates: list[MomentEstimate] = []
+    warnings: list[str] = []
+    for k, p in enumerate(plan.p):
+        used = slice(None)
+        near, far = growth[::2, k], growth[1::2, k]
+        gap, gap_error = float(far.mean() - near.mean()), math.hypot(standard_error(near), standard_error(far))
+        if abs(gap) > DRIFT * gap_error > 0:
+            used = slice(int(gap > 0), None, 2)
+            warnings.append(
+                f"Λ({p:g}): populations that start in two places differ by {abs(gap):.3g}, {abs(gap) / gap_error:.0f} "
+                "standard errors: the noise is too slow to pass between them; the larger value is given"
+            )
+        value = float(growth[used, k].mean() + rate[used, k].mean() / 2)
+        carrying = float(np.sum(tallies["effective"][used, k] / count[used, k]))
+        estimates.append(_estimate(plan, p, (value, standard_error(growth[used, k])), carrying))
+        _warn_of_drift(p, float(trends[used, k].mean()), standard_error(trends[used, k]), "more time", warnings)
+    return estimates, warnings
+
+
+def _estimate(plan: Plan, p: float, found: tuple[float, float], effective: float) -> MomentEstimate:
+    """An estimate, without a value where too few paths carry the mean. Λ(0) = 0 needs none of them."""
+    if p == 0:
+        return MomentEstimate(0.0, 0.0, 0.0, plan.estimator, effective)
+    is_finite = bool(np.all(np.isfinite(found))) and math.isfinite(effective)
+    if is_finite and effective >= FEW[plan.estimator] and _has_variance(plan, p):
+        return MomentEstimate(float(p), *found, plan.estimator, effective)
+    return MomentEstimate(float(p), None, None, plan.estimator, effective if is_finite else 0.0)
+
+
+def _has_variance(plan: Plan, p: float) -> bool:
+    """Whether E‖x‖^2p is finite."""
+    low, high = plan.noise.moments
+    return low <= 2 * p <= high
+
+
+def _missing(plan: Plan, estimates: Sequence[MomentEstimate]) -> list[str]:
+    """Why some p have no estimate, in a warning for each reason."""
+    warnings = []
+    none = [estimate for estimate in estimates if estimate.value is None]
+    wild, few = ([each for each in none if _has_variance(plan, each.p) == has] for has in (False, True))
+    if wild:
+        warnings.append(
+            f"no estimate of Λ(p) at {_orders(wild)}: ‖x‖^p has no variance, as for r0 > 1 the moment of order 2p is "
+            "infinite; use the finite elements"
+        )
+    if few:
+        low, high = (pick(each.effective_paths for each in few) for pick in (min, max))
+        number = f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+        remedy = 'use estimator = "population", or more paths' if plan.estimator == "direct" else "use more paths"
+        warnings.append(
+            f"no estimate of Λ(p) at {_orders(few)}: too few effective paths carry the mean, {number} of the "
+            f"{FEW[plan.estimator]} that are needed; {remedy}"
+        )
+    return warnings
+
+
+def _orders(estimates: Sequence[MomentEstimate]) -> str:
+    return f"p = {', '.join(f'{each.p:g}' for each in estimates)}"
+
+
+def _warn_of_drift(p: float, change: float, error: float, remedy: str, warnings: list[str]) -> None:
+    if abs(change) > DRIFT * error > 0:
+        warnings.append(
+            f"Λ({p:g}) still drifts: over the simulation it changes by {abs(change) / error:.1f} standard errors, more "
+            f"than {DRIFT:g}, which its standard error does not cover; use {remedy}"
+        )
+
+
+def _jackknife(value: float, rests: FloatArray) -> tuple[float, float]:
+    """A statistic of all batches, freed of its bias of first order, and its standard error, from those without one."""
+    count, mean = rests.size, rests.mean()
+    error = math.sqrt((count - 1) / count * np.sum((rests - mean) ** 2))
+    return float(count * value - (count - 1) * mean), float(error)

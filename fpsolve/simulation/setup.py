@@ -1,0 +1,121 @@
+"""How a simulation is set up: how many paths, how long, in which steps; and what would not be right."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal, get_args
+
+import numpy as np
+
+from fpsolve.errors import FpsolveError
+from fpsolve.model.noise import ColouredNoise, NonGaussianNoise, check_existence, relaxation_time
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+
+Estimator = Literal["direct", "population"]
+BATCHES = 32
+"""Independent sets of paths, from whose differences the errors are read."""
+PATHS, TRANSIENTS = 32_768, 64
+"""Defaults: how many paths, and how many transients long they are."""
+MAX_PATHS = 10_000_000
+PROGRESS_STEPS = 100
+"""How often each stretch of a simulation reports progress."""
+_LONGEST = 1_000_000
+"""Steps in a transient; with more, a simulation would not end."""
+
+
+def simulated_parts(problem: Problem) -> tuple[VibroImpactOscillator, ColouredNoise]:
+    """The motion and the noise of a problem, if they can be simulated.
+
+    Raises:
+        FpsolveError: they cannot.
+    """
+    system, noise = problem.system, problem.noise
+    if isinstance(system, VibroImpactOscillator) and isinstance(noise, ColouredNoise):
+        return system, noise
+    raise FpsolveError(
+        "simulation is for a VibroImpactOscillator under OrnsteinUhlenbeck or NonGaussianNoise, but this is a "
+        f"{type(system).__name__} under {type(noise).__name__}; use the finite elements"
+    )
+
+
+def check_settings(noise: ColouredNoise, p: Sequence[float], estimator: Estimator, paths: int, seed: int) -> None:
+    """Refuse what lengths and steps have no part in, see `obstacles`.
+
+    Raises:
+        ValueError: the variance of the noise or an order is not finite, or a setting is out of its range.
+        NoSuchExponent: some Λ(p) is infinite.
+    """
+    if not (math.isfinite(noise.standard_deviation) and np.all(np.isfinite(np.array(p, dtype=float)))):
+        raise ValueError(f"got p = {p} and a noise of variance {noise.standard_deviation**2:g}; all must be finite")
+    for order in p:
+        check_existence(noise, order)
+    if estimator not in get_args(Estimator) or not BATCHES <= paths <= MAX_PATHS or seed < 0:
+        raise ValueError(
+            f"got estimator = {estimator!r}, paths = {paths}, seed = {seed}; must be one of "
+            f"{', '.join(get_args(Estimator))}, {BATCHES} to {MAX_PATHS}, and >= 0"
+        )
+
+
+def largest_step(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> tuple[float, str]:
+    """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
+
+    ω h ≤ ½, ε² |c₁| h ≤ ⅛, ε std(ξ) h ≤ ⅛, α₀ h ≤ ½. For Eq. (7) instead of the last h ≤ τ₀/20; and near the ends of
+    a bounded support, where P_s ~ d^a with a = 1/(1 − r₀), the scheme has the order (a + 1)/2 only, which for a < 3
+    asks for less.
+    """
+    limits = {
+        "the frequency": 0.5 / oscillator.omega,
+        "the damping": 0.125 / (oscillator.epsilon**2 * abs(oscillator.c1)) if oscillator.c1 else math.inf,
+        "the strength of the noise": 0.125 / (oscillator.epsilon * noise.standard_deviation),
+    }
+    if isinstance(noise, NonGaussianNoise):
+        share = 0.5 if noise.r0 == 1 else 0.05
+        if noise.r0 < 1:
+            a = noise.end_exponent
+            share = min(share, max(2e-3 * min(a, 1.0) ** 2, a * 1.25e-3 ** (2 / (a + 1))))
+        limits["the correlation time of the noise"] = share * noise.tau0
+    else:
+        limits["the correlation time of the noise"] = 0.5 / noise.alpha
+    reason = min(limits, key=lambda name: limits[name])
+    return limits[reason], reason
+
+
+def transient(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+    """The time after which ln E‖x‖^p grows like Λ(p) t: whole half-turns π/ω, at least two and eight correlation times.
+
+    In whole half-turns the oscillation cancels that the start from the stationary law leaves in weak noise.
+    """
+    half_turn = math.pi / oscillator.omega
+    return half_turn * max(2, math.ceil(8 * relaxation_time(noise) / half_turn))
+
+
+def default_step(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+    """Half the largest step, or less, so that a half-turn π/ω is a whole number of steps."""
+    half_turn = math.pi / oscillator.omega
+    return half_turn / math.ceil(half_turn / (0.5 * largest_step(oscillator, noise)[0]))
+
+
+def obstacles(
+    oscillator: VibroImpactOscillator, noise: ColouredNoise, *, time: float | None = None, step: float | None = None
+) -> dict[str, str]:
+    """Why a simulation with this length and this step would not be right: a sentence for each of "time" and "step"."""
+    found = {}
+    largest, reason = largest_step(oscillator, noise)
+    settling = transient(oscillator, noise)
+    h = default_step(oscillator, noise) if step is None else step
+    if step is not None and not 0 < step <= largest * (1 + 1e-12):
+        found["step"] = (
+            f"got {step:g}, too large for {reason}; must be > 0 and <= {largest:.4g}; reduce it, or leave it out"
+        )
+    elif settling / h > _LONGEST:
+        found["step"] = (
+            f"one transient, {settling:.3g}, takes {settling / h:.2g} steps of {h:.3g}, which {reason} asks for; must "
+            f"be at most {_LONGEST:.0e}; bring the times of noise and oscillator nearer to each other"
+        )
+    if time is not None and not 2 * settling * (1 - 1e-12) <= time < math.inf:
+        found["time"] = (
+            f"got {time:g}; must be >= {2 * settling:.4g}, two transients, as growth is measured after one; increase it"
+        )
+    return found

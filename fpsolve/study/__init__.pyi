@@ -1,0 +1,6 @@
+from .results import Comparison as Comparison
+from .results import CurveResult as CurveResult
+from .results import SimulatedCurve as SimulatedCurve
+from .simulate import simulate_curves as simulate_curves
+from .solve import compare as compare
+from .solve import solve_curves as solve_curves

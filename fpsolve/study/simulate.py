@@ -1,0 +1,101 @@
+"""Simulating the curves of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
+from fpsolve.errors import FpsolveError
+from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles
+from fpsolve.study.results import SimulatedCurve
+
+if TYPE_CHECKING:  # numba takes half a second to import
+    from fpsolve.simulation.estimators import MonteCarlo
+    from fpsolve.simulation.response import Response
+
+SIGNIFICANT = 3.0
+"""Standard errors by which λ must exceed 0 before a stationary response is sought."""
+
+
+def simulation_work(case: Case) -> int:
+    """How often `simulate_curves` reports progress."""
+    return PROGRESS_STEPS * sum(3 if _is_nonlinear(curve) else 1 for curve in case.curves())
+
+
+def refuse_obstacles(case: Case) -> None:
+    """Refuse a case some curve of which cannot be simulated.
+
+    Raises:
+        FpsolveError: with the curve and the reason.
+    """
+    for curve in case.curves():
+        found = obstacles(curve.oscillator, curve.noise, time=case.monte_carlo.time, step=case.monte_carlo.step)
+        for name, sentence in found.items():
+            place = f"with {curve.label}: " if curve.varied else ""
+            raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
+
+
+def simulate_curves(case: Case, *, progress: Callable[[], None] = lambda: None) -> Iterator[SimulatedCurve]:
+    """Simulate the curves of a case one after the other; an interrupt (Ctrl-C) ends it with what is done.
+
+    With c₂ or c₃ > 0 the stationary response is simulated too.
+
+    Raises:
+        KeyboardInterrupt: nothing was done yet.
+    """
+    for curve in case.curves():
+        try:
+            simulated = _simulate_curve(case, curve, progress)
+        except KeyboardInterrupt:
+            if curve.number == 1:
+                raise
+            return
+        yield simulated
+        if simulated.interrupted:
+            return
+
+
+def _simulate_curve(case: Case, curve: Curve, progress: Callable[[], None]) -> SimulatedCurve:
+    from fpsolve.simulation.estimators import simulate
+
+    setting = case.monte_carlo
+    result = simulate(
+        curve.problem, [float(p) for p in case.simulated], estimator=setting.estimator,
+        paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
+    )  # fmt: skip
+    if not _is_nonlinear(curve) or result.interrupted:
+        return SimulatedCurve(curve, result, None, result.warnings, result.interrupted)
+    try:
+        response, warnings = _respond(curve, result, progress)
+    except KeyboardInterrupt:
+        warning = "no stationary response: stopped before it was reached"
+        return SimulatedCurve(curve, result, None, (*result.warnings, warning), interrupted=True)
+    interrupted = response is not None and response.interrupted
+    return SimulatedCurve(curve, result, response, (*result.warnings, *warnings), interrupted)
+
+
+def _respond(curve: Curve, result: MonteCarlo, progress: Callable[[], None]) -> tuple[Response | None, list[str]]:
+    """The stationary response, or why there is none. Raises KeyboardInterrupt before it is stationary."""
+    from fpsolve.simulation.response import stationary_response
+
+    value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
+    if value <= SIGNIFICANT * error:
+        for _ in range(2 * PROGRESS_STEPS):
+            progress()
+        reason = "is not positive" if value <= 0 else f"is not {SIGNIFICANT:g} standard errors above 0"
+        return None, [
+            f"no stationary response: λ = {value:.3g} ± {error:.1e} {reason}, "
+            "and with λ < 0 almost every path comes to rest"
+        ]
+    response = stationary_response(
+        curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
+        time=result.time, step=result.step, seed=result.seed, progress=progress,
+    )  # fmt: skip
+    warnings = [f"the response was stopped early, after {response.time:.3g}"] if response.interrupted else []
+    return response, warnings
+
+
+def _is_nonlinear(curve: Curve) -> bool:
+    return curve.oscillator.c2 > 0 or curve.oscillator.c3 > 0

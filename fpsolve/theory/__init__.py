@@ -1,0 +1,5 @@
+"""What paper and pencil know: perturbation theory, noise that stands still, where either is valid."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

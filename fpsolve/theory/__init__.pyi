@@ -1,0 +1,6 @@
+from .frozen import frozen_rate as frozen_rate
+from .perturbation import Scale as Scale
+from .perturbation import SecondOrder as SecondOrder
+from .perturbation import first_order_eigenfunction as first_order_eigenfunction
+from .perturbation import scale_of as scale_of
+from .perturbation import second_order as second_order

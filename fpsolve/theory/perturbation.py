@@ -1,0 +1,173 @@
+"""Second-order perturbation theory of weak noise for any motion whose order 0 rotates; Eqs. (33)-(39) are an instance.
+
+In coordinates in which the order 0 is a rotation by ω, with order-1 noise ε ξ (h, q), mean q̄ and wave |q̂| of q, and
+S of Eq. (16),
+
+    Λ₂(p) = p [Σ q̄₂ + (ω/π) Σ ln R + ½|q̂|² S(2ω)] + p² [½ q̄² S(0) + ¼|q̂|² S(2ω)],
+
+as −⟨L₁ L₀⁻¹ L₁ 1⟩ = p ∫₀^∞ C(t) ⟨(h ∂φ + p q)(φ) q(φ + ωt)⟩ dt and h is the quarter-turned wave of q. For the paper's
+oscillator q̄ = |q̂| = ½, and this is Eq. (37). A `NonGaussianNoise` has the S of its Ornstein-Uhlenbeck reduction, as in
+the paper.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fpsolve.arrays import FloatArray, identity, one
+from fpsolve.errors import NoPerturbationTheory
+from fpsolve.model.plane import Harmonics, System, angular_frequency, matrix_at, stretching, turning
+from fpsolve.model.problem import Problem
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How large Λ(p) is before its terms cancel: what errors are measured by.
+
+    Attributes:
+        linear, quadratic: of |p| and p².
+    """
+
+    linear: float
+    quadratic: float
+
+    def moment(self, p: ArrayLike) -> Any:
+        """The scale of Λ(p); that of λ is `linear`, that of Λ″(0) 2 `quadratic`."""
+        size = np.abs(np.asarray(p, dtype=float))
+        return (size * (self.linear + self.quadratic * size))[()]
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """ε²Λ₂(p), a parabola.
+
+    Attributes:
+        linear_terms: what is linear in p: damping of each order, impacts, noise.
+        quadratic: the coefficient of p².
+    """
+
+    linear_terms: tuple[float, ...]
+    quadratic: float
+
+    def moment_exponent(self, p: ArrayLike) -> Any:
+        """ε²Λ₂(p), Eq. (37); an array for an array of p."""
+        p = np.asarray(p, dtype=float)
+        return (p * (self.quadratic * p + self.lyapunov_exponent))[()]
+
+    @property
+    def lyapunov_exponent(self) -> float:
+        """λ = ε²Λ₂′(0), Eq. (39)."""
+        return sum(self.linear_terms)
+
+    @property
+    def stability_index(self) -> float:
+        """δ_p, the non-zero root of ε²Λ₂(p), Eq. (38)."""
+        return -self.lyapunov_exponent / self.quadratic
+
+    @property
+    def variance_rate(self) -> float:
+        """ε²Λ₂″(0), from Eq. (37): the growth rate of the variance of ln ‖x‖."""
+        return 2 * self.quadratic
+
+    @property
+    def scale(self) -> Scale:
+        """The sums of the absolute values of the terms."""
+        return Scale(sum(map(abs, self.linear_terms)), self.quadratic)
+
+
+def second_order(problem: Problem) -> SecondOrder:
+    """ε²Λ₂(p) of a problem.
+
+    Raises:
+        NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in a noise of mean 0.
+    """
+    system, noise = problem.system, problem.noise
+    frame, omega = _rotating_frame(system)
+    terms: list[float] = []
+    driven = np.zeros((2, 2))
+    for drive in system.drives:
+        if drive.order == 1 and drive.g is identity:
+            driven += np.array(drive.matrix)
+        elif drive.order != 1 and drive.g is one:
+            terms.append(system.epsilon**drive.order * _growth(drive.matrix, frame).mean)
+        elif drive.order < 2 or drive.g is not identity:
+            raise NoPerturbationTheory(
+                f"perturbation theory is for motions whose noise enters as epsilon xi; a drive of order {drive.order} "
+                f"with g = {drive.g.__name__} is not of that form"
+            )
+    if abs(noise.mean) > 1e-12 * noise.standard_deviation:
+        raise NoPerturbationTheory(f"perturbation theory is for noise of mean 0, but it has {noise.mean:g}")
+    q, strength = _growth(driven, frame), system.epsilon**2 * noise.spectral_density(2 * omega)
+    terms += [omega / math.pi * kick.second_order for kick in system.kicks]
+    terms.append(strength / 2 * q.amplitude**2)
+    at_rest = system.epsilon**2 * noise.spectral_density(0.0)
+    return SecondOrder(tuple(map(float, terms)), float(at_rest / 2 * q.mean**2 + strength / 4 * q.amplitude**2))
+
+
+def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: ArrayLike) -> FloatArray:
+    """T₁(φ, ξ; p) of Eq. (33) with C = 1 and K(ξ, τ) = ξ exp(−α₀τ); φ and ξ broadcast.
+
+    T₁ = pξ [q̄/α₀ + Re((q_c − i q_s) exp(2iφ)/(α₀ − 2iω))] solves L₀T₁ = −p q ξ, Eq. (32), for noise with relaxation
+    rate α₀; for the paper's q₁ it is ½pξ [1/α₀ − (α₀ cos 2φ − 2ω sin 2φ)/(α₀² + 4ω²)].
+
+    Raises:
+        NoPerturbationTheory: as `second_order`; or the order 0 does not rotate uniformly in these coordinates.
+    """
+    second_order(problem)
+    frame, omega = _rotating_frame(problem.system)
+    if not np.array_equal(frame, np.eye(2)):
+        raise NoPerturbationTheory("T₁ is for a uniform rotation; choose coordinates in which the order 0 is one")
+    q = stretching(matrix_at(problem.system, 1.0, slice(1, 2)))
+    omega = math.copysign(omega, turning(matrix_at(problem.system, 0.0, slice(0, 1))).mean)
+    alpha, xi = 1 / problem.noise.correlation_time, np.asarray(xi, dtype=float)
+    wave = (q.cosine - 1j * q.sine) * np.exp(2j * np.asarray(phi, dtype=float)) / (alpha - 2j * omega)
+    return p / problem.system.epsilon * xi * (q.mean / alpha + wave.real)
+
+
+def scale_of(problem: Problem) -> Scale:
+    """The scale of Λ(p): of perturbation theory, or where that does not apply of norms of the drives."""
+    try:
+        return second_order(problem).scale
+    except NoPerturbationTheory:
+        return _rough_scale(problem)
+
+
+def _rough_scale(problem: Problem) -> Scale:
+    """Constant drives by the largest |q|, noise of strength c by c min(1, c τ), kicks once in a half-turn."""
+    system, noise = problem.system, problem.noise
+    steady, driven = 0.0, 0.0
+    for drive in system.drives:
+        size = system.epsilon**drive.order * float(abs(drive.q.mean) + drive.q.amplitude)
+        if drive.g is one:
+            steady += size
+        else:
+            typical = np.asarray(drive.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
+            driven += size * float(np.sqrt(np.mean(typical**2)))
+    kicks = sum(abs(kick.log_factor) for kick in system.kicks) * angular_frequency(system) / math.pi
+    driven *= min(1.0, driven * noise.correlation_time)
+    return Scale(steady + kicks + driven, driven)
+
+
+def _growth(matrix: Any, frame: FloatArray) -> Harmonics:
+    """q of a matrix in the coordinates in which the order 0 rotates."""
+    return stretching(np.linalg.inv(frame) @ np.asarray(matrix) @ frame)
+
+
+def _rotating_frame(system: System) -> tuple[FloatArray, float]:
+    """P and ω for which P⁻¹A₀P is growth and a rotation by ω."""
+    a = matrix_at(system, 0.0, slice(0, 1))
+    half = 0.5 * (a[0, 0] + a[1, 1])
+    square = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0] - half**2
+    if not square > 0:
+        raise NoPerturbationTheory(
+            "perturbation theory is for motions that rotate without noise, which this one does not"
+        )
+    omega = math.sqrt(square)
+    if a[0, 1] == -a[1, 0] and a[0, 0] == a[1, 1]:
+        return np.eye(2), omega
+    return np.array([[a[0, 1], 0.0], [half - a[0, 0], omega]]), omega

@@ -1,0 +1,168 @@
+"""Running a case: its curves are solved, simulated or checked, written one after the other, and drawn in the end."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+
+from fpsolve.case.case import Case
+from fpsolve.errors import NotConverged
+from fpsolve.files import writable
+from fpsolve.output.figures import draw, draw_response
+from fpsolve.output.tables import write_results, write_simulation
+from fpsolve.output.vtk import write_curve, write_response
+from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
+from fpsolve.study.simulate import refuse_obstacles, simulate_curves, simulation_work
+from fpsolve.study.solve import compare, solve_curves, solving_work
+
+Progress = Callable[[], None]
+_OF_SOLVED = re.compile(r"eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)")
+_OF_SIMULATED = re.compile(r"(monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf))")
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Whom to tell how it goes; by default nobody.
+
+    Attributes:
+        bar: gives a stretch of work, from its name and how often it reports progress, what it shall call for that.
+        solved: takes a case and its curves once they are solved.
+        simulated: takes a case, its simulated curves, and those that are solved too.
+    """
+
+    bar: Callable[[str, int], AbstractContextManager[Progress]] = lambda *_: nullcontext(lambda: None)
+    solved: Callable[[Case, Sequence[CurveResult]], None] = lambda *_: None
+    simulated: Callable[[Case, Sequence[SimulatedCurve], Sequence[CurveResult]], None] = lambda *_: None
+
+
+NOBODY = Watch()
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of a case.
+
+    Attributes:
+        results: its curves, solved; what did not converge is in their `failures`.
+        simulated: its curves, simulated.
+        interrupted: whether an interrupt ended the simulation.
+        comparisons: what it expects beside what was computed.
+    """
+
+    results: tuple[CurveResult, ...] = ()
+    simulated: tuple[SimulatedCurve, ...] = ()
+    interrupted: bool = False
+    comparisons: tuple[Comparison, ...] = ()
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Why some p of some curves are missing."""
+        return tuple(failure.reason for result in self.results for failure in result.failures)
+
+
+def run(case: Case, out: str | Path = "results", *, progress: Progress = lambda: None) -> tuple[CurveResult, ...]:
+    """Solve a case and write `out`/<name of the case>/.
+
+    Tables are written anew after every curve, each file whole or not at all, so that what is finished stays.
+
+    Args:
+        case: from `load_case`.
+        out: folder for the results.
+        progress: called after each moment of each curve.
+
+    Raises:
+        OutputError: the folder cannot be made or written to; nothing is solved.
+        NotConverged: some p failed; everything else is written, and `partial` holds it.
+    """
+    outcome = run_case(case, out, watch=Watch(bar=lambda *_: nullcontext(progress)))
+    if outcome.failures:
+        raise NotConverged("\n".join(outcome.failures), outcome.results)
+    return outcome.results
+
+
+def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = False, watch: Watch = NOBODY) -> Outcome:
+    """Solve a case, simulate it too if `monte_carlo` says so, and draw both in one figure.
+
+    When the simulation is interrupted or fails, the figure shows what was done.
+
+    Raises:
+        OutputError: the folder cannot be made or written to.
+        FpsolveError: a curve cannot be simulated; nothing is solved.
+        KeyboardInterrupt: a curve was being solved, or nothing was simulated yet.
+    """
+    if monte_carlo:
+        refuse_obstacles(case)
+    folder, interrupted = Path(out) / case.name, False
+    simulated: list[SimulatedCurve] = []
+    results = _solve(case, folder, watch)
+    try:
+        watch.solved(case, results)
+        if monte_carlo:
+            interrupted = _simulate(case, folder, watch, simulated)
+            watch.simulated(case, simulated, results)
+    finally:
+        with writable(folder):
+            draw(case, results, simulated, folder)
+    return Outcome(results, tuple(simulated), interrupted)
+
+
+def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Outcome:
+    """Simulate a case and write monte_carlo.json into `out`/<name of the case>/; further curves have a number.
+
+    With c₂ or c₃ > 0 the stationary response is written too. An interrupt (Ctrl-C) ends the simulation, and what is
+    done is estimated and written.
+
+    Raises:
+        OutputError: the folder cannot be made or written to.
+        FpsolveError: a curve cannot be simulated; nothing is written.
+        KeyboardInterrupt: nothing was done yet.
+    """
+    refuse_obstacles(case)
+    simulated: list[SimulatedCurve] = []
+    interrupted = _simulate(case, Path(out) / case.name, watch, simulated)
+    watch.simulated(case, simulated, ())
+    return Outcome((), tuple(simulated), interrupted)
+
+
+def check_case(case: Case, *, watch: Watch = NOBODY) -> Outcome:
+    """Solve a case and compare it with what it expects; nothing is written."""
+    with watch.bar(case.name, solving_work(case)) as progress:
+        results = tuple(result.without_pairs() for result in solve_curves(case, progress=progress))
+    return Outcome(results, comparisons=tuple(compare(case, results)))
+
+
+def _solve(case: Case, folder: Path, watch: Watch) -> tuple[CurveResult, ...]:
+    """Solve the curves of a case, and write after each."""
+    results: list[CurveResult] = []
+    written: set[Path] = set()
+    with writable(folder), watch.bar(case.name, solving_work(case)) as progress:
+        for result in solve_curves(case, progress=progress):
+            written |= write_curve(result, folder)
+            results.append(result.without_pairs())
+            write_results(case, results, folder)
+        _remove_stale(folder, _OF_SOLVED, written)
+    return tuple(results)
+
+
+def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedCurve]) -> bool:
+    """Simulate the curves of a case into a list, and write each; whether an interrupt ended it."""
+    written: set[Path] = set()
+    with writable(folder), watch.bar(f"{case.name}, simulation", simulation_work(case)) as progress:
+        for each in simulate_curves(case, progress=progress):
+            simulated.append(each)
+            written |= write_simulation(case, each, folder) | write_response(each, folder)
+            written |= draw_response(case, each, folder)
+        _remove_stale(folder, _OF_SIMULATED, written)
+    return simulated[-1].interrupted or len(simulated) < len(case.curves())
+
+
+def _remove_stale(folder: Path, ours: re.Pattern[str], written: set[Path]) -> None:
+    """What an earlier run left for curves or p that are no more."""
+    for path in {*folder.glob("*"), *folder.glob("*/*")} - written:
+        if ours.fullmatch(path.relative_to(folder).as_posix()):
+            path.unlink()
+            if path.parent != folder and not any(path.parent.iterdir()):
+                path.parent.rmdir()

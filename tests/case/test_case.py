@@ -1,0 +1,365 @@
+"""Case files that are right: what they mean, and that the shipped ones say what the paper says."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from fpsolve.case.case import Case, load_case
+from fpsolve.case.curves import Curve
+from fpsolve.case.toml import read_document
+from fpsolve.fem.mesh import make_mesh
+from fpsolve.fem.mesh_file import write_mesh
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.vibro_impact import ImpactLaw, VibroImpactOscillator
+from tests.oracles import perturbation
+
+CASES = Path(__file__).parents[2] / "cases"
+FIGURES = ["fig1", "fig2a", "fig2b", "fig2c", "fig3", "fig4", "fig5", "fig6"]
+SMALL = """
+title = "small"
+oscillator = { omega = 2, restitution = 1, c1 = -1, epsilon = 1 }
+noise = { D0 = 1, tau0 = 1, r0 = 1 }
+moments.p = [2, -1]
+"""
+
+Write = Callable[[str], Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def write_text(text: str) -> Path:
+        path = tmp_path / "small.toml"
+        path.write_text(text, encoding="utf-8", newline="")
+        return path
+
+    return write_text
+
+
+def test_every_figure_and_the_minimal_case_are_shipped() -> None:
+    assert {path.stem for path in CASES.glob("*.toml")} >= {*FIGURES, "minimal"}
+
+
+@pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
+def test_shipped_case_loads(path: Path) -> None:
+    case = load_case(path)
+    assert case.name == path.stem
+    assert case.path == path
+    assert case.expect
+    assert all(curve.varied.keys() == case.vary.keys() for curve in case.curves())
+
+
+CAPTIONS: dict[str, dict[str, float]] = {
+    "fig1": {"epsilon": 0.1, "omega": 1, "restitution": 0.8, "c1": 0.1, "r0": 0.95, "tau0": 0.5},
+    "fig2a": {"epsilon": 0.1, "restitution": 0.8, "omega": math.pi, "c1": 0.1, "r0": 0.95, "tau0": 0.5},
+    "fig2b": {"epsilon": 0.1, "restitution": 0.8, "omega": math.pi, "c1": 0.1, "D0": 0.1, "tau0": 0.5},
+    "fig2c": {"epsilon": 0.1, "restitution": 0.8, "omega": math.pi, "c1": 0.1, "D0": 0.1, "r0": 0.95},
+    "fig3": {"epsilon": 0.1, "restitution": 0.8, "c1": 0.1, "r0": 0.95, "tau0": 0.5},
+    "fig4": {"epsilon": 0.1, "restitution": 0.8, "c1": 0.1, "D0": 0.1, "r0": 0.95, "tau0": 0.5},
+    "fig5": {"epsilon": 0.1, "omega": math.pi, "c1": 0.1, "D0": 0.1, "r0": 0.95, "tau0": 0.5},
+    "fig6": {"epsilon": 0.01, "restitution": 0.8, "omega": math.pi, "D0": 0.1, "r0": 0.95, "tau0": 0.5},
+}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_curve_of_a_figure_has_the_caption_s_parameters(name: str) -> None:
+    for curve in load_case(CASES / f"{name}.toml").curves():
+        stated = {key.partition(".")[2]: value for key, value in curve.parameters.items()}
+        assert stated | CAPTIONS[name] == stated
+        assert isinstance(curve.noise, OrnsteinUhlenbeck)
+
+
+@pytest.mark.parametrize(
+    ("name", "varied"),
+    [
+        ("fig1", {"noise.D0"}),
+        ("fig2a", {"noise.D0"}),
+        ("fig2b", {"noise.r0"}),
+        ("fig2c", {"noise.tau0"}),
+        ("fig3", {"oscillator.omega", "noise.D0"}),
+        ("fig4", {"oscillator.omega"}),
+        ("fig5", {"oscillator.restitution"}),
+        ("fig6", {"oscillator.c1"}),
+    ],
+)
+def test_figure_varies_the_parameter_of_its_caption(name: str, varied: set[str]) -> None:
+    assert set(load_case(CASES / f"{name}.toml").vary) == varied
+
+
+def test_fig2c_has_the_three_correlation_times_of_the_text() -> None:
+    assert {1e-4, 1e-3, 1e-2} <= set(load_case(CASES / "fig2c.toml").vary["noise.tau0"])
+
+
+def test_fig3_draws_the_lyapunov_exponent_against_the_frequency() -> None:
+    case = load_case(CASES / "fig3.toml")
+    assert (case.figure.x, case.figure.y) == ("oscillator.omega", "lyapunov_exponent")
+    assert case.output.eigenfunctions == ()
+
+
+def test_two_figures_name_a_mesh_file() -> None:
+    named = {load_case(CASES / f"{name}.toml").mesh.file for name in FIGURES} - {None}
+    assert named == {"../meshes/default.vtu", "../meshes/fine.vtu"}
+
+
+THEORY: dict[str, Callable[..., Any]] = {
+    "moment": perturbation.moment_exponent,
+    "stability_index": perturbation.stability_index,
+    "lyapunov_exponent": perturbation.lyapunov_exponent,
+    "variance_rate": perturbation.variance_rate,
+}
+
+
+@pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
+def test_expected_values_agree_with_their_source(path: Path) -> None:
+    """Second-order values are those of Eqs. (37)-(39); the others lie within O(ε⁴) of them, relative 1e-3."""
+    case = load_case(path)
+    for item in case.expect:
+        curves = [curve for curve in case.curves() if item.selects(curve.varied)]
+        assert len(curves) == 1
+        p = () if item.p is None else (item.p,)
+        value = THEORY[item.quantity](curves[0].oscillator, curves[0].noise, *p)
+        if case.oscillator.epsilon <= 0.1:
+            assert item.value == pytest.approx(value, rel=1e-9 if "second order" in item.source else 1.5e-3)
+        else:  # strong noise: the values are further right, as the theory's cumulants of order 2 alone
+            assert "second order" not in item.source
+
+
+def test_fig1_of_the_schema() -> None:
+    case = load_case(CASES / "fig1.toml")
+    assert case.title.startswith("Fig. 1")
+    assert case.oscillator == VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
+    np.testing.assert_allclose(case.p, np.arange(-2, 6.01, 0.25), atol=1e-14)
+    assert case.rtol == 1e-8
+    assert [curve.varied for curve in case.curves()] == [{"noise.D0": d0} for d0 in (0.1, 0.5, 1.0)]
+    assert case.output.eigenfunctions == (1.0, 2.0)
+    assert case.cylinder_mesh() is None
+
+
+def test_a_curve_holds_every_parameter() -> None:
+    curve = load_case(CASES / "fig1.toml").curves()[2]
+    noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95).ou_reduction()
+    assert (curve.noise, curve.varied) == (noise, {"noise.D0": 1.0})
+    assert curve.parameters == {
+        "oscillator.omega": 1.0,
+        "oscillator.restitution": 0.8,
+        "oscillator.c1": 0.1,
+        "oscillator.epsilon": 0.1,
+        "oscillator.c2": 0.0,
+        "oscillator.c3": 0.0,
+        "oscillator.impact": "delta",
+        "noise.D0": 1.0,
+        "noise.tau0": 0.5,
+        "noise.r0": 0.95,
+        "noise.treatment": "ou-reduction",
+    }
+
+
+def test_defaults_and_integers(write: Write) -> None:
+    case = load_case(write(SMALL))
+    assert case.curves() == (
+        Curve(case.oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=math.sqrt(2)), case.curves()[0].parameters, {}),
+    )
+    assert isinstance(case.oscillator.omega, float)
+    assert case.oscillator.impact is ImpactLaw.DELTA
+    assert case.p.tolist() == [2.0, -1.0]
+    assert (case.rtol, case.vary, case.expect) == (1e-8, {}, ())
+    assert (case.figure.x, case.figure.y) == ("p", "moment")
+    assert case.output.eigenfunctions is None
+    assert case.cylinder_mesh() is None
+
+
+def test_a_case_cannot_be_changed(write: Write) -> None:
+    case = load_case(write(SMALL))
+    with pytest.raises(ValidationError, match="frozen"):
+        case.title = "other"  # type: ignore[misc]
+
+
+def test_a_case_made_in_python_is_checked_too() -> None:
+    data = tomllib.loads(SMALL)
+    assert Case.model_validate(data).title == "small"
+    with pytest.raises(ValidationError):
+        Case.model_validate(data | {"figure": {"x": "noise.D0", "y": "stability_index"}})
+
+
+def test_windows_line_ends(write: Write) -> None:
+    assert load_case(write(SMALL.replace("\n", "\r\n"))).title == "small"
+
+
+def test_exact_treatment_keeps_the_non_gaussian_noise(write: Write) -> None:
+    case = load_case(write(SMALL.replace("r0 = 1", 'r0 = 0.9, treatment = "exact"')))
+    assert case.curves()[0].noise == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
+
+
+def test_restitution_law(write: Write) -> None:
+    case = load_case(write(SMALL.replace("epsilon = 1", 'epsilon = 1, impact = "restitution"')))
+    assert case.curves()[0].oscillator.impact is ImpactLaw.RESTITUTION
+    assert case.curves()[0].parameters["oscillator.impact"] == "restitution"
+
+
+def test_several_varied_keys_give_their_product(write: Write) -> None:
+    text = SMALL + '[vary]\n"noise.D0" = [1, 2]\n"oscillator.omega" = [3, 4, 5]\n'
+    curves = load_case(write(text)).curves()
+    pairs = [(curve.varied["noise.D0"], curve.oscillator.omega) for curve in curves]
+    assert pairs == [(1, 3), (1, 4), (1, 5), (2, 3), (2, 4), (2, 5)]
+
+
+def test_curves_are_numbered_and_named(write: Write) -> None:
+    case = load_case(write(SMALL + '[vary]\n"noise.D0" = [1, 2.5]\n"oscillator.omega" = [3, 0.0001]\n'))
+    curves = case.curves()
+    assert [(curve.number, curve.suffix) for curve in curves] == [(1, ""), (2, "-2"), (3, "-3"), (4, "-4")]
+    assert curves[3].label == "noise.D0 = 2.5, oscillator.omega = 0.0001"
+    assert case.place(curves[3]) == "small, noise.D0 = 2.5, oscillator.omega = 0.0001"
+    assert case.heading(curves[0]) == "small: noise.D0 = 1, oscillator.omega = 3"
+
+
+def test_the_only_curve_needs_no_name(write: Write) -> None:
+    case = load_case(write(SMALL))
+    [curve] = case.curves()
+    assert (curve.number, curve.suffix, curve.label) == (1, "", "")
+    assert (case.place(curve), case.heading(curve)) == ("small", "small")
+
+
+def test_a_curve_knows_the_noise_before_its_reduction(write: Write) -> None:
+    [curve] = load_case(write(SMALL.replace("r0 = 1", "r0 = 0.9"))).curves()
+    assert curve.original_noise == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
+    assert curve.noise == curve.original_noise.ou_reduction()
+
+
+def test_varied_keys_may_be_dotted_without_quotes(write: Write) -> None:
+    assert load_case(write(SMALL + "[vary]\nnoise.D0 = [1.0, 2.0]\n")).vary == {"noise.D0": (1.0, 2.0)}
+
+
+def test_where_selects_curves(write: Write) -> None:
+    text = (
+        SMALL
+        + '[vary]\n"noise.D0" = [1, 2]\n"noise.tau0" = [1, 2]\n[[expect]]\nquantity = "variance_rate"\n'
+        + 'value = 1\natol = 9\nsource = "none"\nwhere = { "noise.D0" = 2 }\n'
+    )
+    case = load_case(write(text))
+    selected = [curve.varied for curve in case.curves() if case.expect[0].selects(curve.varied)]
+    assert selected == [{"noise.D0": 2, "noise.tau0": 1}, {"noise.D0": 2, "noise.tau0": 2}]
+
+
+def test_expectation_without_where_is_about_every_curve(write: Write) -> None:
+    text = SMALL + '[[expect]]\nquantity = "moment"\np = 2\nvalue = 1\nrtol = 9\nsource = "none"\n'
+    case = load_case(write(text))
+    assert case.expect[0].selects(case.curves()[0].varied)
+
+
+def test_mesh_from_numbers(write: Write) -> None:
+    mesh = load_case(write(SMALL + "[mesh]\nphi_cells = 3\nxi_min = -5\nxi_max = 9\n")).cylinder_mesh()
+    assert mesh is not None
+    assert mesh.phi_lines.size == 4
+    assert (mesh.z_lines[0], mesh.z_lines[-1]) == (-5, 9)
+
+
+def test_mesh_file_is_sought_from_the_case(write: Write, tmp_path: Path) -> None:
+    (tmp_path / "inner").mkdir()
+    write_mesh(make_mesh(phi_cells=3), tmp_path / "inner" / "mesh.vtu")
+    mesh = load_case(write(SMALL + '[mesh]\nfile = "inner/mesh.vtu"\n')).cylinder_mesh()
+    assert mesh is not None
+    assert mesh.phi_lines.size == 4
+
+
+@pytest.mark.parametrize(
+    ("override", "key", "value"),
+    [
+        ("oscillator.omega=3.5", "oscillator.omega", 3.5),
+        ("oscillator.omega = 3", "oscillator.omega", 3.0),
+        ('oscillator.impact="restitution"', "oscillator.impact", "restitution"),
+        ("noise={D0=1, tau0=1, r0=0.5}", "noise.r0", 0.5),
+        ("'noise'.\"r0\"=-1", "noise.r0", -1.0),
+    ],
+)
+def test_override(write: Write, override: str, key: str, value: float | str) -> None:
+    assert load_case(write(SMALL), [override]).curves()[0].parameters[key] == value
+
+
+def test_override_of_a_text_needs_no_quotes(write: Write) -> None:
+    case = load_case(write(SMALL), ["oscillator.impact=restitution", "noise.treatment=exact", "title=Two words"])
+    assert case.curves()[0].parameters["oscillator.impact"] == "restitution"
+    assert case.is_exact
+    assert case.title == "Two words"
+
+
+@pytest.mark.parametrize("stated", ['"noise.D0" = [1]', "noise.D0 = [1]", ""])
+@pytest.mark.parametrize("override", ['vary."noise.D0"=[2]', "vary.noise.D0=[2]", 'vary={"noise.D0"=[2]}'])
+def test_override_of_a_varied_key(write: Write, stated: str, override: str) -> None:
+    assert load_case(write(f"{SMALL}[vary]\n{stated}"), [override]).vary == {"noise.D0": (2.0,)}
+
+
+def test_later_overrides_win_and_tables_replace_tables(write: Write) -> None:
+    overrides = ["moments.p=[1.0]", "moments.p={start=0, stop=1, num=3}", "mesh={}", "mesh.xi_cells=7"]
+    case = load_case(write(SMALL + "[mesh]\nphi_cells = 3\n"), overrides)
+    assert case.p.tolist() == [0.0, 0.5, 1.0]
+    assert case.mesh.model_dump(exclude_none=True) == {"xi_cells": 7}
+
+
+def test_overrides_make_sections(write: Write) -> None:
+    case = load_case(write(SMALL), ["output.eigenfunctions=[]", "moments.rtol=1e-6"])
+    assert (case.output.eigenfunctions, case.rtol) == ((), 1e-6)
+
+
+TRICKY = """\
+# comment = 1
+a = 1  # b = [
+"quoted.key" = "x # y"
+'single' = 'z'
+text = \"\"\"
+c = 2
+\"\"\"
+literal = '''
+d = "
+'''
+list = [
+    1,
+    # 2,
+    [3, "]"],
+    { e = 4,  f.g = 5 },
+]
+date = 1979-05-27 07:32:00
+[table . "in.ner"]
+h = -1.5e3
+[[array]]
+i = true
+[array.sub]
+j = 1
+[[array]]
+i = false
+"""
+
+
+def test_lines_of_keys(write: Write) -> None:
+    places = read_document(write(TRICKY)).places
+    expected = {
+        "a": 2, "quoted.key": 3, "single": 4, "text": 5, "literal": 8, "list": 11, "list.0": 12, "list.1": 14,
+        "list.1.1": 14, "list.2": 15, "list.2.e": 15, "list.2.f.g": 15, "date": 17, "table": 18,
+        "table.in.ner": 18, "table.in.ner.h": 19, "array": 20, "array.0": 20, "array.0.i": 21,
+        "array.0.sub": 22, "array.0.sub.j": 23, "array.1": 24, "array.1.i": 25,
+    }  # fmt: skip
+    assert {key: places.get(key) for key in expected} == expected
+    assert not {"b", "c", "d", "comment"} & places.keys()
+
+
+def _leaves(value: Any, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [leaf for key, item in items for leaf in _leaves(item, (*path, str(key)))] or [path]
+
+
+@pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
+def test_every_key_of_a_shipped_case_is_on_its_line(path: Path) -> None:
+    document = read_document(path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    for leaf in _leaves(document.data):
+        place = document.places[".".join(leaf)]
+        assert isinstance(place, int)
+        name = next(part for part in reversed(leaf) if not part.isdigit())
+        assert re.search(rf'\b{re.escape(name)}"? =', lines[place - 1]) or leaf[-1].isdigit()

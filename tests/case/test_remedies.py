@@ -1,0 +1,70 @@
+"""Messages of the solver speak of its arguments; those on a case file, of its keys."""
+
+from __future__ import annotations
+
+import ast
+import re
+from itertools import permutations
+from pathlib import Path
+
+import pytest
+
+import fpsolve
+from fpsolve.case.remedies import CASE_WORDS, in_words_of_a_case
+from fpsolve.errors import NoSuchExponent, Remedy
+from fpsolve.model.noise import NonGaussianNoise, check_existence
+from fpsolve.theory.validity import reduction_note
+
+WORDS = {
+    "MESH": "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]",
+    "CELLS": "use a smaller rtol, or more cells in [mesh]",
+    "REACH": "use a [mesh] that reaches there, or no [mesh]",
+    "BUDGET": "use a larger rtol or a larger [budget]",
+    "MESH_FILE": "make one with `fpsolve mesh`",
+    "REDUCTION": 'or treatment = "ou-reduction"',
+    "NO_REDUCTION": 'treatment = "exact" keeps Eq. (7)',
+    "FOLDER": "choose another --out",
+}
+LOWER_ROOMS = ["", "model", "theory", "fem", "simulation", "exponent", "analysis"]
+OF_A_CASE = re.compile(
+    r"\[(oscillator|noise|moments|budget|vary|mesh|monte_carlo|figure|output|expect)\]|--[a-z]|treatment"
+)
+
+
+@pytest.mark.parametrize("remedy", Remedy)
+def test_every_remedy_has_words_for_a_case(remedy: Remedy) -> None:
+    text = f"Λ(2) did not converge; {remedy}, or use a larger rtol"
+    told = f"Λ(2) did not converge; {WORDS[remedy.name]}, or use a larger rtol"
+    assert in_words_of_a_case(text) == told
+    assert in_words_of_a_case(told) == told
+    assert in_words_of_a_case(f"{text}\n{text}") == f"{told}\n{told}"
+
+
+@pytest.mark.parametrize("text", ["", "use a larger rtol", "Λ(2) is infinite; use more cells", "choose another place"])
+def test_a_text_without_a_remedy_is_left_alone(text: str) -> None:
+    assert in_words_of_a_case(text) == text
+
+
+def test_no_remedy_is_part_of_another() -> None:
+    assert not any(one in other for one, other in permutations(Remedy, 2))
+    assert not any(remedy in words for remedy in Remedy for words in CASE_WORDS.values())
+
+
+def test_the_solver_speaks_of_the_noise_and_a_case_of_its_treatment() -> None:
+    with pytest.raises(NoSuchExponent, match=r"r0 <= 1, or the Ornstein-Uhlenbeck reduction of the noise$") as raised:
+        check_existence(NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.2), 2.0)
+    assert in_words_of_a_case(str(raised.value)).endswith('r0 <= 1, or treatment = "ou-reduction"')
+    note = reduction_note(NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.5))
+    assert note is not None
+    assert note.endswith("; the unreduced noise keeps Eq. (7)")
+    assert in_words_of_a_case(note).endswith('; treatment = "exact" keeps Eq. (7)')
+
+
+@pytest.mark.parametrize("room", LOWER_ROOMS)
+def test_lower_rooms_know_no_sections_and_no_options(room: str) -> None:
+    for path in (Path(fpsolve.__file__).parent / room).glob("*.py"):
+        if path.name not in ("cli.py", "__init__.py"):
+            texts = [
+                node.value for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Constant)
+            ]
+            assert not [text for text in texts if isinstance(text, str) and OF_A_CASE.search(text)], path

@@ -1,0 +1,215 @@
+"""The choice of the discretisation: any tolerance in any regime, with honest errors, or a reason why not."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from fpsolve.errors import NoSuchExponent, NotConverged
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.error import truncation
+from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.mesh import CylinderMesh, make_mesh
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
+from tests.oracles import fourier_hermite, perturbation
+
+WEAK_NOISE = FIG1_NOISE.ou_reduction()
+NO_LOSS = {"omega": 1.0, "restitution": 1.0, "c1": 0.0}
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+@pytest.mark.parametrize("p", [-1.5, 2.0, 5.5])
+def test_every_tolerance_is_met(p, rtol):
+    oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(FIG1, WEAK_NOISE), p=p, harmonics=10, hermite=30)
+    result = moment_lyapunov(FIG1, WEAK_NOISE, p, rtol=rtol)
+    scale = max(abs(oracle), perturbation.moment_scale(FIG1, WEAK_NOISE, p))
+    rounding = 1e-15 * FIG1.omega  # of the oracle, which is read off a matrix of this size
+    assert abs(result.value[0] - oracle) <= rtol * scale + rounding
+    assert result.error_estimate[0] <= rtol * scale
+    assert not result.warnings
+
+
+def test_tighter_tolerances_cost_more_unknowns_but_not_many_more():
+    sizes = [
+        moment_lyapunov(FIG1, WEAK_NOISE, 2.0, rtol=rtol).pairs[0].generator.space.size
+        for rtol in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+    ]
+    assert sizes == sorted(sizes)
+    assert sizes[-1] < 20 * sizes[0]
+
+
+@pytest.mark.parametrize("p", [-1.0, 1.0, 2.0, 4.0])
+def test_no_digits_are_lost_in_weak_noise(p):
+    """(Λ − ε²Λ₂)/ε⁴ has a limit: at ε = 1e-4 that takes Λ right to 1e-10 of itself."""
+    constants = []
+    for epsilon in (1e-2, 1e-3, 1e-4):
+        oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=epsilon)
+        value = moment_lyapunov(oscillator, WEAK_NOISE, p, rtol=1e-11).value[0]
+        constants.append((value - perturbation.moment_exponent(oscillator, WEAK_NOISE, p)) / epsilon**4)
+    np.testing.assert_allclose(constants, constants[1], rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("epsilon", "p", "value"),
+    [
+        (1.0, 2.0, 0.886234813612),
+        (1.0, 3.0, 3.388172823067),
+        (1.0, 4.0, 6.938432719324),
+        (2.0, 2.0, 7.740233350685),
+        (0.5, 8.0, 3.409208991669),
+    ],
+)
+def test_cases_that_fool_a_search_near_the_guess(epsilon, p, value):
+    """α = σ = ω = 1; the values are from Fourier-Hermite computations with up to 24 000 modes."""
+    result = moment_lyapunov(VibroImpactOscillator(**NO_LOSS, epsilon=epsilon), UNIT_NOISE, p, rtol=1e-9)
+    assert result.value[0] == pytest.approx(value, rel=1e-9)
+
+
+@pytest.mark.parametrize("epsilon", [0.1, 0.5, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("c1", [-0.4, 0.3])
+def test_identity_at_p_minus_2_for_any_noise(epsilon, c1):
+    """Λ(−2) = −ε²c₁ + ε²σ²/(2α²) without impact."""
+    noise = OrnsteinUhlenbeck(alpha=1.3, sigma=0.8)
+    oscillator = VibroImpactOscillator(omega=1.7, restitution=1.0, c1=c1, epsilon=epsilon)
+    value = moment_lyapunov(oscillator, noise, -2.0, rtol=1e-9).value[0]
+    expected = epsilon**2 * (noise.sigma**2 / (2 * noise.alpha**2) - c1)
+    assert value == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("tau0", [1e-3, 1e-4, 1e-5, 1e-6])
+def test_fast_noise_tends_to_white_noise(tau0):
+    """p = 2 without impact and damping: λ(λ − 2κ)(λ − κ/2) + 4ω²(λ − κ) = 0, κ = ε²σ²/α² (Stratonovich)."""
+    kappa = 0.25
+    noise = OrnsteinUhlenbeck(alpha=1 / tau0, sigma=math.sqrt(kappa) / tau0)
+    roots = np.roots([1.0, -2.5 * kappa, kappa**2 + 4.0, -4 * kappa])
+    white = roots[np.abs(roots.imag) < 1e-12].real.max()
+    assert white == pytest.approx(0.25198400004, abs=1e-11)
+    result = moment_lyapunov(VibroImpactOscillator(**NO_LOSS, epsilon=1.0), noise, 2.0)
+    assert result.value[0] == pytest.approx(white, abs=tau0 + 1e-10)
+    if tau0 < 1e-4:  # the distance is of first order in τ₀
+        slower = OrnsteinUhlenbeck(alpha=0.1 / tau0, sigma=math.sqrt(kappa) * 0.1 / tau0)
+        distance = moment_lyapunov(VibroImpactOscillator(**NO_LOSS, epsilon=1.0), slower, 2.0).value[0] - white
+        assert distance / (result.value[0] - white) == pytest.approx(10, rel=0.2)
+
+
+@pytest.mark.parametrize("tilt", [3.0, 4.0, 5.0])
+def test_the_tilt_changes_nothing_but_the_cost(tilt):
+    oscillator = VibroImpactOscillator(omega=10.0, restitution=0.8, c1=0.1, epsilon=0.1)
+    noise = NonGaussianNoise(D0=1.0, tau0=20.0, r0=0.95).ou_reduction()
+    phi = make_mesh(phi_cells=2).phi_lines
+    generator = Generator(Problem(oscillator, noise), CylinderMesh(phi, np.linspace(-4, 20, 8), 12, 10), tilt)
+    oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(oscillator, noise), p=15.0, harmonics=8, hermite=200)
+    assert principal_pair(generator, 15.0).value == pytest.approx(oracle, rel=1e-9)
+
+
+def test_slow_noise_is_followed_a_hundred_units_away():
+    oscillator = VibroImpactOscillator(omega=3.0, restitution=0.9, c1=0.1, epsilon=1.0)
+    noise = NonGaussianNoise(D0=1.0, tau0=20.0, r0=1.0).ou_reduction()
+    result = moment_lyapunov(oscillator, noise, 10.0)
+    mesh = result.pairs[0].generator.space.mesh
+    assert mesh.z_lines[0] > 37  # where P_s has underflown
+    finer = moment_lyapunov(oscillator, noise, 10.0, rtol=1e-10)
+    assert result.value[0] == pytest.approx(finer.value[0], rel=1e-8)
+    # to leading order ξ is held where p G(ξ) − ξ²/(4 D₀) is largest, G being the rate of the faster real mode
+    xi = np.linspace(50, 200, 4001) * noise.standard_deviation
+    rate = 0.5 * (xi + 0.1 + np.sqrt((xi + 0.1) ** 2 - 4 * oscillator.omega**2))
+    assert result.value[0] == pytest.approx(np.max(10 * rate - xi**2 / 4), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("tau0", "p", "D0", "value"),
+    [
+        (20.0, 9.0, 1.3, 6.336967),
+        (10.0, 9.0, 1.3, 6.330893),
+        (5.0, 10.0, 1.0, 4.3739602720),
+        (5.0, 10.0, 0.9, 2.608412),
+    ],
+)
+def test_of_two_places_that_slow_noise_may_hold_the_faster_counts(tau0, p, D0, value):
+    """The pair of the slower place, where the oscillator still turns, also has T > 0 as far as a mesh can tell.
+
+    The third value is from 60 × 500 Fourier-Hermite modes, the others from fixed meshes over both places.
+    """
+    oscillator = VibroImpactOscillator(**NO_LOSS, epsilon=math.sqrt(0.1))
+    noise = NonGaussianNoise(D0=D0, tau0=tau0, r0=1.0).ou_reduction()
+    assert moment_lyapunov(oscillator, noise, p).value[0] == pytest.approx(value, rel=3e-7)
+    along = moment_lyapunov(oscillator, noise, [p - 6, p - 3, p])
+    assert along.value[-1] == pytest.approx(value, rel=3e-7)
+
+
+def test_a_mesh_that_leaves_the_faster_place_out_is_warned_of():
+    oscillator = VibroImpactOscillator(**NO_LOSS, epsilon=math.sqrt(0.1))
+    noise = NonGaussianNoise(D0=1.3, tau0=20.0, r0=1.0).ou_reduction()
+    mesh = make_mesh(phi_cells=4, phi_degree=10, xi_cells=12, xi_degree=12, xi_min=-6, xi_max=18)
+    result = moment_lyapunov(oscillator, noise, 9.0, mesh=mesh)
+    assert result.value[0] < 3
+    assert any("Λ(9) may be larger: slow noise may carry the moment near 3" in text for text in result.warnings)
+    assert moment_lyapunov(oscillator, noise, 9.0).warnings == ()
+
+
+def test_wide_cells_of_algebraic_tails_can_be_extended():
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5)
+    noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.4)
+    result = moment_lyapunov(oscillator, noise, -0.01, rtol=1e-4)
+    finer = moment_lyapunov(oscillator, noise, -0.01, rtol=1e-5)
+    assert abs(result.value[0] - finer.value[0]) <= 3 * result.error_estimate[0]
+
+
+def test_algebraic_tails_are_followed():
+    """r₀ = 1.1: the truncation at 4 to 12 noise units that hides Λ(1) = ∞ settles for p = −0.9."""
+    noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1)
+    oscillator = VibroImpactOscillator(**NO_LOSS, epsilon=0.5)
+    result = moment_lyapunov(oscillator, noise, -0.9)
+    assert result.value[0] == pytest.approx(0.0328459, abs=5e-8)
+    wide = make_mesh(phi_cells=6, phi_degree=12, xi_cells=14, xi_degree=10, xi_min=-80, xi_max=80, grading=8.0)
+    fixed = moment_lyapunov(oscillator, noise, -0.9, mesh=wide)
+    assert abs(fixed.value[0] - result.value[0]) <= 3 * (fixed.error_estimate[0] + result.error_estimate[0])
+    with pytest.raises(NoSuchExponent, match=r"Λ\(1\) is infinite: for r0 > 1 the noise has algebraic tails"):
+        moment_lyapunov(oscillator, noise, 1.0)
+
+
+def test_truncation_bounds_what_a_cut_changes():
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
+    full = moment_lyapunov(oscillator, WEAK_NOISE, 3.0, rtol=1e-12).value[0]
+    for upper in (4.0, 5.0, 6.0):
+        mesh = make_mesh(phi_cells=2, phi_degree=14, xi_cells=6, xi_degree=12, xi_min=-8.0, xi_max=upper)
+        pair = principal_pair(Generator(Problem(oscillator, WEAK_NOISE), mesh), 3.0)
+        error = abs(pair.value - full)
+        assert 1e-10 < error <= 3 * truncation(pair)[1] <= 1e3 * error
+
+
+@pytest.mark.parametrize("budget", [Budget(unknowns=1500), Budget(unknowns=5000), Budget(seconds=0.2)])
+def test_a_budget_ends_the_search_with_the_best_value(budget):
+    solver = ExponentSolver(
+        Problem(VibroImpactOscillator(**NO_LOSS, epsilon=1.0), UNIT_NOISE), rtol=1e-12, budget=budget
+    )
+    started = time.perf_counter()
+    with pytest.raises(NotConverged, match=r"Λ\(2\) did not converge: the next mesh .* more than budget\.") as caught:
+        solver.solution(2.0)
+    assert time.perf_counter() - started < 5
+    if caught.value.partial is not None:
+        best = caught.value.partial
+        assert f"best value {best.pair.value:.6g} with an estimated error of {best.error:.1e}" in str(caught.value)
+        assert abs(best.pair.value - 0.886234813612) <= 3 * best.error
+    assert caught.value.partial is not None or budget.seconds < 1
+    with pytest.raises(NotConverged) as again:  # at once, without another search
+        solver.solution(2.0)
+    assert again.value is caught.value
+
+
+def test_a_tolerance_below_rounding_is_refused():
+    with pytest.raises(NotConverged, match=r"rounding alone may change it by .*: use a larger rtol"):
+        moment_lyapunov(FIG1, WEAK_NOISE, 2.0, rtol=1e-17)
+
+
+@pytest.mark.parametrize("budget", [{"unknowns": 5}, {"seconds": 0.0}, {"seconds": math.inf}, {"unknowns": 1e3}])
+def test_bad_budgets_are_refused(budget):
+    with pytest.raises(ValueError, match=r"unknowns|seconds"):
+        Budget(**budget)

@@ -1,0 +1,181 @@
+"""Λ as a function of p: interpolation against solves, its derivatives against the eigenvectors, roots, convexity."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fpsolve.errors import NoSuchExponent, NotConverged
+from fpsolve.exponent.eigen import second_derivative
+from fpsolve.exponent.function import MomentLyapunovFunction, nonzero_root
+from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.mesh import make_mesh
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
+from tests.oracles import fourier_hermite, perturbation
+
+STRONG = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0)
+WEAK_NOISE = FIG1_NOISE.ou_reduction()
+
+
+pytestmark = pytest.mark.xdist_group("functions")  # they share some
+
+
+@pytest.fixture(scope="module")
+def weak():
+    return MomentLyapunovFunction(FIG1, WEAK_NOISE, (-2.0, 6.0))
+
+
+@pytest.fixture(scope="module")
+def strong():
+    return MomentLyapunovFunction(STRONG, UNIT_NOISE, (-1.5, 3.0), rtol=1e-7)
+
+
+@pytest.mark.parametrize("p", [-1.83, -0.4, 1.1, 3.3, 5.9])
+def test_between_the_nodes_against_fourier_hermite(weak, p):
+    oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(FIG1, WEAK_NOISE), p=p, harmonics=10, hermite=30)
+    error = abs(weak(p) - oracle)
+    assert error <= 1e-8 * perturbation.moment_scale(FIG1, WEAK_NOISE, p)
+    assert error <= 3 * weak.error_estimate(p) + 1e-13
+
+
+@pytest.mark.parametrize("p", [-1.37, 0.55, 2.71])
+def test_strong_noise_between_the_nodes_against_solves(strong, p):
+    exact = ExponentSolver(Problem(STRONG, UNIT_NOISE), rtol=1e-10).pair(p).value
+    error, scale = abs(strong(p) - exact), perturbation.moment_scale(STRONG, UNIT_NOISE, p)
+    assert error <= 1e-7 * max(abs(exact), scale)
+    assert error <= 3 * strong.error_estimate(p)
+
+
+def test_few_solves_make_many_points(weak):
+    p = np.linspace(-2, 6, 200)
+    assert weak.nodes.size <= 15
+    values = weak(p)
+    assert values.shape == (200,)
+    assert np.all(np.diff(values, 2) > 0)
+    assert weak(0.0) == 0
+
+
+def curvature_error(function, p):
+    """Markov's bounds on what errors of Λ(p)/p = g make of Λ″ = 2g′ + p g″, for a polynomial of degree n."""
+    n, half = function.nodes.size - 1, np.ptp(function.nodes) / 2
+    error = 3 * np.max(function.error_estimate(function.nodes[[0, -1]]) / np.abs(function.nodes[[0, -1]]))
+    return error * (2 * n**2 / half + abs(p) * n**2 * (n**2 - 1) / 3 / half**2)
+
+
+@pytest.mark.parametrize("name", ["weak", "strong"])
+def test_derivatives_of_the_interpolant_and_of_the_eigenvectors_agree(name, request):
+    function = request.getfixturevalue(name)
+    for p in function.nodes[1:-1]:
+        pair = function.solver.pair(float(p))
+        assert function.derivative(p) == pytest.approx(pair.derivative, rel=1e-5, abs=1e-7)
+        assert function.second_derivative(p) == pytest.approx(second_derivative(pair), abs=curvature_error(function, p))
+
+
+def test_exponents_at_zero_are_the_slope_and_the_curvature(weak):
+    assert weak.lyapunov_exponent().value == pytest.approx(float(weak.derivative(0.0)), rel=1e-7)
+    assert weak.variance_rate().value == pytest.approx(float(weak.second_derivative(0.0)), rel=1e-6)
+
+
+def test_arguments_outside_the_interval_are_refused(weak):
+    with pytest.raises(ValueError, match=r"p must lie in \[-2, 6\]"):
+        weak(6.5)
+    with pytest.raises(ValueError, match="its ends must increase"):
+        MomentLyapunovFunction(FIG1, WEAK_NOISE, (2.0, 2.0))
+
+
+def test_infinite_moments_in_the_interval_are_refused():
+    with pytest.raises(NoSuchExponent, match=r"Λ\(1\) is infinite"):
+        MomentLyapunovFunction(FIG1, NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1), (-0.5, 1.0))
+
+
+def test_an_interval_on_one_side_of_zero():
+    function = MomentLyapunovFunction(FIG1, WEAK_NOISE, (1.0, 3.0))
+    assert function.root() is None
+    assert function.stability_index().value == pytest.approx(-0.3629121344, rel=1e-6)
+
+
+def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):
+    solver = ExponentSolver(Problem(FIG1, WEAK_NOISE))
+    true = ExponentSolver.ratio
+
+    def fooled(self, p):
+        if abs(p - 2) < 1e-9:
+            for pair in (self.solution(p).pair, self.solution(p).finer):
+                object.__setattr__(pair, "value", pair.value + 1e-3)
+        return true(self, p)
+
+    monkeypatch.setattr(ExponentSolver, "ratio", fooled)
+    with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex"):
+        MomentLyapunovFunction(FIG1, WEAK_NOISE, (1.9, 2.1), solver=solver)
+
+
+@pytest.mark.parametrize("interval", [(-2.0, 2.0), (0.0, 4.0), (-1.0, 0.0)])
+def test_zero_as_a_node_is_no_fault(interval):
+    function = MomentLyapunovFunction(FIG1, WEAK_NOISE, interval, rtol=1e-6)
+    assert np.any(function.nodes == 0)
+
+
+def test_moments_one_by_one_are_checked_for_convexity(monkeypatch):
+    true = ExponentSolver.solution
+
+    def fooled(self, p):
+        solution = true(self, p)
+        if p == 2.0 and abs(solution.pair.value) < 0.02:
+            for pair in (solution.pair, solution.finer):
+                object.__setattr__(pair, "value", pair.value + 0.01)
+        return solution
+
+    monkeypatch.setattr(ExponentSolver, "solution", fooled)
+    with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex") as caught:
+        moment_lyapunov(FIG1, WEAK_NOISE, [1.9, 2.0, 2.1])
+    np.testing.assert_array_equal(caught.value.partial.p, [1.9, 2.0, 2.1])
+
+
+def test_a_coarse_mesh_gives_a_coarse_function_with_honest_errors():
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
+    coarse = MomentLyapunovFunction(
+        oscillator, WEAK_NOISE, (-1.0, 3.0), make_mesh(phi_cells=1, phi_degree=6, xi_cells=2, xi_degree=8)
+    )
+    fine = MomentLyapunovFunction(oscillator, WEAK_NOISE, (-1.0, 3.0), rtol=1e-10)
+    p = np.linspace(-1, 3, 50)
+    assert np.all(np.abs(coarse(p) - fine(p)) <= 3 * coarse.error_estimate(p) + 1e-12)
+    assert coarse.moments(p).warnings
+
+
+def test_stability_index_is_a_root_and_lambda_the_slope():
+    for c1 in (-0.2, 0.1, 0.4):
+        oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=c1, epsilon=0.1)
+        solver = ExponentSolver(Problem(oscillator, WEAK_NOISE), rtol=1e-11)
+        index = nonzero_root(solver)
+        assert abs(solver.pair(index.value).value) < 1e-14
+        assert math.copysign(1, index.value) == -math.copysign(1, solver.lyapunov_exponent().value)
+
+
+def test_stability_index_near_zero():
+    """λ changes sign with c₁, and δ_p with it, smoothly."""
+    indices = []
+    for c1 in np.linspace(-0.1172, -0.1168, 5):
+        oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=float(c1), epsilon=0.1)
+        solver = ExponentSolver(Problem(oscillator, WEAK_NOISE), rtol=1e-10)
+        indices.append(nonzero_root(solver).value)
+        expected = -2 * solver.lyapunov_exponent().value / solver.variance_rate().value
+        assert indices[-1] == pytest.approx(expected, abs=1e-6)
+    assert np.all(np.abs(np.diff(indices, 2)) < 1e-6)
+
+
+def test_no_stability_index_within_the_interval_is_none():
+    oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
+    assert nonzero_root(ExponentSolver(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)))) is None
+
+
+@pytest.mark.parametrize("epsilon", [1e-2, 1e-4, 1e-5])
+def test_stability_index_of_the_weakest_noise(epsilon):
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=-0.3, epsilon=epsilon)
+    index = nonzero_root(ExponentSolver(Problem(oscillator, WEAK_NOISE)))
+    theory = perturbation.stability_index(oscillator, WEAK_NOISE)
+    assert abs(index.value - theory) <= index.error_estimate + 10 * epsilon**2
+    assert index.error_estimate < 1e-5

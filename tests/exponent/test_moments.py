@@ -1,0 +1,58 @@
+"""Λ at several p: failures and the root are values, and progress is reported once for each p."""
+
+import numpy as np
+import pytest
+
+from fpsolve.errors import NotConverged
+from fpsolve.exponent import moments
+from fpsolve.exponent.moments import FEW_MOMENTS, moment_lyapunov, solve_moments
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.mesh import make_mesh
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from tests.conftest import FIG1, FIG1_NOISE
+
+WEAK_NOISE = FIG1_NOISE.ou_reduction()
+STRONG = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0)
+HOPELESS = make_mesh(phi_cells=1, phi_degree=2, xi_cells=2, xi_degree=3)
+
+
+def test_a_failed_moment_is_a_value():
+    found = solve_moments(ExponentSolver(Problem(STRONG, WEAK_NOISE), HOPELESS), [6.0, 0.0])
+    np.testing.assert_array_equal(found.p, [0.0])
+    assert found.value.shape == found.error_estimate.shape == (1,)
+    (failure,) = found.failures
+    assert failure.p == 6.0
+    assert "use more cells" in failure.reason
+
+
+def test_what_is_raised_is_the_result_with_its_failures():
+    with pytest.raises(NotConverged) as caught:
+        moment_lyapunov(STRONG, WEAK_NOISE, [6.0, -5.0, 0.0], mesh=HOPELESS)
+    failures = caught.value.partial.failures
+    assert [failure.p for failure in failures] == [6.0, -5.0]
+    assert str(caught.value) == "\n".join(failure.reason for failure in failures)
+
+
+def test_a_curve_that_is_not_convex_is_a_failure_of_all(monkeypatch):
+    monkeypatch.setattr(moments, "broken_convexity", lambda pairs, errors: "not convex")
+    found = solve_moments(ExponentSolver(Problem(FIG1, WEAK_NOISE)), [1.0, 2.0])
+    np.testing.assert_array_equal(found.p, [1.0, 2.0])
+    assert [(failure.p, failure.reason) for failure in found.failures] == [(None, "not convex")]
+
+
+@pytest.mark.parametrize("count", [2, FEW_MOMENTS, FEW_MOMENTS + 1, 40])
+def test_progress_is_reported_once_for_each_moment(count):
+    calls = []
+    solver = ExponentSolver(Problem(FIG1, WEAK_NOISE), rtol=1e-4)
+    found = solve_moments(solver, np.linspace(-1, 2, count), progress=lambda: calls.append(1))
+    assert len(calls) == found.p.size == count
+    assert not found.failures
+
+
+def test_the_root_is_known_where_many_moments_are_interpolated(fig1_solver):
+    many = solve_moments(fig1_solver, np.linspace(-2, 6, 33))
+    assert many.root == pytest.approx(-0.3629121344, rel=1e-3)
+    assert many.pairs == ()
+    assert solve_moments(fig1_solver, np.linspace(1, 6, 33)).root is None
+    assert solve_moments(fig1_solver, [-1.0, 1.0]).root is None

@@ -1,0 +1,47 @@
+"""The table of quantities is complete, its records solve what they say, and two of them are public functions."""
+
+from typing import get_args
+
+import pytest
+
+import fpsolve
+from fpsolve.exponent.quantities import INDICES, QUANTITIES, DrawnName, QuantityName
+from fpsolve.model.noise import OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.theory.perturbation import second_order
+from tests.conftest import FIG1, FIG1_NOISE
+from tests.oracles import perturbation
+
+WEAK_NOISE = FIG1_NOISE.ou_reduction()
+
+
+def test_every_name_of_a_case_has_a_record():
+    assert tuple(QUANTITIES) == get_args(QuantityName)
+    assert set(get_args(DrawnName)) < set(QUANTITIES)
+    for name, quantity in QUANTITIES.items():
+        assert quantity.name == name
+        assert all((quantity.symbol, quantity.title, quantity.equation))
+    assert {"moment", *INDICES} == set(QUANTITIES)
+
+
+@pytest.mark.parametrize("name", INDICES)
+def test_every_index_is_solved_and_approximated(name, fig1_solver):
+    theory = INDICES[name].theory(second_order(fig1_solver.problem))
+    assert theory == pytest.approx(getattr(perturbation, name)(FIG1, WEAK_NOISE), rel=1e-12)
+    for root in (None, -0.36):
+        assert INDICES[name].solve(fig1_solver, root).value == pytest.approx(theory, rel=5e-3)
+
+
+@pytest.mark.parametrize("solve", [fpsolve.lyapunov_exponent, fpsolve.stability_index])
+def test_public_functions(solve, fig1_solver):
+    found, again = solve(FIG1, WEAK_NOISE), solve(Problem(FIG1, WEAK_NOISE), rtol=1e-6)
+    assert found.value == pytest.approx(INDICES[solve.__name__].solve(fig1_solver, None).value, rel=1e-7)
+    assert abs(again.value - found.value) <= 2 * (again.error_estimate + found.error_estimate)
+    with pytest.raises(ValueError, match="rtol"):
+        solve(FIG1, WEAK_NOISE, rtol=-1.0)
+
+
+def test_there_may_be_no_stability_index():
+    oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
+    assert fpsolve.stability_index(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)) is None

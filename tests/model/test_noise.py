@@ -1,0 +1,103 @@
+"""Eqs. (7)-(16): the noise, its densities and its moments."""
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.integrate import quad
+
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+
+DEPARTURES = [-5.0, -1.0, 0.0, 0.5, 0.9, 0.95, 1 - 1e-4, 1.0, 1 + 1e-4, 1.1, 1.3, 1.5]
+
+
+def integral(noise, f):
+    """∫ f P_s over the support; in the variable ξ = s t/(1 − t²) where this is the whole line."""
+    s = noise.standard_deviation
+    if math.isfinite(noise.half_width) and noise.half_width < 50 * s:
+        return quad(lambda xi: f(xi) * noise.density(xi), -noise.half_width, noise.half_width, epsabs=1e-13)[0]
+
+    def transformed(t):
+        xi = s * t / (1 - t**2)
+        return f(xi) * noise.density(xi) * s * (1 + t**2) / (1 - t**2) ** 2
+
+    return quad(transformed, -1, 1, epsabs=1e-13, limit=200)[0]
+
+
+@pytest.mark.parametrize("r0", DEPARTURES)
+def test_density_is_normalised_and_has_the_variance_of_eq_10(r0):
+    noise = NonGaussianNoise(D0=0.7, tau0=1.3, r0=r0)
+    assert integral(noise, lambda xi: 1.0) == pytest.approx(1, abs=1e-10)
+    assert integral(noise, lambda xi: xi**2) == pytest.approx(2 * 0.7 / (1.3 * (5 - 3 * r0)), rel=1e-8)
+
+
+@pytest.mark.parametrize("r0", DEPARTURES)
+def test_drift_is_half_sigma_squared_times_the_log_derivative_of_the_density(r0):
+    noise = NonGaussianNoise(D0=0.7, tau0=1.3, r0=r0)
+    xi = 0.7 * min(noise.half_width, 3 * noise.standard_deviation) * np.linspace(-1, 1, 11)
+    h = 1e-5 * noise.standard_deviation
+    slope = (np.log(noise.density(xi + h)) - np.log(noise.density(xi - h))) / (2 * h)
+    np.testing.assert_allclose(noise.drift(xi), 0.5 * noise.diffusion**2 * slope, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("r0", DEPARTURES)
+def test_drift_is_minus_the_gradient_of_the_potential_over_tau(r0):
+    noise = NonGaussianNoise(D0=0.7, tau0=1.3, r0=r0)
+    xi = 0.7 * min(noise.half_width, 3 * noise.standard_deviation) * np.linspace(-1, 1, 11)
+    h = 1e-5 * noise.standard_deviation
+    gradient = (noise.potential(xi + h) - noise.potential(xi - h)) / (2 * h)
+    np.testing.assert_allclose(noise.drift(xi), -gradient / 1.3, rtol=1e-7, atol=1e-8)
+
+
+def test_r0_to_1_is_the_ornstein_uhlenbeck_process_with_variance_D0_over_tau0():
+    xi = np.linspace(-4, 4, 9)
+    limit = OrnsteinUhlenbeck(alpha=2.0, sigma=math.sqrt(2 * 0.3) * 2)
+    assert limit.standard_deviation**2 == pytest.approx(0.3 / 0.5)
+    for r0 in (1 - 1e-12, 1.0, 1 + 1e-12):
+        noise = NonGaussianNoise(D0=0.3, tau0=0.5, r0=r0)
+        np.testing.assert_allclose(noise.density(xi), limit.density(xi), rtol=1e-9)
+        np.testing.assert_allclose(noise.drift(xi), limit.drift(xi), rtol=1e-9)
+        assert noise.ou_reduction().alpha == pytest.approx(2.0)
+
+
+def test_support_is_bounded_for_r0_below_1_only():
+    noise = NonGaussianNoise(D0=0.3, tau0=0.5, r0=0.7)
+    assert noise.half_width == pytest.approx(math.sqrt(2 * 0.3 / (0.5 * 0.3)))
+    np.testing.assert_array_equal(noise.density([-noise.half_width, 1.01 * noise.half_width, 9.0]), 0)
+    assert noise.density(0.99 * noise.half_width) > 0
+    assert np.isnan(noise.potential(1.01 * noise.half_width))
+    assert math.isinf(NonGaussianNoise(D0=0.3, tau0=0.5, r0=1.2).half_width)
+
+
+def test_reduction_follows_eqs_12_to_14():
+    tau1 = 2 * (2 - 0.95) / (5 - 3 * 0.95) * 0.5
+    D1 = (2 * (2 - 0.95) / (5 - 3 * 0.95)) ** 2 * 1.0
+    ou = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95).ou_reduction()
+    assert ou.alpha == pytest.approx(1 / tau1, rel=1e-15)
+    assert ou.sigma == pytest.approx(math.sqrt(2 * D1) / tau1, rel=1e-15)
+
+
+def test_spectral_density_is_the_fourier_transform_of_the_correlation():
+    ou = OrnsteinUhlenbeck(alpha=1.7, sigma=0.6)
+    variance = 0.6**2 / (2 * 1.7)
+    for omega in (0.0, 0.4, 3.0):
+        transform = 2 * quad(lambda t, w=omega: variance * np.exp(-1.7 * t) * np.cos(w * t), 0, 30, limit=300)[0]
+        assert ou.spectral_density(omega) == pytest.approx(transform, rel=1e-9)
+
+
+@pytest.mark.parametrize("r0", [5 / 3, 2.0])
+def test_no_reduction_where_the_variance_is_infinite(r0):
+    noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0)
+    assert math.isinf(noise.variance)
+    with pytest.raises(ValueError, match=r"r0 = .* need r0 < 5/3"):
+        noise.ou_reduction()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("D0", 0.0), ("D0", -1.0), ("tau0", math.inf), ("tau0", "1"), ("r0", 3.0), ("r0", math.nan), ("D0", True)],
+)
+def test_bad_parameters_are_refused_by_name(name, value):
+    with pytest.raises(ValidationError, match=rf"(?s)1 validation error.*{name}"):
+        NonGaussianNoise(**({"D0": 1.0, "tau0": 0.5, "r0": 0.95} | {name: value}))

@@ -1,0 +1,419 @@
+"""ParaView files: what pyvista and ParaView itself read back from them, and the script that draws them."""
+
+import ast
+import json
+import os
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+import pyvista
+from vtkmodules.vtkCommonDataModel import vtkLagrangeQuadrilateral
+
+from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.mesh import CylinderMesh, make_mesh
+from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.output.vtk import copy_show_script, write_density, write_eigenfunctions
+from tests.conftest import FIG1, UNIT_NOISE
+from tests.oracles.perturbation import first_order_eigenfunction
+
+HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.2)
+FINE = {"phi_degree": 14, "xi_cells": 8}
+MOMENTS = (-1.0, 0.0, 2.0)
+INSTALL = "apt-get install --no-install-recommends paraview python3-paraview xvfb xauth"
+QUARTERS = np.pi * np.array([-0.3, 0.1, 0.5, 0.8, 1.2, 1.5, 1.7])
+MESHES = {
+    "half circle": make_mesh(phi_cells=4, **FINE),
+    "half circle, cells across 0 and pi": make_mesh(phi_cells=3, **FINE),
+    "full circle": make_mesh(phi_cells=4, full_circle=True, **FINE),
+    "full circle, seam at -0.3 pi": CylinderMesh(QUARTERS, np.linspace(-8, 8, 9), 14, 9),
+    "half circle, seam at 7.2 pi": CylinderMesh(np.pi * np.array([7.2, 7.5, 7.9, 8.2]), np.linspace(-8, 8, 9), 14, 9),
+}
+
+
+def written(folder, solver, moments=MOMENTS, **options):
+    """Write eigenfunctions of a solver at some p, and read them back: {p: grid}."""
+    pairs = [solver.pair(p) for p in moments]
+    _, *files = write_eigenfunctions(folder, pairs, solver.pair(0.0), **options)
+    return {float(grid.field_data["p"][0]): grid for grid in map(pyvista.read, files)}
+
+
+pytestmark = pytest.mark.xdist_group("vtk")  # they share the files written
+
+
+@pytest.fixture(scope="module", params=MESHES)
+def solver(request):
+    return ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[request.param])
+
+
+@pytest.fixture(scope="module")
+def grids(solver, tmp_path_factory):
+    return written(tmp_path_factory.mktemp("vtk"), solver)
+
+
+def sides(grid, phi, name):
+    """The values of an array at phi from the left and from the right, over ξ."""
+    left, right = (grid.cell_centers().points[:, 0] < phi), (grid.cell_centers().points[:, 0] > phi)
+    found = []
+    for side in (left, right):
+        points = np.unique(grid.cell_connectivity.reshape(grid.n_cells, -1)[side])
+        points = points[np.abs(grid.points[points, 0] - phi) < 1e-9]
+        found.append(grid[name][points[np.argsort(grid.points[points, 1])]])
+    return found
+
+
+def integral(grid, name):
+    """∫ of the Lagrange polynomials of an array, or of given values, their nodes numbered by VTK's own function."""
+    values = grid[name] if isinstance(name, str) else name
+    k = round(np.sqrt(grid.cell_connectivity.size / grid.n_cells)) - 1
+    order = [vtkLagrangeQuadrilateral.PointIndexFromIJK(i, j, [k, k]) for i in range(k + 1) for j in range(k + 1)]
+    nodes = grid.cell_connectivity.reshape(grid.n_cells, -1)[:, order]
+    t = np.arange(k + 1) / k
+    rule = np.linalg.solve(np.vander(t, increasing=True).T, 1 / np.arange(1, k + 2))
+    areas = np.prod(np.ptp(grid.points[nodes], axis=1)[:, :2], axis=1)
+    return areas @ values[nodes] @ np.outer(rule, rule).ravel()
+
+
+@pytest.mark.parametrize("phi", [np.pi / 2, 3 * np.pi / 2])
+@pytest.mark.parametrize("p", MOMENTS)
+def test_jump_at_the_impacts(grids, p, phi):
+    """T(φ⁻) = R^p T(φ⁺) at every ξ where the tilted density lives; and T* jumps the other way."""
+    (before, after), density = sides(grids[p], phi, "T"), sides(grids[p], phi, "tilted_density")[0]
+    living = density > 1e-4 * density.max()
+    assert np.count_nonzero(living) > 60
+    np.testing.assert_allclose((before / after)[living], HARD.impact_factor(p), rtol=1e-8)
+    before, after = sides(grids[p], phi, "T_adjoint")
+    np.testing.assert_allclose((after / before)[living], HARD.impact_factor(p), rtol=1e-6)
+
+
+def test_nothing_else_jumps(grids):
+    grid = grids[2.0]
+    corners = grid.points[grid.cell_connectivity.reshape(grid.n_cells, -1)[:, 0], 0]
+    for phi in np.unique(np.round(corners, 12)):
+        if abs(np.cos(phi)) > 1e-6 and phi > 0:
+            before, after = sides(grid, phi, "tilted_density")
+            np.testing.assert_allclose(before, after, atol=1e-7)
+
+
+def test_full_circle_is_covered_once(grids):
+    grid = grids[2.0]
+    assert set(grid.celltypes) == {pyvista.CellType.LAGRANGE_QUADRILATERAL}
+    np.testing.assert_allclose(grid.bounds[:2], [0, 2 * np.pi], rtol=1e-15)
+    np.testing.assert_allclose(grid.bounds[2:4], np.array([-8, 8]) * UNIT_NOISE.standard_deviation)
+    assert integral(grid, np.ones(grid.n_points)) == pytest.approx(
+        2 * np.pi * 16 * UNIT_NOISE.standard_deviation, rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("p", MOMENTS)
+def test_point_data(grids, p):
+    grid = grids[p]
+    assert set(grid.point_data) == {"T", "T_adjoint", "tilted_density", "stationary_density", "z"}
+    for name in grid.point_data:
+        assert grid[name].dtype == np.float64
+        assert np.all(np.isfinite(grid[name]))
+    np.testing.assert_allclose(grid["z"], grid.points[:, 1] / UNIT_NOISE.standard_deviation)
+    np.testing.assert_allclose(grid["tilted_density"], grid["T"] * grid["T_adjoint"])
+    for name in ("tilted_density", "stationary_density"):
+        assert integral(grid, name) == pytest.approx(1, abs=1e-6)
+    weight = UNIT_NOISE.density(grid.points[:, 1]) / (2 * np.pi)
+    assert integral(grid, grid["T"] * weight) == pytest.approx(1, abs=1e-6)
+
+
+def test_at_p_zero(grids):
+    np.testing.assert_allclose(grids[0.0]["T"], 1, rtol=1e-7)
+    np.testing.assert_allclose(grids[0.0]["T_adjoint"], grids[2.0]["stationary_density"], atol=1e-14)
+
+
+def test_field_data(solver, grids):
+    for p, grid in grids.items():
+        assert set(grid.field_data) == {"p", "Lambda"}
+        assert grid.field_data["Lambda"][0] == solver.pair(p).value
+
+
+def test_periodic_by_pi(grids):
+    at = np.stack(np.meshgrid(np.linspace(0.01, 3.1, 40), np.linspace(-2, 2, 9), [0.0]), axis=-1).reshape(-1, 3)
+    one, other = (pyvista.PolyData(points).sample(grids[2.0])["T"] for points in (at, at + np.array([np.pi, 0, 0])))
+    np.testing.assert_allclose(one, other, rtol=1e-4)
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    return written(
+        tmp_path_factory.mktemp("reference"), ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
+    )
+
+
+@pytest.mark.parametrize("name", ["T", "T_adjoint", "stationary_density"])
+def test_every_mesh_shows_the_same_field(grids, reference, name):
+    """Interpolated by VTK itself, at random points."""
+    rng = np.random.default_rng(5)
+    points = np.column_stack([rng.uniform(0, 2 * np.pi, 300), rng.uniform(-2, 2, 300), np.zeros(300)])
+    one, other = (pyvista.PolyData(points).sample(grid[2.0])[name] for grid in (grids, reference))
+    np.testing.assert_allclose(one, other, atol=2e-4 * np.abs(other).max())
+
+
+def test_nodes_are_on_the_polynomials(tmp_path):
+    """Values from the file against the elements evaluated at the middle of every mesh cell, in both half turns."""
+    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), make_mesh(phi_cells=3, phi_degree=4, xi_cells=6, xi_degree=4))
+    pair, grid = solver.pair(1.0), written(tmp_path, solver, [1.0])[1.0]
+    space, half = pair.generator.space, np.array([0.5])
+    (phi, at_phi), at_xi = space.phi.evaluation(half), space.xi.samples(half)
+    values = space.evaluate(pair.right, at_phi, at_xi.values)
+    for turn in (0, np.pi):
+        x, y = np.meshgrid((phi + turn) % (2 * np.pi), at_xi.xi, indexing="ij")
+        points = pyvista.PolyData(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3))
+        np.testing.assert_allclose(points.sample(grid)["T"].reshape(values.shape), values, rtol=1e-7)
+
+
+def test_first_order_eigenfunction(tmp_path):
+    """T = 1 + ε T₁ + O(ε²), Eq. (33)."""
+    errors = []
+    for eps in (0.02, 0.01, 0.005):
+        oscillator = VibroImpactOscillator(omega=1.0, restitution=0.5, c1=0.1, epsilon=eps)
+        grid = written(tmp_path / str(eps), ExponentSolver(Problem(oscillator, UNIT_NOISE)), [2.0])[2.0]
+        near = np.abs(grid["z"]) < 3
+        phi, xi, _ = grid.points[near].T
+        first = first_order_eigenfunction(oscillator, UNIT_NOISE, 2.0, phi, xi)
+        errors.append(np.abs(grid["T"][near] - 1 - eps * first).max())
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4, rtol=0.1)
+
+
+def test_stationary_pair_may_be_of_another_mesh(tmp_path):
+    coarse, fine = (ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[k]) for k in list(MESHES)[:2])
+    _, own = write_eigenfunctions(tmp_path / "own", [coarse.pair(2.0)], coarse.pair(0.0))
+    _, other = write_eigenfunctions(tmp_path / "other", [coarse.pair(2.0)], fine.pair(0.0))
+    one, two = (pyvista.read(file)["stationary_density"] for file in (own, other))
+    np.testing.assert_allclose(one, two, atol=1e-8)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 5, 11])
+def test_any_degree(tmp_path, degree):
+    solver = ExponentSolver(
+        Problem(FIG1, UNIT_NOISE), make_mesh(phi_cells=9, phi_degree=degree, xi_cells=9, xi_degree=degree)
+    )
+    grid = written(tmp_path, solver, [1.0])[1.0]
+    assert np.all(np.isfinite(grid["T"]))
+    assert integral(grid, "tilted_density") == pytest.approx(1, abs=2e-2)
+
+
+def test_bounded_noise(tmp_path):
+    """r₀ < 1: P_s vanishes at the ends, and nothing is undefined there."""
+    noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=-1.0)
+    grid = written(tmp_path, ExponentSolver(Problem(HARD, noise)), [2.0])[2.0]
+    assert np.abs(grid.points[:, 1]).max() == pytest.approx(noise.half_width)
+    assert all(np.all(np.isfinite(grid[name])) for name in grid.point_data)
+    assert grid["T_adjoint"][np.abs(grid["z"]) == grid["z"].max()] == pytest.approx(0, abs=1e-6)
+
+
+def test_far_out_where_the_density_is_tiny(tmp_path):
+    mesh = make_mesh(phi_degree=6, xi_cells=90, xi_degree=2, xi_min=-37, xi_max=8)
+    pair = principal_pair(Generator(Problem(FIG1, UNIT_NOISE), mesh), 0.0)
+    grid = pyvista.read(write_eigenfunctions(tmp_path, [pair], pair)[1])
+    assert all(np.all(np.isfinite(grid[name])) for name in grid.point_data)
+    assert np.abs(grid["T_adjoint"][grid["z"] < -30]).max() < 1e-100
+
+
+def test_collection(tmp_path, fig1_solver):
+    """Valid XML over increasing p, one file for each p however close, and nothing else in the folder."""
+    moments = [2.0, 0.1 + 0.2, 0.3, -1.0, 1e-7, 0.3]
+    pairs = [fig1_solver.pair(p) for p in moments]
+    files = write_eigenfunctions(tmp_path, pairs, fig1_solver.pair(0.0), "eigenfunctions-2")
+    assert files[0] == tmp_path / "eigenfunctions-2.pvd"
+    assert len(files[0].read_text().splitlines()) == 5 + len(files) - 1
+    sets = ElementTree.parse(files[0]).findall("Collection/DataSet")
+    assert [float(s.get("timestep")) for s in sets] == sorted(set(moments))
+    assert [tmp_path / s.get("file") for s in sets] == files[1:]
+    assert {k for k in tmp_path.rglob("*") if k.is_file()} == set(files)
+    for s in sets:
+        assert not Path(s.get("file")).is_absolute()
+        assert pyvista.read(tmp_path / s.get("file")).field_data["p"][0] == float(s.get("timestep"))
+    assert list(pyvista.PVDReader(files[0]).time_values) == sorted(set(moments))
+
+
+def test_files_are_small(tmp_path, fig1_solver):
+    _, file = write_eigenfunctions(tmp_path, [fig1_solver.pair(2.0)], fig1_solver.pair(0.0))
+    assert file.stat().st_size < 400e3
+
+
+def test_density_file(tmp_path, solver):
+    grid = pyvista.read(write_density(tmp_path / "density.vtu", solver.pair(0.0)))
+    assert set(grid.point_data) == {"stationary_density", "phi_marginal", "xi_marginal", "z"}
+    assert grid.field_data["lyapunov_exponent"][0] == solver.pair(0.0).derivative
+    assert integral(grid, "stationary_density") == pytest.approx(1, abs=1e-6)
+    width = 16 * UNIT_NOISE.standard_deviation
+    assert integral(grid, "phi_marginal") == pytest.approx(width, rel=1e-8)
+    np.testing.assert_allclose(grid["xi_marginal"], UNIT_NOISE.density(grid.points[:, 1]), atol=1e-10)
+
+
+def test_writing_loads_nothing_that_draws(tmp_path):
+    """It must work without display, OpenGL or EGL."""
+    code = f"""
+import sys
+from pathlib import Path
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.problem import Problem
+from fpsolve.output.vtk import write_eigenfunctions
+from tests.conftest import FIG1, UNIT_NOISE
+assert "pyvista" not in sys.modules
+pair = ExponentSolver(Problem(FIG1, UNIT_NOISE)).pair(0.0)
+write_eigenfunctions(Path({str(tmp_path)!r}), [pair], pair)
+print([name for name in sys.modules if "vtkRendering" in name])
+"""
+    environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True, text=True, check=True, env=environment, cwd=Path(__file__).parents[2],
+    )  # fmt: skip
+    assert done.stdout.strip() == "[]"
+
+
+def test_script_needs_only_the_standard_library_and_paraview(tmp_path):
+    script = copy_show_script(tmp_path)
+    imports = [
+        node for node in ast.walk(ast.parse(script.read_text())) if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
+    names = {getattr(node, "module", None) or node.names[0].name for node in imports}
+    assert names - {"paraview"} <= sys.stdlib_module_names
+    assert f"FOLDER = {str(tmp_path)!r}" in script.read_text()
+
+
+@pytest.fixture(scope="module")
+def paraview():
+    """Runs a script in ParaView's Python, on a virtual display that says when it is ready."""
+    server, python = shutil.which("Xvfb"), shutil.which("pvpython")
+    if not (server and python):
+        message = f"ParaView is missing: {INSTALL}"
+        if os.environ.get("FPSOLVE_REQUIRE_PARAVIEW"):
+            pytest.fail(message)
+        pytest.skip(message)
+    ready, tell = os.pipe()
+    display = subprocess.Popen([server, "-displayfd", str(tell), "-screen", "0", "1280x1024x24"], pass_fds=[tell])
+    os.close(tell)
+    with os.fdopen(ready) as stream:
+        number = stream.readline().strip()
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    environment["DISPLAY"] = f":{number}"
+
+    def run(folder, *arguments):
+        words = [python, *map(str, arguments)]
+        return subprocess.run(words, capture_output=True, text=True, cwd=folder, env=environment, timeout=300)
+
+    yield run
+    display.terminate()
+    display.wait()
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("results")
+    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
+    written(folder, solver)
+    copy_show_script(folder)
+    return folder
+
+
+READ = """
+import json, math, sys
+from paraview import servermanager, simple
+reader = simple.PVDReader(FileName=sys.argv[1])
+jumps, fields = {}, {}
+for p in reader.TimestepValues:
+    reader.UpdatePipeline(p)
+    grid = servermanager.Fetch(reader)
+    values = grid.GetPointData().GetArray("T")
+    density = grid.GetPointData().GetArray("tilted_density")
+    fields[p] = [grid.GetFieldData().GetArray(name).GetValue(0) for name in ("p", "Lambda")]
+    sides = {}
+    for k in range(grid.GetNumberOfCells()):
+        cell = grid.GetCell(k)
+        low, high = cell.GetBounds()[:2]
+        for m in range(cell.GetNumberOfPoints()):
+            phi, xi = cell.GetPoints().GetPoint(m)[:2]
+            i = cell.GetPointId(m)
+            if abs(math.cos(phi)) < 1e-12 and density.GetValue(i) > 1e-5:
+                sides.setdefault((round(phi), xi), {})["left" if phi == high else "right"] = values.GetValue(i)
+    jumps[p] = [(phi, pair["left"] / pair["right"]) for (phi, xi), pair in sides.items()]
+kinds = {grid.GetCellType(k) for k in range(grid.GetNumberOfCells())}
+print(json.dumps({"jumps": jumps, "fields": fields, "kinds": sorted(kinds)}))
+"""
+
+
+def test_paraview_reads_the_collection(paraview, results, tmp_path):
+    script = tmp_path / "read.py"
+    script.write_text(READ)
+    done = paraview(tmp_path, script, results / "eigenfunctions.pvd")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [float(p) for p in found["jumps"]] == list(MOMENTS)
+    assert found["kinds"] == [70]  # VTK_LAGRANGE_QUADRILATERAL
+    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
+    for p, jumps in found["jumps"].items():
+        assert found["fields"][p] == pytest.approx([float(p), solver.pair(float(p)).value], abs=1e-14)
+        lines, ratios = np.transpose(jumps)
+        assert {int(k) for k in lines} == {2, 5}  # π/2 and 3π/2, rounded
+        assert ratios.size > 120
+        np.testing.assert_allclose(ratios, HARD.impact_factor(float(p)), rtol=1e-8)
+
+
+def assert_picture(file):
+    """Not blank, and neither noise: white around, and many colours inside."""
+    picture = matplotlib.image.imread(file)[:, :, :3]
+    assert picture.shape == (1000, 1600, 3)
+    assert 0.3 < np.mean(np.all(picture == 1, axis=2)) < 0.95
+    assert len(np.unique((picture * 255).astype(int).reshape(-1, 3), axis=0)) > 300
+
+
+@pytest.mark.parametrize(
+    ("arguments", "picture"),
+    [
+        ([], "eigenfunctions.png"),
+        (["--cylinder", "--field", "tilted_density", "--p", "1.9", "--output", "cylinder.png"], "cylinder.png"),
+    ],
+)
+def test_show_script(paraview, results, arguments, picture):
+    before = {file: file.read_bytes() for file in results.rglob("*.[pv][vt][du]")}
+    done = paraview(results, "show.py", *arguments)
+    assert done.returncode == 0, done.stderr
+    assert "p = 2: " in done.stdout
+    assert_picture(results / picture)
+    assert {file: file.read_bytes() for file in before} == before
+
+
+MENU = """
+import sys
+sys.argv = [""]
+exec(open({script!r}).read(), {{"__name__": "__vtkconsole__"}})
+print("and ParaView goes on")
+"""
+
+
+def test_show_script_from_the_menu(paraview, results, tmp_path):
+    """There neither the script's file nor its folder is known, and an error must not end ParaView."""
+    menu = tmp_path / "menu.py"
+    menu.write_text(MENU.format(script=str(results / "show.py")))
+    (results / "eigenfunctions.png").unlink(missing_ok=True)
+    done = paraview(tmp_path, menu)
+    assert "and ParaView goes on" in done.stdout, done.stderr
+    assert_picture(results / "eigenfunctions.png")
+    lost = tmp_path / "lost" / "show.py"
+    lost.parent.mkdir()
+    menu.write_text(MENU.format(script=str(copy_show_script(lost.parent))))
+    done = paraview(tmp_path, menu)
+    assert "there is no" in done.stdout
+    assert "and ParaView goes on" in done.stdout, done.stderr
+
+
+def test_show_script_refuses(paraview, tmp_path):
+    done = paraview(tmp_path, copy_show_script(tmp_path))
+    assert done.returncode != 0
+    assert f"there is no {tmp_path / 'eigenfunctions.pvd'}; name the collection with --collection" in done.stderr

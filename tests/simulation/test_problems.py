@@ -1,0 +1,123 @@
+"""What can be simulated, alone or as two halves, and that what is found travels to other processes."""
+
+import pickle
+from dataclasses import dataclass
+from threading import Event
+
+import numpy as np
+import pytest
+
+from fpsolve.arrays import identity
+from fpsolve.errors import FpsolveError
+from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.plane import Drive, PlaneSystem
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import DAMPING, VibroImpactOscillator
+from fpsolve.simulation.batches import PlainBatch, Plan
+from fpsolve.simulation.estimators import simulate
+from fpsolve.simulation.response import stationary_response
+from fpsolve.simulation.setup import PROGRESS_STEPS
+from fpsolve.simulation.step import motion, noise_step
+
+OSCILLATOR = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5, c2=0.3, impact="restitution")
+NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9)
+PLANE = PlaneSystem([Drive(0, ((0.0, 1.0), (-1.0, 0.0))), Drive(1, DAMPING, identity)])
+
+
+@dataclass(frozen=True)
+class WhiteNoise:
+    """Something that looks like a noise."""
+
+    level: float = 1.0
+
+    def spectral_density(self, omega):
+        return self.level
+
+
+def moments(*args, estimator="direct", **kwargs):
+    return simulate(*args, estimator=estimator, paths=640, time=60.0, seed=3, **kwargs)
+
+
+def response(*args, **kwargs):
+    return stationary_response(
+        *args, exponent=0.05, variance_rate=0.01, paths=32, time=50.0, step=0.1, seed=1, **kwargs
+    )
+
+
+@pytest.mark.parametrize("estimator", ["direct", "population"])
+def test_moments_of_a_problem_are_those_of_its_halves(estimator):
+    orders = [-1.0, 0.5]
+    found = moments(OSCILLATOR, NOISE, orders, estimator=estimator)
+    assert moments(Problem(OSCILLATOR, NOISE), orders, estimator=estimator) == found
+    assert moments(problem=Problem(OSCILLATOR, NOISE), p=orders, estimator=estimator) == found
+    assert moments(oscillator=OSCILLATOR, noise=NOISE, p=orders, estimator=estimator) == found
+
+
+def test_response_of_a_problem_is_that_of_its_halves():
+    np.testing.assert_equal(vars(response(Problem(OSCILLATOR, NOISE))), vars(response(OSCILLATOR, NOISE)))
+
+
+@pytest.mark.parametrize(
+    ("problem", "name"),
+    [
+        (Problem(PLANE, NOISE), "PlaneSystem under NonGaussianNoise"),
+        (Problem(OSCILLATOR, WhiteNoise()), "VibroImpactOscillator under WhiteNoise"),
+    ],
+)
+def test_other_problems_are_refused(problem, name):
+    sentence = (
+        "simulation is for a VibroImpactOscillator under OrnsteinUhlenbeck or NonGaussianNoise, but this is a "
+        f"{name}; use the finite elements"
+    )
+    for call in (lambda: moments(problem, [1.0]), lambda: response(problem)):
+        with pytest.raises(FpsolveError) as caught:
+            call()
+        assert str(caught.value) == sentence
+
+
+def test_progress_is_reported():
+    calls = []
+    moments(OSCILLATOR, NOISE, [1.0], estimator="population", progress=lambda: calls.append(1))
+    assert len(calls) == PROGRESS_STEPS
+    response(OSCILLATOR, NOISE, progress=lambda: calls.append(1))
+    assert len(calls) == 3 * PROGRESS_STEPS
+
+
+def copied(thing):
+    return pickle.loads(pickle.dumps(thing))
+
+
+@pytest.mark.parametrize("estimator", ["direct", "population"])
+def test_estimates_pickle(estimator):
+    found = moments(OSCILLATOR, NOISE, [-1.0, 0.5, 30.0], estimator=estimator)
+    assert copied(found) == found
+    assert copied(found.estimates[0]) == found.estimates[0]
+    assert copied(found.estimates[-1]).value is None
+
+
+def test_a_response_pickles():
+    found = response(OSCILLATOR, NOISE)
+    np.testing.assert_equal(vars(copied(found)), vars(found))
+
+
+def test_a_plan_pickles():
+    """A batch that follows the copy goes where one does that follows the plan."""
+    plan = Plan(
+        noise=NOISE,
+        motion=motion(OSCILLATOR),
+        noise_step=noise_step(NOISE, 0.01),
+        step=0.01,
+        p=np.array([-1.0, 2.0]),
+        estimator="direct",
+        paths=16,
+        slice_steps=300,
+        settling=1,
+        wanted=4,
+        levels=3,
+    )
+    np.testing.assert_equal(vars(copied(plan)), vars(plan))
+    batches = [PlainBatch(each, np.random.SeedSequence(1)) for each in (plan, copied(plan))]
+    for batch in batches:
+        batch.advance(plan.settling + plan.wanted, Event())
+    assert batches[0].growth == batches[1].growth
+    np.testing.assert_array_equal(batches[0].log_sums, batches[1].log_sums)

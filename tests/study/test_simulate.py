@@ -1,0 +1,321 @@
+"""`fpsolve simulate` and `fpsolve run --monte-carlo`: files, exit codes, interrupts, bad input."""
+
+import csv
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista
+
+from fpsolve.cli import main
+from fpsolve.errors import NotConverged
+from fpsolve.output import figures
+from fpsolve.simulation import response
+from fpsolve.study import simulate as simulated
+
+CASE = """
+title = "A quick simulation"
+[oscillator]
+epsilon = 0.5
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 0.5
+tau0 = 0.5
+r0 = 0.95
+[moments]
+p = [-1.0, 1.0]
+[monte_carlo]
+paths = 6400
+time = 40.0
+seed = 7
+"""
+QUICK = ["--paths", "64", "--time", "20"]
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "quick.toml"
+    path.write_text(CASE, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "results"
+
+
+def simulate(*arguments):
+    return main(["simulate", *map(str, arguments)])
+
+
+def raising(exception):
+    def fail(*_, **__):
+        raise exception
+
+    return fail
+
+
+def read(path):
+    return json.loads(Path(path).read_text(encoding="utf-8"))
+
+
+def test_monte_carlo_json(case, out, capsys):
+    assert simulate(case, "--out", out) == 0
+    found = read(out / "quick/monte_carlo.json")
+    assert [estimate["p"] for estimate in found["estimates"]] == [-1.0, 1.0]
+    for estimate in found["estimates"]:
+        assert estimate.keys() == {"p", "value", "standard_error", "estimator", "effective_paths"}
+        assert estimate["estimator"] == "direct"
+    assert found["lyapunov_exponent"].keys() == {"value", "standard_error"}
+    assert (found["paths"], found["seed"]) == (6400, 7)
+    assert found["time"] == pytest.approx(40, rel=0.1)
+    assert found["step"] > 0
+    assert found["impacts"] == pytest.approx(6400 * found["time"] / np.pi, rel=0.1)
+    assert found["warnings"] == [text for text in found["warnings"] if "no estimate" in text]
+    assert found["response"] is None
+    printed = capsys.readouterr()
+    assert "6400 paths" in printed.out
+    assert "λ =" in printed.out
+    assert sorted(path.name for path in (out / "quick").iterdir()) == ["monte_carlo.json"]
+
+
+def test_options_replace_those_of_the_case(case, out):
+    options = ["--paths", "640", "--time", "50", "--seed", "3", "--estimator", "population"]
+    assert simulate(case, "--out", out, *options) == 0
+    found = read(out / "quick/monte_carlo.json")
+    assert (found["paths"], found["seed"]) == (640, 3)
+    assert found["time"] == pytest.approx(50, rel=0.1)
+    assert {estimate["estimator"] for estimate in found["estimates"]} == {"population"}
+
+
+def test_a_seed_gives_the_same_bytes(case, out):
+    for folder, seed in (("a", 5), ("b", 5), ("c", 6)):
+        assert simulate(case, "--out", out / folder, "--seed", seed) == 0
+    contents = [(out / folder / "quick/monte_carlo.json").read_bytes() for folder in "abc"]
+    assert contents[0] == contents[1] != contents[2]
+
+
+def test_each_curve_has_its_file_and_stale_ones_go(case, out):
+    vary = ["--set", 'vary."noise.D0"=[0.1, 0.2]']
+    assert simulate(case, "--out", out, *QUICK, *vary) == 0
+    assert [read(out / f"quick/{name}")["varied"] for name in ("monte_carlo.json", "monte_carlo-2.json")] == [
+        {"noise.D0": 0.1}, {"noise.D0": 0.2},
+    ]  # fmt: skip
+    assert simulate(case, "--out", out, *QUICK) == 0
+    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+
+
+def test_the_nonlinear_response_is_written(case, out):
+    nonlinear = [
+        f"--set={setting}"
+        for setting in ("oscillator.c2=0.5", "oscillator.c1=0.8", "noise.D0=0.1", "monte_carlo.paths=4096")
+    ]
+    assert simulate(case, "--out", out, *nonlinear) == 0
+    folder = out / "quick"
+    names = {"monte_carlo.json", "response.csv", "response.vti", "response.png", "response.pdf"}
+    assert {path.name for path in folder.iterdir()} == names
+    response = read(folder / "monte_carlo.json")["response"]
+    assert response["means"].keys() == {"x", "x_squared", "v_squared", "amplitude", "energy"}
+    with (folder / "response.csv").open(encoding="utf-8") as file:
+        rows = np.array([[float(cell) for cell in row.values()] for row in csv.DictReader(file)])
+    width, density = rows[:, 1] - rows[:, 0], rows[:, 2]
+    assert np.sum(width * density) == pytest.approx(1, abs=1e-3)
+    middle = (rows[:, 0] + rows[:, 1]) / 2
+    assert np.sum(width * density * middle) == pytest.approx(response["means"]["amplitude"]["value"], rel=1e-2)
+    grid = pyvista.read(folder / "response.vti")
+    spacing = grid.spacing
+    assert np.sum(grid.cell_data["density"]) * spacing[0] * spacing[1] == pytest.approx(1, abs=1e-3)
+    x = grid.cell_centers().points[:, 0]
+    mean = np.sum(grid.cell_data["density"] * x) * spacing[0] * spacing[1]
+    assert mean == pytest.approx(response["means"]["x"]["value"], rel=1e-2)
+
+
+def test_no_response_where_the_rest_is_stable(case, out, capsys):
+    stable = [f"--set={setting}" for setting in ("oscillator.c2=0.5", "oscillator.c1=-0.5")]
+    assert simulate(case, "--out", out, *QUICK, *stable) == 0
+    found = read(out / "quick/monte_carlo.json")
+    assert found["response"] is None
+    assert any("no stationary response: λ = -" in text and "not positive" in text for text in found["warnings"])
+    assert "no stationary response" in capsys.readouterr().err
+
+
+def test_run_adds_markers(case, out, capsys, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo"]) == 0
+    assert (out / "quick/summary.json").exists()
+    found = read(out / "quick/monte_carlo.json")["estimates"]
+    with_value = [estimate for estimate in found if estimate["value"] is not None]
+    ((series,),) = drawn
+    samples = series.simulated
+    np.testing.assert_array_equal(samples[1], [estimate["value"] for estimate in with_value])
+    np.testing.assert_array_equal(samples[2], [estimate["standard_error"] for estimate in with_value])
+    assert "finite elements" in capsys.readouterr().out
+
+
+def test_run_adds_markers_over_a_parameter(case, out):
+    arguments = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", 'figure={x="noise.D0", y="lyapunov_exponent"}']
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *arguments]) == 0
+    assert (out / "quick/figure.png").stat().st_size > 10_000
+    assert (out / "quick/monte_carlo-2.json").exists()
+
+
+def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, out, capsys, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(simulated, "_simulate_curve", raising(KeyboardInterrupt))
+    monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo"]) == 130
+    ((series,),) = drawn
+    assert series.simulated is None
+    assert (out / "quick/summary.json").exists()
+    printed = capsys.readouterr()
+    assert "δ_p" in printed.out
+    assert "interrupted" in printed.err
+
+
+def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, monkeypatch):
+    drawn, original = [], simulated._simulate_curve
+
+    def failing_later(case, curve, progress):
+        if curve.number == 2:
+            raise NotConverged("the simulation overflowed")
+        return original(case, curve, progress)
+
+    monkeypatch.setattr(simulated, "_simulate_curve", failing_later)
+    monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
+    sets = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", "monte_carlo.time=100.0"]
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *sets]) == 3
+    (series,) = drawn
+    assert [item.simulated is not None for item in series] == [True, False]
+    assert (out / "quick/monte_carlo.json").exists()
+    assert "the simulation overflowed" in capsys.readouterr().err
+
+
+def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys, monkeypatch):
+    monkeypatch.setattr(response, "stationary_response", raising(KeyboardInterrupt))
+    sets = ["oscillator.c2=0.5", "oscillator.c1=0.8", 'vary."noise.D0"=[0.1, 0.2]']
+    assert simulate(case, "--out", out, *(f"--set={text}" for text in sets)) == 130
+    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+    found = read(out / "quick/monte_carlo.json")
+    assert "no stationary response: stopped before it was reached" in found["warnings"]
+    assert "what was done is kept" in capsys.readouterr().err
+
+
+def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
+    """What is finished stays, and the message says so."""
+    original = simulated._simulate_curve
+
+    def interrupted(case, curve, progress):
+        if curve.varied["noise.D0"] == 0.2:
+            raise KeyboardInterrupt
+        return original(case, curve, progress)
+
+    monkeypatch.setattr(simulated, "_simulate_curve", interrupted)
+    assert simulate(case, "--out", out, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]') == 130
+    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+    printed = capsys.readouterr()
+    assert "what was done is kept" in printed.err
+    assert "64 paths" in printed.out
+
+
+def heed_interrupts():
+    """What runs in the background inherits that SIGINT is ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def test_a_real_interrupt(case, out):
+    """SIGINT in the middle of a long slice ends the process soon, with the exit code 130 and a whole file."""
+    command = [sys.executable, "-m", "fpsolve.cli", "simulate", str(case), "--out", str(out), "--paths", "64"]
+    subprocess.run(command, check=True, capture_output=True)  # compiles
+    command[-1] = "400000"
+    with subprocess.Popen(
+        [*command, "--time", "4000"], stderr=subprocess.PIPE, stdout=subprocess.PIPE, preexec_fn=heed_interrupts
+    ) as process:
+        try:
+            time.sleep(12)
+            begun = time.monotonic()
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=60)
+        finally:
+            process.kill()
+        assert process.returncode == 130
+        assert time.monotonic() - begun < 20
+    found = read(out / "quick/monte_carlo.json")
+    assert found["paths"] in (64, 400_000)
+
+
+def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
+    """An interrupt in the second of three curves: the first is whole, the second is marked, the third is not begun."""
+    original, calls = simulated._simulate_curve, []
+
+    def interrupted_later(case, curve, progress):
+        def counted():
+            calls.append(1)
+            if len(calls) == 150:
+                raise KeyboardInterrupt
+            progress()
+
+        return original(case, curve, counted)
+
+    monkeypatch.setattr(simulated, "_simulate_curve", interrupted_later)
+    vary = ["--set", 'vary."noise.D0"=[0.1, 0.2, 0.3]', "--time", "200"]
+    (out / "quick").mkdir(parents=True)
+    (out / "quick/monte_carlo-3.json").write_text("{}", encoding="utf-8")
+    assert simulate(case, "--out", out, *vary) == 130
+    first, second = (read(out / f"quick/{name}") for name in ("monte_carlo.json", "monte_carlo-2.json"))
+    assert not any("stopped early" in text for text in first["warnings"])
+    assert any("stopped early" in text for text in second["warnings"])
+    assert second["time"] < 0.7 * first["time"]
+    assert len(list((out / "quick").iterdir())) == 2  # an earlier third one is gone
+    assert "what was done is kept" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--paths", "5"], "monte_carlo.paths: got 5; must be a whole number >= 32"),
+        (["--paths", "2.5"], "--paths"),
+        (["--time", "1"], r"monte_carlo.time: got 1; must be >= \d+\.\d+, two transients"),
+        (["--time", "nan"], "monte_carlo.time"),
+        (["--seed", "-1"], "monte_carlo.seed: got -1; must be a whole number >= 0"),
+        (["--estimator", "exact"], 'must be one of "direct", "population"'),
+        (["--set", "monte_carlo.step=0.9"], r"too large for the correlation time of the noise; must be > 0 and <= 0\."),
+        (["--set", "monte_carlo.step=0.2", "--set", "oscillator.omega=9.0"], r"the frequency; .* <= 0\.05556"),
+        (["--set", "monte_carlo.step=0.2", "--set", "noise.D0=500.0"], "too large for the strength of the noise"),
+        (["--set", "noise.tau0=1e-8"], "takes .* steps"),
+        (["--set", "monte_carlo.p=[]"], "non-empty"),
+        (["--set", 'monte_carlo.p="x"'], "monte_carlo.p"),
+        (["--set", "monte_carlo.p=[inf]"], "finite"),
+        (["--set", "monte_carlo.p=[1e308]"], "overflow"),
+        (["--set", "oscillator.c1=-1000.0", "--set", "monte_carlo.step=0.1"], "too large for the damping"),
+        (["--set", "monte_carlo.pahts=64"], "unknown key"),
+        (["--set", "noise.r0=1.1", "--set", "noise.treatment=exact"], "is infinite"),
+        (["--set", 'vary."noise.tau0"=[0.5, 0.001]', "--set", "monte_carlo.step=0.1"], "with noise.tau0 = 0.001: got"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_refused(case, out, capsys, arguments, words):
+    assert simulate(case, "--out", out, *arguments) == 2
+    printed = capsys.readouterr().err
+    assert re.search(words, " ".join(printed.split()))
+    assert "Traceback" not in printed
+    assert not out.exists()
+
+
+def test_run_with_simulation_refuses_before_it_solves(case, out):
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", "--set", "noise.tau0=1e-8"]) == 2
+    assert not out.exists()
+
+
+def test_a_folder_that_cannot_be_made(case, tmp_path, capsys):
+    blocker = tmp_path / "file"
+    blocker.write_text("", encoding="utf-8")
+    assert simulate(case, "--out", blocker) == 2
+    assert "choose another --out" in capsys.readouterr().err

@@ -1,0 +1,280 @@
+"""Running a case: what is written, that it agrees with what was computed, and that failures lose nothing."""
+
+import csv
+import json
+from importlib.metadata import version
+
+import numpy as np
+import pytest
+
+import fpsolve
+from fpsolve.errors import CaseError, NotConverged, OutputError
+from fpsolve.study.solve import UNRESOLVED, compare, solve_curves, solving_work
+from fpsolve.workflow import check_case, run_case
+
+TEXT = """
+title = "A test"
+[oscillator]
+epsilon = 0.1
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 0.5
+tau0 = 0.5
+r0 = 0.95
+treatment = "ou-reduction"
+[moments]
+p = [2.0, 0.0, -1.0]
+[vary]
+"noise.D0" = [0.1, 1.0]
+[output]
+eigenfunctions = [2.0]
+"""
+
+
+@pytest.fixture
+def case(tmp_path):
+    return write(tmp_path, TEXT)
+
+
+def write(folder, text, overrides=()):
+    path = folder / "test.toml"
+    path.write_text(text, encoding="utf-8")
+    return fpsolve.load_case(path, overrides)
+
+
+def files(folder):
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
+    results = fpsolve.run(case, tmp_path / "out")
+    summary = json.loads((tmp_path / "out" / "test" / "summary.json").read_text(encoding="utf-8"))
+    assert list(summary) == ["case", "title", "fpsolve_version", "curves"]
+    assert (summary["case"], summary["title"]) == ("test", "A test")
+    assert summary["fpsolve_version"] == version("fpsolve")
+    for curve, result, D0 in zip(summary["curves"], results, (0.1, 1.0), strict=True):
+        assert curve["varied"] == {"noise.D0": D0}
+        assert curve["parameters"]["noise.D0"] == D0
+        assert curve["parameters"]["oscillator.impact"] == "delta"
+        assert curve["parameters"]["noise.treatment"] == "ou-reduction"
+        assert [row["p"] for row in curve["moments"]] == [2.0, 0.0, -1.0]
+        keys = {"p", "value", "derivative", "perturbation", "error_estimate", "residual"}
+        assert all(set(row) == keys for row in curve["moments"])
+        np.testing.assert_array_equal([row["value"] for row in curve["moments"]], result.moments.value)
+        assert curve["lyapunov_exponent"]["value"] == result.lyapunov_exponent.value
+        assert set(curve["stability_index"]) >= {"value", "perturbation"}
+        assert curve["variance_rate"]["value"] > 0
+        assert curve["mesh"] == result.mesh
+        assert curve["mesh"]["unknowns"] > 100
+        assert curve["warnings"] == []
+    assert summary["curves"][1]["moments"][0]["value"] == pytest.approx(0.0141631436533, rel=1e-10)
+    assert summary["curves"][1]["moments"][0]["perturbation"] == pytest.approx(0.014149421727, rel=1e-10)
+
+
+def test_table_holds_every_curve_and_moment(case, tmp_path):
+    results = fpsolve.run(case, tmp_path)
+    with (tmp_path / "test" / "moments.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6
+    assert list(rows[0])[:3] == ["noise.D0", "p", "value"]
+    values = np.concatenate([result.moments.value for result in results])
+    np.testing.assert_array_equal([float(row["value"]) for row in rows], values)
+
+
+def test_all_files_are_there_and_no_temporary_ones(case, tmp_path):
+    fpsolve.run(case, tmp_path / "out")
+    names = files(tmp_path / "out" / "test")
+    expected = {"summary.json", "moments.csv", "figure.png", "figure.pdf", "density.vtu", "show.py"}
+    assert expected | {"eigenfunctions.pvd", "eigenfunctions-2.pvd"} <= names
+    assert not [name for name in names if name.split("/")[-1].startswith(".")]
+    assert (tmp_path / "out" / "test" / "figure.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "out" / "test" / "figure.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_tables_are_the_same_bytes_twice(case, tmp_path):
+    for name in ("first", "second"):
+        fpsolve.run(case, tmp_path / name)
+    for file in ("summary.json", "moments.csv"):
+        assert (tmp_path / "first/test" / file).read_bytes() == (tmp_path / "second/test" / file).read_bytes()
+
+
+def test_no_eigenfunctions_where_none_are_asked_for(tmp_path):
+    case = write(tmp_path, TEXT.replace("[2.0]\n", "[]\n"))
+    fpsolve.run(case, tmp_path / "out")
+    assert not [name for name in files(tmp_path / "out") if "eigenfunctions" in name]
+
+
+def test_without_vary_there_is_one_curve(tmp_path):
+    case = write(tmp_path, TEXT.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', ""))
+    (result,) = fpsolve.run(case, tmp_path / "out")
+    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    assert summary["curves"][0]["varied"] == {}
+    assert summary["curves"][0]["parameters"]["noise.D0"] == 0.5 == result.curve.parameters["noise.D0"]
+
+
+def test_missing_stability_index_is_null_and_said(tmp_path):
+    overrides = ["oscillator.omega=10.0", "oscillator.c1=-1.0", "oscillator.restitution=0.5"]
+    case = write(tmp_path, TEXT, overrides)
+    fpsolve.run(case, tmp_path / "out")
+    curve = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"][0]
+    assert curve["stability_index"] is None
+    assert curve["warnings"] == ["no stability index: Λ(p) has no root p ≠ 0 in [-20, 20]"]
+
+
+HOPELESS = "mesh={ phi_cells = 1, phi_degree = 2, xi_cells = 2, xi_degree = 3 }"
+
+
+def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
+    """The strong-noise curve fails at p = 2 and −1; the weak one and p = 0 are kept."""
+    text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
+    case = write(tmp_path, text, [HOPELESS])
+    with pytest.raises(NotConverged, match="use more cells") as caught:
+        fpsolve.run(case, tmp_path / "out")
+    assert len(caught.value.partial) == 2
+    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    assert [row["p"] for row in summary["curves"][0]["moments"]] == [2.0, 0.0, -1.0]
+    assert 0.0 in [row["p"] for row in summary["curves"][1]["moments"]]
+    assert len(summary["curves"][1]["moments"]) < 3
+    assert "use more cells" in summary["curves"][1]["warnings"][-1]
+    assert {"figure.png", "moments.csv"} <= files(tmp_path / "out/test")
+
+
+def test_failures_are_values(tmp_path):
+    text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
+    case = write(tmp_path, text, [HOPELESS])
+    outcome, checked = run_case(case, tmp_path / "out"), check_case(case)
+    for results in (outcome.results, checked.results):
+        assert [[failure.p for failure in result.failures] for result in results] == [[], [2.0]]
+        assert not {failure.reason for failure in results[1].failures} & set(results[1].warnings)
+    assert len(outcome.failures) == len(checked.failures) == 1
+    assert not outcome.interrupted
+    curves = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    assert curves[1]["warnings"] == [*outcome.results[1].warnings, *outcome.failures]
+    assert files(tmp_path) == {"test.toml", *(f"out/test/{name}" for name in files(tmp_path / "out/test"))}
+
+
+def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
+    calls = []
+
+    def interrupt():
+        calls.append(1)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fpsolve.run(case, tmp_path / "out", progress=interrupt)
+    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    assert [curve["varied"]["noise.D0"] for curve in summary["curves"]] == [0.1]
+    assert "eigenfunctions.pvd" in files(tmp_path / "out/test")
+
+
+def test_infinite_moments_are_refused_before_anything_is_written(tmp_path):
+    """The case says so, with the line of the values that are to blame."""
+    with pytest.raises(CaseError, match=r"test\.toml:15: vary: with noise\.D0 = 0\.1: Λ\(2\) is infinite"):
+        write(tmp_path, TEXT, ["noise.treatment='exact'", "noise.r0=1.1"])
+    text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"noise.r0" = [0.9, 1.1]')
+    with pytest.raises(CaseError, match=r"vary: with noise\.r0 = 1\.1: Λ\(2\) is infinite"):
+        write(tmp_path, text, ["noise.treatment='exact'"])
+    write(tmp_path, text, ["noise.treatment='exact'", "moments.p=[-1.0, 0.0]", "output.eigenfunctions=[]"])
+    write(tmp_path, TEXT.replace("r0 = 0.95", "r0 = 1.1").replace('"noise.D0" = [0.1, 1.0]', '"noise.r0" = [0.9, 0.8]'))
+
+
+def test_a_value_that_vary_would_replace_is_refused(tmp_path):
+    with pytest.raises(CaseError, match=r"--set noise\.D0=7: noise\.D0: has no effect, as the case varies noise\.D0"):
+        write(tmp_path, TEXT, ["noise.D0=7"])
+
+
+def test_a_second_run_leaves_no_eigenfunctions_of_the_first(tmp_path):
+    fpsolve.run(write(tmp_path, TEXT), tmp_path / "out")
+    fpsolve.run(write(tmp_path, TEXT, ["vary={}", "output.eigenfunctions=[-1.0]"]), tmp_path / "out")
+    names = {name for name in files(tmp_path / "out/test") if name.startswith("eigenfunctions")}
+    assert names == {"eigenfunctions.pvd", "eigenfunctions/p-1.0.vtu"}
+    assert not (tmp_path / "out/test/eigenfunctions-2").exists()
+
+
+def test_files_of_the_user_are_left_alone(case, tmp_path):
+    folder = tmp_path / "out/test"
+    mine = [
+        folder / name
+        for name in ("eigenfunctions-mine.pvd", "eigenfunctions_paper/paper.vtu", "eigenfunctions/paper.vtu")
+    ]
+    for path in mine:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("mine", encoding="utf-8")
+    fpsolve.run(case, tmp_path / "out")
+    assert all(path.read_text(encoding="utf-8") == "mine" for path in mine)
+
+
+def test_titles_are_plain_text(tmp_path):
+    case = write(tmp_path, TEXT.replace('"A test"', r"'see [/b] and $\foo$ of [vary]'"))
+    fpsolve.run(case, tmp_path / "out")
+
+
+def test_a_place_that_cannot_be_written_is_an_output_error(case, tmp_path):
+    (tmp_path / "out/test/summary.json").mkdir(parents=True)
+    with pytest.raises(OutputError, match=r"cannot be written"):
+        fpsolve.run(case, tmp_path / "out")
+
+
+def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
+    case = write(tmp_path, TEXT, ["noise.treatment='exact'"])
+    result = next(solve_curves(case))
+    reduced = next(solve_curves(write(tmp_path, TEXT)))
+    np.testing.assert_array_equal(result.moments_perturbation, reduced.moments_perturbation)
+    assert case.is_exact
+
+
+def test_an_unwritable_folder_is_refused_before_solving(case, tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    calls = []
+    with pytest.raises(OutputError, match=r"file/test cannot be made: .*choose another folder"):
+        fpsolve.run(case, tmp_path / "file", progress=lambda: calls.append(1))
+    assert calls == []
+
+
+def test_progress_is_called_once_for_each_moment(case, tmp_path):
+    calls = []
+    fpsolve.run(case, tmp_path, progress=lambda: calls.append(1))
+    assert len(calls) == solving_work(case) == 6
+
+
+def test_expectations_are_compared_where_they_select(tmp_path):
+    expect = """
+[[expect]]
+quantity = "moment"
+p = 2.0
+value = 0.0141631436533
+rtol = 1e-9
+source = "reference"
+where = { "noise.D0" = 1.0 }
+[[expect]]
+quantity = "lyapunov_exponent"
+value = 0.5
+atol = 1e-3
+source = "wrong on purpose"
+"""
+    case = write(tmp_path, TEXT + expect)
+    comparisons = compare(case, list(solve_curves(case)))
+    assert [(item.varied["noise.D0"], item.met) for item in comparisons] == [(1.0, True), (0.1, False), (1.0, False)]
+
+
+def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
+    sets = [
+        "oscillator.epsilon=1.0",
+        "oscillator.restitution=1.0",
+        "oscillator.c1=0.0",
+        "noise.tau0=1.0",
+        "noise.r0=1.0",
+    ]
+    case = write(
+        tmp_path,
+        TEXT,
+        [*sets, "moments.p=[4.0]", "output.eigenfunctions=[4.0]", "moments.rtol=1e-5", 'vary={"noise.D0"=[0.5]}'],
+    )
+    (result,) = solve_curves(case)
+    pair = result.eigenpairs[0]
+    told = [text for text in result.warnings if "do not read its picture" in text]
+    assert len(told) == sum(defect > UNRESOLVED for defect in pair.sign_defects) == 1
+    assert min(pair.sign_defects) < 1e-4

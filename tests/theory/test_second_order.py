@@ -1,0 +1,94 @@
+"""Λ₂ of any motion: the paper's Eqs. (36)-(39) are an instance, and Λ − ε²Λ₂ is of the order ε⁴."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fpsolve.arrays import identity
+from fpsolve.errors import NoPerturbationTheory
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.plane import Drive, Kick, PlaneSystem
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.theory.perturbation import first_order_eigenfunction, scale_of, second_order
+from tests.oracles import perturbation
+
+ROTATION = ((0.0, 1.0), (-1.0, 0.0))
+P = np.array([-2.0, -0.3, 0.0, 1.0, 5.0])
+
+
+@pytest.mark.parametrize("law", ["delta", "restitution"])
+@pytest.mark.parametrize("noise", [OrnsteinUhlenbeck(alpha=0.7, sigma=1.3), NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.8)])
+def test_the_papers_equations_are_an_instance(noise, law):
+    oscillator = VibroImpactOscillator(omega=1.7, restitution=0.6, c1=-0.2, epsilon=0.3, impact=law)
+    theory = second_order(Problem(oscillator, noise))
+    for ours, paper in (
+        (theory.moment_exponent(P), perturbation.moment_exponent(oscillator, noise, P)),
+        (theory.scale.moment(P), perturbation.moment_scale(oscillator, noise, P)),
+        (theory.stability_index, perturbation.stability_index(oscillator, noise)),
+        (theory.lyapunov_exponent, perturbation.lyapunov_exponent(oscillator, noise)),
+        (theory.scale.linear, perturbation.lyapunov_scale(oscillator, noise)),
+        (theory.variance_rate, perturbation.variance_rate(oscillator, noise)),
+    ):
+        np.testing.assert_allclose(ours, paper, rtol=1e-13, atol=1e-16)
+    phi, xi = np.linspace(0, 6, 7)[:, None], np.linspace(-2, 2, 5)
+    np.testing.assert_allclose(
+        first_order_eigenfunction(Problem(oscillator, noise), 1.4, phi, xi),
+        perturbation.first_order_eigenfunction(oscillator, noise, 1.4, phi, xi),
+        rtol=1e-13,
+    )
+
+
+GAUSSIAN = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
+SKEWED = MarkovChain((-1.0, 0.5), ((0, 1.0), (0.5, 0)))
+
+
+@pytest.mark.parametrize("p", [-1.0, 2.0])
+@pytest.mark.parametrize(("noise", "order", "slack"), [(GAUSSIAN, 2, 0.05), (SKEWED, 1, 0.2)], ids=["OU", "chain"])
+@pytest.mark.parametrize("seed", [0, 1, 4])
+def test_what_is_left_out_is_of_higher_order(seed, noise, order, slack, p):
+    """Any matrices, a free motion on ellipses, damping of order 2, two rays. Symmetric noise leaves ε⁴, other ε³."""
+    rng = np.random.default_rng(seed)
+    ellipse = np.array([[0.3, 1.5], [-0.8, -0.3]])
+    driven, damped = rng.uniform(-1, 1, (2, 2, 2))
+    rests = []
+    for epsilon in (0.04, 0.02):
+        kicks = [Kick(0.4, -0.3 * epsilon**2), Kick(1.9, 0.5 * epsilon**2)]
+        drives = [Drive(0, ellipse), Drive(1, driven, identity), Drive(2, damped)]
+        problem = Problem(PlaneSystem(drives, kicks, epsilon), noise)
+        value = ExponentSolver(problem, rtol=1e-9).pair(p).value
+        rests.append(abs(value - second_order(problem).moment_exponent(p)) / epsilon**2)
+    assert math.log2(rests[0] / rests[1]) == pytest.approx(order, abs=slack)
+
+
+@pytest.mark.parametrize(
+    ("drives", "noise", "message"),
+    [
+        ([Drive(0, ((1.0, 0.0), (0.0, -1.0)))], None, "that rotate without noise"),
+        ([Drive(0, ROTATION), Drive(1, ROTATION)], None, "a drive of order 1 with g = one"),
+        ([Drive(0, ROTATION), Drive(1, ROTATION, np.tanh)], None, "with g = tanh"),
+        ([Drive(0, ROTATION), Drive(1, ROTATION, identity)], MarkovChain((0, 1), ((0, 1), (1, 0))), "noise of mean 0"),
+    ],
+)
+def test_where_the_theory_does_not_apply_it_says_so_and_errors_have_a_scale(drives, noise, message):
+    problem = Problem(PlaneSystem(drives, epsilon=0.5), noise or OrnsteinUhlenbeck(alpha=1.0, sigma=1.0))
+    with pytest.raises(NoPerturbationTheory, match=message):
+        second_order(problem)
+    scale = scale_of(problem)
+    assert 0 <= scale.quadratic <= scale.linear < math.inf
+
+
+@pytest.mark.parametrize("turn", [1.3, -1.3])
+def test_the_first_order_eigenfunction_solves_its_equation(turn):
+    """L₀T₁ = −p q ξ, Eq. (32), forward and backward rotation alike."""
+    drives = [Drive(0, ((0.0, turn), (-turn, 0.0))), Drive(1, ((0.2, -0.7), (0.4, 1.0)), identity)]
+    problem = Problem(PlaneSystem(drives), OrnsteinUhlenbeck(alpha=0.7, sigma=1.0))
+    phi, h = np.linspace(0, 3, 7), 1e-5
+    at, after, before = (first_order_eigenfunction(problem, 1.4, x, 0.9) for x in (phi, phi + h, phi - h))
+    residual = -0.7 * at + turn * (after - before) / (2 * h) + 1.4 * 0.9 * drives[1].q(phi)
+    np.testing.assert_allclose(residual, 0, atol=1e-8)
+    with pytest.raises(NoPerturbationTheory):
+        first_order_eigenfunction(Problem(PlaneSystem([*drives, Drive(1, ROTATION)]), problem.noise), 1.4, phi, 0.9)
