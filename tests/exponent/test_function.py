@@ -21,9 +21,6 @@ STRONG = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0)
 WEAK_NOISE = FIG1_NOISE.ou_reduction()
 
 
-pytestmark = pytest.mark.xdist_group("functions")  # they share some
-
-
 @pytest.fixture(scope="module")
 def weak():
     return MomentLyapunovFunction(FIG1, WEAK_NOISE, (-2.0, 6.0))

@@ -5,8 +5,6 @@ import pytest
 
 from tests.random_problems import RTOL, Outcome, problems, solve
 
-pytestmark = pytest.mark.xdist_group("random problems")  # they share the solutions
-
 
 @pytest.fixture(scope="module")
 def outcomes():

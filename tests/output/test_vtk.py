@@ -47,9 +47,6 @@ def written(folder, solver, moments=MOMENTS, **options):
     return {float(grid.field_data["p"][0]): grid for grid in map(pyvista.read, files)}
 
 
-pytestmark = pytest.mark.xdist_group("vtk")  # they share the files written
-
-
 @pytest.fixture(scope="module", params=MESHES)
 def solver(request):
     return ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[request.param])

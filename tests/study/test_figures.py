@@ -14,7 +14,6 @@ from tests.oracles import perturbation
 
 CASES = Path(__file__).parents[2] / "cases"
 NAMES = sorted(path.stem for path in CASES.glob("*.toml"))
-pytestmark = pytest.mark.xdist_group("figures")  # they share the solved cases
 
 
 @cache
