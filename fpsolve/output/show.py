@@ -4,7 +4,7 @@
     pvpython show.py --cylinder --p 1         wrapped on a cylinder: phi around it, xi along it
     pvpython show.py --field tilted_density --output tilted.png
 
-Where there is no display: xvfb-run -a pvpython show.py
+Where there is no display: xvfb-run -a -s -noreset pvpython show.py
 In ParaView itself: Run Script of the Python Shell, or Macros > Import new macro; the time is then p.
 The black lines are the impacts, where T jumps.
 """

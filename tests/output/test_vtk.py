@@ -294,7 +294,9 @@ def paraview():
             pytest.fail(message)
         pytest.skip(message)
     ready, tell = os.pipe()
-    display = subprocess.Popen([server, "-displayfd", str(tell), "-screen", "0", "1280x1024x24"], pass_fds=[tell])
+    display = subprocess.Popen(
+        [server, "-displayfd", str(tell), "-noreset", "-screen", "0", "1280x1024x24"], pass_fds=[tell]
+    )
     os.close(tell)
     with os.fdopen(ready) as stream:
         number = stream.readline().strip()
