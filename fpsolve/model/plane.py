@@ -212,13 +212,19 @@ def _total(system: System, parts: Sequence[Harmonics], xi: ArrayLike) -> Harmoni
     )
 
 
+def squared_frequency(a: FloatArray) -> FloatArray:
+    """det A − (tr A/2)² for matrices of shape (…, 2, 2): ω² where the eigenvalues are complex, negative where real."""
+    half = 0.5 * (a[..., 0, 0] + a[..., 1, 1])
+    return a[..., 0, 0] * a[..., 1, 1] - a[..., 0, 1] * a[..., 1, 0] - half**2
+
+
 def angular_frequency(system: System) -> float:
     """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0, or of all without one.
 
     ω is the imaginary part of the eigenvalues of the matrix of order 0.
     """
     a = matrix_at(system, 0.0, slice(0, 1))
-    square = float(a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0] - np.trace(a) ** 2 / 4)
+    square = float(squared_frequency(a))
     if square > 0:
         return math.sqrt(square)
     sizes = [system.epsilon**drive.order * float(np.linalg.norm(drive.matrix)) for drive in system.drives]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.plane import matrix_at, noise_strength
+from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem
 
 SAMPLES = 1001
@@ -18,10 +18,9 @@ SAMPLES = 1001
 def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, Any]:
     """Real parts of the eigenvalues of A(ξ), the larger one first, and whether they are complex: the phase turns."""
     a = matrix_at(problem.system, xi)
-    trace = a[..., 0, 0] + a[..., 1, 1]
-    square = trace**2 - 4 * (a[..., 0, 0] * a[..., 1, 1] - a[..., 0, 1] * a[..., 1, 0])
-    root = np.sqrt(np.maximum(square, 0))
-    return 0.5 * (trace + root), 0.5 * (trace - root), square < 0
+    half, square = 0.5 * (a[..., 0, 0] + a[..., 1, 1]), squared_frequency(a)
+    root = np.sqrt(np.maximum(-square, 0))
+    return half + root, half - root, square > 0
 
 
 def frozen_rate(problem: Problem, p: float) -> tuple[FloatArray, FloatArray] | None:

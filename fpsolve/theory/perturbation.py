@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, identity, one
 from fpsolve.errors import NoPerturbationTheory
-from fpsolve.model.plane import Harmonics, System, angular_frequency, matrix_at, stretching, turning
+from fpsolve.model.plane import Harmonics, System, angular_frequency, matrix_at, squared_frequency, stretching, turning
 from fpsolve.model.problem import Problem
 
 
@@ -162,7 +162,7 @@ def _rotating_frame(system: System) -> tuple[FloatArray, float]:
     """P and ω for which P⁻¹A₀P is growth and a rotation by ω."""
     a = matrix_at(system, 0.0, slice(0, 1))
     half = 0.5 * (a[0, 0] + a[1, 1])
-    square = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0] - half**2
+    square = float(squared_frequency(a))
     if not square > 0:
         raise NoPerturbationTheory(
             "perturbation theory is for motions that rotate without noise, which this one does not"
