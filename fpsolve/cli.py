@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter, Token
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.text import Text
 
 from fpsolve import __version__
 from fpsolve.case.remedies import in_words_of_a_case
@@ -195,6 +193,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _print_error(text: str) -> None:
+    from rich.text import Text
+
     Console(stderr=True).print(Text(in_words_of_a_case(text)), style="bold red", soft_wrap=True)
 
 
@@ -237,6 +237,8 @@ def _watch() -> Watch:
 
 @contextmanager
 def _bar(name: str, total: int) -> Iterator[Callable[[], None]]:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(name, total=total)

@@ -16,7 +16,7 @@ from fpsolve.output.tables import write_results, write_simulation
 from fpsolve.output.vtk import write_curve, write_response
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulate_curves, simulation_work
-from fpsolve.study.solve import compare, solve_curves, solving_work
+from fpsolve.study.solve import compare, expected, solve_curves, solving_work
 
 Progress = Callable[[], None]
 _OF_SOLVED = re.compile(r"eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)")
@@ -128,9 +128,9 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
 
 
 def check_case(case: Case, *, watch: Watch = NOBODY) -> Outcome:
-    """Solve a case and compare it with what it expects; nothing is written."""
-    with watch.bar(case.name, solving_work(case)) as progress:
-        results = tuple(result.without_pairs() for result in solve_curves(case, progress=progress))
+    """Solve what a case expects, and compare it; nothing is written."""
+    with watch.bar(case.name, solving_work(case, expected)) as progress:
+        results = tuple(result.without_pairs() for result in solve_curves(case, expected, progress=progress))
     return Outcome(results, comparisons=tuple(compare(case, results)))
 
 

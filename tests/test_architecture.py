@@ -12,7 +12,10 @@ ROOMS = {
     "": ["errors", "arrays", "files"],
     "model": ["parameters", "plane", "noise", "markov_chain", "vibro_impact", "problem"],
     "theory": ["perturbation", "frozen", "validity"],
-    "fem": ["line", "mesh", "mesh_file", "noise_space", "space", "kronecker", "terms", "generator"],
+    "fem": [
+        *("reference", "line", "polynomials", "mesh", "mesh_file", "phase_space", "noise_space", "space"),
+        *("kronecker", "factors", "terms", "generator"),
+    ],
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
     "exponent": ["eigen", "fields", "error", "rival", "adapt", "solver", "function", "moments", "quantities"],
     "analysis": ["density"],
@@ -105,7 +108,7 @@ def test_files_functions_and_classes_fit_on_screens():
     for path in SOURCES:
         assert len(path.read_text(encoding="utf-8").splitlines()) <= 350, dotted(path)
         for name, length, is_class in measured(path):
-            limit = 50 if not is_class else 250 if name == "ExponentSolver" else 150
+            limit = 50 if not is_class else 200 if name == "ExponentSolver" else 150
             assert length <= limit, f"{dotted(path)}: {name} has {length} lines"
 
 

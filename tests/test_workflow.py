@@ -66,8 +66,12 @@ def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
         assert curve["lyapunov_exponent"]["value"] == result.lyapunov_exponent.value
         assert set(curve["stability_index"]) >= {"value", "perturbation"}
         assert curve["variance_rate"]["value"] > 0
-        assert curve["mesh"] == result.mesh
-        assert curve["mesh"]["unknowns"] > 100
+        used = curve["discretisation"]
+        assert used == result.discretisation
+        assert used["xi"] == "polynomials"
+        assert used["unknowns"] == used["xi_size"] * sum(degree + 1 for degree in used["phi_degrees"])
+        assert len(used["phi_degrees"]) == used["phi_cells"]
+        assert used["tilt"] > 0
         assert curve["warnings"] == []
     assert summary["curves"][1]["moments"][0]["value"] == pytest.approx(0.0141631436533, rel=1e-10)
     assert summary["curves"][1]["moments"][0]["perturbation"] == pytest.approx(0.014149421727, rel=1e-10)
@@ -143,12 +147,13 @@ def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
 
 def test_failures_are_values(tmp_path):
     text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
+    text += '[[expect]]\nquantity = "moment"\np = 2.0\nvalue = 0.0\natol = 10.0\nsource = "any"\n'
     case = write(tmp_path, text, [HOPELESS])
     outcome, checked = run_case(case, tmp_path / "out"), check_case(case)
-    for results in (outcome.results, checked.results):
-        assert [[failure.p for failure in result.failures] for result in results] == [[], [2.0]]
+    for results, failed in ((outcome.results, [2.0, -1.0]), (checked.results, [2.0])):  # what is not expected is left
+        assert [sorted((each.p for each in result.failures), reverse=True) for result in results] == [[], failed]
         assert not {failure.reason for failure in results[1].failures} & set(results[1].warnings)
-    assert len(outcome.failures) == len(checked.failures) == 1
+    assert (len(outcome.failures), len(checked.failures)) == (2, 1)
     assert not outcome.interrupted
     curves = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
     assert curves[1]["warnings"] == [*outcome.results[1].warnings, *outcome.failures]

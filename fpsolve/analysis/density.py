@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -77,26 +76,26 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     ω ρ, or |dφ/dt| ρ where the noise moves the phase there, is the probability flux through an impact, where the
     log-amplitude jumps by ln R; it is taken on the side from where the impact is met.
     """
-    space, system = pair.generator.space, pair.generator.problem.system
+    space, system = pair.space, pair.generator.problem.system
     growth = stationary_density(pair).mean(lambda phi, xi: growth_rate(system, xi)(phi))
-    turns, table = 2 * math.pi / space.mesh.span, space.table(pair.left)
+    table = space.table(pair.left)
     for kick in system.kicks:
-        at = space.mesh.vertices_at(kick.phase)
-        for traces, direction in ((space.left_trace[at], 1), (space.right_trace[at], -1)):
+        at = space.phi.vertices_at(kick.phase)
+        for traces, direction in ((space.phi.left_trace[at], 1), (space.phi.right_trace[at], -1)):
 
             def flux(xi: Any, phi: float = kick.phase, sign: int = direction) -> Any:
                 return np.maximum(sign * phase_speed(system, xi)(phi), 0)
 
             density = np.sum(traces @ table, axis=0)
-            growth += turns * kick.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant()))
+            growth += space.turns * kick.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant()))
     return growth
 
 
 def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Density:
     """One of the `Fields`, normalised, repeated from a half circle to the full one."""
-    space, at = pair.generator.space, pair.generator.space.xi.samples()
-    turns = round(2 * math.pi / space.mesh.span)
+    space, at = pair.space, pair.space.xi.samples()
+    turns = space.turns
     values = np.tile(getattr(fields(pair, space.phi.values, at), name), (turns, 1))
-    phi = np.concatenate([space.phi.points + k * space.mesh.span for k in range(turns)])
+    phi = np.concatenate([space.phi.points + k * space.phi.span for k in range(turns)])
     phi_weights = np.tile(space.phi.weights, turns)
     return Density(phi, at.xi, phi_weights, at.measure, values / (phi_weights @ values @ at.measure))

@@ -17,7 +17,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
 from fpsolve.errors import MeshError
 from fpsolve.exponent.quantities import DrawnName, QuantityName
-from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh
+from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, vertices_at
 from fpsolve.fem.mesh_file import read_mesh
 from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.model.parameters import STRICT, parameter
@@ -157,7 +157,7 @@ class MeshSection(Section):
         path = folder / self.file
         mesh = read_mesh(path)
         try:
-            mesh.vertices_at(math.pi / 2)
+            vertices_at(mesh.phi_lines, math.pi / 2)
         except MeshError as failure:
             raise MeshError(f"{path}: {failure}") from failure
         return mesh

@@ -1,8 +1,7 @@
-"""Choosing the discretisation: noise interval, tilt, cells and degrees, until Λ(p) meets a tolerance.
+"""Choosing the discretisation: functions of the noise, cells and degrees in φ, until Λ(p) meets a tolerance.
 
-Each stage is solved on a mesh and on a finer one. How fast the effect of a cell's modes falls with their degree is how
-fast the cell converges, and decides between a higher degree and smaller cells. The noise interval is cut where the
-tilted density leaves too little for the tolerance, and the functions are tilted towards where it lies.
+How fast the effect of a cell's modes falls with their degree is how fast the cell converges, and decides between a
+higher degree and smaller cells. Polynomials of the noise are tilted towards where the tilted density lies.
 """
 
 from __future__ import annotations
@@ -11,34 +10,39 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError, NotConverged, Remedy
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.error import ModeEffects, Solution, Stage, mode_effects, noise_marginal, truncation
+from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.error import ModeEffects, Solution
 from fpsolve.exponent.rival import rival
-from fpsolve.fem.mesh import CylinderMesh, halved
-from fpsolve.fem.space import unknowns
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.mesh import MAX_DEGREE, halved
+from fpsolve.fem.space import Discretisation
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import System, phase_speed
 from fpsolve.model.problem import AnyNoise, Problem
-from fpsolve.theory.frozen import growth_without_turning, likely_center
+from fpsolve.theory.frozen import frozen_noise
 
-MAX_PHI_DEGREE, MAX_XI_DEGREE = 14, 10
-MAX_STAGES, MOST_CANCELLED = 40, 30.0
-LEAST_TILT = 2.5
-"""Distance of the tilted density from z = 0 from which on the functions carry an exponential factor."""
-SAFETY = 3.0
-"""An estimate may be too small by this factor; it must lie below the tolerance by as much."""
-TRUNCATION_SHARE, DIRECTION_SHARE = 1e-4, 0.2
-"""Shares of the tolerance for the ends of the noise interval, and for each direction."""
-SECONDS_PER_UNKNOWN = 3e-7
+HALVING = 2 * math.log(2)
+"""By how much more the logarithm of an effect falls with each degree in half a cell."""
+MAX_POLYNOMIALS = 200
+MAX_STAGES, FREE_STAGES = 30, 4
+"""From the second number of stages on, no cell is made coarser."""
+SHARE = 0.05
+"""Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
+LEAST_DEGREE, SPLIT_DEGREE, MOST_DEGREE = 4, 6, 14
+WORTH_A_TRY = 350
+"""Unknowns of a system that takes less time than finding another one."""
+MOST_TILT_AWAY = 0.7
+"""How far the tilt of a space may be from the best one at another p."""
+SECONDS_PER_UNKNOWN = 3e-8
 """A solve takes about this times the power 1.5 of the number of unknowns; it is corrected by the last one."""
 
 
@@ -58,13 +62,6 @@ class Budget:
     seconds: Annotated[float, parameter("time for one p", "seconds = 60.0", gt=0)] = 60.0
 
 
-def fits(stage: Stage, problem: Problem, old: float, new: float) -> bool:
-    """Whether a stage that serves one p is likely to reach where the tilted density of another lies."""
-    tilt = stage.coarse.space.xi.tilt
-    way = abs(likely_center(problem, new) - likely_center(problem, old))
-    return way <= 3.0 and (new != 0 or tilt == 0)
-
-
 def resolve(
     problem: Problem,
     p: float,
@@ -72,24 +69,27 @@ def resolve(
     tolerance: Callable[[float], float],
     rtol: float,
     budget: Budget,
-) -> tuple[Stage, Solution]:
-    """A stage on which the error of Λ(p) is within a tolerance, and the solution there.
+    start: Solution | None = None,
+) -> Solution:
+    """A solution whose error of Λ(p) is within a tolerance.
 
     Args:
         p: the moment, not 0, where Λ has no scale.
         tolerance: the largest error allowed, from a value of Λ(p).
-        rtol: about what that is relative to the size of Λ(p), for a first mesh.
+        rtol: about what that is relative to the size of Λ(p), for a first discretisation.
+        start: a solution at p that does not suffice, to go on from.
 
     Raises:
         NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
             `Solution`, or None.
     """
     meter = _Meter(problem.noise, p, budget)
-    found = _search(problem, likely_center(problem, p), tolerance, rtol, meter)
-    elsewhere = rival(found[1].pair)
+    frozen = frozen_noise(problem)
+    found = _search(problem, frozen.center(p) if frozen else 0.0, tolerance, rtol, meter, start)
+    elsewhere = rival(found.pair)
     if elsewhere is not None:
         other = _search(problem, elsewhere, tolerance, rtol, meter)
-        found = max(found, other, key=lambda item: item[1].pair.value)
+        found = max(found, other, key=lambda each: each.pair.value)
     return found
 
 
@@ -99,31 +99,28 @@ def _search(
     tolerance: Callable[[float], float],
     rtol: float,
     meter: _Meter,
-) -> tuple[Stage, Solution]:
+    start: Solution | None = None,
+) -> Solution:
     """What `resolve` promises, with the tilted density sought around some z."""
-    p, start = meter.p, None
-    mesh_and_tilt = _affordable(problem, center, rtol, meter.budget)
-    guess = growth_without_turning(problem, p, center)
+    p, pair = meter.p, None
+    if start is None:
+        chosen = first(problem, p, center, rtol)
+    else:
+        chosen, pair = refined(start, tolerance(start.pair.value), 0), start.pair
     while True:
-        mesh, tilt = mesh_and_tilt
-        meter.check(mesh)
+        meter.check(chosen)
         try:
-            stage = Stage.on(problem, mesh, tilt)
-            pair = principal_pair(stage.coarse, p, start=start, guess=guess)
-            allowed = tolerance(pair.value)
-            moved = _moved(pair, TRUNCATION_SHARE * allowed)
-            if moved is not None and meter.obstacle(moved[0]) is None:
-                mesh_and_tilt, start = moved, pair
-                continue
-            solution = Solution(pair, principal_pair(stage.fine, p, start=pair, guess=guess))
+            pair = principal_pair(Generator(problem, chosen), p, start=pair)
         except (MeshError, NotConverged, RuntimeError, np.linalg.LinAlgError) as failure:
-            meter.failure, start = failure, None
-            mesh_and_tilt = _halved(mesh), tilt
+            meter.failure, pair = failure, None
+            chosen = _doubled(chosen)
             continue
-        if SAFETY * solution.error <= allowed:
-            return stage, solution
+        solution = Solution(pair)
+        allowed = tolerance(pair.value)
+        if solution.error <= allowed:
+            return solution
         meter.note(solution, allowed)
-        mesh_and_tilt, start = (_refined(solution, allowed), tilt), solution.finer
+        chosen = refined(solution, allowed, meter.stages)
 
 
 @dataclass
@@ -138,31 +135,20 @@ class _Meter:
     best: Solution | None = None
     share: float = math.inf
     failure: Exception | None = None
-    cost: float = SECONDS_PER_UNKNOWN
     last: tuple[float, int] = (0.0, 0)
 
-    def check(self, mesh: CylinderMesh) -> None:
+    def check(self, chosen: Discretisation) -> None:
         """Refuse a stage beyond the budget, and count it."""
-        if self.last[1]:
-            self.cost = max(SECONDS_PER_UNKNOWN, (self.elapsed - self.last[0]) / self.last[1] ** 1.5)
-        obstacle = self.obstacle(mesh)
-        if obstacle:
-            self.stop(obstacle)
-        self.last, self.stages = (self.elapsed, unknowns(mesh.enriched(1.0), self.noise)), self.stages + 1
-
-    def obstacle(self, mesh: CylinderMesh) -> str | None:
-        """Why the budget does not suffice for a stage, or None."""
-        size = unknowns(mesh.enriched(1.0), self.noise)
-        seconds = self.elapsed + self.cost * size**1.5
+        size, elapsed = chosen.unknowns(self.noise), time.thread_time() - self.started
+        cost = max(SECONDS_PER_UNKNOWN, (elapsed - self.last[0]) / max(self.last[1], 1) ** 1.5 if self.last[1] else 0.0)
+        seconds = elapsed + cost * size**1.5
         if size > self.budget.unknowns:
-            return f"the next mesh has {size} unknowns, more than budget.unknowns = {self.budget.unknowns}"
+            self.stop(f"the next mesh has {size} unknowns, more than budget.unknowns = {self.budget.unknowns}")
         if seconds > self.budget.seconds:
-            return f"the next mesh needs some {seconds:.2g} s, more than budget.seconds = {self.budget.seconds:g}"
-        return f"{MAX_STAGES} meshes were tried" if self.stages >= MAX_STAGES else None
-
-    @property
-    def elapsed(self) -> float:
-        return time.thread_time() - self.started
+            self.stop(f"the next mesh needs some {seconds:.2g} s, more than budget.seconds = {self.budget.seconds:g}")
+        if self.stages >= MAX_STAGES:
+            self.stop(f"{MAX_STAGES} meshes were tried")
+        self.last, self.stages = (elapsed, size), self.stages + 1
 
     def note(self, solution: Solution, allowed: float) -> None:
         """Keep the best solution; stop where only rounding is left."""
@@ -187,46 +173,42 @@ class _Meter:
         )
 
 
-def _halved(mesh: CylinderMesh) -> CylinderMesh:
-    """Twice the cells each way, where nothing is known yet."""
-    return replace(mesh, phi_lines=halved(mesh.phi_lines), z_lines=halved(mesh.z_lines))
+def fits(generator: Generator, q: float, p: float) -> bool:
+    """Whether what serves q is likely to serve p, or so small that it is worth a try."""
+    frozen = frozen_noise(generator.problem)
+    if generator.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
+        return False
+    if frozen is None or not generator.chosen.polynomials:
+        return True
+    return abs(frozen.tilt(frozen.center(p)) - generator.chosen.slope * p) <= MOST_TILT_AWAY
 
 
-def _affordable(problem: Problem, center: float, rtol: float, budget: Budget) -> tuple[CylinderMesh, float]:
-    """The first mesh and tilt, for a larger rtol where the budget allows no more: it gives at least a partial value."""
-    most = min(budget.unknowns, (budget.seconds / SECONDS_PER_UNKNOWN) ** (2 / 3))
-    while True:
-        mesh, tilt = _initial(problem, center, rtol)
-        if unknowns(mesh.enriched(1.0), problem.noise) <= most or rtol > 1e-3:
-            return mesh, tilt
-        rtol *= 10
-
-
-def _initial(problem: Problem, center: float, rtol: float) -> tuple[CylinderMesh, float]:
-    """A first mesh and tilt for a tilted density around some z."""
-    noise, degree = problem.noise, round(3 - math.log10(rtol))
-    phi_degree, xi_degree = min(max(degree - 2, 4), MAX_PHI_DEGREE), min(max(degree - 4, 3), MAX_XI_DEGREE)
+def first(problem: Problem, p: float, center: float, rtol: float) -> Discretisation:
+    """A first discretisation, small, for a tilted density around some z."""
+    noise, system, digits = problem.noise, problem.system, -math.log10(rtol)
     if isinstance(noise, MarkovChain):
-        cells = _phi_cells(problem.system, np.array(noise.states), np.array(noise.states))
-        return CylinderMesh(_phi_lines(problem.system, cells), np.zeros(0), phi_degree, xi_degree), 0.0
-    unit, reach = noise.standard_deviation, math.sqrt(2 * math.log(1e5 / rtol))
-    lower, upper = (center, center) if abs(center) > LEAST_TILT else (min(center, 0.0), max(center, 0.0))
+        states = np.array(noise.states)
+        return _with_phi(Discretisation(np.zeros(0), None), system, states, digits)
+    unit = noise.standard_deviation
     end = noise.half_width / unit
-    lower, upper = max(lower - reach, -end), min(upper + reach, end)
-    if not upper - lower > 0.1:  # the center lies beyond the support
-        lower, upper = (end - 1, end) if center > 0 else (-end, 1 - end)
-    cells = _phi_cells(problem.system, unit * np.array([lower, upper]), unit * reach * np.array([-1.0, 1.0]))
-    z_lines = _xi_lines(lower, upper, has_algebraic_tails(noise))
-    return CylinderMesh(_phi_lines(problem.system, cells), z_lines, phi_degree, xi_degree), _tilt(center)
+    reach = np.clip(center + np.array([-2.0, 2.0]), -end, end)
+    if has_algebraic_tails(noise):
+        chosen = Discretisation(np.zeros(0), None, z_lines=_graded(12.0 + abs(center)), xi_degree=round(2 + digits / 2))
+    else:
+        frozen = frozen_noise(problem)
+        slope = frozen.tilt(center) / p if frozen else 0.0
+        count = round(digits / 2) + (3 if math.isinf(end) else 5)
+        chosen = Discretisation(np.zeros(0), None, polynomials=count, slope=slope)
+    return _with_phi(chosen, system, unit * reach, digits)
 
 
-def _phi_cells(system: System, ends: FloatArray, reach: FloatArray) -> int:
-    """More where the phase turns back for a ξ at one of the ends, or its speed changes much within the reach of ξ."""
-    widest, usual = (
-        float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
-        for speed in (phase_speed(system, ends), phase_speed(system, reach))
-    )
-    return 6 if widest > 1 else 2 if usual > 0.25 else 1
+def _with_phi(chosen: Discretisation, system: System, xi: FloatArray, digits: float) -> Discretisation:
+    """With cells in φ, more where its speed changes much for some of the ξ."""
+    speed = phase_speed(system, xi)
+    widest = float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
+    lines = _phi_lines(system, 8 if widest > 1 else 4 if widest > 0.5 else 2)
+    degrees = np.full(lines.size - 1, round(np.clip(digits + 2 - (widest > 0.5) * 4, 4, MOST_DEGREE)))
+    return replace(chosen, phi_lines=lines, phi_degrees=degrees)
 
 
 def _phi_lines(system: System, cells: int) -> FloatArray:
@@ -238,85 +220,69 @@ def _phi_lines(system: System, cells: int) -> FloatArray:
     return np.sort(np.concatenate([lines[:1], lines[1:-1][~near], lines[-1:], others]))
 
 
-def _tilt(center: float) -> float:
-    return 0.5 * center if abs(center) > LEAST_TILT else 0.0
+def _graded(end: float) -> FloatArray:
+    """Lines on both sides, further apart further out."""
+    steps = np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
+    side = np.append(steps[steps < 0.8 * end], end)
+    return np.concatenate([-side[:0:-1], side])
 
 
-def _xi_lines(lower: float, upper: float, algebraic: bool) -> FloatArray:
-    """Lines at most 3.6 noise units apart, further out for algebraic tails."""
-    if algebraic:
-        steps = np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
-        above, below = (np.append(steps[steps < 0.8 * end], end) for end in (upper, -lower))
-        return np.concatenate([-below[:0:-1], above])
-    return np.linspace(lower, upper, max(2, math.ceil((upper - lower) / 3.6)) + 1)
+def _doubled(chosen: Discretisation) -> Discretisation:
+    """Twice as many functions each way, where nothing is known yet."""
+    fine = replace(chosen, phi_lines=halved(chosen.phi_lines), phi_degrees=np.repeat(chosen.phi_degrees, 2))
+    if chosen.polynomials:
+        return replace(fine, polynomials=min(2 * chosen.polynomials, MAX_POLYNOMIALS))
+    return replace(fine, z_lines=halved(chosen.z_lines)) if chosen.z_lines.size else fine
 
 
-def _refined(solution: Solution, tolerance: float) -> CylinderMesh:
-    """A mesh on which every cell's effect should be its share of the tolerance.
+def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation:
+    """A discretisation on which every cell should lack no more than its share of the tolerance."""
+    chosen, noise = solution.pair.generator.chosen, solution.pair.generator.problem.noise
+    share, may_coarsen = SHARE * tolerance, stages < FREE_STAGES
+    phi, xi = solution.effects
+    lines, degrees = _split(chosen.phi_lines, phi, share, may_coarsen)
+    new = replace(chosen, phi_lines=lines, phi_degrees=degrees)
+    if xi and chosen.polynomials:
+        needed = math.ceil(float(xi.needed(share)[0]) + 1.3)
+        least = max(chosen.polynomials // 2, 3) if may_coarsen else chosen.polynomials
+        most = min(3 * chosen.polynomials // 2 + 3, MAX_POLYNOMIALS)
+        new = replace(new, polynomials=max(least, min(needed, most)))
+    elif xi:
+        lines, degrees = _split(chosen.z_lines, xi, share, may_coarsen)
+        new = replace(new, z_lines=_reaching(lines, solution, share), xi_degree=int(np.max(degrees)))
+    grows = new.unknowns(noise) > chosen.unknowns(noise)
+    return new if grows or solution.error <= tolerance else _raised(new)
 
-    The effects are calibrated by the error measured, as their parts cancel, or what a cell lacks harms others.
+
+def _split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool) -> tuple[FloatArray, Any]:
+    """Lines and a degree for each cell with which all together should lack no more than a share.
+
+    A cell is halved where that takes fewer unknowns: in a smaller cell the effects fall faster.
     """
-    mesh = solution.pair.generator.space.mesh
-    effects = [mode_effects(solution.finer, axis) for axis in range(len(solution.pair.generator.space.axes))]
-    seen = sum(each.above(degree) for each, degree in zip(effects, (mesh.phi_degree, mesh.xi_degree), strict=False))
-    share = DIRECTION_SHARE * tolerance * min(MOST_CANCELLED, seen / solution.error)
-    phi_lines, phi_degree = _split(mesh.phi_lines, MAX_PHI_DEGREE, effects[0], share)
-    new = replace(mesh, phi_lines=phi_lines, phi_degree=phi_degree)
-    if len(effects) > 1:
-        z_lines, xi_degree = _split(mesh.z_lines, MAX_XI_DEGREE, effects[1], share)
-        new = replace(new, z_lines=z_lines, xi_degree=xi_degree)
-    noise = solution.pair.generator.problem.noise
-    return new if unknowns(new, noise) > unknowns(mesh, noise) else mesh.enriched(1.0)
+    rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
+    if not may_coarsen:
+        needed = np.maximum(needed, effects.degrees)
+    in_half = needed * rate / (rate + HALVING)
+    is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)
+    is_split |= needed > MOST_DEGREE
+    degrees = np.ceil(np.where(is_split, in_half, needed) + 0.2)
+    degrees = np.clip(degrees, np.maximum(LEAST_DEGREE, effects.degrees - 4), effects.degrees + 4)
+    new = [np.linspace(a, b, n + 2)[:-1] for a, b, n in zip(lines[:-1], lines[1:], is_split, strict=True)]
+    return np.concatenate([*new, lines[-1:]]), np.repeat(np.minimum(degrees, MOST_DEGREE).astype(int), is_split + 1)
 
 
-def _split(lines: FloatArray, most: int, effects: ModeEffects, tolerance: float) -> tuple[FloatArray, int]:
-    """Lines and a degree, at most `most`, with which every cell's effect should meet the tolerance."""
-    needed = effects.needed(max(tolerance, 1e-290) / math.sqrt(lines.size - 1))
-    parts = np.where(needed > 3 * most, 3, np.where(needed > most, 2, 1))
-    new = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(lines[:-1], lines[1:], parts, strict=True)]
-    wanted = math.ceil(np.max(needed / parts + (parts > 1)) + 0.3)  # parts of a cell need about as much less
-    return np.concatenate([*new, lines[-1:]]), int(np.clip(wanted, 4, most))
+def _raised(chosen: Discretisation) -> Discretisation:
+    """One more function each way, where what a cell lacks harms others."""
+    if chosen.polynomials:
+        chosen = replace(chosen, polynomials=min(chosen.polynomials + 2, MAX_POLYNOMIALS))
+    elif chosen.xi_degree:
+        chosen = replace(chosen, xi_degree=min(chosen.xi_degree + 1, MAX_DEGREE))
+    return replace(chosen, phi_degrees=np.minimum(chosen.phi_degrees + 1, MAX_DEGREE))
 
 
-def _moved(pair: PrincipalPair, tolerance: float) -> tuple[CylinderMesh, float] | None:
-    """A mesh whose ends, and a tilt, follow the tilted density; None where they already do."""
-    space, noise = pair.generator.space, pair.generator.problem.noise
-    if isinstance(noise, MarkovChain):
-        return None
-    mesh, end = space.mesh, noise.half_width / noise.standard_deviation
-    effects, is_algebraic = truncation(pair), has_algebraic_tails(noise)
-    z, density = noise_marginal(pair)
-    ends = []
-    for sign, line, effect in zip((-1, 1), mesh.z_lines[[0, -1]], effects, strict=True):
-        is_short = effect > tolerance and abs(line) < end * (1 - 1e-12)
-        way = _extension(sign * (z - line), density, effect / tolerance, abs(line) * is_algebraic) if is_short else 0.0
-        ends.append(float(np.clip(line + sign * way, -end, end)))
-    tilt = _tilt(float(z @ density / density.sum()))
-    if abs(tilt - space.xi.tilt) <= 1.0:
-        tilt = space.xi.tilt
-    if tilt == space.xi.tilt and ends == [*mesh.z_lines[[0, -1]]]:
-        return None
-    new = _xi_lines(ends[0], ends[1], is_algebraic)
-    step = 0.3 * np.min(np.diff(new))
-    kept = mesh.z_lines[(mesh.z_lines > ends[0] + step) & (mesh.z_lines < ends[1] - step)]
-    if tilt == space.xi.tilt and kept.size:
-        outer = new[(new < kept[0] - step) | (new > kept[-1] + step)]
-        new = np.sort(np.concatenate([kept, outer]))
-    return replace(mesh, z_lines=new), tilt
-
-
-def _extension(outward: FloatArray, density: FloatArray, excess: float, algebraic_at: float) -> float:
-    """How far an end must move out to lessen its effect by a factor, from how the density falls towards it.
-
-    Args:
-        outward: distances from the end, negative, with the `density` there.
-        excess: the factor.
-        algebraic_at: |z| of the end where the tail is algebraic, 0 where it is like a Gaussian.
-    """
-    near, width = outward >= min(-2.0, float(np.sort(outward)[-6])), float(np.ptp(outward))
-    fall = -np.polyfit(outward[near], np.log(np.maximum(density[near], 1e-300)), 1)[0]
-    if algebraic_at and fall * algebraic_at > 2:
-        return algebraic_at * math.expm1(min(math.log(excess) / (fall * algebraic_at - 1), 1.2))
-    if algebraic_at or fall < 0.3:
-        return 0.7 * width
-    return min(0.3 - fall + math.sqrt(fall**2 + 2 * math.log(excess)), 1.5 * width)
+def _reaching(lines: FloatArray, solution: Solution, share: float) -> FloatArray:
+    """Lines with a further cell at each end whose effect is more than a share of the tolerance."""
+    lower, upper = solution.truncation
+    below = [1.6 * lines[0]] if lower > share else []
+    above = [1.6 * lines[-1]] if upper > share else []
+    return np.concatenate([below, lines, above])

@@ -13,16 +13,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse import bmat
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
+from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.generator import Generator
+from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.space import CylinderSpace
 from fpsolve.model.markov_chain import MarkovChain
 
@@ -34,7 +35,11 @@ SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
 _EPS = float(np.finfo(float).eps)
 MAX_ITERATIONS = 12
-STEPS_PER_FACTOR = 3
+REFINEMENTS = 3
+"""Of T′, by each of which its error falls to 1e-6 of a rate over the gap of the spectrum."""
+STEPS_PER_FACTOR = 5
+SLOW = 1e-2
+"""A step that lowers the backward error by less than this factor calls for new LU factors."""
 MAX_DENSE_UNKNOWNS = 4000
 SURVEYED_UNKNOWNS = 600
 """Up to so many, a chain is checked by all eigenvalues."""
@@ -66,38 +71,38 @@ class PrincipalPair:
     sign_defects: tuple[float, float]
     generator: Generator = field(repr=False)
 
+    @property
+    def space(self) -> CylinderSpace:
+        """The functions that the coefficients are of."""
+        return self.generator.space(self.p)
+
 
 def principal_pair(
     generator: Generator,
     p: float,
     *,
     start: PrincipalPair | Sequence[PrincipalPair] | None = None,
-    guess: float | None = None,
 ) -> PrincipalPair:
     """The principal eigenvalue Λ(p) of Eq. (19) with T and T*.
 
     Args:
         generator: the discrete tilted generator.
         p: the moment.
-        start: the pair of a neighbouring p or of another mesh, or several pairs of one mesh, between which the
-            eigenfunctions are interpolated in p; it saves time.
-        guess: a number near Λ(p), where a positive T is sought if a mesh with unresolved layers has spurious
-            eigenvalues on the right.
+        start: the pair of a neighbouring p or of another generator, or several pairs, between which the eigenfunctions
+            are interpolated in p where they are of this generator; it saves time.
 
     Raises:
         NotConverged: the iteration stalls, or both T and T* change sign: the mesh does not resolve the problem.
             `partial` is the pair that was reached.
     """
-    one = generator.space.constant()  # T₀ and T₀*/P_s of weak noise, Eqs. (26) and (28)
+    one = generator.space(p).constant()  # T₀ and T₀*/P_s of weak noise, Eqs. (26) and (28)
     pairs = [start] if isinstance(start, PrincipalPair) else start
     searches: list[Callable[[], tuple[FloatArray, FloatArray]]] = [
-        lambda: _carried(pairs, p, generator.space) if pairs else (one, one),
+        lambda: _carried(pairs, p, generator) if pairs else (one, one),
         lambda: _from_the_right(generator, p),
     ]
     if isinstance(generator.problem.noise, MarkovChain):  # states that hardly mix have a positive pair each
         searches.reverse()
-    if guess is not None:
-        searches.append(lambda: _most_positive(generator, p, guess))
     found: list[PrincipalPair] = []
     for search in searches:
         try:
@@ -124,7 +129,7 @@ def _rightmost(pair: PrincipalPair) -> PrincipalPair:
     States may hardly mix, or the phase not leave a ray: then other pairs have a positive T, or T*, too.
     """
     generator = pair.generator
-    if isinstance(generator.problem.noise, MarkovChain) and generator.space.size <= SURVEYED_UNKNOWNS:
+    if isinstance(generator.problem.noise, MarkovChain) and generator.size <= SURVEYED_UNKNOWNS:
         rightmost = spectrum(generator, pair.p, 1)[0]
         if abs(rightmost - pair.value) > 1e-6 * max(abs(rightmost), generator.unit_rate):
             raise NotConverged(
@@ -135,17 +140,31 @@ def _rightmost(pair: PrincipalPair) -> PrincipalPair:
     return pair
 
 
+def slope_rounding(pair: PrincipalPair) -> float:
+    """Bound on the effect of rounding on Λ′."""
+    slope = pair.generator.matrix(pair.p, derivative=1)
+    return float(_EPS * (abs(pair.left) @ (abs(slope) @ abs(pair.right))) * pair.space.turns)
+
+
 def second_derivative(pair: PrincipalPair) -> float:
-    """Λ″(p) = ⟨T*, L″T⟩ + 2⟨T*, (L′ − Λ′)T′⟩, T′ from the bordered system (L − Λ)T′ = −(L′ − Λ′)T, ⟨T*, T′⟩ = 0."""
-    generator, x, y = pair.generator, pair.right, pair.left
-    mass, slope = generator.mass, generator.matrix(pair.p, derivative=1)
-    norm = y @ (mass @ x)
-    source = slope @ x - pair.derivative * (mass @ x)
-    singular = generator.matrix(pair.p, shift=pair.value)
-    system = bmat([[singular, (mass @ x)[:, None]], [(y @ mass)[None], None]], format="csc")
-    change = _factor(system).solve(np.append(-source, 0.0))[:-1]
+    """Λ″(p) = ⟨T*, L″T⟩ + 2⟨T*, (L′ − Λ′)T′⟩, T′ from the bordered system (L − Λ)T′ = −(L′ − Λ′)T, ⟨T*, T′⟩ = 0.
+
+    The system is solved with a shift a little off Λ, and what that leaves of T in T′ is removed.
+    """
+    generator, x, y, p = pair.generator, pair.right, pair.left, pair.p
+    mass, slope = generator.mass(p), generator.matrix(p, derivative=1)
+    weighed = mass @ x
+    norm = y @ weighed
+    source = pair.derivative * weighed - slope @ x
+    operator, change = generator.matrix(p, shift=pair.value), np.zeros_like(x)
+    factor = factorised(generator.matrix(p, shift=pair.value + 1e-6 * generator.unit_rate))
+    for _ in range(REFINEMENTS):
+        rest = source - operator @ change
+        rest -= (y @ rest) / norm * weighed
+        change += factor.solve(rest)
+        change -= (y @ (mass @ change)) / norm * x
     mixed = y @ (slope @ change) - pair.derivative * (y @ (mass @ change))
-    return float((y @ (generator.matrix(pair.p, derivative=2) @ x) + 2 * mixed) / norm)
+    return float((y @ (generator.matrix(p, derivative=2) @ x) + 2 * mixed) / norm)
 
 
 def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
@@ -157,63 +176,41 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
     Raises:
         ValueError: k is not from 1 to the number of unknowns, or these exceed `MAX_DENSE_UNKNOWNS`.
     """
-    size = generator.space.size
+    size = generator.size
     if size > MAX_DENSE_UNKNOWNS:
         raise ValueError(f"{size} unknowns; the whole spectrum takes at most {MAX_DENSE_UNKNOWNS}: use a coarser mesh")
     if not 1 <= k <= size:
         raise ValueError(f"k is {k}; it must be from 1 to the number of unknowns, {size}")
-    root = scipy.linalg.cholesky(generator.mass.toarray(), lower=True)
+    root = scipy.linalg.cholesky(generator.mass(p).toarray(), lower=True)
     half = scipy.linalg.solve_triangular(root, generator.matrix(p).toarray(), lower=True)
     matrix = scipy.linalg.solve_triangular(root, half.T, lower=True).T
     values = scipy.linalg.eigvals(matrix, overwrite_a=True)
     return values[np.lexsort((values.imag, -values.real))][:k]
 
 
-def _carried(pairs: Sequence[PrincipalPair], p: float, space: CylinderSpace) -> tuple[FloatArray, FloatArray]:
-    """Both eigenfunctions at p, by Lagrange interpolation between pairs of one mesh, on a space."""
-    old, nodes = pairs[0].generator.space, [pair.p for pair in pairs]
-    weights = [math.prod((p - q) / (pair.p - q) for q in nodes if q != pair.p) for pair in pairs]
-    right = np.sum([weight * pair.right for weight, pair in zip(weights, pairs, strict=True)], axis=0)
-    left = np.sum([weight * pair.left for weight, pair in zip(weights, pairs, strict=True)], axis=0)
-    return (right, left) if old is space else (space.carry(right, old), space.carry(left, old))
-
-
-def _factor(matrix: Any) -> Any:
-    """LU factors, ordered for a symmetric pattern and pivoting only where it must: half the time and the fill-in."""
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01)
+def _carried(pairs: Sequence[PrincipalPair], p: float, generator: Generator) -> tuple[FloatArray, FloatArray]:
+    """Both eigenfunctions at p, by Lagrange interpolation between pairs of one generator, or from one of another."""
+    kept = [pair for pair in pairs if pair.generator is generator]
+    if not kept:
+        nearest, space = min(pairs, key=lambda pair: abs(pair.p - p)), generator.space(p)
+        return space.carry(nearest.right, nearest.space), space.carry(nearest.left, nearest.space)
+    nodes = np.array([pair.p for pair in kept])
+    weights = np.array([math.prod((p - q) / (node - q) for q in nodes if q != node) for node in nodes])
+    return weights @ [pair.right for pair in kept], weights @ [pair.left for pair in kept]
 
 
 def _from_the_right(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
     """Right and left vectors near the principal ones, from shifts that start at an upper bound of Λ(p)."""
-    mass = generator.mass
+    space = generator.space(p)
     shift = generator.upper_bound(p) + 0.25 * generator.unit_rate
-    right = left = generator.space.constant()
+    right = left = space.constant()
     for _ in range(2):
-        factor = _factor(generator.matrix(p, shift=shift))
-        right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(mass @ v), right, p)
-        left, _unused = _dominant(lambda v, lu=factor: -lu.solve(mass @ v, trans="T"), left, p)
+        factor = factorised(generator.matrix(p, shift=shift))
+        right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, p)
         shift -= 0.95 / inverse_distance
-    return right, left
-
-
-def _most_positive(generator: Generator, p: float, guess: float) -> tuple[FloatArray, FloatArray]:
-    """Right and left vectors of that real eigenvalue among the nearest to a guess whose T is the most positive."""
-    factor, mass, one = _factor(generator.matrix(p, shift=guess)), generator.mass, generator.space.constant()
-    operator = LinearOperator(mass.shape, matvec=lambda v: factor.solve(mass @ v), dtype=float)
-    try:
-        inverse, vectors = eigs(operator, k=min(16, one.size - 2), v0=one, tol=1e-6, maxiter=200)
-    except ArpackNoConvergence:
-        return one, one
-    reals = [
-        (value.real, vector.real * np.sign(one @ (mass @ vector.real)))
-        for value, vector in zip(inverse, vectors.T, strict=True)
-        if abs(value.imag) <= 1e-6 * abs(value)
-    ]
-    if not reals:
-        return one, one
-    value, right = min(reals, key=lambda item: _sign_defects(generator, item[1], one)[0])
-    nearby = _factor(generator.matrix(p, shift=guess + 1 / value + 1e-8 * generator.unit_rate))
-    left = nearby.solve(mass @ nearby.solve(mass @ one, trans="T"), trans="T")
+    for _ in range(4):
+        left = factor.solve_transposed(space.weighed(left))
+        left /= -np.linalg.norm(left)
     return right, left
 
 
@@ -221,7 +218,7 @@ def _dominant(apply: Any, start: FloatArray, p: float) -> tuple[FloatArray, floa
     """The dominant eigenvector of a positive operator, and its eigenvalue, by Arnoldi iteration."""
     operator = LinearOperator((start.size, start.size), matvec=apply, dtype=float)
     try:
-        values, vectors = eigs(operator, k=1, v0=start, tol=1e-4, maxiter=200)
+        values, vectors = eigs(operator, k=1, v0=start, ncv=min(20, start.size - 1), tol=1e-3, maxiter=200)
     except ArpackNoConvergence as failure:
         raise NotConverged(
             f"the Arnoldi iteration for p = {p:g} did not settle; use more or higher-degree cells"
@@ -229,82 +226,102 @@ def _dominant(apply: Any, start: FloatArray, p: float) -> tuple[FloatArray, floa
     return vectors[:, 0].real, float(values[0].real)
 
 
+class _Iterate(NamedTuple):
+    """A two-sided Rayleigh quotient, the larger of the two backward errors, and both vectors, of length 1."""
+
+    value: float
+    residual: float
+    x: FloatArray
+    y: FloatArray
+
+
 def _rayleigh_iteration(generator: Generator, p: float, x: FloatArray, y: FloatArray) -> PrincipalPair:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
-    operator, mass = generator.matrix(p), generator.mass
-    size = np.max(abs(operator).sum(axis=0))
-    best = (*_quotient(operator, mass, size, x, y), x, y)
-    for step in range(MAX_ITERATIONS):
-        value, residual, x, y = best
-        if residual <= BACKWARD_ERROR_GOAL and step:  # the pair of a p very near by passes at once
-            break
-        try:
-            factor = _factor(generator.matrix(p, shift=value))
-        except RuntimeError:  # singular: the shift is the eigenvalue to the last bit
-            factor = _factor(generator.matrix(p, shift=value + 1e-10 * generator.unit_rate))
+    space, operator = generator.space(p), generator.matrix(p)
+    best, size, stalls = (
+        _Iterate(float(y @ (operator @ x) / (y @ space.weighed(x))), math.inf, x, y),
+        operator.norm(),
+        0,
+    )
+    for _ in range(MAX_ITERATIONS):
+        shift, last = best.value, best.residual
+        factor = factorised(operator.shifted(shift))
         for _ in range(STEPS_PER_FACTOR):
-            x, y = factor.solve(mass @ x), factor.solve(mass @ y, trans="T")
-            x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
-        if not (np.all(np.isfinite(x)) and np.all(np.isfinite(y))):
+            new = _improved(factor, space, shift, size, best)
+            if not new.residual < 0.5 * best.residual:
+                break
+            is_slow, best = new.residual > SLOW * best.residual, new
+            if is_slow or best.residual <= BACKWARD_ERROR_GOAL:
+                break
+        stalls = stalls + 1 if best.residual > 0.5 * last else 0
+        may_stall = int(best.residual > BACKWARD_ERROR_LIMIT)
+        if best.residual <= BACKWARD_ERROR_GOAL or stalls > may_stall or not math.isfinite(best.value):
             break
-        new = (*_quotient(operator, mass, size, x, y), x, y)
-        if new[1] > 0.5 * residual and residual <= BACKWARD_ERROR_LIMIT and step:
-            break
-        best = new
-    return _pair(generator, p, operator, *best)
+    if best.residual > 1e-3 * BACKWARD_ERROR_GOAL:  # the value from the forcing is linear in the error of T
+        best = _improved(factor, space, shift, size, best)
+    return _pair(generator, p, operator, best)
 
 
-def _quotient(operator: Any, mass: Any, size: float, x: FloatArray, y: FloatArray) -> tuple[float, float]:
-    """Two-sided Rayleigh quotient and the larger of the two backward errors."""
-    image, weighed = operator @ x, mass @ x
-    value = (y @ image) / (y @ weighed)
-    right = np.linalg.norm(image - value * weighed) / np.linalg.norm(x)
-    left = np.linalg.norm(operator.T @ y - value * (mass @ y)) / np.linalg.norm(y)
-    return float(value), float(max(right, left) / size)
+def _improved(factor: Factors, space: CylinderSpace, shift: float, size: float, old: _Iterate) -> _Iterate:
+    """One step of inverse iteration; of (L − σM) x₁ = M x₀ the images L x₁ need no product with L."""
+    images, vectors = [], []
+    for vector, solve in ((old.x, factor.solve), (old.y, factor.solve_transposed)):
+        source = space.weighed(vector)
+        new = solve(source)
+        length = np.linalg.norm(new)
+        vectors.append(new / length)
+        images.append(source / length)
+    weighed = [space.weighed(vector) for vector in vectors]
+    distance = float(vectors[1] @ images[0] / (vectors[1] @ weighed[0]))
+    errors = [np.linalg.norm(image - distance * each) for image, each in zip(images, weighed, strict=True)]
+    return _Iterate(shift + distance, float(max(errors) / size), *vectors)
 
 
-def _pair(
-    generator: Generator, p: float, operator: Any, value: float, residual: float, x: FloatArray, y: FloatArray
-) -> PrincipalPair:
+def _pair(generator: Generator, p: float, operator: KroneckerSum, found: _Iterate) -> PrincipalPair:
     """Normalise both vectors, judge their signs, and take Λ from the formula that rounding harms less."""
-    mass, one = generator.mass, generator.space.constant()
-    x = x * (one @ (mass @ one)) / (one @ (mass @ x))
-    y = y / (y @ (mass @ x) * 2 * np.pi / generator.space.mesh.span)
-    norm = y @ (mass @ x)
+    space, value = generator.space(p), float(found.value)
+    errors = [
+        np.linalg.norm(matrix @ vector - value * space.weighed(vector))
+        for matrix, vector in ((operator, found.x), (operator.T, found.y))
+    ]
+    one = space.constant()
+    weight, norm = space.weighed(one), 1 / space.turns
+    x = found.x * ((one @ weight) / (weight @ found.x))
+    y = found.y * (norm / (found.y @ space.weighed(x)))
     rounding = _EPS * (abs(y) @ (abs(operator) @ abs(x))) / norm
-    if generator.space.xi.tilt == 0 and generator.keeps_constants:
-        forcing, total = generator.matrix(p, orders=slice(1, None)), one @ (mass @ x)
-        bound = _EPS * (one @ (abs(forcing) @ abs(x))) / total
+    if generator.keeps_constants:
+        forcing, total = generator.matrix(p, orders=slice(1, None)), weight @ x
+        of_noise = np.outer(space.phi.constant, space.xi.generator_of_one()).ravel()
+        doubtful = abs(x) + generator.loss * abs(x - one)
+        bound = _EPS * float(one @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total
         if bound < rounding:
-            value, rounding = one @ (forcing @ x) / total, bound
+            value, rounding = float((one @ (forcing @ x) + of_noise @ x) / total), bound
     return PrincipalPair(
         p=p,
-        value=float(value),
+        value=value,
         right=x,
         left=y,
         derivative=float(y @ (generator.matrix(p, derivative=1) @ x) / norm),
-        residual=residual,
+        residual=float(max(errors) / operator.norm()),
         rounding=float(rounding),
-        sign_defects=_sign_defects(generator, x, y),
+        sign_defects=_sign_defects(space, x, y),
         generator=generator,
     )
 
 
-def _sign_defects(generator: Generator, x: FloatArray, y: FloatArray) -> tuple[float, float]:
+def _sign_defects(space: CylinderSpace, x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Shares of T and of T* that are not positive, by their own size or by |T T*|, whichever is larger.
 
-    On seven points each way of a cell. T T* looks where the tilted density lives: a strong tilt hides the sign change
-    of another pair from P_s.
+    T T* looks where the tilted density lives: a strong tilt hides the sign change of another pair from P_s.
     """
-    space = generator.space
-    local = np.linspace(0.05, 0.95, 7)
-    at_phi, samples = space.phi.evaluation(local)[1], space.xi.samples(local)
-    right, left = (space.evaluate(v, at_phi, samples.values) for v in (x, y))
-    weight = samples.weight
-    tilted = np.abs(right * left) * weight
+    right, left = (space.evaluate(v, space.phi.inner_values, space.xi.values) for v in (x, y))
+    tilted = np.abs(right * left) * space.xi.measure
 
     def share(values: FloatArray) -> float:
-        sizes = np.abs(values) * weight, tilted
-        return max(float(np.sum(size[values <= 0]) / np.sum(size)) for size in sizes)
+        negative = values <= 0
+        if not negative.any():
+            return 0.0
+        sizes = np.abs(values) * space.xi.measure, tilted
+        return max(float(np.sum(size[negative]) / np.sum(size)) for size in sizes)
 
     return share(right), share(left)

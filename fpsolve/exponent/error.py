@@ -1,28 +1,25 @@
-"""Where the error of Λ(p) comes from: a finer mesh, the modes of each cell, the ends of the noise interval.
+"""Where the error of Λ(p) comes from: the modes of each cell, the ends of a noise interval, rounding.
 
-The difference of Λ on a mesh and on the same mesh with higher degrees is the error of the first. The pair on the
-second, (Λ, T, T*), tells where it comes from: without the modes above degree k in one cell the Rayleigh quotient
-changes by exactly ⟨Q T*, (L − Λ) Q T⟩/⟨T*, T⟩, Q being the projection on those modes.
+Without its highest modes, a projection Q, the pair (Λ, T, T*) would have the Rayleigh quotient Λ plus exactly
+⟨Q T*, (L − Λ) Q T⟩/⟨T*, T⟩. Summed in absolute values over the unknowns of a cell, as their signs may cancel, that of
+the two highest modes bounds the error with a degree less by two, that of the four highest with a degree less by four,
+and how it falls tells what is left of it.
 """
 
 from __future__ import annotations
 
-import math
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged, Remedy
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.fields import xi_marginal
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.noise_space import DiffusionSpace
-from fpsolve.model.problem import Problem
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.fem.noise_space import CellSpace, NoiseSpace
+from fpsolve.fem.phase_space import PhaseSpace
 
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
@@ -59,119 +56,109 @@ def checked(name: str, estimate: Estimate) -> Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Λ(p) on a mesh and on a finer one.
+    """Λ(p) with the parts of its error.
 
     Attributes:
-        pair: the principal pair on the mesh.
-        finer: the one on the finer mesh, which measures the error of the first.
+        pair: the principal pair.
+        finer: that on a finer mesh, which measures the error of a given mesh: it may have few modes.
     """
 
     pair: PrincipalPair
-    finer: PrincipalPair
+    finer: PrincipalPair | None = None
+
+    @cached_property
+    def effects(self) -> tuple[ModeEffects, ModeEffects | None]:
+        """Those of φ, and those of ξ if it has elements."""
+        return mode_effects(self.pair)
 
     @cached_property
     def truncation(self) -> tuple[float, float]:
-        """What the lower and the upper end of the noise interval may change in Λ."""
+        """What the lower and the upper end of a noise interval may change in Λ."""
         return truncation(self.pair)
 
-    @property
+    @cached_property
     def error(self) -> float:
         """Estimate of the error of `pair.value`: discretisation, truncation and rounding."""
-        return abs(self.finer.value - self.pair.value) + sum(self.truncation) + self.pair.rounding
+        if self.finer is not None:
+            missing = abs(self.finer.value - self.pair.value)
+        else:
+            missing = sum(each.error for each in self.effects if each)
+        return missing + sum(self.truncation) + self.pair.rounding
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """A discretisation and the finer one that measures its error."""
+class ModeEffects:
+    """How much of Λ each cell of one direction owes to its highest modes.
 
-    coarse: Generator
-    fine: Generator
+    Attributes:
+        degrees: of the cells, shape (cells,).
+        two, four: the effects of the two and of the four highest modes, shape (cells,).
+        slowest: the least share of the effect of two modes that is thought to be left.
+    """
 
-    @classmethod
-    def on(
-        cls,
-        problem: Problem,
-        mesh: CylinderMesh,
-        tilt: float = 0.0,
-        widening: float = 1.0,
-    ) -> Stage:
-        """The stage of a mesh; its finer one has higher degrees, and an interval wider by a factor."""
-        coarse, fine = (Generator(problem, each, tilt) for each in (mesh, mesh.enriched(widening)))
-        return cls(coarse, fine)
+    degrees: Any
+    two: FloatArray
+    four: FloatArray
+    slowest: float = 0.0
 
-    def release(self) -> None:
-        """Give the memory of the matrices free until they are needed again."""
-        self.coarse.release()
-        self.fine.release()
+    @property
+    def of_cells(self) -> FloatArray:
+        """Estimate of what each cell lacks, half way from the effect of two modes to what its fall predicts."""
+        left = np.sqrt(self.two / np.maximum(self.four, 1e-300))
+        return self.two * np.clip(left, self.slowest, 1.0)
 
-    def solve(self, p: float, start: Sequence[PrincipalPair] = ()) -> Solution:
-        """Both pairs at p, from known ones on the coarse mesh. Raises `NotConverged`."""
-        pair = principal_pair(self.coarse, p, start=start)
-        return Solution(pair, principal_pair(self.fine, p, start=pair))
+    @property
+    def error(self) -> float:
+        return float(np.sum(self.of_cells))
+
+    @property
+    def fall(self) -> FloatArray:
+        """By how much the logarithm of the effect falls with each degree, shape (cells,)."""
+        return np.maximum(0.5 * np.log(np.maximum(self.four, 1e-300) / np.maximum(self.two, 1e-300)), 0.3)
+
+    def needed(self, tolerance: float) -> FloatArray:
+        """The degree at which each cell would lack `tolerance`, shape (cells,)."""
+        return self.degrees + np.log(np.maximum(self.of_cells, 1e-300) / tolerance) / self.fall
+
+
+def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects, ModeEffects | None]:
+    """The effects along φ, and along ξ unless that has states."""
+    space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
+    operator = pair.generator.matrix(pair.p, shift=pair.value)
+    tables = space.table(pair.right), space.table(pair.left)
+    found: list[ModeEffects | None] = []
+    lines: tuple[PhaseSpace | NoiseSpace, ...] = (space.phi, space.xi)
+    for axis, line in enumerate(lines):
+        inner, count = line.cells >= 0, int(line.cells.max()) + 1
+        if count == 0:
+            found.append(None)
+            continue
+        degrees = np.zeros(count, dtype=int)
+        np.maximum.at(degrees, line.cells[inner], line.modes[inner])
+        effects, (right, left) = [], tables if axis == 0 else tuple(map(space.xi.nested, tables))
+        for depth in (2, 4):
+            high = inner & (line.modes > degrees[line.cells] - depth)
+            mask = high[:, None] if axis == 0 else high
+            image = space.table(operator @ np.ravel(right * mask))
+            shares = np.abs(left * mask * image).sum(axis=1 - axis)[high]
+            effects.append(np.bincount(line.cells[high], shares, minlength=count) / abs(norm))
+        found.append(ModeEffects(degrees, effects[0], effects[1], axis * space.xi.slowest))
+    return found[0], found[1]  # type: ignore[return-value]
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:
-    """Bounds on what the two ends of the noise interval change in Λ: ½σ² ∫ P_s |T_z| T* dφ / ∫ T T* there."""
-    xi = pair.generator.space.xi
-    if not isinstance(xi, DiffusionSpace):
+    """Bounds on what the two ends of an interval of cells change in Λ: ½σ² ∫ P_s |T_z| T* dφ / ∫ T T* there."""
+    xi = pair.space.xi
+    if not isinstance(xi, CellSpace):
         return 0.0, 0.0
     return _end_effect(pair, xi, 0), _end_effect(pair, xi, -1)
 
 
-def _end_effect(pair: PrincipalPair, xi: DiffusionSpace, end: int) -> float:
+def _end_effect(pair: PrincipalPair, xi: CellSpace, end: int) -> float:
     """½σ² P_s |∂T| T* at an end; the slope is the largest in the last cell, as no flux makes it 0 at the end itself."""
-    space = pair.generator.space
-    local = np.linspace(0, 1, 9) if end else np.linspace(1, 0, 9)
-    points, values = xi.line.evaluation(local)
-    rows = slice(-9, None) if end else slice(0, 9)
-    right, left = (values[rows] @ space.table(v).T for v in (pair.right, pair.left))
-    weighed = space.phi.mass() @ left[-1]
-    product = right @ weighed
-    slope = np.max(np.abs(np.diff(product) / np.diff(points[rows]))) + abs(xi.tilt * product[-1])
-    norm = pair.left @ (pair.generator.mass @ pair.right)
-    return float(xi.rate * xi.weight(points[rows][-1:])[0] * slope / abs(norm))
-
-
-@dataclass(frozen=True)
-class ModeEffects:
-    """How much of Λ each cell of one direction owes to its modes above degree k, for several k.
-
-    Attributes:
-        degrees: k, decreasing, shape (n,), as float.
-        effects: shape (cells, n).
-    """
-
-    degrees: FloatArray
-    effects: FloatArray
-
-    def above(self, degree: int) -> float:
-        """What all cells together owe to modes above a degree."""
-        return float(np.sum(self.effects[:, self.degrees <= degree][:, :1]))
-
-    def needed(self, tolerance: float) -> FloatArray:
-        """The degree at which each cell's effect would be `tolerance`, shape (cells,)."""
-        logs = np.log(np.maximum(self.effects, 1e-300))
-        rate = np.maximum((logs[:, -1] - logs[:, 0]) / max(self.degrees[0] - self.degrees[-1], 1), 0.2)
-        return self.degrees[0] + (logs[:, 0] - math.log(tolerance)) / rate
-
-
-def mode_effects(pair: PrincipalPair, axis: int) -> ModeEffects:
-    """The effects along one of the axes of a pair's space: φ (0), or ξ (1) if that is a line."""
-    generator, space = pair.generator, pair.generator.space
-    line = space.axes[axis]
-    operator, norm = generator.matrix(pair.p, shift=pair.value), pair.left @ (generator.mass @ pair.right)
-    shape = (space.phi.size, space.xi.size)
-    degrees = np.arange(line.degree - 1.0, max(line.degree - 5, 0), -1)
-    effects = []
-    for degree in degrees:
-        inside = line.modes > degree
-        mask = np.broadcast_to(inside[:, None] if axis == 0 else inside, shape).ravel()
-        products = ((pair.left * mask) * (operator @ (pair.right * mask))).reshape(shape).sum(axis=1 - axis)
-        effects.append(np.bincount(line.cells[inside], np.abs(products[inside]), minlength=line.lines.size - 1))
-    return ModeEffects(degrees, np.stack(effects, axis=-1) / abs(norm))
-
-
-def noise_marginal(pair: PrincipalPair) -> tuple[FloatArray, FloatArray]:
-    """z and the ξ-marginal of the tilted density at points of each cell, times their distance."""
-    at = pair.generator.space.xi.samples((np.arange(12) + 0.5) / 12)
-    return at.xi / pair.generator.problem.noise.standard_deviation, np.abs(xi_marginal(pair, at)) * at.measure
+    space, lines = pair.space, xi.line.lines[[-1, -2] if end else [0, 1]]
+    z = lines[0] + (lines[1] - lines[0]) * np.linspace(0, 1, 9)
+    right, left = (xi.values_at(z) @ space.table(v).T for v in (pair.right, pair.left))
+    slope = np.max(np.abs(np.diff(right @ left[0]) / np.diff(z)))
+    norm = pair.left @ space.weighed(pair.right)
+    return float(xi.rate * xi.weight(z[:1])[0] * slope / abs(norm))

@@ -15,11 +15,22 @@ from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, checked
-from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, checked_moments
+from fpsolve.exponent.solver import (
+    ExponentSolver,
+    MomentLyapunov,
+    best_order,
+    checked_moments,
+    misplaced,
+    missed,
+)
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.problem import Problem, of_problem_too
 
 SEARCH_INTERVAL = (-20.0, 20.0)
+SHARE = 0.4
+"""Of the tolerance of Λ(p)/p, that is left to the interpolation."""
+FEW_NODES = 5
+"""For so many an interpolation is tried, even if few p are asked for."""
 LEVELS = (3, 5, 9, 17, 33, 65)
 """Numbers of nodes tried; each has the nodes of the one before, and new ones between them."""
 
@@ -36,7 +47,7 @@ class MomentLyapunovFunction:
         mesh: a mesh for all p; None chooses one for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a mesh may cost for one p; None for the default one.
-        most: the largest number of nodes.
+        among: p to choose the nodes from, so that those solved are of use; None for the best ones.
         solver: one of the same problem, to go on with; it decides the mesh, rtol and the budget.
         progress: called after each solve.
 
@@ -60,7 +71,7 @@ class MomentLyapunovFunction:
         *,
         rtol: float = 1e-8,
         budget: Budget | None = None,
-        most: int = LEVELS[-1],
+        among: FloatArray | None = None,
         solver: ExponentSolver | None = None,
         progress: Callable[[], None] = lambda: None,
     ) -> None:
@@ -68,9 +79,9 @@ class MomentLyapunovFunction:
         if not low < high:
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
-        given = solver or ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
-        self.solver = given.uniformly()
-        self.interpolation_error = math.inf
+        self.solver = solver or ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+        self.interpolation_error, self._among, self._allowed = math.inf, among, SHARE * self._tolerance(1.0, 0.0)
+        most = LEVELS[-1] if among is None else max(FEW_NODES, 3 * among.size // 10)
         for count in LEVELS:
             last = self.interpolation_error
             self._interpolate(count, progress)
@@ -117,8 +128,8 @@ class MomentLyapunovFunction:
             derivative=self.derivative(points),
             error_estimate=error,
             residual=np.full(points.size, max(pair.residual for pair in self._pairs)),
-            pairs=(),
-            warnings=(*self.solver.missed(points, value, error), *self.solver.misplaced(self._pairs)),
+            solver=self.solver,
+            warnings=(*missed(self.solver, points, value, error), *misplaced(self.solver, self._pairs)),
             root=self.root(),
         )
 
@@ -153,9 +164,13 @@ class MomentLyapunovFunction:
         """Solve at so many Chebyshev points, the outermost first, and interpolate."""
         x = -np.cos(np.pi * np.arange(count) / (count - 1))
         self.nodes = _scaled(x, *self.interval)
+        if self._among is not None:
+            self.nodes = np.unique(self._among[np.argmin(np.abs(self._among - self.nodes[:, None]), axis=1)])
+            x = np.interp(self.nodes, self.interval, (-1.0, 1.0))
+            count = x.size
         ratios = np.empty((count, 3))
         for i in best_order(self.nodes):
-            ratios[i] = self.solver.ratio(float(self.nodes[i]))
+            ratios[i] = self.solver.ratio(float(self.nodes[i]), self._tolerance)
             progress()
         values, slopes, self._errors = ratios.T
         self._series = _hermite_interpolant(x, values, slopes, self.interval)
@@ -167,10 +182,9 @@ class MomentLyapunovFunction:
         at_nodes = np.max(self._errors) if self.solver.mesh is None else np.min(self._errors)
         return self.interpolation_error <= max(self._allowed, float(at_nodes))
 
-    @property
-    def _allowed(self) -> float:
-        """The share of the tolerance of Λ(p)/p that is left to the interpolation."""
-        return 0.4 * self.solver.rtol * self.solver.scales.linear
+    def _tolerance(self, p: float, value: float) -> float:
+        """That of a node: the same for Λ(p)/p at all of them."""
+        return self.solver.rtol * abs(p) * self.solver.scales.linear
 
 
 def _nodes_needed(count: int, last: float, error: float, allowed: float) -> float:
@@ -203,6 +217,8 @@ def _hermite_interpolant(
 
 def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str | None:
     """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex."""
+    if not pairs:
+        return None
     p, value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("p", "value", "derivative"))
     value[p == 0] = 0.0  # but for rounding
     above = np.append(value, 0.0)[None] - (value[:, None] + slope[:, None] * (np.append(p, 0.0)[None] - p[:, None]))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import repeat
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
@@ -45,7 +46,8 @@ def moment_lyapunov(
         NoSuchExponent: Λ(p) is infinite.
         NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
     """
-    result = solve_moments(ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()), p)
+    solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+    result = solve_moments(solver, checked_moments(p, problem))
     if result.failures:
         raise NotConverged("\n".join(failure.reason for failure in result.failures), result)
     return result
@@ -58,13 +60,13 @@ def solve_moments(
 
     Args:
         solver: of the problem.
-        p: one moment, or an array of shape (n,).
+        p: one moment, or an array of shape (n,), which here may be empty.
         progress: called once for each p, whatever the number of solves.
 
     Raises:
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
-    points = checked_moments(p, solver.problem)
+    points = checked_moments(p, solver.problem) if np.size(p) else np.zeros(0)
     reports = repeat(progress, points.size)
 
     def report() -> None:
@@ -82,7 +84,7 @@ def _interpolated(solver: ExponentSolver, p: FloatArray, progress: Callable[[], 
         return None
     ends = float(p.min()), float(p.max())
     try:
-        function = MomentLyapunovFunction(solver.problem, ends, solver=solver, most=p.size // 2, progress=progress)
+        function = MomentLyapunovFunction(solver.problem, ends, solver=solver, among=p, progress=progress)
         return function.moments(p) if function.is_converged else None
     except NotConverged:
         return None

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import noise_marginal
-from fpsolve.theory.frozen import frozen_rate
+from fpsolve.exponent.fields import noise_marginal
+from fpsolve.theory.frozen import frozen_noise
 
 RIVAL = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
@@ -20,14 +20,15 @@ def rival(pair: PrincipalPair) -> float | None:
     Between two such places slow noise hardly ever passes: each has its own pair with T > 0 as far as that can be
     told, and only the larger eigenvalue is Λ.
     """
-    found = frozen_rate(pair.generator.problem, pair.p)
-    if found is None:
+    frozen = frozen_noise(pair.generator.problem)
+    if frozen is None:
         return None
-    z, rate = found
+    z, rate = frozen.peaks(pair.p)
+    if z.size < 2:
+        return None
     at, density = noise_marginal(pair)
     mean = float(at @ density / density.sum())
     width = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
-    peaks = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
     enough = pair.value - (1 - RIVAL) * abs(pair.value)
-    peaks = peaks[(np.abs(z[peaks] - mean) > 3 * width + 2) & (rate[peaks] > enough)]
-    return float(z[peaks[np.argmax(rate[peaks])]]) if peaks.size else None
+    far = (np.abs(z - mean) > 3 * width + 2) & (rate > enough)
+    return float(z[far][np.argmax(rate[far])]) if np.any(far) else None

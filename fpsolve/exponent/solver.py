@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cache, cached_property
@@ -14,22 +15,26 @@ from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, NotConverged, Remedy
-from fpsolve.exponent.adapt import SAFETY, Budget, fits, resolve
-from fpsolve.exponent.eigen import PrincipalPair, second_derivative
-from fpsolve.exponent.error import Estimate, Solution, Stage, checked
+from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, refined, resolve
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair, second_derivative, slope_rounding
+from fpsolve.exponent.error import Estimate, Solution, checked
 from fpsolve.exponent.rival import rival
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.space import CylinderSpace
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem, refuse_infinite
 from fpsolve.theory.perturbation import Scale, scale_of
 
+TRIM = 0.8
+"""A smaller space must have at most this share of the unknowns."""
 SMALL_P = 1e-2
-"""Below it the discretisation is chosen at this p, as Λ and its error go to zero together."""
+"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 NEIGHBOURS = 6
 """How many known eigenfunctions those of another p are interpolated from."""
+Tolerance = Callable[[float, float], float]
+"""The largest error allowed, from p and a value of Λ(p)."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +58,10 @@ class MomentLyapunov:
         p: the moments, shape (n,), in the order asked for, without those that failed.
         value: Λ(p), per unit time, shape (n,).
         derivative: Λ′(p), shape (n,).
-        error_estimate: estimate of |error of `value`|, from a finer mesh, the ends of the noise interval and the
+        error_estimate: estimate of |error of `value`|, from the highest modes, the ends of a noise interval and the
             bound of rounding, shape (n,).
         residual: backward error of the eigenpairs, shape (n,).
-        pairs: the eigenpairs, one for each p; none where Λ was interpolated.
+        solver: what solved them.
         warnings: sentences on p where `error_estimate` exceeds rtol.
         root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
         failures: why some p are missing, or none is to be trusted.
@@ -67,22 +72,30 @@ class MomentLyapunov:
     derivative: FloatArray
     error_estimate: FloatArray
     residual: FloatArray
-    pairs: tuple[PrincipalPair, ...] = field(repr=False)
+    solver: ExponentSolver = field(repr=False)
     warnings: tuple[str, ...] = ()
     root: float | None = None
     failures: tuple[Failure, ...] = ()
 
+    @property
+    def pairs(self) -> tuple[PrincipalPair, ...]:
+        """The eigenpairs, one for each p; solved now where Λ was interpolated. Raises `NotConverged`."""
+        return tuple(self.solver.pair(float(p)) for p in self.p)
+
+    def forgetful(self) -> MomentLyapunov:
+        """The same numbers, without the eigenfunctions that the solver keeps."""
+        return replace(self, solver=replace(self.solver))
+
 
 @dataclass(frozen=True, eq=False)
 class ExponentSolver:
-    """Λ(p) of one problem, each solve starting from the nearest p solved before.
+    """Λ(p) of one problem, each solve starting from those at the nearest p.
 
     Args:
         problem: a motion and its noise.
-        mesh: a mesh for all p; None chooses one for each p that meets rtol.
+        mesh: a mesh for all p; None chooses a discretisation for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
-        budget: what the choice of a mesh may cost.
-        uniform: measure the error of Λ(p)/p at every p by its scale at p = 0, as an interpolation over p needs it.
+        budget: what the choice of a discretisation may cost.
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
@@ -94,10 +107,8 @@ class ExponentSolver:
     _: KW_ONLY
     rtol: float = 1e-8
     budget: Budget = field(default_factory=Budget)
-    uniform: bool = False
-    _known: dict[float, tuple[Stage, Solution]] = field(init=False, default_factory=dict)
+    _known: dict[float, Solution] = field(init=False, default_factory=dict)
     _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
-    _stages: list[Stage] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.problem.noise.standard_deviation):
@@ -106,16 +117,13 @@ class ExponentSolver:
             )
         if not (math.isfinite(self.rtol) and self.rtol > 0):
             raise ValueError(f"rtol is {self.rtol!r}; it must be a positive number such as 1e-8")
-        if self.mesh is not None:
-            widening = 2.0 if has_algebraic_tails(self.problem.noise) else 1.15
-            self._stages.append(Stage.on(self.problem, self.mesh, widening=widening))
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
         return self.solution(p).pair
 
-    def solution(self, p: float) -> Solution:
-        """The principal eigenpairs at p on a mesh and on a finer one.
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+        """The principal eigenpair at p and its error, within a tolerance, that of rtol if none is given.
 
         Raises:
             NoSuchExponent: Λ(p) is infinite.
@@ -124,13 +132,11 @@ class ExponentSolver:
         refuse_infinite(self.problem, p)
         if p in self._failed:
             raise self._failed[p]
-        if p not in self._known:
+        tolerance = tolerance or self.tolerance
+        if p not in self._known or (self.mesh is None and not _meets(self._known[p], tolerance)):
             try:
                 with _one_thread().limit(limits=1):
-                    self._known[p] = self._adapted(p) if self.mesh is None else self._tried(self._stages[0], p)
-                for stage, _ in self._known.values():  # a curve walks from stage to stage, and seldom back
-                    if stage is not self._known[p][0]:
-                        stage.release()
+                    self._known[p] = self._found(p, tolerance)
             except NotConverged as failure:
                 self._failed[p] = failure
                 raise
@@ -138,11 +144,12 @@ class ExponentSolver:
                 raise NotConverged(f"Λ({p:g}) cannot be solved on this mesh ({failure}); {Remedy.MESH}") from failure
             except (ArithmeticError, RuntimeError, ValueError) as failure:
                 raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
-        return self._known[p][1]
+        return self._known[p]
 
-    def largest(self) -> CylinderSpace | None:
-        """The space on which the p of the largest size was solved; None where none was."""
-        return self._known[max(self._known, key=abs)][0].coarse.space if self._known else None
+    def largest(self) -> tuple[float, Generator] | None:
+        """The p of the largest size that was solved, and with what; None where none was."""
+        p = max(self._known, key=abs, default=None)
+        return None if p is None else (p, self._known[p].pair.generator)
 
     @cached_property
     def scales(self) -> Scale:
@@ -155,16 +162,7 @@ class ExponentSolver:
 
     def tolerance(self, p: float, value: float) -> float:
         """The largest error allowed of a value of Λ(p)."""
-        if self.uniform:
-            return self.rtol * abs(p) * self.scales.linear
         return self.rtol * max(abs(value), self.scale(p))
-
-    def uniformly(self) -> ExponentSolver:
-        """The same solver, but `uniform`; what either solves is known to both."""
-        other = replace(self, uniform=True)
-        for name in ("_known", "_stages"):
-            object.__setattr__(other, name, getattr(self, name))
-        return other
 
     def moments(self, p: ArrayLike, *, progress: Callable[[], None] = lambda: None) -> MomentLyapunov:
         """Λ(p) at several p; `progress` is called after each, also after one that fails.
@@ -172,7 +170,7 @@ class ExponentSolver:
         Raises:
             NoSuchExponent: Λ(p) is infinite for one of the p.
         """
-        points = checked_moments(p, self.problem)
+        points = checked_moments(p, self.problem) if np.size(p) else np.zeros(0)
         solutions, failures = {}, []
         for i in best_order(points):
             try:
@@ -191,87 +189,89 @@ class ExponentSolver:
 
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2). Raises `NotConverged`."""
-        scale = self.scales.linear
-        return self._difference("λ", lambda pair: pair.derivative, scale)
+        value, _, error = self.ratio(0.0)
+        return checked("λ", Estimate(value, error, self.scales.linear))
 
     def variance_rate(self) -> Estimate:
-        """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖. Raises `NotConverged`."""
-        scale = 2 * self.scales.quadratic
-        return self._difference("Λ″(0)", second_derivative, scale)
+        """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖. Raises `NotConverged`.
 
-    def ratio(self, p: float) -> tuple[float, float, float]:
+        Its error is the difference from that of a finer discretisation.
+        """
+        pair = self.pair(0.0)
+        finer = principal_pair(pair.generator.enriched(), 0.0, start=pair)
+        value, better = second_derivative(pair), second_derivative(finer)
+        scale = 2 * self.scales.quadratic
+        rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
+        return checked("Λ″(0)", Estimate(better, abs(better - value) + rounding, scale))
+
+    def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0.
 
-        Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss.
+        Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss; its error is that at p = ±`SMALL_P`.
         """
         if abs(p) >= TINY_P:
-            solution = self.solution(p)
+            solution = self.solution(p, tolerance)
             value = solution.pair.value / p
             return value, (solution.pair.derivative - value) / p, solution.error / abs(p)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
-        solutions = [self.solution(point) for point in points]
-        value, finer = (
-            float(np.mean([pair.derivative for pair in pairs]))
-            for pairs in zip(*((each.pair, each.finer) for each in solutions), strict=True)
-        )
-        rounding = max(each.pair.rounding for each in solutions)
-        return value, 0.5 * second_derivative(solutions[0].pair), abs(finer - value) + rounding
+        pairs = [self.solution(point, tolerance).pair for point in points]
+        near = self._near_zero(p, tolerance or self.tolerance)
+        error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
+        return float(np.mean([pair.derivative for pair in pairs])), 0.5 * second_derivative(pairs[0]), error
 
-    def _difference(self, name: str, quantity: Callable[[PrincipalPair], float], scale: float) -> Estimate:
-        solution = self.solution(0.0)
-        coarse, fine = quantity(solution.pair), quantity(solution.finer)
-        return checked(name, Estimate(coarse, abs(fine - coarse) + solution.pair.rounding, scale))
-
-    def _tried(self, stage: Stage, p: float) -> tuple[Stage, Solution]:
-        """The solution at p on a stage: from those around p on it, or from the nearest one."""
-        known = sorted(
-            (solution.pair for other, solution in self._known.values() if other is stage),
-            key=lambda pair: abs(pair.p - p),
-        )
-        near = known[:NEIGHBOURS]
-        is_inside = bool(near) and min(pair.p for pair in near) < p < max(pair.p for pair in near)
-        return stage, stage.solve(p, near if is_inside else near[:1])
-
-    def _adapted(self, p: float) -> tuple[Stage, Solution]:
-        """A solution that meets rtol, on the stage of the nearest p if that does, otherwise on a new one."""
-        nearest = min(self._known, key=lambda q: abs(q - p), default=None)
-        if nearest is not None:
-            stage = self._known[nearest][0]
-            if fits(stage, self.problem, nearest, p):
-                try:
-                    tried = self._tried(stage, p)
-                except NotConverged:
-                    tried = None
-                if tried is not None and self._suffices(tried[1]) and rival(tried[1].pair) is None:
-                    return tried
+    def _near_zero(self, p: float, tolerance: Tolerance) -> Solution:
+        """The solution at ±`SMALL_P` that a smaller p goes with."""
         side = p or (-1.0 if has_algebraic_tails(self.problem.noise) else 1.0)  # where Λ is finite
-        q = p if abs(p) >= SMALL_P else math.copysign(SMALL_P, side)
-        for rtol in self.rtol * 10.0 ** -np.arange(4):
-            share = rtol / self.rtol
-            new = resolve(
-                self.problem,
-                q,
-                tolerance=lambda value, q=q, share=share: share * self.tolerance(q, value),  # type: ignore[misc]
-                rtol=rtol,
-                budget=self.budget,
-            )
-            self._known.setdefault(q, new)
-            if q == p:
-                return new
-            tried = self._tried(new[0], p)
-            if self._suffices(tried[1]):
-                return tried
-        raise NotConverged(f"Λ({p:g}) did not converge on the meshes for p = {q:g}; {Remedy.BUDGET}")
+        return self.solution(math.copysign(SMALL_P, side), tolerance)
 
-    def _suffices(self, solution: Solution) -> bool:
-        """Whether Λ(p), and at p = 0 its derivative, meets rtol; for tiny p apart from rounding."""
-        pair = solution.pair
-        if abs(pair.p) < TINY_P:
-            scale = self.scales.linear
-            error, allowed = abs(pair.derivative - solution.finer.derivative), self.rtol * scale
-        else:
-            error, allowed = solution.error, self.tolerance(pair.p, pair.value)
-        return SAFETY * error <= allowed
+    def _found(self, p: float, tolerance: Tolerance) -> Solution:
+        """A solution that meets a tolerance, or the one on the given mesh."""
+        if self.mesh is not None:
+            pair = self._tried(self._given[0], p).pair
+            return Solution(pair, principal_pair(self._given[1], p, start=pair))
+        if abs(p) < SMALL_P:
+            return self._tried(self._near_zero(p, tolerance).pair.generator, p)
+        nearest = min(self._known, key=lambda q: abs(q - p), default=None)
+        start = None
+        if nearest is not None:
+            generator = self._trimmed(self._known[nearest], tolerance)
+            try:
+                start = self._tried(generator, p) if fits(generator, nearest, p) else None
+            except NotConverged:
+                start = None
+            if start is not None and _meets(start, tolerance) and rival(start.pair) is None:
+                return start
+        return resolve(
+            self.problem,
+            p,
+            tolerance=lambda value: tolerance(p, value),
+            rtol=self.rtol,
+            budget=self.budget,
+            start=start,
+        )
+
+    @cached_property
+    def _given(self) -> tuple[Generator, Generator]:
+        """That of the given mesh, and one of four degrees more, whose error hardly counts beside it."""
+        assert self.mesh is not None
+        generator = Generator(self.problem, self.mesh)
+        return generator, generator.enriched().enriched()
+
+    def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Generator:
+        """The generator of a solution, or a much smaller one that would do."""
+        pair, size = solution.pair, solution.pair.generator.size
+        if abs(pair.p) < SMALL_P or size <= WORTH_A_TRY:
+            return pair.generator
+        smaller = refined(solution, tolerance(pair.p, pair.value), 0)
+        is_better = smaller.unknowns(self.problem.noise) <= TRIM * size
+        return Generator(self.problem, smaller) if is_better else pair.generator
+
+    def _tried(self, generator: Generator, p: float) -> Solution:
+        """The solution at p with a generator, from those around p, or from the nearest one."""
+        near = sorted((solution.pair for solution in self._known.values()), key=lambda pair: abs(pair.p - p))[
+            :NEIGHBOURS
+        ]
+        return Solution(principal_pair(generator, p, start=near))
 
     def _result(self, solutions: Sequence[Solution], failures: Sequence[Failure]) -> MomentLyapunov:
         pairs = tuple(solution.pair for solution in solutions)
@@ -283,36 +283,44 @@ class ExponentSolver:
             derivative=np.array([pair.derivative for pair in pairs]),
             error_estimate=errors,
             residual=np.array([pair.residual for pair in pairs]),
-            pairs=pairs,
-            warnings=(*self.missed(p, value, errors), *self.misplaced(pairs)),
+            solver=self,
+            warnings=(*missed(self, p, value, errors), *misplaced(self, pairs)),
             failures=tuple(failures),
         )
 
-    def missed(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[str, ...]:
-        """A warning about the p at which the estimated error exceeds rtol, or nothing."""
-        size = np.where(p == 0, math.inf, np.maximum(np.abs(value), [self.scale(float(each)) for each in p]))
-        shares = error / size
-        if not np.any(shares > self.rtol):
-            return ()
-        worst = int(np.argmax(shares))
-        remedy = Remedy.MESH if self.mesh is not None else "as rounding limits it"
-        return (
-            f"rtol = {self.rtol:g} is not met at {np.count_nonzero(shares > self.rtol)} of {p.size} moments, worst at "
-            f"p = {p[worst]:g} with an estimated relative error of {shares[worst]:.1e}; {remedy}, or use a larger rtol",
-        )
 
-    def misplaced(self, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
-        """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
-        if self.mesh is None:  # then both places have been looked at
-            return ()
-        found = ((pair, rival(pair)) for pair in pairs)
-        pair, z = next(((pair, z) for pair, z in found if z is not None), (None, None))
-        if pair is None:
-            return ()
-        return (
-            f"Λ({pair.p:g}) may be larger: slow noise may carry the moment near {z:.3g} standard "
-            f"deviations; {Remedy.REACH}",
-        )
+def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[str, ...]:
+    """A warning about the p at which the estimated error exceeds rtol, or nothing."""
+    size = np.where(p == 0, math.inf, np.maximum(np.abs(value), [solver.scale(float(each)) for each in p]))
+    shares = error / size
+    if not np.any(shares > solver.rtol):
+        return ()
+    worst = int(np.argmax(shares))
+    remedy = Remedy.MESH if solver.mesh is not None else "as rounding limits it"
+    return (
+        f"rtol = {solver.rtol:g} is not met at {np.count_nonzero(shares > solver.rtol)} of {p.size} moments, worst at "
+        f"p = {p[worst]:g} with an estimated relative error of {shares[worst]:.1e}; {remedy}, or use a larger rtol",
+    )
+
+
+def misplaced(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
+    """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
+    if solver.mesh is None:  # then both places have been looked at
+        return ()
+    found = ((pair, rival(pair)) for pair in pairs)
+    pair, z = next(((pair, z) for pair, z in found if z is not None), (None, None))
+    if pair is None:
+        return ()
+    return (
+        f"Λ({pair.p:g}) may be larger: slow noise may carry the moment near {z:.3g} standard "
+        f"deviations; {Remedy.REACH}",
+    )
+
+
+def _meets(solution: Solution, tolerance: Tolerance) -> bool:
+    """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
+    pair = solution.pair
+    return abs(pair.p) < SMALL_P or solution.error <= tolerance(pair.p, pair.value)
 
 
 @cache

@@ -7,88 +7,121 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix, kron
+import scipy.linalg
 
-from fpsolve.arrays import FloatArray
-from fpsolve.fem.kronecker import KroneckerPattern, KroneckerSum
+from fpsolve.arrays import Coefficient, one
+from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.space import CylinderSpace
+from fpsolve.fem.phase_space import PhaseSpace
+from fpsolve.fem.space import CylinderSpace, Discretisation, noise_space
 from fpsolve.fem.terms import Jump, Power, Term, power_of_epsilon, terms_of
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rate, phase_speed
 from fpsolve.model.problem import Problem
 
 _ALL = slice(None)
+KEPT_SPACES = 16
+MOST_FOR_A_BOUND = 300
+"""Functions of ξ up to which the sharper bound of Λ is used; beyond, that of noise that rests at an end."""
 
 
 class Generator:
-    """L(p) in weak form on a mesh; `print` lists its terms.
+    """L(p) in weak form; `print` lists its terms.
 
     Args:
         problem: a motion and its noise.
-        mesh: half circle (its principal eigenvalue is that of the full circle) or full circle.
-        tilt: s of the factor exp(s z) in the trial and test functions, see `DiffusionSpace`.
+        chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
     Raises:
-        MeshError: the mesh has no line at a kick, or a cell's polynomials in the noise cannot be told apart.
+        MeshError: there is no φ-line at a kick, or a cell's polynomials in the noise cannot be told apart.
     """
 
-    def __init__(self, problem: Problem, mesh: CylinderMesh, tilt: float = 0.0) -> None:
-        self.problem, self.space = problem, CylinderSpace(mesh, problem.noise, tilt)
+    def __init__(self, problem: Problem, chosen: Discretisation | CylinderMesh) -> None:
+        if isinstance(chosen, CylinderMesh):
+            chosen = Discretisation.on(chosen, problem.noise)
+        self.problem, self.chosen = problem, chosen
+        self.phi = PhaseSpace(chosen.phi_lines, chosen.phi_degrees)
         for kick in problem.system.kicks:
-            self.space.mesh.vertices_at(kick.phase)
+            self.phi.vertices_at(kick.phase)
+        self._spaces: dict[float, CylinderSpace] = {}
+        self.space(0.0)  # refuses a mesh that cannot be used
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What it is made of; the matrices are assembled again when they are needed."""
-        return type(self), (self.problem, self.space.mesh, self.space.xi.tilt)
+        return type(self), (self.problem, self.chosen)
 
     def __str__(self) -> str:
         lines = [f"  {power_of_epsilon(term.order):<2}  {term.text}" for term in self.terms()]
         return "\n".join(["L(p), Eq. (19), the sum of", *lines])
 
+    def space(self, p: float) -> CylinderSpace:
+        """Trial and test functions; the tilt of those of ξ moves with p."""
+        key = p if self.chosen.slope else 0.0
+        if key not in self._spaces:
+            if len(self._spaces) >= KEPT_SPACES:
+                del self._spaces[next(iter(self._spaces))]
+            self._spaces[key] = CylinderSpace(self.phi, noise_space(self.problem.noise, self.chosen, p))
+        return self._spaces[key]
+
+    def enriched(self) -> Generator:
+        """That of the next finer discretisation."""
+        return Generator(self.problem, self.chosen.enriched())
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.chosen.unknowns(self.problem.noise)
+
     def terms(self) -> tuple[Term, ...]:
         """L(p) term by term."""
-        return tuple(terms_of(self.problem.system, self.space))
+        return tuple(terms_of(self.problem.system, self.space(0.0)))
 
-    def matrix(self, p: float, *, derivative: int = 0, shift: float = 0.0, orders: slice = _ALL) -> csc_matrix:
-        """The matrix of dᵏL/dpᵏ − shift, from the terms of some orders in ε; all matrices share their indices.
+    def matrix(self, p: float, *, derivative: int = 0, shift: float = 0.0, orders: slice = _ALL) -> KroneckerSum:
+        """The matrix of dᵏL/dpᵏ − shift in the space for p, from the terms of some orders in ε.
 
         Args:
             p: the moment.
-            derivative: k.
+            derivative: k; the tilt is held.
             shift: times the mass matrix.
             orders: slice(1, None) leaves out L₀.
         """
-        pattern, keys, entries = self._assembled
-        wanted = range(1 + max(order for order, _ in keys))[orders]
-        of_p = [c(p, derivative) if order in wanted else 0.0 for order, c in keys]
-        return pattern.matrix(np.array([*of_p, -shift]) @ entries)
+        phases: dict[Coefficient | None, Any] = {one: -shift * self.phi.identity}
+        last = max(order for parts in self._parts.values() for order, _, _ in parts)
+        wanted = range(1 + last)[orders]
+        for g, parts in self._parts.items():
+            for order, of_p, phase in parts:
+                size = of_p(p, derivative) if order in wanted else 0.0
+                if size:
+                    phases[g] = phases[g] + size * phase if g in phases else size * phase
+        space = self.space(p)
+        return KroneckerSum([(phase, space.xi_matrix(g)) for g, phase in phases.items()])
 
-    @cached_property
-    def mass(self) -> csc_matrix:
+    def mass(self, p: float) -> KroneckerSum:
         """∫ P_s w T."""
-        return csc_matrix(kron(self.space.phi.mass(), self.space.xi.mass()))
+        return KroneckerSum([(self.phi.identity, self.space(p).xi_matrix(one))])
 
     @cached_property
-    def _assembled(self) -> tuple[KroneckerPattern, list[tuple[int, Power | Jump]], FloatArray]:
-        """The sparsity pattern, (order, coefficient) of each sum of terms, and its entries; the last is the mass."""
-        sums: dict[tuple[int, Power | Jump], KroneckerSum] = {}
+    def _parts(self) -> dict[Coefficient | None, list[tuple[int, Power | Jump, Any]]]:
+        """For each function of ξ the sums of the φ-matrices of all terms with the same order and coefficient."""
+        sums: dict[tuple[Coefficient | None, int, Power | Jump], Any] = {}
         for term in self.terms():
-            key = term.order, term.of_p
-            sums[key] = sums[key] + term.operator if key in sums else term.operator
-        operators = [*sums.values(), KroneckerSum.of(self.space.phi.mass(), self.space.xi.mass())]
-        pattern = KroneckerPattern(operators)
-        return pattern, list(sums), np.stack([pattern.entries(operator) for operator in operators])
-
-    def release(self) -> None:
-        """Give the memory of the assembled parts free; they are assembled again when they are needed."""
-        for name in ("_assembled", "mass"):
-            self.__dict__.pop(name, None)
+            key = term.g, term.order, term.of_p
+            sums[key] = sums[key] + term.phase if key in sums else term.phase
+        parts: dict[Coefficient | None, list[tuple[int, Power | Jump, Any]]] = {}
+        for (g, order, of_p), phase in sums.items():
+            parts.setdefault(g, []).append((order, of_p, phase))
+        return parts
 
     @property
     def unit_rate(self) -> float:
         """The system's own unit of rates, ω."""
         return angular_frequency(self.problem.system)
+
+    @cached_property
+    def loss(self) -> float:
+        """About how many times its rounding elimination may harm T − 1: the size of the free transport over a rate."""
+        free = self.matrix(0.0, orders=slice(0, 1)).terms[0][0]
+        return 10 * float(abs(free).sum(axis=0).max()) / self.unit_rate
 
     @property
     def keeps_constants(self) -> bool:
@@ -97,17 +130,23 @@ class Generator:
         return all(drive.h.amplitude == 0 and drive.q.vanishes for drive in free)
 
     def upper_bound(self, p: float) -> float:
-        """A number right of Λ(p): the supremum of p q over φ and ξ, and of the kicks spread evenly over φ.
+        """A number right of Λ(p): the growth rate of E exp ∫ f(ξ) dt, f the supremum over φ of p q and of the kicks.
 
-        Where states of a chain move the phase over a ray to and fro, each jump between them may bring a kick more.
+        The kicks are spread evenly over φ. Where states of a chain move the phase over a ray to and fro, each jump
+        between them may bring a kick more.
         """
-        system, noise, xi = self.problem.system, self.problem.noise, self.space.xi.support
-        q, speed = growth_rate(system, xi), phase_speed(system, xi)
-        growth = max(0.0, float(np.max(p * q.mean + abs(p) * q.amplitude)))
-        fastest = float(np.max(np.abs(speed.mean) + speed.amplitude))
+        system, noise, xi = self.problem.system, self.problem.noise, self.space(p).xi
+
+        def fastest(xi: Any) -> Any:
+            q, speed = growth_rate(system, xi), phase_speed(system, xi)
+            gains = sum(max(0.0, p * kick.log_factor) for kick in system.kicks)
+            return p * q.mean + abs(p) * q.amplitude + gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
+
+        if xi.size > MOST_FOR_A_BOUND:
+            growth = float(np.max(fastest(xi.support)))
+        else:
+            growth = float(np.max(scipy.linalg.eigvals(xi.generator() + xi.mass(fastest), xi.mass()).real))
         for kick in system.kicks:
-            gain = max(0.0, p * kick.log_factor)
-            growth += gain * fastest / math.pi
-            if isinstance(noise, MarkovChain) and crosses_both_ways(system, kick, xi):
-                growth += float(-np.min(noise.rates)) * math.expm1(gain)
+            if isinstance(noise, MarkovChain) and crosses_both_ways(system, kick, xi.support):
+                growth += float(-np.min(noise.rates)) * math.expm1(max(0.0, p * kick.log_factor))
         return growth

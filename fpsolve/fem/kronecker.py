@@ -4,73 +4,94 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, kron
+from scipy.sparse import csc_matrix, csr_matrix, identity, issparse, kron
 
 from fpsolve.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class KroneckerSum:
-    """Σ Φ_k ⊗ Ξ_k, the factors kept apart.
+    """Σ Φ_k ⊗ Ξ_k, the factors kept apart; vectors are those of functions on φ × ξ, φ slowest.
 
     Attributes:
-        terms: pairs of a φ-matrix, shape (m, m), and a ξ-matrix, shape (n, n).
+        terms: pairs of a φ-matrix, shape (m, m), and a ξ-matrix, shape (n, n): arrays, or sparse.
     """
 
-    terms: tuple[tuple[csr_matrix, csr_matrix], ...]
+    terms: Sequence[tuple[Any, Any]]
 
-    @classmethod
-    def of(cls, phase: Any, noise: Any) -> KroneckerSum:
-        """One product."""
-        return cls(((csr_matrix(phase), csr_matrix(noise)),))
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(m, n)."""
+        return self.terms[0][0].shape[0], self.terms[0][1].shape[0]
 
-    def __add__(self, other: KroneckerSum) -> KroneckerSum:
-        return KroneckerSum(self.terms + other.terms)
+    @property
+    def size(self) -> int:
+        """m·n."""
+        m, n = self.shape
+        return m * n
 
-    def __rmul__(self, factor: float) -> KroneckerSum:
-        return KroneckerSum(tuple((factor * phase, noise) for phase, noise in self.terms) if factor else ())
+    def __matmul__(self, vector: FloatArray) -> FloatArray:
+        table = vector.reshape(self.shape)
+        return np.ravel(sum(phase @ (table @ noise.T) for phase, noise in self.terms))
+
+    @property
+    def T(self) -> KroneckerSum:
+        """The transpose."""
+        return KroneckerSum([(phase.T, noise.T) for phase, noise in self.terms])
+
+    def __abs__(self) -> KroneckerSum:
+        """A bound on the absolute values."""
+        return KroneckerSum([(abs(phase), abs(noise)) for phase, noise in self.terms])
+
+    def norm(self) -> float:
+        """A bound on the largest sum of the absolute values of a column."""
+        return float(sum(np.prod([abs(factor).sum(axis=0).max() for factor in term]) for term in self.terms))
+
+    def shifted(self, shift: float) -> KroneckerSum:
+        """The sum less `shift` · 1 ⊗ Ξ₀, Ξ₀ being the ξ-matrix of the first term."""
+        (phase, noise), *others = self.terms
+        return KroneckerSum([(phase - shift * _identity(phase), noise), *others])
+
+    @cached_property
+    def is_sparse(self) -> bool:
+        return any(issparse(factor) for term in self.terms for factor in term)
+
+    @cached_property
+    def band(self) -> int:
+        """How many diagonals the ξ-matrices have on each side; n − 1 for sparse ones."""
+        if self.is_sparse:
+            return self.shape[1] - 1
+        rows, columns = np.nonzero(sum(abs(noise) for _, noise in self.terms))
+        return int(np.max(np.abs(rows - columns), initial=0))
+
+    def blocks(self, offset: int) -> FloatArray:
+        """The φ-matrices between the functions i and i + offset of ξ, by the lesser of both; Fortran order each."""
+        m, n = self.shape
+        phases = np.stack([phase.T.ravel() for phase, _ in self.terms])
+        noises = np.stack([np.diagonal(noise, offset) for _, noise in self.terms], axis=1)
+        return (noises @ phases).reshape(n - abs(offset), m, m).transpose(0, 2, 1)
 
     def toarray(self) -> FloatArray:
-        """The dense matrix, shape (m·n, m·n), φ slowest."""
-        return np.asarray(sum(kron(phase, noise).toarray() for phase, noise in self.terms), dtype=float)
+        """The dense matrix, shape (m·n, m·n)."""
+        m, n = self.shape
+        phases, noises = (np.stack([_dense(term[side]) for term in self.terms]) for side in (0, 1))
+        products = phases.reshape(len(self.terms), -1).T @ noises.reshape(len(self.terms), -1)
+        return products.reshape(m, m, n, n).transpose(0, 2, 1, 3).reshape(m * n, m * n)
+
+    def tocsc(self) -> csc_matrix:
+        """The sparse matrix."""
+        products = (kron(csr_matrix(phase), csr_matrix(noise), format="csr") for phase, noise in self.terms)
+        return csc_matrix(sum(products))
 
 
-class KroneckerPattern:
-    """The common sparsity pattern of several sums, on which each is one array of entries.
-
-    Linear combinations of the sums are then those of arrays, and the pattern is sorted once.
-    """
-
-    def __init__(self, sums: Sequence[KroneckerSum]) -> None:
-        terms = [term for total in sums for term in total.terms]
-        self._phase, self._noise = (_places([term[side] for term in terms]) for side in (0, 1))
-        n = terms[0][1].shape[0]
-        size = terms[0][0].shape[0] * n
-        row, column = (
-            (phase[:, None] * n + noise).ravel() for phase, noise in zip(self._phase, self._noise, strict=True)
-        )
-        numbers = coo_matrix((np.arange(row.size), (row, column)), shape=(size, size)).tocsc()
-        self._order, self._indices, self._indptr = numbers.data, numbers.indices, numbers.indptr
-        self._shape = numbers.shape
-
-    def entries(self, total: KroneckerSum) -> FloatArray:
-        """The entries of a sum, in the order that `matrix` takes."""
-        if not total.terms:
-            return np.zeros(self._order.size)
-        phase = np.stack([np.asarray(phase[self._phase]).ravel() for phase, _ in total.terms])
-        noise = np.stack([np.asarray(noise[self._noise]).ravel() for _, noise in total.terms])
-        return (phase.T @ noise).ravel()[self._order]
-
-    def matrix(self, entries: FloatArray) -> csc_matrix:
-        """The matrix with these entries; all matrices of a pattern share their indices."""
-        return csc_matrix((entries, self._indices, self._indptr), shape=self._shape)
+def _identity(like: Any) -> Any:
+    size = like.shape[0]
+    return identity(size, format="csr") if issparse(like) else np.eye(size)
 
 
-def _places(matrices: Sequence[csr_matrix]) -> tuple[Any, Any]:
-    """Rows and columns, by columns, of all that is not zero in some matrices."""
-    pattern = sum((abs(matrix) for matrix in matrices[1:]), start=abs(matrices[0]))
-    column, row = pattern.T.nonzero()
-    return row, column
+def _dense(matrix: Any) -> FloatArray:
+    return matrix.toarray() if issparse(matrix) else matrix

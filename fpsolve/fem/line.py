@@ -1,4 +1,4 @@
-"""Finite elements on an interval, in an inner product with a weight.
+"""Continuous finite elements on an interval, in an inner product with a weight.
 
 The bubbles of every cell are orthonormalised in the weighted energy ∫ w u′v′: polynomials that differ without a weight
 hardly do so where it falls steeply, and P_s spans thirty orders of magnitude. The functions then have unit norms,
@@ -7,38 +7,27 @@ constants lie in the vertex functions alone, and the mass matrix is well conditi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 import skfem
-from numpy.polynomial.legendre import legvander
-from scipy.linalg import solve
-from scipy.sparse import csr_matrix, diags
-from scipy.special import beta, roots_jacobi, roots_legendre
+from scipy.sparse import csr_matrix, identity
+from scipy.special import beta, roots_jacobi
 
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.errors import MeshError
-
-_EXTRA_POINTS = 12
-"""Quadrature points beyond what the mass matrix without its weight needs: for sin 2φ, cos 2φ and P_s."""
-
-
-@dataclass(frozen=True)
-class _Rule:
-    """A quadrature rule on [0, 1]."""
-
-    points: FloatArray
-    weights: FloatArray
+from fpsolve.fem.reference import EXTRA_POINTS, Rule, gauss_legendre
 
 
 @lru_cache(maxsize=512)
-def _gauss_rule(count: int, left: float = 0.0, right: float = 0.0) -> _Rule:
+def _gauss_rule(count: int, left: float = 0.0, right: float = 0.0) -> Rule:
     """Gauss-Jacobi rule for integrands like x^left (1 − x)^right times a polynomial; Gauss-Legendre without powers."""
-    y, w = roots_jacobi(count, right, left) if left or right else roots_legendre(count)
+    if not (left or right):
+        return gauss_legendre(count)
+    y, w = roots_jacobi(count, right, left)
     x = 0.5 * (1 + y)
-    return _Rule(x, w / w.sum() * beta(left + 1, right + 1) / (x**left * (1 - x) ** right))
+    return Rule(x, w / w.sum() * beta(left + 1, right + 1) / (x**left * (1 - x) ** right))
 
 
 class LineSpace:
@@ -48,13 +37,12 @@ class LineSpace:
         lines: the vertices, shape (m + 1,).
         degree: polynomial degree.
         weight: the weight w(x) > 0 of every integral.
-        discontinuous: cut the continuity between cells.
         end_exponents: powers with which the weight vanishes at the two ends, honoured by Gauss-Jacobi rules.
 
     Attributes:
         size: number of unknowns.
         points: points of the quadrature rules, increasing, shape (n,).
-        weights: their weights, without w.
+        measure: their weights times w, shape (n,).
         cells: for each unknown the cell that it belongs to, -1 for one shared by two, shape (size,).
         modes: for each unknown the degree of its polynomial, 1 for vertex functions, shape (size,).
 
@@ -68,45 +56,48 @@ class LineSpace:
         degree: int,
         weight: Coefficient = one,
         *,
-        discontinuous: bool = False,
         end_exponents: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self.lines, self.degree, self._sizes = lines, degree, np.diff(lines)
-        element = _element(degree)
-        dofs = skfem.Dofs(skfem.MeshLine(lines), skfem.ElementDG(element) if discontinuous else element)
+        dofs = skfem.Dofs(skfem.MeshLine(lines), _element(degree))
         self._dofs, self.size = dofs.element_dofs.T, int(dofs.N)
         self.cells, self.modes = _hierarchy(self._dofs, self.size)
         rules = self._rules(end_exponents)
         local = np.stack([rule.points for rule in rules])
         points, weights = self._global(local), np.stack([rule.weights for rule in rules]) * self._sizes[:, None]
-        self.points, self.weights = points.ravel(), weights.ravel()
+        self.points = points.ravel()
         self._measure = weights * weight(points)
         tables = [_reference(degree, rule.points.tobytes()) for rule in rules]
         values = np.stack([table[0] for table in tables])
         slopes = np.stack([table[1] for table in tables]) / self._sizes[:, None, None]
-        self._transform = _orthogonalised(slopes, self._measure)
+        self._transform, shares = _orthogonalised(slopes, self._measure)
         squares = np.einsum("cq,cqi->ci", self._measure, (values @ self._transform) ** 2)
         self._norms = np.sqrt(np.bincount(self._dofs.ravel(), squares.ravel(), minlength=self.size))
         self._transform /= self._norms[self._dofs][:, None, :]
         self._values, self._slopes = values @ self._transform, slopes @ self._transform
-        self._evaluations: dict[bytes, tuple[FloatArray, csr_matrix]] = {}
+        norms = self._norms[self._dofs]
+        self._shares = shares * norms[:, 2:, None] / norms[:, None, :2]
 
     @cached_property
     def values(self) -> csr_matrix:
         """The basis functions at the points, shape (n, size)."""
         return self._scattered(self._values)
 
-    @cached_property
-    def traces(self) -> tuple[FloatArray, FloatArray]:
-        """The basis functions at the lower and at the upper end of each cell, from inside it: twice (m, size)."""
-        lower, upper = np.zeros((2, self.lines.size - 1, self.size))
-        for end, dofs in ((lower, self._dofs[:, 0]), (upper, self._dofs[:, 1])):
-            end[np.arange(dofs.size), dofs] = 1 / self._norms[dofs]
-        return lower, upper
-
     def constant(self) -> FloatArray:
         """Coefficients of the function 1, shape (size,): the vertex functions add up to it."""
         return np.where(self.modes == 1, self._norms, 0.0)
+
+    @cached_property
+    def nested(self) -> csr_matrix:
+        """The matrix to coefficients of bubbles whose sums by degree, with linear functions, are those of lower degree.
+
+        What the vertex functions hold of the bubbles is given to these, shape (size, size).
+        """
+        bubbles, vertices = np.broadcast_arrays(self._dofs[:, 2:, None], self._dofs[:, None, :2])
+        shape = (self.size, self.size)
+        return identity(self.size, format="csr") + csr_matrix(
+            (self._shares.ravel(), (bubbles.ravel(), vertices.ravel())), shape=shape
+        )
 
     def mass(self, f: Coefficient = one) -> csr_matrix:
         """∫ w f u v."""
@@ -116,55 +107,28 @@ class LineSpace:
     def _mass(self) -> csr_matrix:
         return self._form(self._values, one, self._values)
 
-    def convection(self, f: Coefficient = one) -> csr_matrix:
-        """∫ w f u′ v, cell by cell."""
-        return self._form(self._values, f, self._slopes)
+    def stiffness(self) -> csr_matrix:
+        """∫ w u′v′."""
+        return self._form(self._slopes, one, self._slopes)
 
-    def stiffness(self, tilt: float = 0.0) -> csr_matrix:
-        """∫ w (u′ + s u)(v′ + s v), s being the tilt."""
-        slopes = self._slopes + tilt * self._values
-        return self._form(slopes, one, slopes)
-
-    def evaluation(self, local: FloatArray) -> tuple[FloatArray, csr_matrix]:
-        """Points and values in every cell at local coordinates in [0, 1]: x, and E with u(x) = E @ coefficients.
-
-        Both run over cells, then local points: shapes (m·len(local),) and (m·len(local), size). At 0 and 1 the
-        values are the traces from inside each cell.
-        """
-        key = np.asarray(local, dtype=float).tobytes()
-        if key not in self._evaluations:
-            values = _reference(self.degree, key)[0] @ self._transform
-            self._evaluations[key] = self._global(np.frombuffer(key)[None]).ravel(), self._scattered(values)
-        return self._evaluations[key]
+    @property
+    def measure(self) -> FloatArray:
+        return self._measure.ravel()
 
     def _global(self, local: FloatArray) -> FloatArray:
         """Points of the cells at local coordinates, shape (m, n)."""
         return self.lines[:-1, None] + self._sizes[:, None] * local
 
-    def at(self, x: FloatArray, inside: FloatArray | None = None) -> csr_matrix:
+    def at(self, x: FloatArray) -> csr_matrix:
         """Values at any points, as rows of E with u(x) = E @ coefficients, shape (len(x), size).
 
-        Beyond the ends the values there are taken. A point on a line between cells is seen from the cell that holds
-        its entry of `inside`, without it from the cell above.
+        Beyond the ends the values there are taken.
         """
-        count = self.lines.size - 1
-        cell = np.clip(np.searchsorted(self.lines, x if inside is None else inside, side="right") - 1, 0, count - 1)
+        cell = np.clip(np.searchsorted(self.lines, x, side="right") - 1, 0, self.lines.size - 2)
         local = np.clip((x - self.lines[cell]) / self._sizes[cell], 0, 1)
-        nodes = _gauss_rule(self.degree + 1).points
-        known, wanted = (legvander(2 * t - 1, self.degree).T for t in (nodes, local))
-        column = cell[:, None] * nodes.size + np.arange(nodes.size)
-        rows = np.repeat(np.arange(x.size), nodes.size)
-        interpolation = np.linalg.solve(known, wanted).T.ravel()
-        matrix = csr_matrix((interpolation, (rows, column.ravel())), shape=(x.size, count * nodes.size))
-        return matrix @ self.evaluation(nodes)[1]
-
-    def projection(self, other: LineSpace, factor: Coefficient = one) -> FloatArray:
-        """The matrix that takes a function u of another space to the projection of factor·u, shape (size, other.size).
-
-        Orthogonal in the weight of this space.
-        """
-        scaled = diags(self._measure.ravel() * factor(self.points)) @ other.at(self.points)
-        return np.asarray(solve(self.mass().toarray(), (self.values.T @ scaled).toarray(), assume_a="pos"), dtype=float)
+        values = _reference(self.degree, local.tobytes())[0][:, None, :] @ self._transform[cell]
+        rows = np.repeat(np.arange(x.size), self.degree + 1)
+        return csr_matrix((values.ravel(), (rows, self._dofs[cell].ravel())), shape=(x.size, self.size))
 
     def _form(self, left: FloatArray, f: Coefficient, right: FloatArray) -> csr_matrix:
         """∫ w f (right) (left), without what is zero but for rounding."""
@@ -183,9 +147,9 @@ class LineSpace:
         columns = np.broadcast_to(self._dofs[:, None, :], values.shape)
         return csr_matrix((values.ravel(), columns.ravel(), np.arange(0, m * n * k + 1, k)), shape=(m * n, self.size))
 
-    def _rules(self, end_exponents: tuple[float, float]) -> list[_Rule]:
+    def _rules(self, end_exponents: tuple[float, float]) -> list[Rule]:
         """The quadrature rule of each cell."""
-        count, last, (left, right) = self.degree + _EXTRA_POINTS, self.lines.size - 2, end_exponents
+        count, last, (left, right) = self.degree + EXTRA_POINTS, self.lines.size - 2, end_exponents
         return [_gauss_rule(count, left * (j == 0), right * (j == last)) for j in range(last + 1)]
 
 
@@ -198,8 +162,10 @@ def _hierarchy(dofs_of_cells: Any, size: int) -> tuple[Any, Any]:
     return cells, modes
 
 
-def _orthogonalised(slopes: FloatArray, measure: FloatArray) -> FloatArray:
+def _orthogonalised(slopes: FloatArray, measure: FloatArray) -> tuple[FloatArray, FloatArray]:
     """New functions in the elements' own, shape (m, k + 1, k + 1), so that in every cell ∫ w u′v′ is diagonal.
+
+    And what a vertex function holds of each bubble, shape (m, k − 1, 2).
 
     `slopes` are those of the elements' own at points with the weights `measure`, shapes (m, n, k + 1) and (m, n). The
     bubbles are orthonormalised by QR, and the vertex functions are made orthogonal to them. All functions
@@ -218,8 +184,9 @@ def _orthogonalised(slopes: FloatArray, measure: FloatArray) -> FloatArray:
     inverse = np.linalg.solve(r, np.broadcast_to(np.eye(r.shape[1]), r.shape)) / scale[:, 2:, None]
     transform = np.broadcast_to(np.eye(slopes.shape[2]), (len(slopes), *2 * slopes.shape[2:])).copy()
     transform[:, 2:, 2:] = inverse
-    transform[:, 2:, :2] = -inverse @ (q.transpose(0, 2, 1) @ slopes[:, :, :2])
-    return transform
+    shares = -q.transpose(0, 2, 1) @ slopes[:, :, :2]
+    transform[:, 2:, :2] = inverse @ shares
+    return transform, shares
 
 
 def _element(degree: int) -> Any:

@@ -69,17 +69,6 @@ class CylinderMesh:
     def is_full_circle(self) -> bool:
         return self.span > 1.5 * math.pi
 
-    def vertices_at(self, phase: float) -> Any:
-        """The indices of the φ-lines phi_lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
-        found = np.flatnonzero(np.abs(np.sin(self.phi_lines[:-1] - phase)) < TOLERANCE)
-        if found.size != round(self.span / math.pi):
-            name = "pi/2" if phase == math.pi / 2 else f"{phase:.6g}"
-            raise MeshError(
-                f"{round(self.span / math.pi)} impact line(s) expected at phi = {name} + k pi, {found.size} found; "
-                "put a line of the mesh at each impact"
-            )
-        return found
-
     def within(self, half_width: float) -> CylinderMesh:
         """This mesh cut off at |z| = half_width, the end of the noise's support, where it reaches beyond."""
         if not self.z_lines.size:
@@ -91,28 +80,18 @@ class CylinderMesh:
         inside = self.z_lines[(self.z_lines > lower + sliver) & (self.z_lines < upper - sliver)]
         return replace(self, z_lines=np.concatenate([[lower], inside, [upper]]))
 
-    def enriched(self, widening: float = 1.15) -> CylinderMesh:
-        """A finer mesh to measure this one's error by: higher degrees, and further ξ-cells at each end.
 
-        The ends move out by the factor `widening`, by one noise unit at least. Where a degree cannot be raised, the
-        cells are halved.
-        """
-        phi_lines, phi_degree = _raised(self.phi_lines, self.phi_degree, 2)
-        if not self.z_lines.size:
-            return replace(self, phi_lines=phi_lines, phi_degree=phi_degree)
-        lower, upper = self.z_lines[[0, -1]]
-        steps = np.linspace(0, 1, math.ceil(math.log(widening, 1.5)) + 1)[1:]
-        below = lower + steps * min((widening - 1) * lower, -1)
-        above = upper + steps * max((widening - 1) * upper, 1)
-        beyond = np.concatenate([below[::-1], self.z_lines, above])
-        z_lines, xi_degree = _raised(beyond, self.xi_degree, 2)
-        return CylinderMesh(phi_lines, z_lines, phi_degree, xi_degree)
-
-
-def _raised(lines: FloatArray, degree: int, by: int) -> tuple[FloatArray, int]:
-    if degree + by <= MAX_DEGREE:
-        return lines, degree + by
-    return halved(lines), degree
+def vertices_at(lines: FloatArray, phase: float) -> Any:
+    """The indices of the φ-lines lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
+    found = np.flatnonzero(np.abs(np.sin(lines[:-1] - phase)) < TOLERANCE)
+    turns = round((lines[-1] - lines[0]) / math.pi)
+    if found.size != turns:
+        name = "pi/2" if phase == math.pi / 2 else f"{phase:.6g}"
+        raise MeshError(
+            f"{turns} impact line(s) expected at phi = {name} + k pi, {found.size} found; "
+            "put a line of the mesh at each impact"
+        )
+    return found
 
 
 def halved(lines: FloatArray) -> FloatArray:

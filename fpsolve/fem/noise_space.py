@@ -1,26 +1,33 @@
 """Functions of the noise ξ, in the inner product weighted by its stationary law.
 
-On the line of a diffusion the functions are continuous elements in z = ξ/std, and the noise's part of the generator is
-−½σ²∫P_s u′v′: constants are in its kernel on every mesh. A Markov chain has a value for each state.
+Where P_s falls fast, or ends, they are its orthogonal polynomials: one element on the whole support. On a given
+interval, and for algebraic tails, they are continuous elements in z = ξ/std. A Markov chain has a value for each state.
+The noise's part of the generator is −½σ²∫P_s u′v′: constants are in its kernel in every space.
+
+With a tilt s every function carries the factor exp(s (z − c)): where T ~ exp(s z) the polynomials stand for what is
+left of it. The products of two functions are then weighted by P_s exp(2s z), which for Ornstein-Uhlenbeck noise is P_s
+moved by 2s, however far that is.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, Protocol
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags, identity
 
 from fpsolve.arrays import Coefficient, FloatArray, one
-from fpsolve.errors import MeshError
-from fpsolve.fem.line import LineSpace
-from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.polynomials import Polynomials, gegenbauer, hermite, stieltjes
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import Diffusion
-from fpsolve.model.problem import AnyNoise
 
-_SAMPLES = 2001
+MAX_DENSE_UNKNOWNS = 600
+"""Matrices of ξ are NumPy arrays for so many unknowns, and sparse beyond."""
+FAR = 50.0
+"""Noise units beyond which OU noise does not come."""
+EXTRA_POINTS = 16
+"""Quadrature points beyond the number of polynomials."""
 
 
 class Samples(NamedTuple):
@@ -37,166 +44,257 @@ class Samples(NamedTuple):
     xi: FloatArray
     weight: FloatArray
     measure: FloatArray
-    values: csr_matrix
+    values: Any
     factor: FloatArray
 
 
-class NoiseSpace(Protocol):
-    """What the generator and its users ask of the functions of ξ."""
+class NoiseSpace:
+    """What the generator and its users ask of the functions of ξ; matrices are arrays, or sparse where they are large.
+
+    Attributes:
+        tilt: s of the factor exp(s (z − c)) that every function carries.
+        center: c, about the mean z of the weight.
+        support: ξ between whose extremes the noise lives, as far as it matters, or its states.
+        values: the functions at the points of a quadrature rule, or at the states, without factor, shape (n, size).
+        measure: ∫ of the weight at those points, shape (n,).
+        cells: for each unknown the cell that it belongs to, -1 for none or two, shape (size,).
+        modes: for each unknown the degree of its polynomial, shape (size,).
+        is_local: whether the functions can follow a kink in ξ.
+        slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
+    """
+
+    tilt, center, slowest, is_local = 0.0, 0.0, 0.0, True
+    support: FloatArray
+    values: Any
+    measure: FloatArray
+    cells: Any
+    modes: Any
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
+        return int(self.values.shape[1])
 
-    @property
-    def axes(self) -> tuple[LineSpace, ...]:
-        """The elements, none for a chain."""
-
-    @property
-    def tilt(self) -> float:
-        """s of the factor exp(s z) that every function carries; 0 where there is none."""
-
-    @property
-    def support(self) -> FloatArray:
-        """ξ between whose extremes the noise lives, or its states: there the sign of the phase speed is looked at."""
-
-    def mass(self, g: Coefficient = one) -> csr_matrix:
+    def mass(self, g: Coefficient = one) -> Any:
         """∫ P_s g(ξ) u v."""
+        raise NotImplementedError
 
-    def generator(self) -> csr_matrix:
+    def generator(self) -> Any:
         """∫ P_s v L_ξ u, L_ξ the generator of the noise."""
+        raise NotImplementedError
+
+    def generator_of_one(self) -> FloatArray:
+        """The same with v the function 1, times the factor; shape (size,)."""
+        return np.zeros(self.size)
 
     def constant(self) -> FloatArray:
         """Coefficients of the function 1, times the factor, shape (size,)."""
+        raise NotImplementedError
 
-    def samples(self, local: FloatArray | None = None) -> Samples:
-        """At local coordinates in [0, 1] of every cell, or at the quadrature points; of a chain at its states."""
+    def nested(self, table: FloatArray) -> FloatArray:
+        """Coefficients, along the last axis, of modes whose sums by degree are all functions of a lower degree."""
+        return table
+
+    def samples(self) -> Samples:
+        """At the points of the rule, or at the states."""
+        raise NotImplementedError
 
     def projection(self, other: Any) -> FloatArray:
         """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
+        raise NotImplementedError
 
 
-class DiffusionSpace:
-    """Continuous elements in z = ξ/std, for noise that diffuses.
+class LineNoiseSpace(NoiseSpace):
+    """What functions on the line of a diffusion share.
 
-    With a tilt s every function carries the factor exp(s (z − c)): where T ~ exp(s z) the polynomials stand for what
-    is left of it. The products of two functions are then weighted by P_s exp(2s z), which for Ornstein-Uhlenbeck
-    noise is P_s moved to 2s, however far that is.
+    Attributes:
+        unit: ξ/z.
+        rate: ½σ²/std², the diffusion of z.
+        points: z of a quadrature rule, shape (n,).
+    """
+
+    points: FloatArray
+
+    def __init__(self, noise: Diffusion, tilt: float = 0.0) -> None:
+        self.unit, self.tilt = noise.standard_deviation, tilt
+        self.rate = 0.5 * (noise.diffusion / self.unit) ** 2
+        self._log_density, self._log_weight = noise.log_density, -math.log(self.unit)
+
+    def values_at(self, z: FloatArray) -> Any:
+        """The functions at any z, shape (len(z), size)."""
+        raise NotImplementedError
+
+    def weight(self, z: FloatArray) -> FloatArray:
+        """P_s exp(2s z) as a density of z: its integral is 1."""
+        return np.exp(self._log_density(self.unit * z) + 2 * self.tilt * z - self._log_weight)
+
+    def at(self, z: FloatArray) -> Samples:
+        """At any z; the measure is 0."""
+        return self._sampled(z, np.zeros_like(z), self.values_at(z))
+
+    def samples(self) -> Samples:
+        return self._sampled(self.points, self.unit * self.measure / self.weight(self.points), self.values)
+
+    def _sampled(self, z: FloatArray, measure: FloatArray, values: Any) -> Samples:
+        factor = np.exp(np.clip(self.tilt * (z - self.center), -600, 600))
+        return Samples(self.unit * z, self.weight(z) / self.unit, measure, values, factor)
+
+    def projection(self, other: LineNoiseSpace) -> FloatArray:
+        exponent = other.tilt * (self.points - other.center) - self.tilt * (self.points - self.center)
+        scaled = (self.measure * np.exp(np.clip(exponent, -600, 600)))[:, None] * _dense(other.values_at(self.points))
+        return np.asarray(np.linalg.solve(_dense(self.mass()), self.values.T @ scaled))
+
+
+class PolynomialSpace(LineNoiseSpace):
+    """The orthogonal polynomials of P_s exp(2s z), over 1 − (ξ/ξ_s)² where the noise ends at ±ξ_s.
+
+    All matrices are banded: for Ornstein-Uhlenbeck noise that of 1 is the identity, that of L_ξ without a tilt is
+    diagonal, and that of ξ has one diagonal on each side. Near ξ_s expansions converge only like powers.
+
+    Args:
+        noise: the noise; P_s must end, or fall like a Gaussian.
+        count: the number of polynomials.
+        tilt: s.
+    """
+
+    is_local = False
+
+    def __init__(self, noise: Diffusion, count: int, tilt: float = 0.0) -> None:
+        super().__init__(noise, tilt)
+        end = noise.half_width / self.unit
+        if math.isinf(end):
+            self._polynomials, x, self.values, slopes, self.measure = _hermite_table(count)
+            self._shift, self._scale, self._log_weight = 2 * tilt, 1.0, self._log_weight + 2 * tilt**2
+            self.points = x + self._shift
+        else:
+            self._shift, self._scale, self.slowest = 0.0, end, 1.0
+            more = min(abs(tilt) * end, 4 * tilt**2)
+            points = 16 * math.ceil((2 * count + EXTRA_POINTS + more) / 16)  # few rules serve many spaces
+            x, weights = _gegenbauer_rule(points, noise.end_exponent - 1)
+            self.points, damping = end * x, 1 - x**2
+            logs = np.log(weights) + 2 * tilt * self.points
+            tilted = np.exp(logs - logs.max())
+            self._polynomials = stieltjes(x, tilted, count) if tilt else gegenbauer(count, noise.end_exponent - 1)
+            self.values, slopes = self._polynomials.at(x)
+            self.measure = tilted * damping / (tilted @ damping)
+            self._log_weight += math.log((tilted @ damping) / (weights @ damping)) + float(logs.max())
+        self._slopes = slopes / self._scale + tilt * self.values
+        self.center = float(self.measure @ self.points)
+        self.support = self.unit * min(end, FAR) * np.array([-1.0, 1.0])
+        self.cells, self.modes = np.zeros(count, dtype=int), np.arange(count)
+
+    def mass(self, g: Coefficient = one) -> FloatArray:
+        measure = self.measure if g is one else self.measure * g(self.unit * self.points)
+        return _form(self.values, measure)
+
+    def generator(self) -> FloatArray:
+        """−½σ² ∫ P_s (u′ + s u)(v′ + s v)."""
+        return np.asarray(-self.rate * _form(self._slopes, self.measure))
+
+    def generator_of_one(self) -> FloatArray:
+        return np.asarray(-self.rate * self.tilt * (self.measure @ self._slopes))
+
+    def constant(self) -> FloatArray:
+        return np.eye(1, self.size)[0]
+
+    def values_at(self, z: FloatArray) -> FloatArray:
+        return self._polynomials.at((z - self._shift) / self._scale)[0]
+
+
+class CellSpace(LineNoiseSpace):
+    """Continuous elements on an interval, for given meshes and algebraic tails.
 
     Args:
         noise: the noise.
         lines: vertices in z, within the support of the noise.
         degree: of the elements.
-        tilt: s.
 
     Attributes:
-        line: the elements, in the weight `weight`.
-        unit: ξ/z.
-        center: c, where the weight is largest.
-        rate: ½σ²/std², the diffusion of z.
+        line: the elements, in the weight P_s.
 
     Raises:
         MeshError: a cell's polynomials cannot be told apart under the weight.
     """
 
-    def __init__(self, noise: Diffusion, lines: FloatArray, degree: int, tilt: float = 0.0) -> None:
-        self.unit, self.tilt, self.center = noise.standard_deviation, tilt, 0.0
-        self._log_density, self._log_weight = noise.log_density, -math.log(self.unit)
-        self.rate = 0.5 * (noise.diffusion / self.unit) ** 2
-        if tilt:
-            inside = np.linspace(lines[0], lines[-1], _SAMPLES)[1:-1]
-            sizes = self._log_density(self.unit * inside) + 2 * tilt * inside
-            self.center, self._log_weight = float(inside[sizes.argmax()]), float(sizes.max())
+    def __init__(self, noise: Diffusion, lines: FloatArray, degree: int) -> None:
+        from fpsolve.fem.line import LineSpace  # scikit-fem takes a while to import
+
+        super().__init__(noise)
         end, exponent = noise.half_width / self.unit, noise.end_exponent
-        ends = exponent * (lines[0] <= -end), exponent * (lines[-1] >= end)
+        reaches = (lines[0] <= -end * (1 - 1e-12), lines[-1] >= end * (1 - 1e-12))
+        ends = (exponent * reaches[0], exponent * reaches[1])
         self.line = LineSpace(lines, degree, self.weight, end_exponents=ends)
+        self.points, self.measure, self.values = self.line.points, self.line.measure, self.line.values
+        self.cells, self.modes = self.line.cells, self.line.modes
+        self.support = self.unit * lines[[0, -1]]
 
-    @property
-    def size(self) -> int:
-        return self.line.size
+    def mass(self, g: Coefficient = one) -> Any:
+        return _small(self.line.mass() if g is one else self.line.mass(lambda z: g(self.unit * z)))
 
-    @property
-    def axes(self) -> tuple[LineSpace, ...]:
-        return (self.line,)
-
-    @property
-    def support(self) -> FloatArray:
-        return self.unit * np.concatenate([self.line.lines, self.line.points])
-
-    def weight(self, z: FloatArray) -> FloatArray:
-        """P_s exp(2s z): without a tilt the stationary density of z, otherwise with its largest value, at c, made 1."""
-        return np.exp(self._log_density(self.unit * z) + 2 * self.tilt * z - self._log_weight)
-
-    def factor(self, z: FloatArray, other: DiffusionSpace | None = None) -> FloatArray:
-        """exp(s (z − c)), which every function carries, over that of another space; kept within e^±600."""
-        exponent = self.tilt * (z - self.center)
-        if other is not None:
-            exponent = exponent - other.tilt * (z - other.center)
-        return np.exp(np.clip(exponent, -600, 600))
-
-    def mass(self, g: Coefficient = one) -> csr_matrix:
-        return self.line.mass() if g is one else self.line.mass(lambda z: g(self.unit * z))
-
-    def generator(self) -> csr_matrix:
-        """−½σ² ∫ P_s (u′ + s u)(v′ + s v); at the ends no probability flux is the natural condition."""
-        return -self.rate * self.line.stiffness(self.tilt)
+    def generator(self) -> Any:
+        """−½σ² ∫ P_s u′v′; at the ends no probability flux is the natural condition."""
+        return _small(-self.rate * self.line.stiffness())
 
     def constant(self) -> FloatArray:
         return self.line.constant()
 
-    def samples(self, local: FloatArray | None = None) -> Samples:
-        if local is None:
-            return self._sampled(self.line.points, self.line.weights, self.line.values)
-        z, values = self.line.evaluation(local)
-        return self._sampled(z, np.repeat(np.diff(self.line.lines) / local.size, local.size), values)
+    def nested(self, table: FloatArray) -> FloatArray:
+        return np.asarray((self.line.nested @ table.T).T)
 
-    def at(self, z: FloatArray, inside: FloatArray | None = None) -> Samples:
-        """At any z, see `LineSpace.at`; the measure is 0."""
-        return self._sampled(z, np.zeros_like(z), self.line.at(z, inside))
-
-    def _sampled(self, z: FloatArray, measure: FloatArray, values: csr_matrix) -> Samples:
-        return Samples(self.unit * z, self.weight(z) / self.unit, self.unit * measure, values, self.factor(z))
-
-    def projection(self, other: DiffusionSpace) -> FloatArray:
-        return self.line.projection(other.line, lambda z: other.factor(z, self))
+    def values_at(self, z: FloatArray) -> Any:
+        return self.line.at(z)
 
 
-class ChainSpace:
+class ChainSpace(NoiseSpace):
     """One value for each state of a Markov chain: ∫ P_s becomes a sum over the states with their probabilities."""
 
-    tilt, axes = 0.0, ()
-
     def __init__(self, noise: MarkovChain) -> None:
-        self.support, self.rates = np.array(noise.states), np.array(noise.rates)
-        self._probabilities = noise.probabilities
-        self.size = self.support.size
+        self.support, self.measure, self._rates = np.array(noise.states), noise.probabilities, np.array(noise.rates)
+        self.values = np.eye(self.support.size)
+        self.cells, self.modes = np.full(self.size, -1), np.zeros(self.size, dtype=int)
 
-    def mass(self, g: Coefficient = one) -> csr_matrix:
-        return csr_matrix(diags(self._probabilities * g(self.support)))
+    def mass(self, g: Coefficient = one) -> FloatArray:
+        return np.diag(self.measure * g(self.support))
 
-    def generator(self) -> csr_matrix:
+    def generator(self) -> FloatArray:
         """diag(π) Q."""
-        return csr_matrix(self._probabilities[:, None] * self.rates)
+        return self.measure[:, None] * self._rates
 
     def constant(self) -> FloatArray:
         return np.ones(self.size)
 
-    def samples(self, local: FloatArray | None = None) -> Samples:
+    def samples(self) -> Samples:
         ones = np.ones(self.size)
-        return Samples(self.support, self._probabilities, ones, csr_matrix(identity(self.size)), ones)
+        return Samples(self.support, self.measure, ones, self.values, ones)
 
     def projection(self, other: ChainSpace) -> FloatArray:
         return np.eye(self.size)
 
 
-def noise_space(noise: AnyNoise, mesh: CylinderMesh, tilt: float = 0.0) -> NoiseSpace:
-    """The functions of a noise on a mesh, which for a chain has no lines in z.
+@lru_cache(maxsize=64)
+def _hermite_table(count: int) -> tuple[Polynomials, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """The polynomials, points of a rule, values and slopes there, weights."""
+    x, weights = hermite(count + EXTRA_POINTS).rule()
+    polynomials = hermite(count)
+    return polynomials, x, *polynomials.at(x), weights
 
-    Raises:
-        MeshError: the mesh has lines where the noise has states, or none where it has a line.
-    """
-    if isinstance(noise, MarkovChain) == bool(mesh.z_lines.size):
-        raise MeshError("noise with states needs a mesh without z_lines, and noise on a line one with them")
-    if isinstance(noise, MarkovChain):
-        return ChainSpace(noise)
-    return DiffusionSpace(noise, mesh.z_lines, mesh.xi_degree, tilt)
+
+@lru_cache(maxsize=64)
+def _gegenbauer_rule(count: int, exponent: float) -> tuple[FloatArray, FloatArray]:
+    return gegenbauer(count, exponent).rule()
+
+
+def _form(values: FloatArray, measure: FloatArray) -> FloatArray:
+    """∫ of the products of functions, without what is zero but for rounding."""
+    matrix = (values * measure[:, None]).T @ values
+    matrix[np.abs(matrix) < 1e-13 * np.max(np.abs(matrix))] = 0.0
+    return matrix
+
+
+def _small(matrix: Any) -> Any:
+    """A sparse matrix as an array unless it is large."""
+    return matrix.toarray() if matrix.shape[0] <= MAX_DENSE_UNKNOWNS else matrix
+
+
+def _dense(matrix: Any) -> FloatArray:
+    return matrix if isinstance(matrix, np.ndarray) else np.asarray(matrix.toarray())

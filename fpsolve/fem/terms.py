@@ -2,11 +2,13 @@
 
 For trial T and test w, every integral weighted by P_s(ξ), a drive ε^n g(ξ) A x with h = e′ᵀA e and q = eᵀA e gives
 
-    transport(ε^n h g) + p ε^n ∫ P_s q g w T,      transport(v) = ∫ P_s v w T_φ + point loads,
+    ∫ P_s ε^n g h w T_φ + p ε^n ∫ P_s g q w T,
 
-with the load ∫ P_s v (T(φ⁺) − T(φ⁻)) w at each φ-vertex, on the trace of w from which the whole phase speed, the sum
-over all drives, points away (upwinding): w(φ⁻) where it is positive, w(φ⁺) where it is negative. A kick makes the load
-that of R^p T(φ⁺) − T(φ⁻), or of T(φ⁺) − R^p T(φ⁻): an impact is exactly a point load.
+and at each φ-vertex the point load ∫ P_s (v {w} − ½θ [w]) [T], with the phase speed v = Σ ε^n g h, the mean {w} and the
+jump [w] = w(φ⁺) − w(φ⁻) of its two traces. θ = |v| is upwinding; for polynomials of ξ, which cannot follow its kink, θ
+is its size for the typical ξ, |Σ ε^n h| over what no noise drives + Σ ε^n |h| (mean of g²)^½ over the rest. A kick
+makes the load that of R^p T(φ⁺) − T(φ⁻), on w(φ⁻), as the phase runs forward, or of T(φ⁺) − R^p T(φ⁻), on w(φ⁺): an
+impact is exactly a point load, for which θ must be |v|.
 """
 
 from __future__ import annotations
@@ -14,13 +16,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import diags, issparse
 
-from fpsolve.arrays import Coefficient, one
-from fpsolve.fem.kronecker import KroneckerSum
+from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.space import CylinderSpace
 from fpsolve.model.plane import Drive, Harmonics, Kick, System, phase_speed
 
@@ -51,74 +53,106 @@ class Jump:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """One term of L(p): a coefficient of p times an operator.
+    """One term of L(p): a coefficient of p times an operator Φ ⊗ ∫P_s g.
 
     Attributes:
         order: the power of ε with which it begins; the power itself is in the operator.
         of_p: the coefficient.
-        operator: its matrix in weak form.
+        phase: the matrix of φ.
+        g: the function of ξ; None for L_ξ.
         text: the term as a reader would write it.
     """
 
     order: int
     of_p: Power | Jump
-    operator: KroneckerSum
+    phase: Any
+    g: Coefficient | None
     text: str
 
 
 def terms_of(system: System, space: CylinderSpace) -> Iterator[Term]:
-    """L(p) of Eq. (19), term by term."""
-    yield Term(0, Power(0), KroneckerSum.of(space.phi.mass(), space.xi.generator()), "L_ξ, the generator of the noise")
-    turns_back = _reversals(system, space)
+    """L(p) of Eq. (19), term by term; those of φ alone are the same with any tilt."""
+    phi = space.phi
+    yield Term(0, Power(0), phi.identity, None, "L_ξ, the generator of the noise")
+    jump, mean = phi.right_trace - phi.left_trace, 0.5 * (phi.right_trace + phi.left_trace)
     for drive in system.drives:
-        size, text, noise = system.epsilon**drive.order, _prefix(drive), space.xi.mass(drive.g)
+        size, text = system.epsilon**drive.order, _prefix(drive)
         if not drive.h.vanishes:
-            operator = _transport(system, space, drive, noise, turns_back)
-            yield Term(drive.order, Power(0), size * operator, f"{text}{_written(drive.h)} ∂φ")
+            along = size * (phi.convection(drive.h) + mean.T @ _rows(drive.h(phi.lines[:-1]), jump))
+            yield Term(drive.order, Power(0), along, drive.g, f"{text}{_written(drive.h)} ∂φ")
         if not drive.q.vanishes:
-            operator = KroneckerSum.of(space.phi.mass(drive.q), noise)
-            yield Term(drive.order, Power(1), size * operator, f"p {text}{_written(drive.q)}")
+            yield Term(drive.order, Power(1), size * phi.mass(drive.q), drive.g, f"p {text}{_written(drive.q)}")
+    yield from _upwinding(system, space, jump)
     for kick in system.kicks:
-        text = f"(R^p − 1) |dφ/dt| δ(φ − {kick.phase:.6g} mod π), R = {math.exp(kick.log_factor):.6g}"
-        yield Term(2, Jump(kick.log_factor), _load(system, space, kick), text)
+        yield from _kicked(system, space, kick)
 
 
-def _transport(system: System, space: CylinderSpace, drive: Drive, noise: csr_matrix, turns_back: Any) -> KroneckerSum:
-    """∫ P_s h(φ) g(ξ) w T_φ and its upwind point loads at the φ-vertices; `noise` is ∫ P_s g(ξ)."""
-    vertices = space.mesh.phi_lines[:-1]
-    jumps = drive.h(vertices)[:, None] * (space.right_trace - space.left_trace)
-    along = space.phi.convection(drive.h) + csr_matrix(space.left_trace[~turns_back].T @ jumps[~turns_back])
-    total = KroneckerSum.of(along, noise)
-    for j in np.flatnonzero(turns_back):
-        for trace, direction in ((space.left_trace[j], 1), (space.right_trace[j], -1)):
-            load = np.outer(trace, jumps[j])
-            total += KroneckerSum.of(load, space.xi.mass(_upwind(system, vertices[j], direction, drive.g)))
-    return total
+def _upwinding(system: System, space: CylinderSpace, jump: Any) -> Iterator[Term]:
+    """−½ ∫ P_s θ [w] [T] at the φ-vertices."""
+    vertices, text = space.phi.lines[:-1], "upwind loads between cells"
+    is_exact = np.full(vertices.size, space.xi.is_local)
+    for kick in system.kicks:
+        is_exact[space.phi.vertices_at(kick.phase)] = True
+    speed = phase_speed(system, space.xi.support[:, None])(vertices)
+    direction = 1 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
+    if not np.all(is_exact):
+        typical = np.where(is_exact, 0.0, _typical_speed(system, space))
+        yield Term(0, Power(0), -0.5 * jump.T @ _rows(typical, jump), one, text)
+    for drive in system.drives:
+        speed = np.where(is_exact, direction, 0) * system.epsilon**drive.order * drive.h(vertices)
+        if np.any(speed):
+            yield Term(drive.order, Power(0), -0.5 * jump.T @ _rows(speed, jump), drive.g, text)
+    for j in np.flatnonzero(is_exact & (direction == 0)):
+        size = partial(_size_of_speed, system=system, phi=float(vertices[j]))
+        yield Term(0, Power(0), -0.5 * jump[[j]].T @ jump[[j]], size, text)
 
 
-def _load(system: System, space: CylinderSpace, kick: Kick) -> KroneckerSum:
+def _typical_speed(system: System, space: CylinderSpace) -> FloatArray:
+    """θ at the φ-vertices for the typical ξ, shape (m,)."""
+    vertices, constant = space.phi.lines[:-1], space.xi.constant()
+    total, steady, driven = (
+        constant @ (space.xi_matrix(one) @ constant),
+        np.zeros(vertices.size),
+        np.zeros(vertices.size),
+    )
+    for drive in system.drives:
+        speed = system.epsilon**drive.order * drive.h(vertices)
+        if drive.g is one:
+            steady += speed
+        else:
+            square = space.xi.mass(lambda xi, g=drive.g: g(xi) ** 2)  # type: ignore[misc]
+            driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
+    return abs(steady) + driven
+
+
+def _size_of_speed(xi: Any, system: System, phi: float) -> Any:
+    """|dφ/dt| at φ."""
+    return np.abs(phase_speed(system, xi)(phi))
+
+
+def _kicked(system: System, space: CylinderSpace, kick: Kick) -> Iterator[Term]:
     """A kick's point load beyond continuity: |v| w(φ⁻) T(φ⁺) where the phase runs forward, else |v| w(φ⁺) T(φ⁻)."""
-    at = space.mesh.vertices_at(kick.phase)
-    left, right = space.left_trace[at], space.right_trace[at]
-
-    def speed(xi: Any) -> Any:
-        return phase_speed(system, xi)(kick.phase)
-
-    total = KroneckerSum.of(left.T @ right, space.xi.mass(lambda xi: np.maximum(speed(xi), 0)))
-    if np.any(speed(space.xi.support) < 0):
-        total += KroneckerSum.of(right.T @ left, space.xi.mass(lambda xi: np.maximum(-speed(xi), 0)))
-    return total
-
-
-def _reversals(system: System, space: CylinderSpace) -> Any:
-    """At which φ-vertices the phase speed is negative for some ξ, boolean."""
-    speed = phase_speed(system, space.xi.support[:, None])
-    return np.any(speed(space.mesh.phi_lines[:-1]) < 0, axis=0)
+    at = space.phi.vertices_at(kick.phase)
+    left, right = space.phi.left_trace[at], space.phi.right_trace[at]
+    text = f"(R^p − 1) |dφ/dt| δ(φ − {kick.phase:.6g} mod π), R = {math.exp(kick.log_factor):.6g}"
+    speed = phase_speed(system, space.xi.support)(kick.phase)
+    if np.ptp(speed) <= 1e-12 * np.max(np.abs(speed)):
+        load = left.T @ right if speed[0] > 0 else right.T @ left
+        yield Term(2, Jump(kick.log_factor), abs(float(speed[0])) * load, one, text)
+        return
+    for load, sign in ((left.T @ right, 1), (right.T @ left, -1)):
+        if np.any(sign * speed > 0):
+            yield Term(2, Jump(kick.log_factor), load, partial(_flux, system=system, phi=kick.phase, sign=sign), text)
 
 
-def _upwind(system: System, phi: float, direction: int, g: Coefficient) -> Coefficient:
-    """g(ξ) where the phase speed at φ has the asked direction, 1 or −1; 0 elsewhere."""
-    return lambda xi: g(xi) * ((phase_speed(system, xi)(phi) >= 0) == (direction > 0))
+def _flux(xi: Any, system: System, phi: float, sign: int) -> Any:
+    """max(± dφ/dt, 0) at φ."""
+    return np.maximum(sign * phase_speed(system, xi)(phi), 0)
+
+
+def _rows(factors: FloatArray, matrix: Any) -> Any:
+    """A matrix with its rows multiplied."""
+    return diags(factors) @ matrix if issparse(matrix) else factors[:, None] * matrix
 
 
 def power_of_epsilon(order: int) -> str:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 from pydantic.dataclasses import dataclass
-from scipy.special import betaln, xlog1py
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, Remedy
@@ -185,6 +184,8 @@ class NonGaussianNoise:
 
     def log_density(self, xi: ArrayLike) -> FloatArray:
         """ln P_s(ξ) of Eq. (9) with the exponent −1/(r₀ − 1), normalised in closed form; −∞ outside the support."""
+        from scipy.special import xlog1py  # takes a tenth of a second to import
+
         xi = np.asarray(xi, dtype=float)
         if self.r0 == 1:
             return self.ou_reduction().log_density(xi)
@@ -200,6 +201,8 @@ class NonGaussianNoise:
     @property
     def _log_normalisation(self) -> float:
         """ln Z of Eq. (9): Z = B(a + 1, ½)/√|b| for r₀ < 1 and B(a − ½, ½)/√b for r₀ > 1, with a = 1/|r₀ − 1|."""
+        from scipy.special import betaln
+
         a = 1 / abs(self.r0 - 1)
         return float(betaln(a + 1 if self.r0 < 1 else a - 0.5, 0.5)) - 0.5 * math.log(abs(self.curvature))
 

@@ -46,6 +46,8 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     """
     noise, system = problem.noise, problem.system
     check_existence(noise, p)
+    if not any(p * kick.log_factor > math.log(2.0) for kick in system.kicks):
+        return
     if isinstance(noise, MarkovChain):
         xi, most = np.array(noise.states), math.e
     else:

@@ -57,7 +57,7 @@ def _summary(result: CurveResult) -> dict[str, Any]:
         **_parameters(result.curve),
         "moments": _rows(result),
         **{name: _estimate(result.estimates[name], index.theory(theory)) for name, index in INDICES.items()},
-        "mesh": result.mesh,
+        "discretisation": result.discretisation,
         "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
         "notes": list(result.notes),
     }

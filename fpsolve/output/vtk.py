@@ -16,19 +16,20 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import OutputError
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import Fields, fields, xi_marginal
-from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.noise_space import DiffusionSpace, Samples
+from fpsolve.fem.noise_space import LineNoiseSpace, Samples
+from fpsolve.fem.phase_space import PhaseSpace
 from fpsolve.files import atomic, write_text
+from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals written; elements of a higher degree are cut into several of them."""
+FAINT = 1e-6
 
 
 def write_eigenfunctions(
@@ -37,8 +38,8 @@ def write_eigenfunctions(
     """Write `<stem>.pvd`, a time series over p, and `<stem>/p….vtu`, one file for each p.
 
     Point data: `T`; `T_adjoint`, T*; `tilted_density`, T T*; `stationary_density`, T* at p = 0; `z` = ξ/std.
-    T has mean 1 over P_s(ξ)/2π, or where its factor exp(s z) is large, over what that makes of P_s, and is cut off
-    beyond e^±600; ∫T T* dφ dξ = 1. Field data: `p` and `Lambda`, Λ(p).
+    T has mean 1 over P_s(ξ)/2π, see `fields`, and is cut off beyond e^±600; ∫T T* dφ dξ = 1. Field data: `p` and
+    `Lambda`, Λ(p).
 
     Args:
         directory: the folder, made where it is missing.
@@ -71,12 +72,12 @@ def write_density(path: Path, stationary: PrincipalPair) -> Path:
 
     Point data: `stationary_density`, `phi_marginal`, `xi_marginal`, `z`. Field data: `lyapunov_exponent`, λ.
     """
-    grid, space = _Grid.of(stationary), stationary.generator.space
+    grid, space = _Grid.of(stationary), stationary.space
     over_xi = space.table(stationary.left) @ (space.xi.mass() @ space.xi.constant())
     data = {
         "stationary_density": grid.fields(stationary).adjoint,
         "phi_marginal": grid.phase_table(stationary) @ over_xi[:, None],
-        "xi_marginal": 2 * math.pi / space.mesh.span * xi_marginal(stationary, grid.samples(stationary)),
+        "xi_marginal": space.turns * xi_marginal(stationary, grid.samples(stationary)),
         "z": grid.z,
     }
     _write_grid(path, grid, data, {"lyapunov_exponent": stationary.derivative})
@@ -135,12 +136,17 @@ class _Grid:
 
     @classmethod
     def of(cls, pair: PrincipalPair) -> _Grid:
-        """Nodes that show a pair; P_s in the adjoint also asks for quadrilaterals of one noise unit at most."""
-        mesh = pair.generator.space.mesh
-        order = min(MAX_ORDER, max(mesh.phi_degree, mesh.xi_degree))
-        tall = math.ceil(np.max(np.diff(mesh.z_lines)) - 1e-9)
-        phi = _nodes(_phi_breaks(mesh), order, _parts(mesh.phi_degree, order))
-        z = _nodes(mesh.z_lines, order, max(tall, _parts(mesh.xi_degree, order)))
+        """Nodes that show a pair; P_s in the adjoint also asks for quadrilaterals of one noise unit at most.
+
+        Raises:
+            OutputError: the noise has states.
+        """
+        space, lines = pair.space, _z_lines(pair)
+        degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
+        order = min(MAX_ORDER, max(degrees))
+        tall = math.ceil(np.max(np.diff(lines)) - 1e-9)
+        phi = _nodes(_phi_breaks(space.phi), order, _parts(degrees[0], order))
+        z = _nodes(lines, order, max(tall, _parts(pair.generator.chosen.xi_degree, order)))
         return cls(phi, z, pair.generator.problem.noise.standard_deviation, order)
 
     @property
@@ -152,18 +158,15 @@ class _Grid:
         """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
         return fields(pair, self.phase_table(pair), self.samples(pair))
 
-    def phase_table(self, pair: PrincipalPair) -> csr_matrix:
+    def phase_table(self, pair: PrincipalPair) -> FloatArray:
         """Values of the φ-elements at the nodes, shape (φ-nodes, φ-unknowns)."""
-        mesh, inside = pair.generator.space.mesh, _inward(self.phi)
-        turned = mesh.span * np.floor((inside - mesh.phi_lines[0]) / mesh.span)
-        return pair.generator.space.phi.at((self.phi - turned).ravel(), (inside - turned).ravel())
+        phi, inside = pair.space.phi, _inward(self.phi)
+        turned = phi.span * np.floor((inside - phi.lines[0]) / phi.span)
+        return phi.at((self.phi - turned).ravel(), (inside - turned).ravel())
 
     def samples(self, pair: PrincipalPair) -> Samples:
-        """The functions of ξ at the nodes, each seen from inside its cell; of states there are none."""
-        xi, inside = pair.generator.space.xi, _inward(self.z_cells)
-        if not isinstance(xi, DiffusionSpace):
-            raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
-        return xi.at(self.z, np.append(inside[:, :-1], inside[-1, -1]))
+        """The functions of ξ at the nodes."""
+        return _on_a_line(pair).at(self.z)
 
     def points(self) -> FloatArray:
         """(φ, ξ, 0), φ slowest, shape (points, 3)."""
@@ -179,12 +182,37 @@ class _Grid:
         return corners.reshape(-1, 1) + i * self.z.size + j
 
 
-def _phi_breaks(mesh: CylinderMesh) -> FloatArray:
+def _phi_breaks(phi: PhaseSpace) -> FloatArray:
     """0, 2π and the φ-lines between them, those of a half circle repeated."""
-    lines = np.sort(np.mod(mesh.phi_lines[:-1], mesh.span))
-    lines = np.concatenate([lines + k * mesh.span for k in range(round(2 * math.pi / mesh.span))])
+    lines = np.sort(np.mod(phi.lines[:-1], phi.span))
+    lines = np.concatenate([lines + k * phi.span for k in range(round(2 * math.pi / phi.span))])
     inside = lines[(lines > 1e-9) & (lines < 2 * math.pi - 1e-9)]
     return np.concatenate([[0.0], inside, [2 * math.pi]])
+
+
+def _z_lines(pair: PrincipalPair) -> FloatArray:
+    """The lines of the ξ-cells; of polynomials the interval in which the noise lives along some paths, in noise units.
+
+    Outside it P_s and the tilted density are below `FAINT` of their largest values.
+    """
+    xi, noise = _on_a_line(pair), pair.generator.problem.noise
+    if pair.generator.chosen.z_lines.size or isinstance(noise, MarkovChain):
+        return pair.generator.chosen.z_lines
+    end = noise.half_width / noise.standard_deviation
+    reach = min(end, 12.0 + abs(xi.center))
+    z = np.linspace(-reach, reach, 2001)[1:-1]
+    tilted, stationary = np.abs(xi_marginal(pair, xi.at(z))), noise.density(noise.standard_deviation * z)
+    seen = z[(tilted > FAINT * tilted.max()) | (stationary > FAINT * stationary.max())]
+    lower, upper = max(math.floor(seen[0]), -end), min(math.ceil(seen[-1]), end)
+    inside = np.arange(math.floor(lower) + 1, math.ceil(upper))
+    return np.concatenate([[lower], inside[(inside > lower + 0.1) & (inside < upper - 0.1)], [upper]])
+
+
+def _on_a_line(pair: PrincipalPair) -> LineNoiseSpace:
+    """The functions of ξ of a pair. Raises `OutputError` where the noise has states."""
+    if not isinstance(pair.space.xi, LineNoiseSpace):
+        raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
+    return pair.space.xi
 
 
 def _parts(degree: int, order: int) -> int:

@@ -30,7 +30,7 @@ class CurveResult:
         estimates: of each of the `INDICES`, by its name; None where there is none, or it did not converge.
         eigenpairs: those whose eigenfunctions are written; none once they are no longer needed.
         stationary: the eigenpair at p = 0; None once it is no longer needed.
-        mesh: what was used for the p of the largest size, ξ in noise units; None where no p was solved.
+        discretisation: what was used for the p of the largest size; None where no p was solved.
         warnings: what limits these numbers.
         notes: where the theories compared with are not valid.
         failures: why some p are missing.
@@ -42,7 +42,7 @@ class CurveResult:
     estimates: Mapping[str, Estimate | None]
     eigenpairs: tuple[PrincipalPair, ...]
     stationary: PrincipalPair | None
-    mesh: dict[str, Any] | None
+    discretisation: dict[str, Any] | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     failures: tuple[Failure, ...] = ()
@@ -63,8 +63,8 @@ class CurveResult:
         return self.estimates[VARIANCE_RATE.name]
 
     def without_pairs(self) -> CurveResult:
-        """The numbers without the eigenpairs, whose matrices take some 20 MB a curve."""
-        return replace(self, moments=replace(self.moments, pairs=()), eigenpairs=(), stationary=None)
+        """The numbers without the eigenpairs; those of `moments` are solved again when they are asked for."""
+        return replace(self, moments=self.moments.forgetful(), eigenpairs=(), stationary=None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.case.remedies import in_words_of_a_case
@@ -18,8 +19,8 @@ from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.space import CylinderSpace
 from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
 from fpsolve.theory.perturbation import second_order
@@ -28,19 +29,53 @@ UNRESOLVED = 0.1
 """The share of an eigenfunction with the wrong sign from which on its picture misleads."""
 
 
-def solving_work(case: Case) -> int:
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What is asked of a curve.
+
+    Attributes:
+        p: the moments, shape (n,).
+        indices: names of `INDICES`.
+        shown: the p whose eigenfunctions are kept.
+        density: whether the stationary density is.
+    """
+
+    p: FloatArray
+    indices: tuple[str, ...]
+    shown: tuple[float, ...] = ()
+    density: bool = False
+
+
+def everything(case: Case, curve: Curve) -> Wanted:
+    """All moments and indices, and the eigenfunctions to be drawn."""
+    return Wanted(case.p, tuple(INDICES), tuple(case.shown), density=True)
+
+
+def expected(case: Case, curve: Curve) -> Wanted:
+    """What the expectations of a case compare."""
+    chosen = [each for each in case.expect if each.selects(curve.varied)]
+    p = np.unique([each.p for each in chosen if each.p is not None])
+    return Wanted(p, tuple(name for name in INDICES if any(each.quantity == name for each in chosen)))
+
+
+def solving_work(case: Case, of_curve: Callable[[Case, Curve], Wanted] = everything) -> int:
     """How often `solve_curves` reports progress: once for each moment of each curve."""
-    return len(case.curves()) * case.p.size
+    return sum(of_curve(case, curve).p.size for curve in case.curves())
 
 
-def solve_curves(case: Case, *, progress: Callable[[], None] = lambda: None) -> Iterator[CurveResult]:
+def solve_curves(
+    case: Case,
+    of_curve: Callable[[Case, Curve], Wanted] = everything,
+    *,
+    progress: Callable[[], None] = lambda: None,
+) -> Iterator[CurveResult]:
     """Solve the curves of a case one after the other; what did not converge is in their `failures`."""
     mesh = case.cylinder_mesh()
     for curve in case.curves():
         try:
-            yield _solve_curve(case, curve, mesh, progress)
+            yield _solve_curve(case, curve, of_curve(case, curve), mesh, progress)
         except MeshError as failure:
-            raise MeshError(f"{case.path}: mesh, or the finer one that measures its error: {failure}") from failure
+            raise MeshError(f"{case.path}: mesh: {failure}") from failure
 
 
 def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
@@ -53,11 +88,13 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
     ]
 
 
-def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: Callable[[], None]) -> CurveResult:
+def _solve_curve(
+    case: Case, curve: Curve, wanted: Wanted, mesh: CylinderMesh | None, progress: Callable[[], None]
+) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
-    moments = solve_moments(solver, case.p, progress=progress)
-    estimates, missing = _solve_indices(solver, moments.root)
-    attempts = (_pair(solver, float(p)) for p in case.shown if np.any(moments.p == p))
+    moments = solve_moments(solver, wanted.p, progress=progress)
+    estimates, missing = _solve_indices(solver, wanted.indices, moments.root)
+    attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
     warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None), *_unresolved(pairs)]
     return CurveResult(
@@ -66,19 +103,23 @@ def _solve_curve(case: Case, curve: Curve, mesh: CylinderMesh | None, progress: 
         moments_perturbation=second_order(curve.problem).moment_exponent(moments.p),
         estimates=estimates,
         eigenpairs=pairs,
-        stationary=_pair(solver, 0.0),
-        mesh=None if (space := solver.largest()) is None else _mesh(space),
+        stationary=_pair(solver, 0.0) if wanted.density else None,
+        discretisation=None if (used := solver.largest()) is None else _discretisation(*used),
         warnings=tuple(map(in_words_of_a_case, warnings)),
         notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments))),
         failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),
     )
 
 
-def _solve_indices(solver: ExponentSolver, root: float | None) -> tuple[dict[str, Estimate | None], list[str]]:
-    """All indices, δ_p first, and why some are missing."""
+def _solve_indices(
+    solver: ExponentSolver, names: Sequence[str], root: float | None
+) -> tuple[dict[str, Estimate | None], list[str]]:
+    """Indices, δ_p first, None for those not asked for; and why some of those asked for are missing."""
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
     missing = []
     for index in (STABILITY_INDEX, LYAPUNOV_EXPONENT, VARIANCE_RATE):
+        if index.name not in names:
+            continue
         low, high = np.clip(index.interval, *solver.problem.noise.moments)
         try:
             estimates[index.name] = index.solve(solver, root)
@@ -140,15 +181,16 @@ def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
     return Comparison(expectation, dict(result.curve.varied), value, tolerance, met)
 
 
-def _mesh(space: CylinderSpace) -> dict[str, Any]:
-    mesh = space.mesh
+def _discretisation(p: float, generator: Generator) -> dict[str, Any]:
+    """That of one p, z in noise units."""
+    chosen, noise = generator.chosen, generator.problem.noise
+    interval = {"xi_min": float(chosen.z_lines[0]), "xi_max": float(chosen.z_lines[-1])} if chosen.z_lines.size else {}
     return {
-        "full_circle": mesh.is_full_circle,
-        "phi_cells": mesh.phi_lines.size - 1,
-        "phi_degree": mesh.phi_degree,
-        "xi_cells": mesh.z_lines.size - 1,
-        "xi_degree": mesh.xi_degree,
-        "xi_min": float(mesh.z_lines[0]),
-        "xi_max": float(mesh.z_lines[-1]),
-        "unknowns": space.size,
+        "phi_cells": chosen.phi_lines.size - 1,
+        "phi_degrees": [int(degree) for degree in chosen.phi_degrees],
+        "xi": chosen.xi_kind,
+        "xi_size": chosen.xi_size(noise),
+        **interval,
+        "tilt": chosen.slope * p,
+        "unknowns": generator.size,
     }

@@ -1,4 +1,5 @@
-from .frozen import frozen_rate as frozen_rate
+from .frozen import FrozenNoise as FrozenNoise
+from .frozen import frozen_noise as frozen_noise
 from .perturbation import Scale as Scale
 from .perturbation import SecondOrder as SecondOrder
 from .perturbation import first_order_eigenfunction as first_order_eigenfunction

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem
 
 SAMPLES = 1001
+LARGEST_P = 25.0
+"""The places for larger p may lie beyond those that are looked at."""
 
 
 def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, Any]:
@@ -23,41 +26,67 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
     return half + root, half - root, square > 0
 
 
-def frozen_rate(problem: Problem, p: float) -> tuple[FloatArray, FloatArray] | None:
-    """z on both sides, and the growth rate of ‖x‖^p on paths that hold the noise there.
+class FrozenNoise:
+    """The growth rate F(z; p) of ‖x‖^p on paths that hold the noise at z, and where it is the largest.
 
     F = p G(ξ) − ⅛σ²((ln P_s)′)². G is the growth rate of ln ‖x‖ with ξ frozen, the largest real part of an eigenvalue
     of A(ξ): for the paper's oscillator εξ/2 while it oscillates, |εξ| < 2ω, the rate of the faster real mode beyond.
     For p < −1 the paths that stay on the other real mode carry more: (p + 1)·slow − fast. The second term is what
     holding ξ costs. Slow noise has its tilted density where F is largest, and more than one such place.
 
-    None for a chain.
+    Args:
+        problem: its noise must not be a chain.
+
+    Attributes:
+        z: points on both sides, increasing, denser near 0, shape (n,).
     """
-    noise, system = problem.noise, problem.system
-    if isinstance(noise, MarkovChain):
+
+    def __init__(self, problem: Problem) -> None:
+        noise = problem.noise
+        if isinstance(noise, MarkovChain):
+            raise TypeError("noise with states is held in each of them; there is no z to look for")
+        unit = noise.standard_deviation
+        furthest = 5 * LARGEST_P * unit * noise_strength(problem.system) * noise.correlation_time
+        end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
+        spread = max(np.log(end / 1e-2), 1.0)
+        side = end * np.sinh(spread * np.linspace(0, 1, SAMPLES)) / np.sinh(spread)
+        self.z = np.concatenate([-side[:0:-1], side])
+        self._faster, self._slower, self._turns = eigenvalues_at(problem, unit * self.z)
+        self._slope = np.gradient(noise.log_density(unit * self.z), self.z)
+        self._holding = 0.125 * (noise.diffusion / unit * self._slope) ** 2
+
+    def rate(self, p: float) -> FloatArray:
+        """F at `z`."""
+        growth = p * self._faster
+        if p < -1:
+            growth = np.where(self._turns, growth, np.maximum(growth, (p + 1) * self._slower - self._faster))
+        return growth - self._holding
+
+    def peaks(self, p: float) -> tuple[FloatArray, FloatArray]:
+        """z and F of the local maxima."""
+        rate = self.rate(p)
+        at = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
+        return self.z[at], rate[at]
+
+    def center(self, p: float) -> float:
+        """About the mean z of the tilted density."""
+        return float(self.z[np.argmax(self.rate(p))])
+
+    def tilt(self, z: float) -> float:
+        """s for which P_s exp(2s z) is the largest at z: −½(ln P_s)′."""
+        return -0.5 * float(np.interp(z, self.z, self._slope))
+
+
+def frozen_noise(problem: Problem) -> FrozenNoise | None:
+    """That of a problem; None for a chain, which holds its states."""
+    if isinstance(problem.noise, MarkovChain):
         return None
-    unit = noise.standard_deviation
-    furthest = 2.5 * abs(p) * 2 * unit * noise_strength(system) * noise.correlation_time
-    side = min(max(furthest, 1e-3), 0.999 * noise.half_width / unit) * np.linspace(0, 1, SAMPLES)
-    z = np.concatenate([-side[:0:-1], side])
-    faster, slower, turns = eigenvalues_at(problem, unit * z)
-    growth = p * faster
-    if p < -1:
-        growth = np.where(turns, growth, np.maximum(growth, (p + 1) * slower - faster))
-    holding = 0.125 * (noise.diffusion / unit * np.gradient(noise.log_density(unit * z), z)) ** 2
-    return z, growth - holding
+    try:
+        return _kept(problem)
+    except TypeError:  # a motion or a noise of the user's own that cannot be hashed
+        return FrozenNoise(problem)
 
 
-def likely_center(problem: Problem, p: float) -> float:
-    """About the mean z of the tilted density."""
-    found = frozen_rate(problem, p)
-    return 0.0 if found is None else float(found[0][np.argmax(found[1])])
-
-
-def growth_without_turning(problem: Problem, p: float, center: float) -> float | None:
-    """About Λ(p), where the noise stays so far out that the phase does not turn; else None."""
-    found = frozen_rate(problem, p)
-    if found is None or eigenvalues_at(problem, problem.noise.standard_deviation * center)[2]:
-        return None
-    z, rate = found
-    return float(rate[np.argmin(np.abs(z - center))])
+@lru_cache(maxsize=8)
+def _kept(problem: Problem) -> FrozenNoise:
+    return FrozenNoise(problem)

@@ -54,7 +54,7 @@ class Pencil:
         weight = self._mass @ constant
         constant /= weight @ constant
         self._weight = weight / (weight @ constant)  # ∫ P_s u = 1 normalises every eigenvector
-        self._known: dict[float, tuple[float, FloatArray]] = {0.0: (0.0, constant)}
+        self.known: dict[float, tuple[float, FloatArray]] = {0.0: (0.0, constant)}
 
     @property
     def unknowns(self) -> int:
@@ -68,13 +68,13 @@ class Pencil:
     def moments(self, p: FloatArray) -> FloatArray:
         """Λ at every p, followed from p = 0 outwards, and confirmed from the right at the first and the last p."""
         for point in sorted((float(point) for point in p), key=abs):
-            if point not in self._known:
-                self._known[point] = self._follow(point)
+            if point not in self.known:
+                self.known[point] = self.follow(point)
         for end in {float(np.min(p)), float(np.max(p))} - {0.0}:
-            self._confirm(end)
-        return np.array([self._known[float(point)][0] for point in p])
+            self.confirm(end)
+        return np.array([self.known[float(point)][0] for point in p])
 
-    def _follow(self, p: float) -> tuple[float, FloatArray]:
+    def follow(self, p: float) -> tuple[float, FloatArray]:
         """Inverse iteration from the extrapolated pair; from the right where the neighbours are too far."""
         shift, u = self._predict(p)
         matrix = self._shifted(p, shift)
@@ -92,15 +92,15 @@ class Pencil:
 
     def _predict(self, p: float) -> tuple[float, FloatArray]:
         """Value and vector of the polynomial through the nearest p, the value off by a little for a regular matrix."""
-        nearest = sorted(self._known, key=lambda other: abs(other - p))[:NEIGHBOURS]
+        nearest = sorted(self.known, key=lambda other: abs(other - p))[:NEIGHBOURS]
         share = [np.prod([(p - b) / (a - b) for b in nearest if b != a]) for a in nearest]
-        pairs = [self._known[a] for a in nearest]
+        pairs = [self.known[a] for a in nearest]
         value = sum(s * pair[0] for s, pair in zip(share, pairs, strict=True))
         return value + 100 * self._tolerance, sum(s * pair[1] for s, pair in zip(share, pairs, strict=True))
 
-    def _confirm(self, p: float) -> None:
+    def confirm(self, p: float) -> None:
         """Raise if the principal eigenvalue is another one than that which was followed."""
-        (value, _), (principal, _) = self._known[p], self._from_the_right(p, tolerance=1e-4)
+        (value, _), (principal, _) = self.known[p], self._from_the_right(p, tolerance=1e-4)
         if abs(principal - value) > 1e-2 * (self._bound(p) - value):
             raise ArithmeticError(f"at p = {p:g} the principal eigenvalue is {principal:g}, not {value:g}")
 
@@ -109,7 +109,7 @@ class Pencil:
         shift = self._bound(p)
         solve = self._factor(self._shifted(p, shift), pivot_threshold=0.0)
         resolvent = spla.LinearOperator(self._mass.shape, lambda u: solve(self._mass @ u), dtype=float)
-        (largest,), vectors = spla.eigs(resolvent, 1, v0=self._known[0.0][1], tol=tolerance)
+        (largest,), vectors = spla.eigs(resolvent, 1, v0=self.known[0.0][1], tol=tolerance)
         u = vectors[:, 0] / (self._weight @ vectors[:, 0])
         if abs(largest.imag) > 1e-6 * abs(largest):
             raise ArithmeticError(f"at p = {p:g} no real eigenvalue is nearest to {shift:g}: {shift + 1 / largest}")

@@ -1,4 +1,4 @@
-"""300 random problems over the whole range: each meets its tolerance, with an honest error, or is refused."""
+"""300 random problems over the whole range: each is solved within its tolerance, with an honest error, and fast."""
 
 import numpy as np
 import pytest
@@ -16,10 +16,8 @@ def solved(outcomes):
     return [outcome for outcome in outcomes if isinstance(outcome, Outcome)]
 
 
-def test_at_most_3_percent_are_refused_with_a_reason(outcomes):
-    refusals = [outcome for outcome in outcomes if isinstance(outcome, str)]
-    assert len(refusals) <= 9
-    assert all("did not converge: " in refusal and "use a larger rtol" in refusal for refusal in refusals)
+def test_none_is_refused(outcomes):
+    assert not [outcome for outcome in outcomes if isinstance(outcome, str)]
 
 
 def test_all_true_errors_meet_the_tolerance(solved):
@@ -28,13 +26,14 @@ def test_all_true_errors_meet_the_tolerance(solved):
 
 
 def test_error_estimates_are_honest(solved):
-    """Never below a third of the error, nor a hundred times above it, where the reference can tell."""
+    """Never below the error, and mostly less than 300 times above it, where the reference can tell."""
     for outcome in solved:
-        assert outcome.estimate >= (outcome.error - 3 * outcome.doubt) / 3, outcome
-        assert outcome.estimate <= 100 * max(outcome.error, 3 * outcome.doubt, 1e-14), outcome
+        assert outcome.estimate >= outcome.error - 3 * outcome.doubt, outcome
+    telling = [outcome.estimate / outcome.error for outcome in solved if outcome.error > 3 * outcome.doubt]
+    assert np.median(telling) < 300
 
 
-def test_none_takes_a_minute_and_most_are_quick(solved):
+def test_each_takes_milliseconds(solved):
     seconds = np.array([outcome.seconds for outcome in solved])
-    assert seconds.max() < 60
-    assert np.median(seconds) < 1
+    assert seconds.max() < 2
+    assert np.median(seconds) < 0.05

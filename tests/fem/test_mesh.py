@@ -9,6 +9,7 @@ from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.fem.mesh_file import MARKERS, read_mesh, write_mesh
+from fpsolve.fem.space import Discretisation
 from fpsolve.model.problem import Problem
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite
@@ -93,15 +94,14 @@ def test_a_bounded_noise_cuts_the_mesh_off_at_its_support():
     np.testing.assert_allclose(make_mesh(xi_cells=8).within(4.001).z_lines, [-4.001, -2, 0, 2, 4.001])
 
 
-def test_enriched_meshes_are_finer_and_wider_at_every_degree():
+def test_enriched_discretisations_are_finer_at_every_degree():
     for degree in (1, 9, 19, 20):
-        mesh = make_mesh(phi_degree=degree, xi_degree=degree)
-        finer = mesh.enriched()
-        for lines, order in (("phi_lines", "phi_degree"), ("z_lines", "xi_degree")):
-            unknowns = [(getattr(m, lines).size - 1) * (getattr(m, order) + 1) for m in (mesh, finer)]
-            assert unknowns[1] > unknowns[0]
-            assert set(getattr(mesh, lines)) <= set(getattr(finer, lines))
-        assert finer.z_lines[-1] > mesh.z_lines[-1]
+        chosen = Discretisation.on(make_mesh(phi_degree=degree, xi_degree=degree), UNIT_NOISE)
+        finer = chosen.enriched()
+        assert np.sum(finer.phi_degrees + 1) > np.sum(chosen.phi_degrees + 1)
+        assert finer.xi_size(UNIT_NOISE) > chosen.xi_size(UNIT_NOISE)
+        assert set(chosen.phi_lines) <= set(finer.phi_lines)
+        assert set(chosen.z_lines) <= set(finer.z_lines)
 
 
 GOOD = {"phi_lines": [np.pi / 2, 3 * np.pi / 2], "z_lines": [-8.0, 0.0, 8.0], "phi_degree": 4, "xi_degree": 4}

@@ -62,8 +62,7 @@ def test_bilinear_forms_of_smooth_functions():
 
 def interpolate(generator, f):
     """Coefficients of f, by least squares at many points of each direction."""
-    space, local = generator.space, np.linspace(0, 1, 30)
-    (phi, to_phi), (z, to_z) = (line.evaluation(local) for line in (space.phi, space.xi.line))
-    values = f(phi[:, None], z[None])
-    in_phi = np.linalg.lstsq(to_phi.toarray(), values, rcond=None)[0]
-    return np.linalg.lstsq(to_z.toarray(), in_phi.T, rcond=None)[0].T.ravel()
+    space = generator.space(0.0)
+    values = f(space.phi.points[:, None], space.xi.points[None])
+    in_phi = np.linalg.lstsq(space.phi.values, values, rcond=None)[0]
+    return np.linalg.lstsq(space.xi.values.toarray(), in_phi.T, rcond=None)[0].T.ravel()

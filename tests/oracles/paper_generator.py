@@ -1,6 +1,7 @@
 """Eq. (19) for the paper's oscillator as it is printed: L₀ + ε L₁ + ε² L₂ and the impact, from h₁, q₁, h₂, q₂.
 
-Dense Kronecker products of the elements' matrices; upwind by the sign of ω + ε h₁ξ + ε² h₂ at every φ-vertex.
+Dense Kronecker products of the elements' matrices. Where the functions of ξ can follow a kink, the load at a φ-vertex
+is on the trace from which ω + ε h₁ξ + ε² h₂ points away; for polynomials it is that of the mean trace, and a penalty.
 """
 
 import math
@@ -8,62 +9,78 @@ import math
 import numpy as np
 
 from fpsolve.arrays import one
+from fpsolve.model.plane import Harmonics
 
-
-def h1(phi):
-    return 0.5 * np.sin(2 * phi)
-
-
-def q1(phi):
-    return 0.5 * (1 - np.cos(2 * phi))
+H1, Q1, ONE = Harmonics(0.0, 0.0, 0.5), Harmonics(0.5, -0.5, 0.0), Harmonics(1.0, 0.0, 0.0)
 
 
 class PaperGenerator:
-    """The matrices of L(p) on the space of a generator."""
+    """The matrices of L(p) on a space of a generator."""
 
     def __init__(self, oscillator, noise, space):
-        self.oscillator, self.noise, self.space, self.line = oscillator, noise, space, space.xi.line
-        self.unit = noise.standard_deviation
+        self.oscillator, self.noise, self.space, self.phi = oscillator, noise, space, space.phi
+        self.vertices = space.phi.lines[:-1]
+        self.jump = space.phi.right_trace - space.phi.left_trace
 
     def L0(self):
-        rate = 0.5 * (self.noise.diffusion / self.unit) ** 2
-        diffusion = np.kron(self.space.phi.mass().toarray(), self.line.stiffness(self.space.xi.tilt).toarray())
-        return -rate * diffusion + self.transport(lambda phi: np.full_like(phi, self.oscillator.omega), one)
+        diffusion = np.kron(np.eye(self.phi.size), dense(self.space.xi.generator()))
+        return diffusion + self.transport(ONE, self.oscillator.omega, one) + self.penalty()
 
     def L1(self, p):
-        return self.transport(h1, self.xi) + p * self.reaction(q1, self.xi)
+        return self.transport(H1, 1.0, lambda xi: xi) + p * self.reaction(Q1, lambda xi: xi)
 
     def L2(self, p):
         c1 = self.oscillator.c1
-        return self.transport(lambda phi: c1 * h1(phi), one) + p * self.reaction(lambda phi: c1 * q1(phi), one)
+        return self.transport(H1, c1, one) + p * c1 * self.reaction(Q1, one)
 
     def impact(self, p):
-        at = np.abs(np.cos(self.space.mesh.phi_lines[:-1])) < 1e-9
-        load = self.space.left_trace[at].T @ self.space.right_trace[at]
+        at = np.abs(np.cos(self.vertices)) < 1e-9
+        load = self.phi.left_trace[at].T @ self.phi.right_trace[at]
         factor = math.expm1(p * self.oscillator.log_impact_factor)
-        return factor * self.oscillator.omega * np.kron(load, self.line.mass().toarray())
+        return factor * self.oscillator.omega * np.kron(load, self.mass(one))
 
     def matrix(self, p):
         eps = self.oscillator.epsilon
         return self.L0() + eps * self.L1(p) + eps**2 * self.L2(p) + self.impact(p)
 
-    def xi(self, z):
-        return self.unit * z
+    def mass(self, g):
+        return dense(self.space.xi.mass(g))
 
     def reaction(self, f, g):
-        return np.kron(self.space.phi.mass(f).toarray(), self.line.mass(g).toarray())
+        return np.kron(self.phi.mass(f), self.mass(g))
 
-    def transport(self, f, g):
-        """∫ P_s f g w T_φ, and at each vertex the jump on the trace from which the phase speed points away."""
-        total = np.kron(self.space.phi.convection(f).toarray(), self.line.mass(g).toarray())
-        eps, c1, omega = self.oscillator.epsilon, self.oscillator.c1, self.oscillator.omega
-        for j, phi in enumerate(self.space.mesh.phi_lines[:-1]):
+    def speed(self, j, xi):
+        oscillator = self.oscillator
+        return oscillator.omega + float(H1(self.vertices[j])) * (
+            oscillator.epsilon * xi + oscillator.epsilon**2 * oscillator.c1
+        )
 
-            def forward(z, phi=phi):
-                return omega + eps * h1(phi) * self.xi(z) + eps**2 * c1 * h1(phi) >= 0
+    def transport(self, f, size, g):
+        """∫ P_s f g w T_φ, and at each vertex the jump of T on the trace, or the mean of both traces, of w."""
+        total = np.kron(self.phi.convection(f), self.mass(g))
+        for j, phi in enumerate(self.vertices):
+            load = float(f(phi)) * self.jump[j]
+            if not self.space.xi.is_local:
+                total += np.kron(np.outer(0.5 * (self.phi.left_trace[j] + self.phi.right_trace[j]), load), self.mass(g))
+                continue
+            for trace, sign in ((self.phi.left_trace[j], True), (self.phi.right_trace[j], False)):
 
-            jump = f(np.array([phi]))[0] * (self.space.right_trace[j] - self.space.left_trace[j])
-            for trace, sign in ((self.space.left_trace[j], True), (self.space.right_trace[j], False)):
-                weight = self.line.mass(lambda z, sign=sign, forward=forward: g(z) * (forward(z) == sign))
-                total += np.kron(np.outer(trace, jump), weight.toarray())
+                def directed(xi, j=j, sign=sign):
+                    return g(xi) * ((self.speed(j, xi) >= 0) == sign)
+
+                total += np.kron(np.outer(trace, load), self.mass(directed))
+        return size * total
+
+    def penalty(self):
+        """−½ θ [w] [T] of polynomials, θ = |ω + ε² h₂| + ε |h₁| std, and |ω| at the impact, where h₁ = h₂ = 0."""
+        total = np.zeros(2 * (self.space.size,))
+        if not self.space.xi.is_local:
+            for j in range(self.vertices.size):
+                driven = self.oscillator.epsilon * abs(float(H1(self.vertices[j]))) * self.noise.standard_deviation
+                theta = abs(self.speed(j, 0.0)) + driven
+                total -= 0.5 * theta * np.kron(np.outer(self.jump[j], self.jump[j]), self.mass(one))
         return total
+
+
+def dense(matrix):
+    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()

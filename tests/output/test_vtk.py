@@ -163,9 +163,10 @@ def test_nodes_are_on_the_polynomials(tmp_path):
     """Values from the file against the elements evaluated at the middle of every mesh cell, in both half turns."""
     solver = ExponentSolver(Problem(HARD, UNIT_NOISE), make_mesh(phi_cells=3, phi_degree=4, xi_cells=6, xi_degree=4))
     pair, grid = solver.pair(1.0), written(tmp_path, solver, [1.0])[1.0]
-    space, half = pair.generator.space, np.array([0.5])
-    (phi, at_phi), at_xi = space.phi.evaluation(half), space.xi.samples(half)
-    values = space.evaluate(pair.right, at_phi, at_xi.values)
+    space, lines = pair.space, pair.generator.chosen.z_lines
+    phi, z = 0.5 * (space.phi.lines[1:] + space.phi.lines[:-1]), 0.5 * (lines[1:] + lines[:-1])
+    at_xi = space.xi.at(z)
+    values = space.evaluate(pair.right, space.phi.at(phi), at_xi.values)
     for turn in (0, np.pi):
         x, y = np.meshgrid((phi + turn) % (2 * np.pi), at_xi.xi, indexing="ij")
         points = pyvista.PolyData(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3))

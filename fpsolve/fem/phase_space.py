@@ -1,0 +1,158 @@
+"""Functions of the phase φ: discontinuous elements, in each cell polynomials up to a degree of its own."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags
+
+from fpsolve.arrays import FloatArray
+from fpsolve.fem.mesh import vertices_at
+from fpsolve.fem.reference import legendre, orthonormal
+from fpsolve.model.plane import Harmonics
+
+MAX_DENSE_UNKNOWNS = 600
+"""Matrices of φ are NumPy arrays for so many unknowns, and sparse beyond."""
+
+
+class PhaseSpace:
+    """Discontinuous elements on the circle or half circle; in each cell the basis is orthonormal, by degree.
+
+    Args:
+        lines: the vertices, shape (m + 1,); the first and the last are one.
+        degrees: the degree in each cell, from 1 on, shape (m,).
+
+    Attributes:
+        size: number of unknowns.
+        cells, modes: the cell of each unknown, and the degree of its polynomial, shape (size,).
+        points, weights: a quadrature rule, shape (n,).
+        left_trace, right_trace: T(φⱼ⁻) and T(φⱼ⁺) at the vertices lines[:-1], shape (m, size); the left trace at the
+            seam comes from the last cell.
+    """
+
+    def __init__(self, lines: FloatArray, degrees: Any) -> None:
+        self.lines, self.degrees = np.asarray(lines, dtype=float), np.asarray(degrees, dtype=int)
+        self._sizes, self._table = np.diff(self.lines), orthonormal(int(self.degrees.max()))
+        kept = np.arange(self.degrees.max() + 1) <= self.degrees[:, None]
+        self.cells, self.modes = np.nonzero(kept)
+        self.size = self.cells.size
+        self._number = np.cumsum(kept).reshape(kept.shape) - 1
+        self._pairs = kept[:, :, None] & kept[:, None, :]
+        local, weights = self._table.rule
+        self._grid = self.lines[:-1, None] + self._sizes[:, None] * local
+        self._local_weights = weights
+        self.right_trace, self.left_trace = (
+            self._scattered(np.arange(kept.shape[0]) + shift, self._table.ends[side] / np.sqrt(self._sizes)[:, None])
+            for side, shift in ((0, 0), (1, 1))
+        )
+
+    @property
+    def points(self) -> FloatArray:
+        return self._grid.ravel()
+
+    @property
+    def weights(self) -> FloatArray:
+        return (self._sizes[:, None] * self._local_weights).ravel()
+
+    @property
+    def span(self) -> float:
+        """π or 2π."""
+        return float(self.lines[-1] - self.lines[0])
+
+    def vertices_at(self, phase: float) -> Any:
+        """The indices of the φ-lines lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
+        return vertices_at(self.lines, phase)
+
+    def mass(self, f: Harmonics) -> Any:
+        """∫ f u v."""
+        return self._combined(f, self._masses)
+
+    def convection(self, f: Harmonics) -> Any:
+        """∫ f u′ v, cell by cell."""
+        return self._combined(f, self._convections)
+
+    @cached_property
+    def identity(self) -> Any:
+        """∫ u v."""
+        return self._assembled(np.broadcast_to(np.eye(self._pairs.shape[1]), self._pairs.shape))
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        """Coefficients of the function 1, shape (size,)."""
+        return np.where(self.modes == 0, np.sqrt(self._sizes)[self.cells], 0.0)
+
+    def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Any:
+        """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).
+
+        A point on a line between cells is seen from the cell that holds its entry of `inside`, without it from the
+        cell above.
+        """
+        where = np.searchsorted(self.lines, phi if inside is None else inside, side="right") - 1
+        cell = np.clip(where, 0, self._sizes.size - 1)
+        local = np.clip((phi - self.lines[cell]) / self._sizes[cell], 0, 1)
+        values = legendre(local, int(self.degrees.max())) / np.sqrt(self._sizes[cell])[:, None]
+        kept = np.arange(values.shape[1]) <= self.degrees[cell, None]
+        return self._matrix(values[kept], np.nonzero(kept)[0], self._number[cell][kept], (phi.size, self.size))
+
+    @cached_property
+    def values(self) -> Any:
+        """The basis functions at the points of the rule, shape (n, size)."""
+        return self.at(self.points)
+
+    @cached_property
+    def inner_values(self) -> Any:
+        """The basis functions at five points inside each cell, shape (5 m, size)."""
+        return self.at((self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel())
+
+    def projection(self, other: PhaseSpace) -> Any:
+        """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
+        return self.values.T @ (diags(self.weights) @ other.at(self.points))
+
+    @cached_property
+    def _waves(self) -> FloatArray:
+        """cos 2φ and sin 2φ times the weights of the rule, shape (2, m, n)."""
+        return np.stack([np.cos(2 * self._grid), np.sin(2 * self._grid)]) * self._local_weights
+
+    @cached_property
+    def _masses(self) -> tuple[Any, Any, Any]:
+        cosine, sine = self._waves @ self._table.products
+        return self.identity, self._assembled(cosine), self._assembled(sine)
+
+    @cached_property
+    def _convections(self) -> tuple[Any, Any, Any]:
+        weights = np.broadcast_to(self._local_weights, self._grid.shape)[None]
+        blocks = np.concatenate([weights, self._waves]) @ self._table.convections
+        mean, cosine, sine = blocks / self._sizes[:, None]
+        return self._assembled(mean), self._assembled(cosine), self._assembled(sine)
+
+    def _combined(self, f: Harmonics, parts: tuple[Any, Any, Any]) -> Any:
+        total = f.mean * parts[0]
+        for factor, part in ((f.cosine, parts[1]), (f.sine, parts[2])):
+            if factor:
+                total = total + factor * part
+        return total
+
+    def _assembled(self, blocks: Any) -> Any:
+        """The matrix with a block for each cell; its rows are those of the test functions."""
+        entries = blocks.reshape(self._pairs.shape)[self._pairs]
+        return self._matrix(entries, *self._places, (self.size, self.size))
+
+    @cached_property
+    def _places(self) -> tuple[Any, Any]:
+        rows, columns = np.broadcast_arrays(self._number[:, :, None], self._number[:, None, :])
+        return rows[self._pairs], columns[self._pairs]
+
+    def _scattered(self, vertex: Any, values: FloatArray) -> Any:
+        """A row for each vertex, with values for the functions of a cell."""
+        kept = self._pairs[:, :, 0]
+        rows = np.broadcast_to((vertex % len(kept))[:, None], kept.shape)
+        return self._matrix(values[kept], rows[kept], self._number[kept], (len(kept), self.size))
+
+    def _matrix(self, entries: FloatArray, rows: Any, columns: Any, shape: tuple[int, int]) -> Any:
+        if self.size > MAX_DENSE_UNKNOWNS:
+            return csr_matrix((entries, (rows, columns)), shape=shape)
+        matrix = np.zeros(shape)
+        matrix[rows, columns] = entries
+        return matrix

@@ -1,0 +1,59 @@
+"""LU factors of Kronecker sums, dense, by blocks and sparse, against one dense solve."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+
+from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, BlockFactors, DenseFactors, SparseFactors, factorised
+from fpsolve.fem.kronecker import KroneckerSum
+
+
+def banded(rng, n, band):
+    full = rng.standard_normal((n, n))
+    i, j = np.indices((n, n))
+    return np.where(abs(i - j) <= band, full, 0.0)
+
+
+@pytest.fixture(params=[(7, 5, 1), (9, 8, 3), (4, 12, 2), (6, 1, 0)])
+def operator(request, rng):
+    m, n, band = request.param
+    terms = [(rng.standard_normal((m, m)) + 4 * k * np.eye(m), banded(rng, n, band) + 3 * np.eye(n)) for k in range(3)]
+    return KroneckerSum(terms)
+
+
+@pytest.mark.parametrize("kind", [lambda each: DenseFactors(each.toarray()), BlockFactors, SparseFactors])
+def test_all_kinds_solve_the_same_systems(operator, kind, rng):
+    factors, matrix, b = kind(operator), operator.toarray(), rng.standard_normal(operator.size)
+    np.testing.assert_allclose(factors.solve(b), np.linalg.solve(matrix, b), rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(factors.solve_transposed(b), np.linalg.solve(matrix.T, b), rtol=1e-8, atol=1e-10)
+
+
+def test_products_transposes_and_bounds(operator, rng):
+    matrix, v = operator.toarray(), rng.standard_normal(operator.size)
+    np.testing.assert_allclose(operator @ v, matrix @ v, atol=1e-12 * np.abs(matrix).max() * operator.size)
+    np.testing.assert_allclose(operator.T @ v, matrix.T @ v, atol=1e-12 * np.abs(matrix).max() * operator.size)
+    np.testing.assert_allclose(operator.tocsc().toarray(), matrix, atol=1e-12)
+    assert np.all(abs(operator) @ abs(v) >= np.abs(matrix) @ abs(v) - 1e-9)
+    assert operator.norm() >= np.abs(matrix).sum(axis=0).max() - 1e-9
+    first = np.kron(np.eye(operator.shape[0]), operator.terms[0][1])
+    np.testing.assert_allclose(operator.shifted(0.3).toarray(), matrix - 0.3 * first, atol=1e-12)
+
+
+def test_the_kind_follows_from_the_factors(rng):
+    def sum_of(m, n, band):
+        return KroneckerSum([(np.eye(m) + 0.1 * rng.standard_normal((m, m)), banded(rng, n, band) + 5 * np.eye(n))])
+
+    assert isinstance(factorised(sum_of(10, 5, 4)), DenseFactors)
+    m = MAX_DENSE_UNKNOWNS // 10
+    assert isinstance(factorised(sum_of(m, 12, 1)), BlockFactors)
+    assert isinstance(factorised(sum_of(m, 12, 11)), SparseFactors)
+    dense = sum_of(10, 5, 1).terms[0]
+    assert isinstance(factorised(KroneckerSum([(csr_matrix(dense[0]), dense[1])])), SparseFactors)
+
+
+def test_a_singular_matrix_gives_its_null_vector():
+    phase = np.diag([0.0, 1.0, 2.0])
+    for kind in (lambda each: DenseFactors(each.toarray()), BlockFactors, SparseFactors):
+        found = kind(KroneckerSum([(phase, np.eye(2))])).solve(np.ones(6))
+        assert np.all(np.isfinite(found))
+        assert abs(found[0]) > 1e10 * abs(found[-1])
