@@ -130,15 +130,16 @@ class ExponentSolver:
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
         """
         refuse_infinite(self.problem, p)
-        if p in self._failed:
-            raise self._failed[p]
         tolerance = tolerance or self.tolerance
+        if p in self._failed and tolerance == self.tolerance:
+            raise self._failed[p]
         if p not in self._known or (self.mesh is None and not _meets(self._known[p], tolerance)):
             try:
                 with _one_thread().limit(limits=1):
                     self._known[p] = self._found(p, tolerance)
             except NotConverged as failure:
-                self._failed[p] = failure
+                if tolerance == self.tolerance:  # a tighter one may be out of reach where this is not
+                    self._failed[p] = failure
                 raise
             except np.linalg.LinAlgError as failure:
                 raise NotConverged(f"Λ({p:g}) cannot be solved on this mesh ({failure}); {Remedy.MESH}") from failure

@@ -145,6 +145,13 @@ def test_zeroth_moment_is_conserved_on_every_mesh(name, noise, epsilon):
     assert change @ (generator.mass(0.0) @ change) <= 1e-22
 
 
+def test_a_tolerance_out_of_reach_harms_no_other():
+    solver = ExponentSolver(Problem(FIG1, FIG1_NOISE.ou_reduction()))
+    with pytest.raises(NotConverged, match="rounding alone"):
+        solver.solution(2.0, lambda p, value: 1e-22)
+    assert solver.pair(2.0).value == pytest.approx(0.0141631436533, rel=1e-10)
+
+
 def test_half_and_full_circle_give_one_exponent():
     noise = FIG1_NOISE.ou_reduction()
     half, full = (ExponentSolver(Problem(FIG1, noise), make_mesh(full_circle=full)).pair(2.0) for full in (False, True))
