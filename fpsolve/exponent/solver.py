@@ -269,9 +269,8 @@ class ExponentSolver:
 
     def _tried(self, generator: Generator, p: float) -> Solution:
         """The solution at p with a generator, from those around p, or from the nearest one."""
-        near = sorted((solution.pair for solution in self._known.values()), key=lambda pair: abs(pair.p - p))[
-            :NEIGHBOURS
-        ]
+        known = (solution.pair for solution in self._known.values())
+        near = sorted(known, key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
         return Solution(principal_pair(generator, p, start=near))
 
     def _result(self, solutions: Sequence[Solution], failures: Sequence[Failure]) -> MomentLyapunov:
