@@ -74,7 +74,18 @@ def test_large_spaces_are_sparse_and_the_same():
     large = PhaseSpace(lines, np.full(60, 10))
     assert large.size > MAX_DENSE_UNKNOWNS
     phi, weights = fine_rule(lines)
-    values = large.at(phi)
+    values = large.at(phi).toarray()
     expected = (values * (weights * WAVE(phi))[:, None]).T @ values
     np.testing.assert_allclose(large.mass(WAVE).toarray(), expected, atol=1e-12)
-    np.testing.assert_allclose(large.right_trace.toarray(), large.at(lines[:-1]), atol=1e-12)
+    np.testing.assert_allclose(large.right_trace.toarray(), large.at(lines[:-1]).toarray(), atol=1e-12)
+
+
+def test_sparse_and_dense_spaces_are_carried_into_each_other():
+    large = PhaseSpace(np.linspace(np.pi / 2, 3 * np.pi / 2, 61), np.full(60, 10))
+    small = PhaseSpace(LINES, [3, 4, 1, 2])
+    u = np.linspace(-1, 1, small.size)
+    phi, _ = fine_rule(LINES)
+    there = large.projection(PhaseSpace(LINES[[0, -1]], [6])) @ np.arange(7.0)
+    expected = PhaseSpace(LINES[[0, -1]], [6]).at(phi) @ np.arange(7.0)
+    np.testing.assert_allclose(large.at(phi) @ there, expected, atol=1e-10)
+    assert (small.projection(large) @ (large.projection(small) @ u)).shape == u.shape
