@@ -296,6 +296,8 @@ def _pair(generator: Generator, p: float, operator: KroneckerSum, found: _Iterat
         bound = _EPS * float(one @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total
         if bound < rounding:
             value, rounding = float((one @ (forcing @ x) + of_noise @ x) / total), bound
+    if p == 0:  # where Λ = 0
+        rounding = max(rounding, abs(value))
     return PrincipalPair(
         p=p,
         value=value,

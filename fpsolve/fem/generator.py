@@ -121,7 +121,7 @@ class Generator:
     def loss(self) -> float:
         """About how many times its rounding elimination may harm T − 1: the size of the free transport over a rate."""
         free = self.matrix(0.0, orders=slice(0, 1)).terms[0][0]
-        return 10 * float(abs(free).sum(axis=0).max()) / self.unit_rate
+        return 30 * float(abs(free).sum(axis=0).max()) / self.unit_rate
 
     @property
     def keeps_constants(self) -> bool:
