@@ -288,12 +288,12 @@ def _pair(generator: Generator, p: float, operator: KroneckerSum, found: _Iterat
     weight, norm = space.weighed(one), 1 / space.turns
     x = found.x * ((one @ weight) / (weight @ found.x))
     y = found.y * (norm / (found.y @ space.weighed(x)))
-    rounding = _EPS * (abs(y) @ (abs(operator) @ abs(x))) / norm
+    rounding = _EPS * float(abs(y) @ (abs(operator) @ abs(x))) / norm
     if generator.keeps_constants:
         forcing, total = generator.matrix(p, orders=slice(1, None)), weight @ x
         of_noise = np.outer(space.phi.constant, space.xi.generator_of_one()).ravel()
         doubtful = abs(x) + generator.loss * abs(x - one)
-        bound = _EPS * float(one @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total
+        bound = _EPS * float((one @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total)
         if bound < rounding:
             value, rounding = float((one @ (forcing @ x) + of_noise @ x) / total), bound
     if p == 0:  # where Λ = 0
