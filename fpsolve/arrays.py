@@ -21,3 +21,8 @@ def one(x: Any) -> Any:
 def identity(x: Any) -> Any:
     """The coefficient x."""
     return x
+
+
+def dense(matrix: Any) -> FloatArray:
+    """An array of a matrix that may be sparse."""
+    return matrix if isinstance(matrix, np.ndarray) else np.asarray(matrix.toarray())

@@ -20,6 +20,7 @@ from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import ModeEffects, Solution
 from fpsolve.exponent.rival import rival
+from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import MAX_DEGREE, halved
 from fpsolve.fem.space import Discretisation
@@ -38,7 +39,7 @@ MAX_STAGES, FREE_STAGES = 30, 4
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
 LEAST_DEGREE, SPLIT_DEGREE, MOST_DEGREE = 4, 6, 14
-WORTH_A_TRY = 350
+WORTH_A_TRY = MAX_DENSE_UNKNOWNS
 """Unknowns of a system that takes less time than finding another one."""
 MOST_TILT_AWAY = 0.7
 """How far the tilt of a space may be from the best one at another p."""

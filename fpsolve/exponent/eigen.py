@@ -151,9 +151,8 @@ def second_derivative(pair: PrincipalPair) -> float:
 
     The system is solved with a shift a little off Λ, and what that leaves of T in T′ is removed.
     """
-    generator, x, y, p = pair.generator, pair.right, pair.left, pair.p
-    mass, slope = generator.mass(p), generator.matrix(p, derivative=1)
-    weighed = mass @ x
+    generator, space, x, y, p = pair.generator, pair.space, pair.right, pair.left, pair.p
+    slope, weighed = generator.matrix(p, derivative=1), space.weighed(x)
     norm = y @ weighed
     source = pair.derivative * weighed - slope @ x
     operator, change = generator.matrix(p, shift=pair.value), np.zeros_like(x)
@@ -162,8 +161,8 @@ def second_derivative(pair: PrincipalPair) -> float:
         rest = source - operator @ change
         rest -= (y @ rest) / norm * weighed
         change += factor.solve(rest)
-        change -= (y @ (mass @ change)) / norm * x
-    mixed = y @ (slope @ change) - pair.derivative * (y @ (mass @ change))
+        change -= (y @ space.weighed(change)) / norm * x
+    mixed = y @ (slope @ change) - pair.derivative * (y @ space.weighed(change))
     return float((y @ (generator.matrix(p, derivative=2) @ x) + 2 * mixed) / norm)
 
 
@@ -238,11 +237,8 @@ class _Iterate(NamedTuple):
 def _rayleigh_iteration(generator: Generator, p: float, x: FloatArray, y: FloatArray) -> PrincipalPair:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
     space, operator = generator.space(p), generator.matrix(p)
-    best, size, stalls = (
-        _Iterate(float(y @ (operator @ x) / (y @ space.weighed(x))), math.inf, x, y),
-        operator.norm(),
-        0,
-    )
+    best = _Iterate(float(y @ (operator @ x) / (y @ space.weighed(x))), math.inf, x, y)
+    size, stalls = operator.norm(), 0
     for _ in range(MAX_ITERATIONS):
         shift, last = best.value, best.residual
         factor = factorised(operator.shifted(shift))
@@ -259,7 +255,7 @@ def _rayleigh_iteration(generator: Generator, p: float, x: FloatArray, y: FloatA
             break
     if best.residual > 1e-3 * BACKWARD_ERROR_GOAL:  # the value from the forcing is linear in the error of T
         best = _improved(factor, space, shift, size, best)
-    return _pair(generator, p, operator, best)
+    return _pair(generator, p, operator, size, best)
 
 
 def _improved(factor: Factors, space: CylinderSpace, shift: float, size: float, old: _Iterate) -> _Iterate:
@@ -277,7 +273,7 @@ def _improved(factor: Factors, space: CylinderSpace, shift: float, size: float, 
     return _Iterate(shift + distance, float(max(errors) / size), *vectors)
 
 
-def _pair(generator: Generator, p: float, operator: KroneckerSum, found: _Iterate) -> PrincipalPair:
+def _pair(generator: Generator, p: float, operator: KroneckerSum, size: float, found: _Iterate) -> PrincipalPair:
     """Normalise both vectors, judge their signs, and take Λ from the formula that rounding harms less."""
     space, value = generator.space(p), float(found.value)
     errors = [
@@ -304,7 +300,7 @@ def _pair(generator: Generator, p: float, operator: KroneckerSum, found: _Iterat
         right=x,
         left=y,
         derivative=float(y @ (generator.matrix(p, derivative=1) @ x) / norm),
-        residual=float(max(errors) / operator.norm()),
+        residual=float(max(errors) / size),
         rounding=float(rounding),
         sign_defects=_sign_defects(space, x, y),
         generator=generator,

@@ -135,18 +135,19 @@ class Generator:
         The kicks are spread evenly over φ. Where states of a chain move the phase over a ray to and fro, each jump
         between them may bring a kick more.
         """
-        system, noise, xi = self.problem.system, self.problem.noise, self.space(p).xi
+        system, noise, space = self.problem.system, self.problem.noise, self.space(p)
 
         def fastest(xi: Any) -> Any:
             q, speed = growth_rate(system, xi), phase_speed(system, xi)
             gains = sum(max(0.0, p * kick.log_factor) for kick in system.kicks)
             return p * q.mean + abs(p) * q.amplitude + gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
 
-        if xi.size > MOST_FOR_A_BOUND:
-            growth = float(np.max(fastest(xi.support)))
+        if space.xi.size > MOST_FOR_A_BOUND:
+            growth = float(np.max(fastest(space.xi.support)))
         else:
-            growth = float(np.max(scipy.linalg.eigvals(xi.generator() + xi.mass(fastest), xi.mass()).real))
+            driven = space.xi_matrix(None) + space.xi.mass(fastest)
+            growth = float(np.max(scipy.linalg.eigvals(driven, space.xi_matrix(one)).real))
         for kick in system.kicks:
-            if isinstance(noise, MarkovChain) and crosses_both_ways(system, kick, xi.support):
+            if isinstance(noise, MarkovChain) and crosses_both_ways(system, kick, space.xi.support):
                 growth += float(-np.min(noise.rates)) * math.expm1(max(0.0, p * kick.log_factor))
         return growth

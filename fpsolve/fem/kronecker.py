@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, identity, issparse, kron
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, dense
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class KroneckerSum:
     def toarray(self) -> FloatArray:
         """The dense matrix, shape (m·n, m·n)."""
         m, n = self.shape
-        phases, noises = (np.stack([_dense(term[side]) for term in self.terms]) for side in (0, 1))
+        phases, noises = (np.stack([dense(term[side]) for term in self.terms]) for side in (0, 1))
         products = phases.reshape(len(self.terms), -1).T @ noises.reshape(len(self.terms), -1)
         return products.reshape(m, m, n, n).transpose(0, 2, 1, 3).reshape(m * n, m * n)
 
@@ -91,7 +91,3 @@ class KroneckerSum:
 def _identity(like: Any) -> Any:
     size = like.shape[0]
     return identity(size, format="csr") if issparse(like) else np.eye(size)
-
-
-def _dense(matrix: Any) -> FloatArray:
-    return matrix.toarray() if issparse(matrix) else matrix

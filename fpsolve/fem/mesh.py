@@ -65,10 +65,6 @@ class CylinderMesh:
         """π or 2π."""
         return float(self.phi_lines[-1] - self.phi_lines[0])
 
-    @property
-    def is_full_circle(self) -> bool:
-        return self.span > 1.5 * math.pi
-
     def within(self, half_width: float) -> CylinderMesh:
         """This mesh cut off at |z| = half_width, the end of the noise's support, where it reaches beyond."""
         if not self.z_lines.size:

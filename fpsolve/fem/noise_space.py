@@ -17,13 +17,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.arrays import Coefficient, FloatArray, dense, one
+from fpsolve.fem.phase_space import MAX_DENSE_UNKNOWNS
 from fpsolve.fem.polynomials import Polynomials, gegenbauer, hermite, stieltjes
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import Diffusion
 
-MAX_DENSE_UNKNOWNS = 600
-"""Matrices of ξ are NumPy arrays for so many unknowns, and sparse beyond."""
 FAR = 50.0
 """Noise units beyond which OU noise does not come."""
 EXTRA_POINTS = 16
@@ -141,8 +140,8 @@ class LineNoiseSpace(NoiseSpace):
 
     def projection(self, other: LineNoiseSpace) -> FloatArray:
         exponent = other.tilt * (self.points - other.center) - self.tilt * (self.points - self.center)
-        scaled = (self.measure * np.exp(np.clip(exponent, -600, 600)))[:, None] * _dense(other.values_at(self.points))
-        return np.asarray(np.linalg.solve(_dense(self.mass()), self.values.T @ scaled))
+        scaled = (self.measure * np.exp(np.clip(exponent, -600, 600)))[:, None] * dense(other.values_at(self.points))
+        return np.asarray(np.linalg.solve(dense(self.mass()), self.values.T @ scaled))
 
 
 class PolynomialSpace(LineNoiseSpace):
@@ -294,7 +293,3 @@ def _form(values: FloatArray, measure: FloatArray) -> FloatArray:
 def _small(matrix: Any) -> Any:
     """A sparse matrix as an array unless it is large."""
     return matrix.toarray() if matrix.shape[0] <= MAX_DENSE_UNKNOWNS else matrix
-
-
-def _dense(matrix: Any) -> FloatArray:
-    return matrix if isinstance(matrix, np.ndarray) else np.asarray(matrix.toarray())

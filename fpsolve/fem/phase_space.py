@@ -14,7 +14,7 @@ from fpsolve.fem.reference import legendre, orthonormal
 from fpsolve.model.plane import Harmonics
 
 MAX_DENSE_UNKNOWNS = 600
-"""Matrices of φ are NumPy arrays for so many unknowns, and sparse beyond."""
+"""Matrices of φ, and of ξ, are NumPy arrays for so many unknowns, and sparse beyond."""
 
 
 class PhaseSpace:
