@@ -11,13 +11,16 @@ import fpsolve
 ROOMS = {
     "": ["errors", "arrays", "files"],
     "model": ["parameters", "plane", "noise", "markov_chain", "vibro_impact", "problem"],
-    "theory": ["perturbation", "frozen", "validity"],
+    "theory": ["perturbation", "frozen", "far", "validity"],
     "fem": [
         *("reference", "line", "polynomials", "mesh", "mesh_file", "phase_space", "noise_space", "space"),
         *("kronecker", "factors", "terms", "generator"),
     ],
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
-    "exponent": ["eigen", "fields", "error", "rival", "adapt", "solver", "function", "moments", "quantities"],
+    "exponent": [
+        *("rounding", "eigen", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
+        *("function", "moments", "quantities"),
+    ],
     "analysis": ["density"],
     "case": ["toml", "messages", "sections", "vary", "curves", "remedies", "refusals", "case"],
     "study": ["results", "solve", "simulate"],

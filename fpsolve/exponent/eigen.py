@@ -19,13 +19,15 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, dense, one
 from fpsolve.errors import NotConverged
+from fpsolve.exponent.rounding import rounding_of_entries
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.space import CylinderSpace
 from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.theory.frozen import eigenvalues_at
 
 BACKWARD_ERROR_GOAL = 1e-14
 BACKWARD_ERROR_LIMIT = 1e-11
@@ -95,10 +97,9 @@ def principal_pair(
         NotConverged: the iteration stalls, or both T and T* change sign: the mesh does not resolve the problem.
             `partial` is the pair that was reached.
     """
-    one = generator.space(p).constant()  # T₀ and T₀*/P_s of weak noise, Eqs. (26) and (28)
     pairs = [start] if isinstance(start, PrincipalPair) else start
     searches: list[Callable[[], tuple[FloatArray, FloatArray]]] = [
-        lambda: _carried(pairs, p, generator) if pairs else (one, one),
+        lambda: _carried(pairs, p, generator) if pairs else _simplest(generator, p),
         lambda: _from_the_right(generator, p),
     ]
     if isinstance(generator.problem.noise, MarkovChain):  # states that hardly mix have a positive pair each
@@ -198,11 +199,22 @@ def _carried(pairs: Sequence[PrincipalPair], p: float, generator: Generator) -> 
     return weights @ [pair.right for pair in kept], weights @ [pair.left for pair in kept]
 
 
+def _simplest(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
+    """T = T*/P_s = 1 of weak noise, Eqs. (26) and (28); where paths are killed those of noise that rests."""
+    space = generator.space(p)
+    if not generator.chosen.is_killed:
+        return space.constant(), space.constant()
+    resting = space.xi.mass(lambda xi: p * eigenvalues_at(generator.problem, xi)[0])
+    _, vectors = scipy.linalg.eigh(dense(space.xi_matrix(None) + resting), dense(space.xi_matrix(one)))
+    vector = np.outer(space.phi.constant, vectors[:, -1]).ravel()
+    return vector, vector
+
+
 def _from_the_right(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
     """Right and left vectors near the principal ones, from shifts that start at an upper bound of Λ(p)."""
     space = generator.space(p)
     shift = generator.upper_bound(p) + 0.25 * generator.unit_rate
-    right = left = space.constant()
+    right, left = _simplest(generator, p)
     for _ in range(2):
         factor = factorised(generator.matrix(p, shift=shift))
         right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, p)
@@ -275,23 +287,25 @@ def _improved(factor: Factors, space: CylinderSpace, shift: float, size: float, 
 
 def _pair(generator: Generator, p: float, operator: KroneckerSum, size: float, found: _Iterate) -> PrincipalPair:
     """Normalise both vectors, judge their signs, and take Λ from the formula that rounding harms less."""
-    space, value = generator.space(p), float(found.value)
-    errors = [
-        np.linalg.norm(matrix @ vector - value * space.weighed(vector))
-        for matrix, vector in ((operator, found.x), (operator.T, found.y))
-    ]
-    one = space.constant()
-    weight, norm = space.weighed(one), 1 / space.turns
-    x = found.x * ((one @ weight) / (weight @ found.x))
+    space = generator.space(p)
+    images = operator @ found.x, operator.T @ found.y
+    weighed = space.weighed(found.x), space.weighed(found.y)
+    value = float(found.y @ images[0] / (found.y @ weighed[0]))  # without what elimination rounds off
+    errors = [np.linalg.norm(image - value * each) for image, each in zip(images, weighed, strict=True)]
+    constant = space.constant()
+    weight, norm = space.weighed(constant), 1 / space.turns
+    x = found.x * ((constant @ weight) / (weight @ found.x))
     y = found.y * (norm / (found.y @ space.weighed(x)))
     rounding = _EPS * float(abs(y) @ (abs(operator) @ abs(x))) / norm
+    if generator.chosen.is_killed:
+        rounding += rounding_of_entries(generator, p, x, y) / norm
     if generator.keeps_constants:
         forcing, total = generator.matrix(p, orders=slice(1, None)), weight @ x
         of_noise = np.outer(space.phi.constant, space.xi.generator_of_one()).ravel()
-        doubtful = abs(x) + generator.loss * abs(x - one)
-        bound = _EPS * float((one @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total)
+        doubtful = abs(x) + generator.loss * abs(x - constant)
+        bound = _EPS * float((constant @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total)
         if bound < rounding:
-            value, rounding = float((one @ (forcing @ x) + of_noise @ x) / total), bound
+            value, rounding = float((constant @ (forcing @ x) + of_noise @ x) / total), bound
     if p == 0:  # where Λ = 0
         rounding = max(rounding, abs(value))
     return PrincipalPair(

@@ -31,11 +31,13 @@ class Estimate:
 
     Attributes:
         scale: size of the terms that the number is the sum of, where they may cancel.
+        meaning: what the number is, where its name may mislead.
     """
 
     value: float
     error_estimate: float
     scale: float
+    meaning: str = ""
 
     @property
     def relative_error(self) -> float:
@@ -155,10 +157,14 @@ def truncation(pair: PrincipalPair) -> tuple[float, float]:
 
 
 def _end_effect(pair: PrincipalPair, xi: CellSpace, end: int) -> float:
-    """½σ² P_s |∂T| T* at an end; the slope is the largest in the last cell, as no flux makes it 0 at the end itself."""
+    """½σ² P_s |∂T| T* at an end; the slope is the largest in the last cell, as no flux makes it 0 at the end itself.
+
+    Where paths are killed T and T* are 0 at the end, and ½σ² P_s |∂T ∂T*| times the last cell bounds what it hides.
+    """
     space, lines = pair.space, xi.line.lines[[-1, -2] if end else [0, 1]]
     z = lines[0] + (lines[1] - lines[0]) * np.linspace(0, 1, 9)
     right, left = (xi.values_at(z) @ space.table(v).T for v in (pair.right, pair.left))
-    slope = np.max(np.abs(np.diff(right @ left[0]) / np.diff(z)))
+    adjoint = left[1] * (lines[1] - lines[0]) / (z[1] - z[0]) if xi.is_killed else left[0]
+    slope = np.max(np.abs(np.diff(right @ adjoint) / np.diff(z)))
     norm = pair.left @ space.weighed(pair.right)
     return float(xi.rate * xi.weight(z[:1])[0] * slope / abs(norm))

@@ -25,6 +25,7 @@ from fpsolve.exponent.solver import (
 )
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.problem import Problem, of_problem_too
+from fpsolve.theory.far import grows_far_out
 
 SEARCH_INTERVAL = (-20.0, 20.0)
 SHARE = 0.4
@@ -59,7 +60,8 @@ class MomentLyapunovFunction:
     Raises:
         ValueError: the interval is empty or not finite.
         NoSuchExponent: Λ(p) is infinite in the interval.
-        NotConverged: some p failed, or Λ(p) is not convex, so that a wrong eigenvalue is among the values.
+        NotConverged: some p failed, or Λ(p) is not convex, so that a wrong eigenvalue is among the values; or the noise
+            has algebraic tails, and Λ(p) a kink.
     """
 
     @of_problem_too
@@ -75,10 +77,7 @@ class MomentLyapunovFunction:
         solver: ExponentSolver | None = None,
         progress: Callable[[], None] = lambda: None,
     ) -> None:
-        low, high = (float(end) for end in checked_moments(list(interval), problem))
-        if not low < high:
-            raise ValueError(f"the interval of p is {interval}; its ends must increase")
-        self.interval = low, high
+        self.interval = _checked_interval(interval, problem)
         self.solver = solver or ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
         self.interpolation_error, self._among, self._allowed = math.inf, among, SHARE * self._tolerance(1.0, 0.0)
         most = LEVELS[-1] if among is None else max(FEW_NODES, 3 * among.size // 10)
@@ -215,6 +214,19 @@ def _hermite_interpolant(
     return Chebyshev(coefficients, domain=interval)
 
 
+def _checked_interval(interval: tuple[float, float], problem: Problem) -> tuple[float, float]:
+    """The ends, where Λ(p) is finite and smooth between them. Raises `ValueError`, `NoSuchExponent`, `NotConverged`."""
+    low, high = (float(end) for end in checked_moments(list(interval), problem))
+    if not low < high:
+        raise ValueError(f"the interval of p is {interval}; its ends must increase")
+    if grows_far_out(problem):
+        raise NotConverged(
+            "Λ(p) is not smooth in p: noise with algebraic tails carries the moment far out for some p; use "
+            "moment_lyapunov, which takes each p by itself"
+        )
+    return low, high
+
+
 def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str | None:
     """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex."""
     if not pairs:
@@ -235,13 +247,15 @@ def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str 
 def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
 ) -> Estimate | None:
-    """δ_p, the non-zero root of Λ(p); None where Λ has no such root in the interval.
+    """δ_p, the non-zero root of Λ(p); None where Λ has none in the interval, as for noise with algebraic tails.
 
     Λ is convex, so Λ(p)/p increases and has one root at most: a safeguarded Newton iteration on it.
 
     Raises:
         NotConverged: some p on the way is not resolved.
     """
+    if grows_far_out(solver.problem):
+        return None
     low, high = (float(end) for end in np.clip(interval, *solver.problem.noise.moments))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)

@@ -16,6 +16,7 @@ from fpsolve.exponent.function import MomentLyapunovFunction, broken_convexity
 from fpsolve.exponent.solver import ExponentSolver, Failure, MomentLyapunov, checked_moments
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.problem import Problem, of_problem
+from fpsolve.theory.far import grows_far_out
 
 FEW_MOMENTS = 9
 """Up to so many p are solved one by one."""
@@ -80,7 +81,7 @@ def solve_moments(
 
 def _interpolated(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov | None:
     """Λ at many p; None where that takes as many solves, or does not converge."""
-    if p.size <= FEW_MOMENTS:
+    if p.size <= FEW_MOMENTS or grows_far_out(solver.problem):
         return None
     ends = float(p.min()), float(p.max())
     try:

@@ -89,6 +89,8 @@ def lyapunov_exponent(
 ) -> Estimate:
     """The largest Lyapunov exponent λ = Λ′(0), Eq. (2): how fast almost every path grows.
 
+    For noise with algebraic tails a positive λ is not Λ′(0), see `theory.far_places`; `meaning` says so.
+
     Args:
         problem: a motion and its noise, in one argument or two.
         rtol, mesh, budget: as for `moment_lyapunov`.
@@ -105,6 +107,8 @@ def stability_index(
     problem: Problem, *, rtol: float = 1e-8, mesh: CylinderMesh | None = None, budget: Budget | None = None
 ) -> Estimate | None:
     """The stability index δ_p, the non-zero root of Λ(p); None where there is none from -20 to 20.
+
+    For noise with algebraic tails there is none: Λ(p) > 0 for every p ≠ 0, see `theory.far_places`.
 
     Args:
         problem: a motion and its noise, in one argument or two.

@@ -8,6 +8,8 @@ import numpy as np
 
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import noise_marginal
+from fpsolve.model.noise import has_algebraic_tails
+from fpsolve.theory.far import Place, far_places
 from fpsolve.theory.frozen import frozen_noise
 
 RIVAL = 0.6
@@ -18,17 +20,32 @@ def rival(pair: PrincipalPair) -> float | None:
     """Another z, far from the tilted density of a pair, where paths that hold the noise grow about as fast, or None.
 
     Between two such places slow noise hardly ever passes: each has its own pair with T > 0 as far as that can be
-    told, and only the larger eigenvalue is Λ.
+    told, and only the larger eigenvalue is Λ. For algebraic tails see `far_rivals`.
     """
     frozen = frozen_noise(pair.generator.problem)
-    if frozen is None:
+    if frozen is None or has_algebraic_tails(pair.generator.problem.noise):
         return None
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
         return None
+    mean, width = _where(pair)
+    far = (np.abs(z - mean) > 3 * width + 2) & (rate > _enough(pair.value))
+    return float(z[far][np.argmax(rate[far])]) if np.any(far) else None
+
+
+def far_rivals(pair: PrincipalPair) -> list[Place]:
+    """The other places of algebraic tails where paths that hold the noise grow about as fast as that of a pair."""
+    places = [place for place in far_places(pair.generator.problem, pair.p) if place.rate > _enough(pair.value)]
+    mean = _where(pair)[0] if places else 0.0
+    return [place for place in places if not place.lower <= mean <= place.upper]
+
+
+def _where(pair: PrincipalPair) -> tuple[float, float]:
+    """Mean and standard deviation of z in the tilted density of a pair."""
     at, density = noise_marginal(pair)
     mean = float(at @ density / density.sum())
-    width = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
-    enough = pair.value - (1 - RIVAL) * abs(pair.value)
-    far = (np.abs(z - mean) > 3 * width + 2) & (rate > enough)
-    return float(z[far][np.argmax(rate[far])]) if np.any(far) else None
+    return mean, math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
+
+
+def _enough(value: float) -> float:
+    return value - (1 - RIVAL) * abs(value)

@@ -6,35 +6,35 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, NotConverged, Remedy
-from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, refined, resolve
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.branch import Branch, Tolerance
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Solution, checked
-from fpsolve.exponent.rival import rival
+from fpsolve.exponent.fields import noise_marginal
+from fpsolve.exponent.refine import WIDER, widened
+from fpsolve.exponent.rival import far_rivals, rival
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.theory.far import far_places, grows_far_out, growth_beyond, highest_rate, log_tail, variance_tail
+from fpsolve.theory.frozen import FURTHEST
 from fpsolve.theory.perturbation import Scale, scale_of
+from fpsolve.theory.validity import ALMOST_EVERY
 
-TRIM = 0.8
-"""A smaller space must have at most this share of the unknowns."""
-SMALL_P = 1e-2
-"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
+LOOSE = 1e-3
+"""Share of the rates within which a place is solved before it is compared with others."""
+HARDLY_FINITE = 1e-6
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
-NEIGHBOURS = 6
-"""How many known eigenfunctions those of another p are interpolated from."""
-Tolerance = Callable[[float, float], float]
-"""The largest error allowed, from p and a value of Λ(p)."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,8 @@ class MomentLyapunov:
         warnings: sentences on p where `error_estimate` exceeds rtol.
         root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
         failures: why some p are missing, or none is to be trusted.
+        rare: the p at which rare paths, far out in the algebraic tails of the noise, carry the moment, shape (k,).
+        notes: a sentence on them.
     """
 
     p: FloatArray
@@ -76,6 +78,8 @@ class MomentLyapunov:
     warnings: tuple[str, ...] = ()
     root: float | None = None
     failures: tuple[Failure, ...] = ()
+    rare: FloatArray = field(default_factory=lambda: np.zeros(0))
+    notes: tuple[str, ...] = ()
 
     @property
     def pairs(self) -> tuple[PrincipalPair, ...]:
@@ -107,8 +111,6 @@ class ExponentSolver:
     _: KW_ONLY
     rtol: float = 1e-8
     budget: Budget = field(default_factory=Budget)
-    _known: dict[float, Solution] = field(init=False, default_factory=dict)
-    _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.problem.noise.standard_deviation):
@@ -117,6 +119,20 @@ class ExponentSolver:
             )
         if not (math.isfinite(self.rtol) and self.rtol > 0):
             raise ValueError(f"rtol is {self.rtol!r}; it must be a positive number such as 1e-8")
+
+    @cached_property
+    def near(self) -> Branch:
+        """The branch of the place nearest to ξ = 0, which for all noise but that of algebraic tails is Λ(p)."""
+        return self._branch(is_far=False)
+
+    @cached_property
+    def far(self) -> Branch:
+        """The branch of the places far out of algebraic tails."""
+        return self._branch(is_far=True)
+
+    def _branch(self, is_far: bool) -> Branch:
+        chosen = {"rtol": self.rtol, "budget": self.budget, "tolerance": self.tolerance}
+        return Branch(self.problem, None if is_far else self.mesh, is_far=is_far, **chosen)  # type: ignore[arg-type]
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
@@ -130,27 +146,20 @@ class ExponentSolver:
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
         """
         refuse_infinite(self.problem, p)
-        tolerance = tolerance or self.tolerance
-        if p in self._failed and tolerance == self.tolerance:
-            raise self._failed[p]
-        if p not in self._known or (self.mesh is None and not _meets(self._known[p], tolerance)):
-            try:
-                with _one_thread().limit(limits=1):
-                    self._known[p] = self._found(p, tolerance)
-            except NotConverged as failure:
-                if tolerance == self.tolerance:  # a tighter one may be out of reach where this is not
-                    self._failed[p] = failure
-                raise
-            except np.linalg.LinAlgError as failure:
-                raise NotConverged(f"Λ({p:g}) cannot be solved on this mesh ({failure}); {Remedy.MESH}") from failure
-            except (ArithmeticError, RuntimeError, ValueError) as failure:
-                raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
-        return self._known[p]
+        if self.mesh is not None or p == 0 or not has_algebraic_tails(self.problem.noise):
+            return self.near.solution(p, tolerance)  # on a given mesh `misplaced` warns of other places
+        places = far_places(self.problem, p)
+        refuse_beyond(self.problem, p, highest_rate(self.problem, p))
+        near = self.loose(p)
+        refuse_beyond(self.problem, p, max(near.pair.value + near.error, *(place.rate for place in places), 0.0))
+        far = self.far.solution(p, tolerance) if far_rivals(near.pair) else None
+        if far is None or far.pair.value - far.error < near.pair.value + 10 * near.error:
+            near = self.near.solution(p, tolerance)
+        return max((each for each in (near, far) if each), key=lambda each: each.pair.value)
 
     def largest(self) -> tuple[float, Generator] | None:
         """The p of the largest size that was solved, and with what; None where none was."""
-        p = max(self._known, key=abs, default=None)
-        return None if p is None else (p, self._known[p].pair.generator)
+        return self.near.largest()
 
     @cached_property
     def scales(self) -> Scale:
@@ -164,6 +173,11 @@ class ExponentSolver:
     def tolerance(self, p: float, value: float) -> float:
         """The largest error allowed of a value of Λ(p)."""
         return self.rtol * max(abs(value), self.scale(p))
+
+    def loose(self, p: float) -> Solution:
+        """That near ξ = 0 at p, to compare with others: where one outdoes it, its eigenvalue is no exact one."""
+        best = max((place.rate for place in far_places(self.problem, p)), default=0.0)
+        return self.near.solution(p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)))
 
     def moments(self, p: ArrayLike, *, progress: Callable[[], None] = lambda: None) -> MomentLyapunov:
         """Λ(p) at several p; `progress` is called after each, also after one that fails.
@@ -189,21 +203,32 @@ class ExponentSolver:
         return Estimate(solution.pair.value, solution.error, self.scale(solution.pair.p))
 
     def lyapunov_exponent(self) -> Estimate:
-        """λ = Λ′(0), Eq. (2). Raises `NotConverged`."""
+        """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
         value, _, error = self.ratio(0.0)
-        return checked("λ", Estimate(value, error, self.scales.linear))
+        meaning = ALMOST_EVERY if grows_far_out(self.problem) else ""
+        return checked("λ", Estimate(value, error, self.scales.linear, meaning))
 
     def variance_rate(self) -> Estimate:
-        """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖. Raises `NotConverged`.
+        """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
 
-        Its error is the difference from that of a finer discretisation.
+        Its error is the difference from that of a finer discretisation, for algebraic tails of a wider one, and what is
+        left by how that falls.
+
+        Raises:
+            NoSuchExponent: the variance grows faster than t.
+            NotConverged: it is not resolved.
         """
-        pair = self.pair(0.0)
-        finer = principal_pair(pair.generator.enriched(), 0.0, start=pair)
+        tail = variance_tail(self.problem)
+        if tail < HARDLY_FINITE:
+            raise NoSuchExponent(
+                "Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time"
+            )
+        pair, scale = self.near.solution(0.0).pair, 2 * self.scales.quadratic
+        finer = principal_pair(Generator(self.problem, widened(pair.generator).enriched()), 0.0, start=pair)
         value, better = second_derivative(pair), second_derivative(finer)
-        scale = 2 * self.scales.quadratic
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
-        return checked("Λ″(0)", Estimate(better, abs(better - value) + rounding, scale))
+        beyond = max(1.0, 1 / math.expm1(tail * math.log(WIDER)))  # what is left, over what the wider one has added
+        return checked("Λ″(0)", Estimate(better, beyond * abs(better - value) + rounding, scale))
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0.
@@ -211,81 +236,32 @@ class ExponentSolver:
         Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss; its error is that at p = ±`SMALL_P`.
         """
         if abs(p) >= TINY_P:
-            solution = self.solution(p, tolerance)
+            solution = self.near.solution(p, tolerance)
             value = solution.pair.value / p
             return value, (solution.pair.derivative - value) / p, solution.error / abs(p)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
-        pairs = [self.solution(point, tolerance).pair for point in points]
-        near = self._near_zero(p, tolerance or self.tolerance)
+        pairs = [self.near.solution(point, tolerance).pair for point in points]
+        near = self.near.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
         return float(np.mean([pair.derivative for pair in pairs])), 0.5 * second_derivative(pairs[0]), error
-
-    def _near_zero(self, p: float, tolerance: Tolerance) -> Solution:
-        """The solution at ±`SMALL_P` that a smaller p goes with."""
-        side = p or (-1.0 if has_algebraic_tails(self.problem.noise) else 1.0)  # where Λ is finite
-        return self.solution(math.copysign(SMALL_P, side), tolerance)
-
-    def _found(self, p: float, tolerance: Tolerance) -> Solution:
-        """A solution that meets a tolerance, or the one on the given mesh."""
-        if self.mesh is not None:
-            pair = self._tried(self._given[0], p).pair
-            return Solution(pair, principal_pair(self._given[1], p, start=pair))
-        if abs(p) < SMALL_P:
-            return self._tried(self._near_zero(p, tolerance).pair.generator, p)
-        nearest = min(self._known, key=lambda q: abs(q - p), default=None)
-        start = None
-        if nearest is not None:
-            generator = self._trimmed(self._known[nearest], tolerance)
-            try:
-                start = self._tried(generator, p) if fits(generator, nearest, p) else None
-            except NotConverged:
-                start = None
-            if start is not None and _meets(start, tolerance) and rival(start.pair) is None:
-                return start
-        return resolve(
-            self.problem,
-            p,
-            tolerance=lambda value: tolerance(p, value),
-            rtol=self.rtol,
-            budget=self.budget,
-            start=start,
-        )
-
-    @cached_property
-    def _given(self) -> tuple[Generator, Generator]:
-        """That of the given mesh, and one of four degrees more, whose error hardly counts beside it."""
-        assert self.mesh is not None
-        generator = Generator(self.problem, self.mesh)
-        return generator, generator.enriched().enriched()
-
-    def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Generator:
-        """The generator of a solution, or a much smaller one that would do."""
-        pair, size = solution.pair, solution.pair.generator.size
-        if abs(pair.p) < SMALL_P or size <= WORTH_A_TRY:
-            return pair.generator
-        smaller = refined(solution, tolerance(pair.p, pair.value), 0)
-        is_better = smaller.unknowns(self.problem.noise) <= TRIM * size
-        return Generator(self.problem, smaller) if is_better else pair.generator
-
-    def _tried(self, generator: Generator, p: float) -> Solution:
-        """The solution at p with a generator, from those around p, or from the nearest one."""
-        known = (solution.pair for solution in self._known.values())
-        near = sorted(known, key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
-        return Solution(principal_pair(generator, p, start=near))
 
     def _result(self, solutions: Sequence[Solution], failures: Sequence[Failure]) -> MomentLyapunov:
         pairs = tuple(solution.pair for solution in solutions)
         p, errors = np.array([pair.p for pair in pairs]), np.array([solution.error for solution in solutions])
-        value = np.array([pair.value for pair in pairs])
+        value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("value", "derivative"))
+        if grows_far_out(self.problem):
+            slope[p == 0] = np.minimum(slope[p == 0], 0.0)  # from the left, where Λ is finite
         return MomentLyapunov(
             p=p,
             value=value,
-            derivative=np.array([pair.derivative for pair in pairs]),
+            derivative=slope,
             error_estimate=errors,
             residual=np.array([pair.residual for pair in pairs]),
             solver=self,
             warnings=(*missed(self, p, value, errors), *misplaced(self, pairs)),
             failures=tuple(failures),
+            rare=np.array([pair.p for pair in pairs if self.far.holds(pair)]),
+            notes=carried_far_out(self, pairs),
         )
 
 
@@ -307,26 +283,45 @@ def misplaced(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[s
     """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
     if solver.mesh is None:  # then both places have been looked at
         return ()
-    found = ((pair, rival(pair)) for pair in pairs)
+    found = ((pair, _elsewhere(pair)) for pair in pairs)
     pair, z = next(((pair, z) for pair, z in found if z is not None), (None, None))
     if pair is None:
         return ()
+    cause = "noise with heavy tails" if has_algebraic_tails(solver.problem.noise) else "slow noise"
     return (
-        f"Λ({pair.p:g}) may be larger: slow noise may carry the moment near {z:.3g} standard "
-        f"deviations; {Remedy.REACH}",
+        f"Λ({pair.p:g}) may be larger: {cause} may carry the moment near {z:.3g} standard deviations; {Remedy.REACH}",
     )
 
 
-def _meets(solution: Solution, tolerance: Tolerance) -> bool:
-    """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
-    pair = solution.pair
-    return abs(pair.p) < SMALL_P or solution.error <= tolerance(pair.p, pair.value)
+def _elsewhere(pair: PrincipalPair) -> float | None:
+    """Another z where noise that is held there may carry the moment, or None."""
+    places = far_rivals(pair)
+    return math.sqrt(places[0].lower * places[0].upper) * math.copysign(1, places[0].lower) if places else rival(pair)
 
 
-@cache
-def _one_thread() -> ThreadpoolController:
-    """Keeps BLAS from threads, which for the small blocks of a sparse LU cost three times what they save."""
-    return ThreadpoolController()
+def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
+    """At which p rare paths carry the moment, and from when on at the first of them, or nothing."""
+    far = [pair for pair in pairs if solver.far.holds(pair)]
+    if not far:
+        return ()
+    (z, density), p = noise_marginal(far[0]), far[0].p
+    mean, near = float(z @ density / density.sum()), solver.loose(p).pair.value
+    rarity = -log_tail(solver.problem, mean)
+    return (
+        f"at p = {', '.join(f'{pair.p:g}' for pair in far)} rare paths carry the moment, at p = {p:g} those with noise "
+        f"around {mean:.3g} standard deviations, of probability 1e-{rarity / math.log(10):.0f}; for times up to about "
+        f"{rarity / (far[0].value - near):.1g} they hardly count, and E‖x‖^p grows at {near:.3g}",
+    )
+
+
+def refuse_beyond(problem: Problem, p: float, reached: float) -> None:
+    """Refuse a p where paths that hold the noise beyond all z looked at grow as fast as all others, or faster."""
+    beyond = growth_beyond(problem, p)
+    if beyond > 0 and beyond >= reached:
+        raise NotConverged(
+            f"Λ({p:g}) did not converge: it is at least {beyond:.3g}, as much as paths grow that hold the noise beyond "
+            f"{FURTHEST:g} standard deviations, and no eigenfunction belongs to them"
+        )
 
 
 def best_order(p: FloatArray) -> Any:

@@ -125,7 +125,9 @@ class Generator:
 
     @property
     def keeps_constants(self) -> bool:
-        """Whether ⟨P_s, L₀T⟩ = 0 for every T: the order 0 of the motion rotates uniformly, without growth."""
+        """Whether ⟨P_s, L₀T⟩ = 0 for every T: no path is killed, and the order 0 only rotates uniformly."""
+        if self.chosen.is_killed:
+            return False
         free = [drive for drive in self.problem.system.drives if drive.order == 0]
         return all(drive.h.amplitude == 0 and drive.q.vanishes for drive in free)
 

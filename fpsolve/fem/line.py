@@ -45,6 +45,7 @@ class LineSpace:
         measure: their weights times w, shape (n,).
         cells: for each unknown the cell that it belongs to, -1 for one shared by two, shape (size,).
         modes: for each unknown the degree of its polynomial, 1 for vertex functions, shape (size,).
+        ends: the two unknowns whose functions do not vanish at the ends.
 
     Raises:
         MeshError: a cell's polynomials cannot be told apart under the weight.
@@ -62,6 +63,7 @@ class LineSpace:
         dofs = skfem.Dofs(skfem.MeshLine(lines), _element(degree))
         self._dofs, self.size = dofs.element_dofs.T, int(dofs.N)
         self.cells, self.modes = _hierarchy(self._dofs, self.size)
+        self.ends = self._dofs[[0, -1], [0, 1]]
         rules = self._rules(end_exponents)
         local = np.stack([rule.points for rule in rules])
         points, weights = self._global(local), np.stack([rule.weights for rule in rules]) * self._sizes[:, None]

@@ -207,41 +207,54 @@ class CellSpace(LineNoiseSpace):
         noise: the noise.
         lines: vertices in z, within the support of the noise.
         degree: of the elements.
+        is_killed: whether paths that leave the interval are killed: T = 0 at its ends. Otherwise they are reflected.
 
     Attributes:
-        line: the elements, in the weight P_s.
+        line: the elements, in the weight P_s, or a multiple of it where paths are killed.
 
     Raises:
         MeshError: a cell's polynomials cannot be told apart under the weight.
     """
 
-    def __init__(self, noise: Diffusion, lines: FloatArray, degree: int) -> None:
+    def __init__(self, noise: Diffusion, lines: FloatArray, degree: int, is_killed: bool = False) -> None:
         from fpsolve.fem.line import LineSpace  # scikit-fem takes a while to import
 
         super().__init__(noise)
+        self.is_killed = is_killed
+        if is_killed:  # far out P_s underflows
+            self._log_weight = float(np.max(noise.log_density(self.unit * lines)))
         end, exponent = noise.half_width / self.unit, noise.end_exponent
         reaches = (lines[0] <= -end * (1 - 1e-12), lines[-1] >= end * (1 - 1e-12))
         ends = (exponent * reaches[0], exponent * reaches[1])
         self.line = LineSpace(lines, degree, self.weight, end_exponents=ends)
-        self.points, self.measure, self.values = self.line.points, self.line.measure, self.line.values
-        self.cells, self.modes = self.line.cells, self.line.modes
+        inner = np.ones(self.line.size, dtype=bool)
+        if is_killed:
+            inner[self.line.ends] = False
+        self._inner = np.flatnonzero(inner)
+        self.points, self.measure, self.values = self.line.points, self.line.measure, self.line.values[:, self._inner]
+        self.cells, self.modes = self.line.cells[inner], self.line.modes[inner]
         self.support = self.unit * lines[[0, -1]]
 
     def mass(self, g: Coefficient = one) -> Any:
-        return _small(self.line.mass() if g is one else self.line.mass(lambda z: g(self.unit * z)))
+        return self._form(self.line.mass() if g is one else self.line.mass(lambda z: g(self.unit * z)))
 
     def generator(self) -> Any:
         """−½σ² ∫ P_s u′v′; at the ends no probability flux is the natural condition."""
-        return _small(-self.rate * self.line.stiffness())
+        return self._form(-self.rate * self.line.stiffness())
 
     def constant(self) -> FloatArray:
-        return self.line.constant()
+        """Coefficients of the function 1, shape (size,); where paths are killed it falls to 0 at the ends."""
+        return self.line.constant()[self._inner]
 
     def nested(self, table: FloatArray) -> FloatArray:
-        return np.asarray((self.line.nested @ table.T).T)
+        return np.asarray((self.line.nested[self._inner][:, self._inner] @ table.T).T)
 
     def values_at(self, z: FloatArray) -> Any:
-        return self.line.at(z)
+        return self.line.at(z)[:, self._inner]
+
+    def _form(self, matrix: Any) -> Any:
+        """Without the functions at killed ends; sparse where it is large."""
+        return _small(matrix[self._inner][:, self._inner] if self.is_killed else matrix)
 
 
 class ChainSpace(NoiseSpace):

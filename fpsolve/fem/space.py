@@ -32,6 +32,7 @@ class Discretisation:
         slope: s/p of the factor exp(s z) that goes with polynomials.
         z_lines: the vertices in z; none for polynomials or states.
         xi_degree: the degree of the elements in ξ; 0 for polynomials or states.
+        is_killed: whether T = 0 at the ends of the z_lines, as paths that leave are killed.
     """
 
     phi_lines: FloatArray
@@ -40,6 +41,7 @@ class Discretisation:
     slope: float = 0.0
     z_lines: FloatArray = field(default_factory=lambda: np.zeros(0))
     xi_degree: int = 0
+    is_killed: bool = False
 
     @classmethod
     def on(cls, mesh: CylinderMesh, noise: AnyNoise) -> Discretisation:
@@ -65,7 +67,7 @@ class Discretisation:
         """The number of functions of ξ."""
         if isinstance(noise, MarkovChain):
             return len(noise.states)
-        return self.polynomials or (self.z_lines.size - 1) * self.xi_degree + 1
+        return self.polynomials or (self.z_lines.size - 1) * self.xi_degree + 1 - 2 * self.is_killed
 
     def unknowns(self, noise: AnyNoise) -> int:
         """The size of the space."""
@@ -89,7 +91,7 @@ def noise_space(noise: AnyNoise, chosen: Discretisation, p: float) -> NoiseSpace
         return ChainSpace(noise)
     if chosen.polynomials:
         return PolynomialSpace(noise, chosen.polynomials, chosen.slope * p)
-    return CellSpace(noise, chosen.z_lines, chosen.xi_degree)
+    return CellSpace(noise, chosen.z_lines, chosen.xi_degree, chosen.is_killed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,33 +75,36 @@ def terms_of(system: System, space: CylinderSpace) -> Iterator[Term]:
     phi = space.phi
     yield Term(0, Power(0), phi.identity, None, "L_ξ, the generator of the noise")
     jump, mean = phi.right_trace - phi.left_trace, 0.5 * (phi.right_trace + phi.left_trace)
+    is_exact, direction = _upwind(system, space)
+    trace = mean - _rows(0.5 * direction, jump)  # nothing is left of the other side: where ξ is large that would count
     for drive in system.drives:
         size, text = system.epsilon**drive.order, _prefix(drive)
         if not drive.h.vanishes:
-            along = size * (phi.convection(drive.h) + mean.T @ _rows(drive.h(phi.lines[:-1]), jump))
+            along = size * (phi.convection(drive.h) + trace.T @ _rows(drive.h(phi.lines[:-1]), jump))
             yield Term(drive.order, Power(0), along, drive.g, f"{text}{_written(drive.h)} ∂φ")
         if not drive.q.vanishes:
             yield Term(drive.order, Power(1), size * phi.mass(drive.q), drive.g, f"p {text}{_written(drive.q)}")
-    yield from _upwinding(system, space, jump)
+    yield from _penalties(system, space, jump, is_exact, direction)
     for kick in system.kicks:
         yield from _kicked(system, space, kick)
 
 
-def _upwinding(system: System, space: CylinderSpace, jump: Any) -> Iterator[Term]:
-    """−½ ∫ P_s θ [w] [T] at the φ-vertices."""
-    vertices, text = space.phi.lines[:-1], "upwind loads between cells"
+def _upwind(system: System, space: CylinderSpace) -> tuple[Any, FloatArray]:
+    """At which φ-vertices θ = |v|, and the sign of v at those of them where it is the same for all ξ, otherwise 0."""
+    vertices = space.phi.lines[:-1]
     is_exact = np.full(vertices.size, space.xi.is_local)
     for kick in system.kicks:
         is_exact[space.phi.vertices_at(kick.phase)] = True
     speed = phase_speed(system, space.xi.support[:, None])(vertices)
-    direction = 1 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
+    return is_exact, np.where(is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0), 0.0)
+
+
+def _penalties(system: System, space: CylinderSpace, jump: Any, is_exact: Any, direction: FloatArray) -> Iterator[Term]:
+    """−½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|."""
+    vertices, text = space.phi.lines[:-1], "upwind loads between cells"
     if not np.all(is_exact):
         typical = np.where(is_exact, 0.0, _typical_speed(system, space))
         yield Term(0, Power(0), -0.5 * jump.T @ _rows(typical, jump), one, text)
-    for drive in system.drives:
-        speed = np.where(is_exact, direction, 0) * system.epsilon**drive.order * drive.h(vertices)
-        if np.any(speed):
-            yield Term(drive.order, Power(0), -0.5 * jump.T @ _rows(speed, jump), drive.g, text)
     for j in np.flatnonzero(is_exact & (direction == 0)):
         size = partial(_size_of_speed, system=system, phi=float(vertices[j]))
         yield Term(0, Power(0), -0.5 * jump[[j]].T @ jump[[j]], size, text)

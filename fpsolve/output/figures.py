@@ -42,7 +42,8 @@ def _moment_series(result: CurveResult, sample: SimulatedCurve | None) -> Series
     theory = second_order(result.curve.problem).moment_exponent(line)
     estimates = sample.result.estimates if sample else ()
     dots = [(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]
-    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, _columns(dots))
+    rare = np.isin(moments.p, moments.rare)
+    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, _columns(dots), rare)
 
 
 def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:

@@ -33,6 +33,7 @@ class Series:
     Attributes:
         varied: the parameters that tell it from the others, for the legend.
         simulated: x, y and the standard errors of y from a simulation, shape (3, n).
+        rare: which of the x have moments that rare paths carry, shape (n,).
     """
 
     varied: dict[str, float]
@@ -41,6 +42,7 @@ class Series:
     line_x: FloatArray
     line_y: FloatArray
     simulated: FloatArray | None = None
+    rare: Any = False
 
 
 def write_figure(
@@ -59,8 +61,8 @@ def write_figure(
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
             _draw(axes, item, i)
-        is_simulated = any(item.simulated is not None for item in series)
-        _add_legend(axes, y.equation + (", reduced noise" if is_reduced else ""), is_simulated)
+        is_simulated, has_rare = any(item.simulated is not None for item in series), any(map(_has_rare, series))
+        _add_legend(axes, y.equation + (", reduced noise" if is_reduced else ""), is_simulated, has_rare)
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         axes.margins(x=0.03)
 
@@ -128,17 +130,25 @@ def _draw(axes: Any, item: Series, i: int) -> None:
         item.x, item.y, marker, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6,
         markevery=every, label=label or None,
     )  # fmt: skip
+    if _has_rare(item):
+        filled = item.rare & (np.arange(item.x.size) % every == 0)
+        axes.plot(item.x[filled], item.y[filled], marker, color=colour, markersize=7)
     if item.simulated is not None:
         x, y, error = item.simulated[:, :: max(1, item.simulated.shape[1] // 16)]
         axes.errorbar(x, y, 2 * error, **_DOT)
 
 
-def _add_legend(axes: Any, equation: str, is_simulated: bool) -> None:
-    """Colours tell the curves apart; two or three grey entries tell the method."""
+def _has_rare(item: Series) -> bool:
+    return bool(np.any(item.rare))
+
+
+def _add_legend(axes: Any, equation: str, is_simulated: bool, has_rare: bool) -> None:
+    """Colours tell the curves apart; two to four grey entries tell the method."""
     handles, labels = axes.get_legend_handles_labels()
     grey = {"color": "0.35"}
     methods = {
         "finite elements": axes.plot([], [], "o", markersize=7, markerfacecolor="none", markeredgewidth=1.6, **grey)[0],
+        **({"carried by rare paths": axes.plot([], [], "o", markersize=7, **grey)[0]} if has_rare else {}),
         f"perturbation, Eq. {equation}": axes.plot([], [], "-", linewidth=1.6, **grey)[0],
     }
     if is_simulated:

@@ -15,6 +15,7 @@ from fpsolve.case.curves import Curve
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, VARIANCE_RATE, Quantity
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
+from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.perturbation import second_order
 
 
@@ -136,7 +137,7 @@ def _indices(result: CurveResult) -> str:
     parts = []
     for name, estimate in result.estimates.items():
         error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
-        parts.append(f"{INDICES[name].symbol} = {_digits_of(estimate, most=9)}{error}")
+        parts.append(f"{INDICES[name].symbol} = {_digits_of(estimate, result, most=9)}{error}")
     return "   ".join(parts) + "\n"
 
 
@@ -151,7 +152,7 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
         theory = second_order(result.curve.problem)
         row = [f"{value:g}" for value in result.curve.varied.values()]
         for index in indices:
-            row += [_digits_of(result.estimates[index.name], most=7), f"{index.theory(theory):.6g}"]
+            row += [_digits_of(result.estimates[index.name], result, most=7), f"{index.theory(theory):.6g}"]
         table.add_row(*row)
     return table
 
@@ -196,8 +197,10 @@ def _explain_star(table: Table, case: Case) -> None:
         table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
 
 
-def _digits_of(estimate: Estimate | None, most: int) -> str:
-    return digits(estimate.value, estimate.error_estimate, most) if estimate else "none found"
+def _digits_of(estimate: Estimate | None, result: CurveResult, most: int) -> str:
+    if estimate is None:
+        return "none" if grows_far_out(result.curve.problem) else "none found"
+    return digits(estimate.value, estimate.error_estimate, most)
 
 
 def digits(value: float, error: float, most: int = 13) -> str:

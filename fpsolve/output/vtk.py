@@ -25,6 +25,7 @@ from fpsolve.fem.noise_space import LineNoiseSpace, Samples
 from fpsolve.fem.phase_space import PhaseSpace
 from fpsolve.files import atomic, write_text
 from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 MAX_ORDER = 4
@@ -136,7 +137,7 @@ class _Grid:
 
     @classmethod
     def of(cls, pair: PrincipalPair) -> _Grid:
-        """Nodes that show a pair; P_s in the adjoint also asks for quadrilaterals of one noise unit at most.
+        """Nodes that show a pair; P_s in the adjoint also asks for low quadrilaterals.
 
         Raises:
             OutputError: the noise has states.
@@ -144,7 +145,7 @@ class _Grid:
         space, lines = pair.space, _z_lines(pair)
         degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
         order = min(MAX_ORDER, max(degrees))
-        tall = math.ceil(np.max(np.diff(lines)) - 1e-9)
+        tall = math.ceil(np.max(np.diff(lines) / _resolution(pair, lines)) - 1e-9)
         phi = _nodes(_phi_breaks(space.phi), order, _parts(degrees[0], order))
         z = _nodes(lines, order, max(tall, _parts(pair.generator.chosen.xi_degree, order)))
         return cls(phi, z, pair.generator.problem.noise.standard_deviation, order)
@@ -206,6 +207,13 @@ def _z_lines(pair: PrincipalPair) -> FloatArray:
     lower, upper = max(math.floor(seen[0]), -end), min(math.ceil(seen[-1]), end)
     inside = np.arange(math.floor(lower) + 1, math.ceil(upper))
     return np.concatenate([[lower], inside[(inside > lower + 0.1) & (inside < upper - 0.1)], [upper]])
+
+
+def _resolution(pair: PrincipalPair, lines: FloatArray) -> FloatArray:
+    """The height of quadrilaterals, in noise units, that shows P_s in each cell: 1, or more in algebraic tails."""
+    if not has_algebraic_tails(pair.generator.problem.noise):
+        return np.ones(lines.size - 1)
+    return np.maximum(1.0, np.minimum(abs(lines[:-1]), abs(lines[1:])) / 6)
 
 
 def _on_a_line(pair: PrincipalPair) -> LineNoiseSpace:

@@ -10,6 +10,7 @@ from fpsolve.case.curves import Curve
 from fpsolve.errors import FpsolveError
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles
 from fpsolve.study.results import SimulatedCurve
+from fpsolve.theory.validity import simulated_tail_note
 
 if TYPE_CHECKING:  # numba takes half a second to import
     from fpsolve.simulation.estimators import MonteCarlo
@@ -65,15 +66,17 @@ def _simulate_curve(case: Case, curve: Curve, progress: Callable[[], None]) -> S
         curve.problem, [float(p) for p in case.simulated], estimator=setting.estimator,
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
+    note = simulated_tail_note(curve.problem) if any(each.p for each in result.estimates) else None
+    noted = result.warnings if note is None else (*result.warnings, note)
     if not _is_nonlinear(curve) or result.interrupted:
-        return SimulatedCurve(curve, result, None, result.warnings, result.interrupted)
+        return SimulatedCurve(curve, result, None, noted, result.interrupted)
     try:
         response, warnings = _respond(curve, result, progress)
     except KeyboardInterrupt:
         warning = "no stationary response: stopped before it was reached"
-        return SimulatedCurve(curve, result, None, (*result.warnings, warning), interrupted=True)
+        return SimulatedCurve(curve, result, None, (*noted, warning), interrupted=True)
     interrupted = response is not None and response.interrupted
-    return SimulatedCurve(curve, result, response, (*result.warnings, *warnings), interrupted)
+    return SimulatedCurve(curve, result, response, (*noted, *warnings), interrupted)
 
 
 def _respond(curve: Curve, result: MonteCarlo, progress: Callable[[], None]) -> tuple[Response | None, list[str]]:

@@ -13,7 +13,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.case.sections import Expectation
-from fpsolve.errors import MeshError, NotConverged, Remedy
+from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.moments import solve_moments
@@ -23,6 +23,7 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
+from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.perturbation import second_order
 
 UNRESOLVED = 0.1
@@ -106,7 +107,7 @@ def _solve_curve(
         stationary=_pair(solver, 0.0) if wanted.density else None,
         discretisation=None if (used := solver.largest()) is None else _discretisation(*used),
         warnings=tuple(map(in_words_of_a_case, warnings)),
-        notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments))),
+        notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]))),
         failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),
     )
 
@@ -120,20 +121,22 @@ def _solve_indices(
     for index in (STABILITY_INDEX, LYAPUNOV_EXPONENT, VARIANCE_RATE):
         if index.name not in names:
             continue
-        low, high = np.clip(index.interval, *solver.problem.noise.moments)
         try:
             estimates[index.name] = index.solve(solver, root)
-            reason = f"Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]"
-        except NotConverged as failure:
-            reason = str(failure)
-        if estimates[index.name] is None:
-            missing.append(f"no stability index: {reason}" if index is STABILITY_INDEX else reason)
+        except (NotConverged, NoSuchExponent) as failure:
+            missing.append(f"no stability index: {failure}" if index is STABILITY_INDEX else str(failure))
+            continue
+        if estimates[index.name] is None and not grows_far_out(solver.problem):  # of that a note tells
+            low, high = np.clip(index.interval, *solver.problem.noise.moments)
+            missing.append(f"no stability index: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]")
     return estimates, missing
 
 
-def _notes(case: Case, curve: Curve, moments: MomentLyapunov) -> tuple[str, ...]:
-    """Where the reduction of the noise, the impact law or Eq. (37) is not valid."""
+def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:
+    """What heavy tails make of the numbers, and where the reduction of the noise, the impact law or Eq. (37) fails."""
     notes = [
+        validity.heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
+        *moments.notes,
         None if case.is_exact else validity.reduction_note(curve.original_noise),
         validity.impact_note(curve.oscillator),
         validity.weak_noise_note(curve.problem, moments.p, moments.value),

@@ -1,3 +1,5 @@
+from .far import Place as Place
+from .far import far_places as far_places
 from .frozen import FrozenNoise as FrozenNoise
 from .frozen import frozen_noise as frozen_noise
 from .perturbation import Scale as Scale

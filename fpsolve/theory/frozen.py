@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any
 
@@ -10,29 +11,43 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem
 
 SAMPLES = 1001
 LARGEST_P = 25.0
 """The places for larger p may lie beyond those that are looked at."""
+FURTHEST = 1e12
+"""Where algebraic tails are looked at last, in standard deviations."""
 
 
 def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, Any]:
-    """Real parts of the eigenvalues of A(ξ), the larger one first, and whether they are complex: the phase turns."""
+    """Growth rates of ln ‖x‖ at ξ, that of the faster mode first, and whether the phase turns.
+
+    Where A(ξ) has real eigenvalues they are the rates; where the phase turns, their common real part and the kicks,
+    each once in half a turn.
+    """
     a = matrix_at(problem.system, xi)
     half, square = 0.5 * (a[..., 0, 0] + a[..., 1, 1]), squared_frequency(a)
-    root = np.sqrt(np.maximum(-square, 0))
-    return half + root, half - root, square > 0
+    root, turns = np.sqrt(np.abs(square)), square > 0
+    turning = half + root / math.pi * sum(kick.log_factor for kick in problem.system.kicks)
+    larger = half + np.copysign(root, half)  # in size; the other one from the determinant, without cancellation
+    determinant = a[..., 0, 0] * a[..., 1, 1] - a[..., 0, 1] * a[..., 1, 0]
+    other = np.divide(determinant, larger, out=np.zeros_like(larger), where=larger != 0)
+    faster, slower = np.maximum(larger, other), np.minimum(larger, other)
+    return np.where(turns, turning, faster), np.where(turns, turning, slower), turns
 
 
 class FrozenNoise:
     """The growth rate F(z; p) of ‖x‖^p on paths that hold the noise at z, and where it is the largest.
 
     F = p G(ξ) − ⅛σ²((ln P_s)′)². G is the growth rate of ln ‖x‖ with ξ frozen, the largest real part of an eigenvalue
-    of A(ξ): for the paper's oscillator εξ/2 while it oscillates, |εξ| < 2ω, the rate of the faster real mode beyond.
-    For p < −1 the paths that stay on the other real mode carry more: (p + 1)·slow − fast. The second term is what
-    holding ξ costs. Slow noise has its tilted density where F is largest, and more than one such place.
+    of A(ξ): for the paper's oscillator εξ/2 while it oscillates, |εξ| < 2ω, and what the impacts take, the rate of the
+    faster real mode beyond. For p < −1 the paths that stay on the other real mode carry more: (p + 1)·slow − fast. The
+    second term is what holding ξ costs. Slow noise has its tilted density where F is largest, and more than one such
+    place. Far out there is none for r₀ ≤ 1: Gaussian noise is held at a cost ~ξ², bounded noise at one ~1/(distance to
+    its end)², and the gain is at most linear in ξ. Algebraic tails cost ~1/ξ² only, see `far`.
 
     Args:
         problem: its noise must not be a chain.
@@ -48,6 +63,8 @@ class FrozenNoise:
         unit = noise.standard_deviation
         furthest = 5 * LARGEST_P * unit * noise_strength(problem.system) * noise.correlation_time
         end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
+        self._is_heavy = has_algebraic_tails(noise)
+        end = FURTHEST if self._is_heavy else end
         spread = max(np.log(end / 1e-2), 1.0)
         side = end * np.sinh(spread * np.linspace(0, 1, SAMPLES)) / np.sinh(spread)
         self.z = np.concatenate([-side[:0:-1], side])
@@ -69,8 +86,16 @@ class FrozenNoise:
         return self.z[at], rate[at]
 
     def center(self, p: float) -> float:
-        """About the mean z of the tilted density."""
+        """About the mean z of the tilted density; for algebraic tails that of the place nearest to 0."""
+        if self._is_heavy:
+            peaks, _ = self.peaks(p)
+            return float(peaks[np.argmin(np.abs(peaks))]) if peaks.size else 0.0
         return float(self.z[np.argmax(self.rate(p))])
+
+    def at_the_ends(self, p: float) -> float:
+        """The larger F of the outermost z."""
+        rate = self.rate(p)
+        return float(max(rate[0], rate[-1]))
 
     def tilt(self, z: float) -> float:
         """s for which P_s exp(2s z) is the largest at z: −½(ln P_s)′."""

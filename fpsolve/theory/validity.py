@@ -9,6 +9,7 @@ from fpsolve.errors import Remedy
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.perturbation import second_order
 
 NEAR_GAUSSIAN = 0.1
@@ -36,6 +37,26 @@ def impact_note(oscillator: VibroImpactOscillator) -> str | None:
         f"1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much; R = "
         f"{oscillator.impact_factor():.3g} belongs to the delta law alone"
     )
+
+
+NO_INDEX = "Λ(p) > 0 for every p ≠ 0, as rare paths that hold the noise far out carry the moments in the end"
+"""Why noise with algebraic tails leaves no stability index, see `far_places`."""
+ALMOST_EVERY = "growth rate of almost every path (Furstenberg-Khasminskii)"
+
+
+def heavy_tail_note(problem: Problem, exponent: float | None) -> str | None:
+    """What λ, Λ(p) and δ_p mean for noise with algebraic tails, see `far_places`."""
+    if not grows_far_out(problem):
+        return None
+    slope = "" if exponent is None or exponent <= 0 else ", not Λ′(0)"
+    return f"algebraic tails: {NO_INDEX}; there is no stability index, and λ is the {ALMOST_EVERY}{slope}"
+
+
+def simulated_tail_note(problem: Problem) -> str | None:
+    """What a simulation cannot see."""
+    if not grows_far_out(problem):
+        return None
+    return f"algebraic tails: {NO_INDEX}; a simulation shows Λ(p) without these paths, and λ is the {ALMOST_EVERY}"
 
 
 def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> str | None:

@@ -1,0 +1,160 @@
+"""The largest eigenvalue around one place of the noise at any p, each solve starting from those at the nearest p."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass, field
+from functools import cache, cached_property
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from fpsolve.errors import NotConverged, Remedy
+from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.error import Solution
+from fpsolve.exponent.refine import refined
+from fpsolve.exponent.rival import rival
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model.noise import has_algebraic_tails
+from fpsolve.model.problem import Problem
+
+TRIM = 0.8
+"""A smaller space must have at most this share of the unknowns."""
+SMALL_P = 1e-2
+"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
+NEIGHBOURS = 6
+"""How many known eigenfunctions those of another p are interpolated from."""
+Tolerance = Callable[[float, float], float]
+"""The largest error allowed, from p and a value of Λ(p)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """The eigenvalue of one problem on all p.
+
+    Args:
+        problem: a motion and its noise.
+        mesh: a mesh for all p; None chooses a discretisation for each p that meets the tolerance.
+        rtol: about what the tolerance is relative to the size of Λ(p).
+        budget: what the choice of a discretisation may cost.
+        tolerance: the usual one.
+        is_far: whether it is that of the places far out of algebraic tails.
+    """
+
+    problem: Problem
+    mesh: CylinderMesh | None
+    _: KW_ONLY
+    rtol: float
+    budget: Budget
+    tolerance: Tolerance
+    is_far: bool = False
+    _known: dict[float, Solution] = field(init=False, default_factory=dict)
+    _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
+
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+        """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
+
+        Raises:
+            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
+        """
+        if tolerance is None and p in self._failed:
+            raise self._failed[p]
+        allowed = tolerance or self.tolerance
+        if p not in self._known or (self.mesh is None and not self._meets(self._known[p], allowed)):
+            try:
+                with _one_thread().limit(limits=1):
+                    self._known[p] = self._found(p, allowed)
+            except NotConverged as failure:
+                if self.is_far:
+                    text = f"{failure}; this moment is carried by rare paths, with noise far out in its tails"
+                    failure = NotConverged(text, failure.partial)
+                if tolerance is None:  # a tighter one may be out of reach where this is not
+                    self._failed[p] = failure
+                raise failure from None
+            except np.linalg.LinAlgError as failure:
+                raise NotConverged(f"Λ({p:g}) cannot be solved on this mesh ({failure}); {Remedy.MESH}") from failure
+            except (ArithmeticError, RuntimeError, ValueError) as failure:
+                raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
+        return self._known[p]
+
+    def holds(self, pair: PrincipalPair) -> bool:
+        """Whether a pair is one of this branch."""
+        return pair.p in self._known and self._known[pair.p].pair is pair
+
+    def largest(self) -> tuple[float, Generator] | None:
+        """The p of the largest size that was solved, and with what; None where none was."""
+        p = max(self._known, key=abs, default=None)
+        return None if p is None else (p, self._known[p].pair.generator)
+
+    def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+        """The solution at ±`SMALL_P` that a smaller p goes with."""
+        side = p or (-1.0 if has_algebraic_tails(self.problem.noise) else 1.0)  # where Λ is finite
+        return self.solution(math.copysign(SMALL_P, side), tolerance)
+
+    def _found(self, p: float, tolerance: Tolerance) -> Solution:
+        """A solution that meets a tolerance, or the one on the given mesh."""
+        if self.mesh is not None:
+            coarse, fine = self._given
+            pair = self._tried(coarse, p).pair
+            return Solution(pair, principal_pair(fine, p, start=pair))
+        if abs(p) < SMALL_P and not self.is_far:
+            return self._tried(self.near_zero(p, tolerance).pair.generator, p)
+        start = self._from_nearest(p, tolerance)
+        if start is not None and self._meets(start, tolerance) and rival(start.pair) is None:
+            return start
+        return (resolve_far if self.is_far else resolve)(
+            self.problem,
+            p,
+            tolerance=lambda value: tolerance(p, value),
+            rtol=self.rtol,
+            budget=self.budget,
+            start=start,
+        )
+
+    @cached_property
+    def _given(self) -> tuple[Generator, Generator]:
+        """That of the given mesh, and one of four degrees more, whose error hardly counts beside it."""
+        assert self.mesh is not None
+        generator = Generator(self.problem, self.mesh)
+        return generator, generator.enriched().enriched()
+
+    def _from_nearest(self, p: float, tolerance: Tolerance) -> Solution | None:
+        """The solution at p with what was chosen for the nearest p, where that is likely to do."""
+        nearest = min(self._known, key=lambda q: abs(q - p), default=None)
+        if nearest is None:
+            return None
+        generator = self._trimmed(self._known[nearest], tolerance)
+        try:
+            return self._tried(generator, p) if fits(generator, nearest, p) else None
+        except NotConverged:
+            return None
+
+    def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Generator:
+        """The generator of a solution, or a much smaller one that would do."""
+        pair, size = solution.pair, solution.pair.generator.size
+        if abs(pair.p) < SMALL_P or size <= WORTH_A_TRY:
+            return pair.generator
+        smaller = refined(solution, tolerance(pair.p, pair.value), 0)
+        is_better = smaller.unknowns(self.problem.noise) <= TRIM * size
+        return Generator(self.problem, smaller) if is_better else pair.generator
+
+    def _tried(self, generator: Generator, p: float) -> Solution:
+        """The solution at p with a generator, from those around p, or from the nearest one."""
+        known = (solution.pair for solution in self._known.values())
+        near = sorted(known, key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
+        return Solution(principal_pair(generator, p, start=near))
+
+    def _meets(self, solution: Solution, tolerance: Tolerance) -> bool:
+        """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
+        pair = solution.pair
+        is_small = abs(pair.p) < SMALL_P and not self.is_far
+        return is_small or solution.error <= tolerance(pair.p, pair.value)
+
+
+@cache
+def _one_thread() -> ThreadpoolController:
+    """Keeps BLAS from threads, which for the small blocks of a sparse LU cost three times what they save."""
+    return ThreadpoolController()
