@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
+from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.fields import fields
+from fpsolve.exponent.fields import MOST_NEGATIVE, fields
 from fpsolve.model.plane import growth_rate, phase_speed
 
 
@@ -51,23 +52,24 @@ def stationary_density(pair: PrincipalPair) -> Density:
     """ρ(φ, ξ), solution of the Fokker-Planck equation L*(0)ρ = 0.
 
     Raises:
+        NotConverged: too much of it is negative; `partial` is what was found.
         ValueError: the pair is not the one at p = 0.
     """
-    if pair.p != 0:
-        raise ValueError(
-            f"the stationary density is the adjoint eigenfunction at p = 0, but the pair has p = {pair.p:g}"
-        )
-    return adjoint_density(pair)
+    return _judged(pair, _density(_of_zero(pair), "adjoint"), "stationary density")
 
 
 def adjoint_density(pair: PrincipalPair) -> Density:
-    """T*(φ, ξ; p) normalised to 1."""
-    return _density(pair, "adjoint")
+    """T*(φ, ξ; p) normalised to 1. Raises `NotConverged` where too much of it is negative."""
+    return _judged(pair, _density(pair, "adjoint"), "adjoint density")
 
 
 def tilted_density(pair: PrincipalPair) -> Density:
-    """T T*: how phase and noise are distributed along the paths that carry the p-th moment."""
-    return _density(pair, "product")
+    """T T*: how phase and noise are distributed along the paths that carry the p-th moment.
+
+    Raises:
+        NotConverged: too much of it is negative; `partial` is what was found.
+    """
+    return _judged(pair, _density(pair, "product"), "tilted density")
 
 
 def furstenberg_khasminskii(pair: PrincipalPair) -> float:
@@ -77,7 +79,7 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     log-amplitude jumps by ln R; it is taken on the side from where the impact is met.
     """
     space, system = pair.space, pair.generator.problem.system
-    growth = stationary_density(pair).mean(lambda phi, xi: growth_rate(system, xi)(phi))
+    growth = _density(_of_zero(pair), "adjoint").mean(lambda phi, xi: growth_rate(system, xi)(phi))
     table = space.table(pair.left)
     for kick in system.kicks:
         at = space.phi.vertices_at(kick.phase)
@@ -89,6 +91,28 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
             density = np.sum(traces @ table, axis=0)
             growth += space.turns * kick.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant()))
     return growth
+
+
+def _of_zero(pair: PrincipalPair) -> PrincipalPair:
+    """The pair, which must be that at p = 0. Raises `ValueError`."""
+    if pair.p != 0:
+        raise ValueError(
+            f"the stationary density is the adjoint eigenfunction at p = 0, but the pair has p = {pair.p:g}"
+        )
+    return pair
+
+
+def _judged(pair: PrincipalPair, density: Density, name: str) -> Density:
+    """The density, if it is one. Raises `NotConverged`."""
+    sizes = density.phi_weights[:, None] * np.abs(density.values) * density.xi_weights
+    share = float(np.sum(sizes[density.values < 0]) / np.sum(sizes))
+    if share > MOST_NEGATIVE:
+        raise NotConverged(
+            f"the {name} at p = {pair.p:g} is not resolved, {share:.0%} of it is negative; use a mesh with more cells, "
+            "in the phase and in the noise",
+            density,
+        )
+    return density
 
 
 def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Density:

@@ -10,7 +10,7 @@ from functools import cache, cached_property
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from fpsolve.errors import NotConverged, Remedy
+from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
@@ -74,11 +74,20 @@ class Branch:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure
                 raise failure from None
-            except np.linalg.LinAlgError as failure:
-                raise NotConverged(f"Λ({p:g}) cannot be solved on this mesh ({failure}); {Remedy.MESH}") from failure
-            except (ArithmeticError, RuntimeError, ValueError) as failure:
+            except (ArithmeticError, RuntimeError, ValueError, MeshError) as failure:  # LinAlgError is a ValueError
+                if isinstance(failure, MeshError) and self.mesh is None:
+                    raise NotConverged(f"Λ({p:g}) did not converge: {failure}; {self.remedy}") from failure
+                if isinstance(failure, np.linalg.LinAlgError):
+                    raise NotConverged(f"Λ({p:g}) cannot be solved ({failure}); {self.remedy}") from failure
+                if not is_numerical(failure):
+                    raise
                 raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
         return self._known[p]
+
+    @property
+    def remedy(self) -> Remedy:
+        """What to do where it is not resolved."""
+        return Remedy.BUDGET if self.mesh is None else Remedy.MESH
 
     def holds(self, pair: PrincipalPair) -> bool:
         """Whether a pair is one of this branch."""
@@ -92,7 +101,12 @@ class Branch:
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
         side = p or (-1.0 if has_algebraic_tails(self.problem.noise) else 1.0)  # where Λ is finite
-        return self.solution(math.copysign(SMALL_P, side), tolerance)
+        q = math.copysign(SMALL_P, side)
+        try:
+            return self.solution(q, tolerance)
+        except NotConverged as failure:
+            text = str(failure).replace(f"Λ({q:g}) did", f"Λ({q:g}), which stands for p near 0, did")
+            raise NotConverged(text, failure.partial) from failure
 
     def _found(self, p: float, tolerance: Tolerance) -> Solution:
         """A solution that meets a tolerance, or the one on the given mesh."""
@@ -152,6 +166,13 @@ class Branch:
         pair = solution.pair
         is_small = abs(pair.p) < SMALL_P and not self.is_far
         return is_small or solution.error <= tolerance(pair.p, pair.value)
+
+
+def is_numerical(failure: Exception) -> bool:
+    """Whether numbers became too large, or a matrix singular; all else is a fault of the program."""
+    text = str(failure)
+    is_singular = isinstance(failure, RuntimeError) and ("singular" in text or "ARPACK" in text)
+    return isinstance(failure, ArithmeticError) or is_singular or "infs or NaNs" in text
 
 
 @cache

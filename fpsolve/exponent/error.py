@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NotConverged, Remedy
+from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_space import CellSpace, NoiseSpace
 from fpsolve.fem.phase_space import PhaseSpace
@@ -45,12 +45,29 @@ class Estimate:
         return self.error_estimate / max(abs(self.value), self.scale, sys.float_info.min)
 
 
-def checked(name: str, estimate: Estimate) -> Estimate:
+@dataclass(frozen=True)
+class Absent:
+    """A quantity that does not exist; it is false.
+
+    Attributes:
+        reason: why.
+    """
+
+    reason: str
+
+    def __bool__(self) -> bool:
+        return False
+
+    def __str__(self) -> str:
+        return f"none: {self.reason}"
+
+
+def checked(name: str, estimate: Estimate, remedy: str) -> Estimate:
     """An estimate whose error leaves it a meaning. Raises `NotConverged`."""
     if not estimate.relative_error <= MEANINGLESS:
         raise NotConverged(
             f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "
-            f"mean anything; {Remedy.MESH}",
+            f"mean anything; {remedy}",
             estimate,
         )
     return estimate

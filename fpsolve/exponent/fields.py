@@ -11,6 +11,8 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_space import Samples
 
 MOST_TILT = 1.5
+UNRESOLVED, MOST_NEGATIVE = 0.1, 0.02
+"""The share of an eigenfunction, and of a density, with the wrong sign from which on it misleads."""
 
 
 class Fields(NamedTuple):

@@ -14,7 +14,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Estimate, checked
+from fpsolve.exponent.error import Absent, Estimate, checked
 from fpsolve.exponent.solver import (
     ExponentSolver,
     MomentLyapunov,
@@ -24,8 +24,10 @@ from fpsolve.exponent.solver import (
     missed,
 )
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.problem import Problem, of_problem_too
 from fpsolve.theory.far import grows_far_out
+from fpsolve.theory.validity import NO_INDEX
 
 SEARCH_INTERVAL = (-20.0, 20.0)
 SHARE = 0.4
@@ -120,7 +122,8 @@ class MomentLyapunovFunction:
         value, error = self(points), self.error_estimate(points)
         for point, each, bound in zip(points, value, error, strict=True):
             if point != 0:
-                checked(f"Λ({point:g})", Estimate(float(each), float(bound), self.solver.scale(float(point))))
+                estimate = Estimate(float(each), float(bound), self.solver.scale(float(point)))
+                checked(f"Λ({point:g})", estimate, self.solver.near.remedy)
         return MomentLyapunov(
             p=points,
             value=value,
@@ -147,9 +150,9 @@ class MomentLyapunovFunction:
         """Λ″(0), solved at p = 0. Raises `NotConverged`."""
         return self.solver.variance_rate()
 
-    def stability_index(self, search: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | None:
-        """δ_p, see `nonzero_root`, from `root` on. Raises `NotConverged`."""
-        return nonzero_root(self.solver, search, self.root())
+    def stability_index(self, search: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | Absent:
+        """δ_p, see `nonzero_root`, from `root` on, or why there is none. Raises `NotConverged`."""
+        return nonzero_root(self.solver, search, self.root()) or Absent(no_root(self.solver.problem, search))
 
     def _inside(self, p: ArrayLike) -> FloatArray:
         points = np.asarray(p, dtype=float)
@@ -244,6 +247,17 @@ def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str 
     )
 
 
+def no_root(problem: Problem, interval: tuple[float, float] = SEARCH_INTERVAL) -> str:
+    """Why Λ(p) has no root p ≠ 0."""
+    if grows_far_out(problem):
+        return NO_INDEX
+    low, high = np.clip(interval, *problem.noise.moments)
+    text = f"Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]"
+    is_bounded = isinstance(problem.noise, MarkovChain) or math.isfinite(problem.noise.half_width)
+    remark = ", and may have none at all: with bounded noise P(sup ‖x‖ > A) may fall faster than any power of A"
+    return text + remark * is_bounded
+
+
 def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
 ) -> Estimate | None:
@@ -269,7 +283,8 @@ def nonzero_root(
         low, high = (p, high) if ratio < 0 else (low, p)
         new = p - ratio / slope
         if abs(new - p) <= max(1e-13 * max(1.0, abs(p)), 0.1 * error / slope):
-            return checked("the stability index", Estimate(p, error / slope + abs(new - p), scale=1.0))
+            estimate = Estimate(p, error / slope + abs(new - p), scale=1.0)
+            return checked("the stability index", estimate, solver.near.remedy)
         if low == high:
             return None
         if not low < new < high:

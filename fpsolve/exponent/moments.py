@@ -61,14 +61,14 @@ def solve_moments(
 
     Args:
         solver: of the problem.
-        p: one moment, or an array of shape (n,), which here may be empty.
+        p: one moment, or an array of shape (n,), which here may be empty; equal ones are solved once.
         progress: called once for each p, whatever the number of solves.
 
     Raises:
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
-    points = checked_moments(p, solver.problem) if np.size(p) else np.zeros(0)
-    reports = repeat(progress, points.size)
+    asked = checked_moments(p, solver.problem) if np.size(p) else np.zeros(0)
+    points, reports = _each_once(asked), repeat(progress, asked.size)
 
     def report() -> None:
         next(reports, lambda: None)()
@@ -76,7 +76,21 @@ def solve_moments(
     result = _interpolated(solver, points, report) or _one_by_one(solver, points, report)
     for each in reports:
         each()
-    return result
+    return result if points.size == asked.size else _at(result, asked)
+
+
+def _each_once(p: FloatArray) -> FloatArray:
+    """The p without those that are equal to one before, in their order."""
+    return p[np.sort(np.unique(p, return_index=True)[1])]
+
+
+def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
+    """A result at p some of which are equal, without those that failed."""
+    order = np.argsort(result.p)
+    places = np.minimum(np.searchsorted(result.p[order], p), order.size - 1) if order.size else np.zeros(0, dtype=int)
+    index = order[places[result.p[order[places]] == p]] if order.size else places
+    names = ("p", "value", "derivative", "error_estimate", "residual")
+    return replace(result, **{name: getattr(result, name)[index] for name in names})
 
 
 def _interpolated(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov | None:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.function import SEARCH_INTERVAL, nonzero_root
+from fpsolve.exponent.error import Absent, Estimate
+from fpsolve.exponent.function import SEARCH_INTERVAL, no_root, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.problem import Problem, of_problem
@@ -105,8 +105,8 @@ def lyapunov_exponent(
 @of_problem
 def stability_index(
     problem: Problem, *, rtol: float = 1e-8, mesh: CylinderMesh | None = None, budget: Budget | None = None
-) -> Estimate | None:
-    """The stability index δ_p, the non-zero root of Λ(p); None where there is none from -20 to 20.
+) -> Estimate | Absent:
+    """The stability index δ_p, the non-zero root of Λ(p), or why there is none from -20 to 20.
 
     For noise with algebraic tails there is none: Λ(p) > 0 for every p ≠ 0, see `theory.far_places`.
 
@@ -118,4 +118,5 @@ def stability_index(
         ValueError: rtol is not positive.
         NotConverged: some p on the way to it is not resolved on the mesh, or within the budget.
     """
-    return nonzero_root(ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()))
+    solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+    return nonzero_root(solver) or Absent(no_root(problem))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NoSuchExponent, NotConverged, Remedy
+from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.branch import Branch, Tolerance
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair, second_derivative, slope_rounding
@@ -191,7 +191,7 @@ class ExponentSolver:
             try:
                 solution = self.solution(float(points[i]))
                 if points[i] != 0:  # where Λ = 0 has no scale
-                    checked(f"Λ({points[i]:g})", self.estimate(solution))
+                    checked(f"Λ({points[i]:g})", self.estimate(solution), self.near.remedy)
                 solutions[i] = solution
             except NotConverged as failure:
                 failures.append(Failure(float(points[i]), str(failure)))
@@ -206,7 +206,7 @@ class ExponentSolver:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
         value, _, error = self.ratio(0.0)
         meaning = ALMOST_EVERY if grows_far_out(self.problem) else ""
-        return checked("λ", Estimate(value, error, self.scales.linear, meaning))
+        return checked("λ", Estimate(value, error, self.scales.linear, meaning), self.near.remedy)
 
     def variance_rate(self) -> Estimate:
         """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
@@ -224,11 +224,20 @@ class ExponentSolver:
                 "Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time"
             )
         pair, scale = self.near.solution(0.0).pair, 2 * self.scales.quadratic
-        finer = principal_pair(Generator(self.problem, widened(pair.generator).enriched()), 0.0, start=pair)
+        finer = self._finer(pair)
         value, better = second_derivative(pair), second_derivative(finer)
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
         beyond = max(1.0, 1 / math.expm1(tail * math.log(WIDER)))  # what is left, over what the wider one has added
-        return checked("Λ″(0)", Estimate(better, beyond * abs(better - value) + rounding, scale))
+        error = beyond * abs(better - value) + rounding
+        return checked("Λ″(0)", Estimate(better, error, scale), self.near.remedy)
+
+    def _finer(self, pair: PrincipalPair) -> PrincipalPair:
+        """That of a finer and wider discretisation. Raises `NotConverged`."""
+        try:
+            generator = Generator(self.problem, widened(pair.generator).enriched())
+        except MeshError as failure:
+            raise NotConverged(f"Λ″(0) did not converge: {failure}; {self.near.remedy}") from failure
+        return principal_pair(generator, pair.p, start=pair)
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0.
@@ -249,6 +258,7 @@ class ExponentSolver:
         pairs = tuple(solution.pair for solution in solutions)
         p, errors = np.array([pair.p for pair in pairs]), np.array([solution.error for solution in solutions])
         value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("value", "derivative"))
+        value[p == 0], errors[p == 0] = 0.0, 0.0  # but for rounding, in every space
         if grows_far_out(self.problem):
             slope[p == 0] = np.minimum(slope[p == 0], 0.0)  # from the left, where Λ is finite
         return MomentLyapunov(

@@ -24,8 +24,10 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
     console = Console()
     if case.figure.x == "p":
         for result in results:
-            console.print(_moment_table(case, result))
-            console.print(_indices(result), highlight=False)
+            if result.moments.p.size:
+                console.print(_moment_table(case, result))
+            if any(result.estimates.values()):
+                console.print(_indices(result), highlight=False)
     else:
         console.print(_curve_table(case, results))
     print_warnings(case, results)
@@ -128,7 +130,8 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
     for p, value, error, theory in zip(
         moments.p, moments.value, moments.error_estimate, result.moments_perturbation, strict=True
     ):
-        table.add_row(f"{p:g}", digits(value, error), f"{error:.0e}", f"{theory + 0.0:.6g}", f"{value - theory:.2e}")
+        shown = f"{error:.0e}" if error else "0"
+        table.add_row(f"{p + 0.0:g}", digits(value, error), shown, f"{theory + 0.0:.6g}", f"{value - theory + 0.0:.2e}")
     return table
 
 

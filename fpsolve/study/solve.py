@@ -16,6 +16,8 @@ from fpsolve.case.sections import Expectation
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
+from fpsolve.exponent.function import no_root
 from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
@@ -25,9 +27,6 @@ from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
 from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.perturbation import second_order
-
-UNRESOLVED = 0.1
-"""The share of an eigenfunction with the wrong sign from which on its picture misleads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +96,17 @@ def _solve_curve(
     estimates, missing = _solve_indices(solver, wanted.indices, moments.root)
     attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
-    warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None), *_unresolved(pairs)]
+    stationary = _pair(solver, 0.0) if wanted.density else None
+    lost = [] if stationary is None or stationary.sign_defects[1] <= MOST_NEGATIVE else [_lost(stationary)]
+    pictures = [*_unresolved(pairs), *lost]
+    warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None), *pictures]
     return CurveResult(
         curve=curve,
         moments=moments,
         moments_perturbation=second_order(curve.problem).moment_exponent(moments.p),
         estimates=estimates,
         eigenpairs=pairs,
-        stationary=_pair(solver, 0.0) if wanted.density else None,
+        stationary=None if lost else stationary,
         discretisation=None if (used := solver.largest()) is None else _discretisation(*used),
         warnings=tuple(map(in_words_of_a_case, warnings)),
         notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]))),
@@ -117,6 +119,7 @@ def _solve_indices(
 ) -> tuple[dict[str, Estimate | None], list[str]]:
     """Indices, δ_p first, None for those not asked for; and why some of those asked for are missing."""
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
+    failed: dict[str, list[str]] = {}
     missing = []
     for index in (STABILITY_INDEX, LYAPUNOV_EXPONENT, VARIANCE_RATE):
         if index.name not in names:
@@ -124,12 +127,11 @@ def _solve_indices(
         try:
             estimates[index.name] = index.solve(solver, root)
         except (NotConverged, NoSuchExponent) as failure:
-            missing.append(f"no stability index: {failure}" if index is STABILITY_INDEX else str(failure))
+            failed.setdefault(str(failure), []).append(index.symbol)
             continue
         if estimates[index.name] is None and not grows_far_out(solver.problem):  # of that a note tells
-            low, high = np.clip(index.interval, *solver.problem.noise.moments)
-            missing.append(f"no stability index: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]")
-    return estimates, missing
+            missing.append(f"no stability index: {no_root(solver.problem)}")
+    return estimates, missing + [f"no {', '.join(symbols)}: {reason}" for reason, symbols in failed.items()]
 
 
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:
@@ -153,6 +155,14 @@ def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
         for name, defect in zip(("T", "T_adjoint"), pair.sign_defects, strict=True)
         if defect > UNRESOLVED
     ]
+
+
+def _lost(stationary: PrincipalPair) -> str:
+    """That there is no stationary density."""
+    return (
+        f"the stationary density is not resolved, {stationary.sign_defects[1]:.0%} of it has the wrong sign; it is not "
+        f"written, nor are eigenfunctions; {Remedy.CELLS}"
+    )
 
 
 def _imprecise(estimates: Mapping[str, Estimate | None], rtol: float, is_adaptive: bool) -> list[str]:

@@ -44,4 +44,4 @@ def test_public_functions(solve, fig1_solver):
 
 def test_there_may_be_no_stability_index():
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
-    assert fpsolve.stability_index(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)) is None
+    assert not fpsolve.stability_index(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fpsolve.case.case import load_case
+from fpsolve.cli import main
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import compare, solve_curves
 
@@ -33,6 +34,16 @@ value = 0.0
 atol = 1.0
 source = "a guess"
 """
+
+SLOW = """epsilon = 1.0930367
+omega = 0.07252887
+restitution = 0.57982
+c1 = -0.338098
+impact = "restitution\""""
+SLOW_NOISE = """D0 = 0.09531017
+tau0 = 49.143166
+r0 = 0.61455889
+treatment = "exact\""""
 
 
 @pytest.fixture(scope="module")
@@ -76,3 +87,30 @@ def test_simulated_curves_pickle(case):
 def test_results_are_frozen(result):
     with pytest.raises(FrozenInstanceError):
         result.failures = ()
+
+
+def test_what_did_not_converge_is_printed_once(case, tmp_path, capsys):
+    """No empty table, and one sentence for λ and Λ″(0), which fail for one reason."""
+    tight = ["--set", "budget.unknowns=100", "--set", "oscillator.epsilon=2.0", "--set", "moments.p=[9.0]"]
+    assert main(["run", str(case.path), "--out", str(tmp_path), *tight]) == 3
+    printed = capsys.readouterr()
+    assert "┃" not in printed.out
+    said = " ".join(printed.err.split())
+    assert said.count("which stands for p near 0, did not converge") == 1
+    assert "no δ_p, λ, Λ″(0): Λ(0.01), which stands for p near 0" in said
+    assert "[mesh]" not in said  # there is none
+
+
+def test_a_density_that_is_none_is_not_written(tmp_path, capsys):
+    path = tmp_path / "slow.toml"
+    path.write_text(
+        CASE.replace("epsilon = 0.5\nomega = 1.0\nrestitution = 0.8\nc1 = 0.8\nc2 = 0.5", SLOW)
+        .replace("D0 = 0.1\ntau0 = 0.5\nr0 = 0.95", SLOW_NOISE)
+        .replace("[moments]", "[moments]\nrtol = 1e-4")
+        .replace("time = 40.0", "time = 4000.0"),
+        encoding="utf-8",
+    )
+    assert main(["run", str(path), "--out", str(tmp_path)]) == 0
+    assert "the stationary density is not resolved" in " ".join(capsys.readouterr().err.split())
+    assert (tmp_path / "slow" / "summary.json").exists()
+    assert not list((tmp_path / "slow").rglob("*.vtu"))

@@ -1,0 +1,111 @@
+"""What goes wrong is said once, in the right words, and what is right is not lost."""
+
+import numpy as np
+import pytest
+
+from fpsolve import (
+    MomentLyapunovFunction,
+    NonGaussianNoise,
+    Problem,
+    VibroImpactOscillator,
+    moment_lyapunov,
+    stability_index,
+)
+from fpsolve.analysis import adjoint_density, stationary_density
+from fpsolve.errors import MeshError, NotConverged
+from fpsolve.exponent import branch
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.solver import ExponentSolver
+
+FIG1 = Problem(
+    VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1),
+    NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95).ou_reduction(),
+)
+SLOW = Problem(
+    VibroImpactOscillator(omega=0.07252887, restitution=0.57982, c1=-0.338098, epsilon=1.0930367, impact="restitution"),
+    NonGaussianNoise(D0=0.09531017, tau0=49.143166, r0=0.61455889),
+)
+
+
+def test_a_density_that_is_none_is_refused():
+    """Slow, strong noise: a fifth of the adjoint eigenfunction at p = 0 is negative, though λ is right."""
+    pair = ExponentSolver(SLOW, rtol=1e-4).pair(0.0)
+    with pytest.raises(
+        NotConverged, match=r"the stationary density at p = 0 is not resolved, 2\d% of it is negative"
+    ) as e:
+        stationary_density(pair)
+    assert np.min(e.value.partial.values) < 0
+    with pytest.raises(NotConverged, match="the adjoint density at p = 0 is not resolved"):
+        adjoint_density(pair)
+
+
+@pytest.mark.parametrize(
+    ("failure", "words"),
+    [
+        (OverflowError("too large"), "beyond floating-point numbers"),
+        (ValueError("array must not contain infs or NaNs"), "beyond floating-point numbers"),
+        (RuntimeError("Factor is exactly singular"), "beyond floating-point numbers"),
+        (np.linalg.LinAlgError("singular"), "cannot be solved"),
+        (MeshError("P_s underflows"), "did not converge: P_s underflows"),
+    ],
+)
+def test_what_numbers_do_is_not_converged(monkeypatch, failure, words):
+    monkeypatch.setattr(branch, "resolve", lambda *_, **__: (_ for _ in ()).throw(failure))
+    with pytest.raises(NotConverged, match=words):
+        moment_lyapunov(FIG1, 2.0)
+
+
+@pytest.mark.parametrize("failure", [ValueError("zip() argument 3 is longer"), TypeError("no"), RuntimeError("dict")])
+def test_a_fault_of_the_program_is_no_failure_to_converge(monkeypatch, failure):
+    monkeypatch.setattr(branch, "resolve", lambda *_, **__: (_ for _ in ()).throw(failure))
+    with pytest.raises(type(failure), match=str(failure).split()[0][:3]):
+        moment_lyapunov(FIG1, 2.0)
+
+
+def test_equal_moments_are_solved_once():
+    result = moment_lyapunov(FIG1, [2.0] * 10)
+    once = moment_lyapunov(FIG1, 2.0)
+    np.testing.assert_array_equal(result.value, np.full(10, once.value[0]))
+    assert result.p.size == result.error_estimate.size == result.derivative.size == 10
+    mixed = moment_lyapunov(FIG1, [1.0, 2.0, 1.0, -0.0, 0.0])
+    np.testing.assert_array_equal(mixed.p, [1, 2, 1, 0, 0])
+    assert mixed.value[0] == mixed.value[2] != mixed.value[1]
+
+
+def test_of_equal_moments_none_is_there_that_failed(monkeypatch):
+    def resolve(problem, p, **options):
+        if p == 3.0:
+            raise NotConverged("no")
+        return solve(problem, p, **options)
+
+    solve = branch.resolve
+    monkeypatch.setattr(branch, "resolve", resolve)
+    monkeypatch.setattr(branch, "fits", lambda *_: False)
+    with pytest.raises(NotConverged, match=r"^no$") as e:
+        moment_lyapunov(FIG1, [3.0, 0.5, 3.0, 1.0, 0.5])
+    np.testing.assert_array_equal(e.value.partial.p, [0.5, 1.0, 0.5])
+
+
+def test_at_zero_it_is_zero():
+    result = moment_lyapunov(FIG1, [0.0, 2.0])
+    assert result.value[0] == result.error_estimate[0] == 0.0
+    assert not np.signbit(result.value[0])
+
+
+def test_where_there_is_no_stability_index_the_reason_is_told():
+    """Without damping by impacts but with weak bounded noise and much damping every moment up to 20 decays."""
+    problem = Problem(
+        VibroImpactOscillator(omega=1.0, restitution=0.5, c1=-3.0, epsilon=0.3),
+        NonGaussianNoise(D0=0.01, tau0=0.5, r0=0.7),
+    )
+    found = stability_index(problem)
+    assert not found
+    assert "no root p ≠ 0 in [-20, 20]" in str(found)
+    assert "with bounded noise P(sup ‖x‖ > A) may fall faster than any power of A" in found.reason
+    assert str(MomentLyapunovFunction(problem, (0.5, 1.0)).stability_index()) == str(found)
+
+
+def test_near_zero_the_reason_names_the_moment_that_stands_for_it():
+    solver = ExponentSolver(SLOW, budget=Budget(unknowns=100))
+    with pytest.raises(NotConverged, match=r"^Λ\(0\.01\), which stands for p near 0, did not converge"):
+        solver.lyapunov_exponent()
