@@ -258,7 +258,8 @@ def _syntax_fault(text: str, message: str) -> Fault:
             key, second = scanner.repeated
             first, key = scanner.lines[key], re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", key)
             return Fault(key, second, f"set twice, first on line {first}; remove one of them")
-    shown = text.splitlines()[line - 1].strip() if line and line <= text.count("\n") + 1 else ""
+    lines = text.splitlines()
+    shown = lines[line - 1].strip() if line and line <= len(lines) else ""
     return Fault("", line, f"not valid TOML: {message}; {_syntax_remedy(shown)}")
 
 

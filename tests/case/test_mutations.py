@@ -1,0 +1,118 @@
+"""Case files and mesh files with random faults: each is read, or refused with sentences; nothing else happens."""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.errors import CaseError, MeshError
+from fpsolve.fem.mesh import make_mesh
+from fpsolve.fem.mesh_file import read_mesh, write_mesh
+
+COUNT = 150
+"""Mutations of each kind; two thousand take a minute."""
+CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.toml"))
+NUMBERS = ["0", "-1", "1e308", "5e-324", "nan", "inf", "-0.0", "true", '"x"', "[]", "{}", "1e400", "9" * 400, "0x10"]
+PIECES = [
+    "=",
+    "[",
+    "]",
+    '"',
+    "'",
+    "\n",
+    "#",
+    ",",
+    ".",
+    "[[expect]]",
+    "[vary]",
+    "\x00",
+    "\ufeff",
+    "é",
+    "p",
+    "where",
+    "{",
+]
+
+
+def mutated(text, rng):
+    """A text with one to four faults."""
+    for _ in range(rng.randint(1, 4)):
+        lines = text.splitlines() or [""]
+        i = rng.randrange(len(lines))
+        kind = rng.randrange(7)
+        if kind == 0:
+            del lines[i]
+        elif kind == 1:
+            lines.insert(i, rng.choice(lines))
+        elif kind == 2:
+            name = lines[i].partition("=")[0]
+            lines[i] = f"{name}= {rng.choice(NUMBERS)}"
+        elif kind == 3:
+            at = rng.randrange(len(lines[i]) + 1)
+            lines[i] = lines[i][:at] + rng.choice(PIECES) + lines[i][at:]
+        elif kind == 4:
+            at = rng.randrange(len(lines[i]) + 1)
+            lines[i] = lines[i][:at] + lines[i][at + rng.randint(1, 3) :]
+        elif kind == 5:
+            lines[i] = lines[i].replace("=", "= [") + " ]" * rng.randint(0, 1)
+        else:
+            lines[i] = "".join(rng.sample(lines[i], len(lines[i])))
+        text = "\n".join(lines) + "\n"
+    return text
+
+
+def refusals(path):
+    """The sentences with which a case is refused; none where it is read."""
+    try:
+        load_case(path)
+    except CaseError as error:
+        return [fault.sentence for fault in error.faults] or [""]
+    return []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mutated_cases_are_read_or_refused(seed, tmp_path):
+    rng = random.Random(seed)
+    refused = 0
+    for _ in range(COUNT // 4):
+        path = tmp_path / "case.toml"
+        path.write_text(mutated(rng.choice(CASES).read_text(encoding="utf-8"), rng), encoding="utf-8")
+        faults = refusals(path)
+        refused += bool(faults)
+        assert all(faults)
+        assert "pydantic" not in " ".join(faults)
+        assert list(tmp_path.iterdir()) == [path]
+    assert refused > COUNT // 10
+
+
+def test_mutated_bytes_are_read_or_refused(tmp_path):
+    rng = random.Random(5)
+    path = tmp_path / "case.toml"
+    for _ in range(COUNT // 4):
+        data = bytearray(rng.choice(CASES).read_bytes())
+        for _ in range(rng.randint(1, 5)):
+            data[rng.randrange(len(data))] = rng.randrange(256)
+        path.write_bytes(bytes(data))
+        assert all(refusals(path))
+
+
+@pytest.mark.parametrize("ending", [".vtu", ".msh"])
+def test_mutated_meshes_are_read_or_refused(ending, tmp_path):
+    original, path = tmp_path / f"good{ending}", tmp_path / f"bad{ending}"
+    write_mesh(make_mesh(phi_cells=2, phi_degree=3, xi_cells=2, xi_degree=3), original)
+    rng, refused = random.Random(7), 0
+    for _ in range(COUNT // 3):
+        data = bytearray(original.read_bytes())
+        for _ in range(rng.randint(1, 6)):
+            if rng.random() < 0.5:
+                data[rng.randrange(len(data))] = rng.randrange(256)
+            else:
+                at = rng.randrange(len(data))
+                del data[at : at + rng.randint(1, 40)]
+        path.write_bytes(bytes(data))
+        try:
+            read_mesh(path)
+        except MeshError:
+            refused += 1
+    assert refused > COUNT // 10
