@@ -21,7 +21,7 @@ class Density:
     """A probability density on the cylinder, known at the points of a quadrature rule.
 
     Attributes:
-        phi: points on the full circle, shape (m,), increasing.
+        phi: points on the full circle, from 0 to 2π, shape (m,), increasing.
         xi: points on the noise axis, shape (n,), increasing.
         phi_weights, xi_weights: weights of the rule, so that ∫f dφ dξ = phi_weights @ f @ xi_weights.
         values: the density, per radian and unit of ξ, shape (m, n).
@@ -120,6 +120,7 @@ def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Densit
     space, at = pair.space, pair.space.xi.samples()
     turns = space.turns
     values = np.tile(getattr(fields(pair, space.phi.values, at), name), (turns, 1))
-    phi = np.concatenate([space.phi.points + k * space.phi.span for k in range(turns)])
-    phi_weights = np.tile(space.phi.weights, turns)
+    phi = np.mod(np.concatenate([space.phi.points + k * space.phi.span for k in range(turns)]), 2 * np.pi)
+    order = np.argsort(phi)
+    phi, values, phi_weights = phi[order], values[order], np.tile(space.phi.weights, turns)[order]
     return Density(phi, at.xi, phi_weights, at.measure, values / (phi_weights @ values @ at.measure))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fpsolve.analysis.density import adjoint_density, furstenberg_khasminskii, stationary_density, tilted_density
+from fpsolve.exponent.fields import fields
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
@@ -38,8 +39,27 @@ def test_stationary_density_integrates_to_1(solver):
     density = stationary_density(solver.pair(0.0))
     assert density.mean(lambda phi, xi: 1.0) == pytest.approx(1, abs=1e-13)
     assert density.phi_marginal() @ density.phi_weights == pytest.approx(1, abs=1e-13)
-    assert density.phi[0] < 0.5 * np.pi + 0.1
     assert density.phi_weights.sum() == pytest.approx(2 * np.pi)
+
+
+def test_phase_runs_once_around_the_circle(solver):
+    density = stationary_density(solver.pair(0.0))
+    assert 0 <= density.phi[0] < 0.1
+    assert 2 * np.pi - 0.1 < density.phi[-1] < 2 * np.pi
+    assert np.all(np.diff(density.phi) > 0)
+
+
+@pytest.mark.parametrize("name", ["adjoint", "product"])
+def test_values_and_weights_belong_to_their_phase(solver, name):
+    """Against the elements, looked up at each phase in the half circle of the mesh."""
+    pair = solver.pair(2.0)
+    density = {"adjoint": adjoint_density, "product": tilted_density}[name](pair)
+    phi, span = pair.space.phi, pair.space.phi.span
+    at_phi = phi.at(phi.lines[0] + (density.phi - phi.lines[0]) % span)
+    expected = getattr(fields(pair, at_phi, pair.space.xi.samples()), name)
+    expected = expected / (density.phi_weights @ expected @ density.xi_weights)
+    np.testing.assert_allclose(density.values, expected, atol=1e-11 * expected.max())
+    assert density.phi_weights @ density.phi == pytest.approx(2 * np.pi**2)
 
 
 def test_noise_marginal_is_the_stationary_density_of_the_noise(solver):
