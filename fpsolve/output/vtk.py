@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -33,20 +34,28 @@ MAX_ORDER = 4
 FAINT = 1e-6
 
 
+Facts = Mapping[str, float | str]
+
+
 def write_eigenfunctions(
-    directory: Path, pairs: Sequence[PrincipalPair], stationary: PrincipalPair, stem: str = "eigenfunctions"
+    directory: Path,
+    pairs: Sequence[PrincipalPair],
+    stationary: PrincipalPair,
+    stem: str = "eigenfunctions",
+    parameters: Facts = MappingProxyType({}),
 ) -> list[Path]:
     """Write `<stem>.pvd`, a time series over p, and `<stem>/p….vtu`, one file for each p.
 
     Point data: `T`; `T_adjoint`, T*; `tilted_density`, T T*; `stationary_density`, T* at p = 0; `z` = ξ/std.
-    T has mean 1 over P_s(ξ)/2π, see `fields`, and is cut off beyond e^±600; ∫T T* dφ dξ = 1. Field data: `p` and
-    `Lambda`, Λ(p).
+    T, which ParaView shows first, has mean 1 over P_s(ξ)/2π, see `fields`, and is cut off beyond e^±600;
+    ∫T T* dφ dξ = 1. Field data: `p`; `Lambda`, Λ(p); and each of the parameters.
 
     Args:
         directory: the folder, made where it is missing.
         pairs: the eigenpairs, at most one of them written for each p.
         stationary: the pair at p = 0 of the same oscillator and noise, on any mesh.
         stem: name of the collection and of the folder of its files.
+        parameters: of the oscillator and the noise, by dotted keys such as "noise.D0".
 
     Returns:
         The files written, the collection first.
@@ -62,16 +71,17 @@ def write_eigenfunctions(
             "stationary_density": grid.fields(stationary).adjoint,
             "z": grid.z,
         }
-        _write_grid(directory / names[pair.p], grid, data, {"p": pair.p, "Lambda": pair.value})
+        _write_grid(directory / names[pair.p], grid, data, {"p": pair.p, "Lambda": pair.value, **parameters})
     collection = directory / f"{stem}.pvd"
     write_text(collection, _collection(names))
     return [collection, *(directory / name for name in names.values())]
 
 
-def write_density(path: Path, stationary: PrincipalPair) -> Path:
+def write_density(path: Path, stationary: PrincipalPair, parameters: Facts = MappingProxyType({})) -> Path:
     """Write the stationary density of (φ, ξ), per radian and unit of ξ, with its marginals, to a `.vtu` file.
 
-    Point data: `stationary_density`, `phi_marginal`, `xi_marginal`, `z`. Field data: `lyapunov_exponent`, λ.
+    Point data: `stationary_density`, which ParaView shows first, `phi_marginal`, `xi_marginal`, `z`. Field data:
+    `lyapunov_exponent`, λ, and each of the parameters.
     """
     grid, space = _Grid.of(stationary), stationary.space
     over_xi = space.table(stationary.left) @ (space.xi.mass() @ space.xi.constant())
@@ -81,7 +91,7 @@ def write_density(path: Path, stationary: PrincipalPair) -> Path:
         "xi_marginal": space.turns * xi_marginal(stationary, grid.samples(stationary)),
         "z": grid.z,
     }
-    _write_grid(path, grid, data, {"lyapunov_exponent": stationary.derivative})
+    _write_grid(path, grid, data, {"lyapunov_exponent": stationary.derivative, **parameters})
     return path
 
 
@@ -89,11 +99,12 @@ def write_curve(result: CurveResult, folder: Path) -> set[Path]:
     """Write the eigenfunctions of a curve, and return their files; with the first curve the stationary density too."""
     stationary, curve = result.stationary, result.curve
     if stationary is not None and curve.number == 1:
-        write_density(folder / "density.vtu", stationary)
+        write_density(folder / "density.vtu", stationary, curve.parameters)
     if stationary is None or not result.eigenpairs:
         return set()
     copy_show_script(folder)
-    return set(write_eigenfunctions(folder, result.eigenpairs, stationary, stem=f"eigenfunctions{curve.suffix}"))
+    stem = f"eigenfunctions{curve.suffix}"
+    return set(write_eigenfunctions(folder, result.eigenpairs, stationary, stem, curve.parameters))
 
 
 def write_response(simulated: SimulatedCurve, folder: Path) -> set[Path]:
@@ -247,8 +258,8 @@ def _vtk_order(k: int) -> list[tuple[int, int]]:
     return [*corners, *edges, *((i, j) for j in inner for i in inner)]
 
 
-def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: Mapping[str, float]) -> None:
-    """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes)."""
+def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: Facts) -> None:
+    """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes), and the first is shown first."""
     import pyvista
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
@@ -261,6 +272,7 @@ def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: 
         output.point_data[name] = np.broadcast_to(values, (grid.phi.size, grid.z.size)).ravel()
     for name, value in facts.items():
         output.field_data[name] = [value]
+    output.GetPointData().SetActiveScalars(next(iter(data)))
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(output)
     writer.WriteToOutputStringOn()
