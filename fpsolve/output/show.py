@@ -2,11 +2,11 @@
 
     pvpython show.py                          T(phi, xi) at p = 2 as a surface, saved to eigenfunctions.png
     pvpython show.py --cylinder --p 1         wrapped on a cylinder: phi around it, xi along it
-    pvpython show.py --field tilted_density --output tilted.png
+    pvpython show.py --field tilted_density   another field, saved to eigenfunctions-tilted_density.png
 
 Where there is no display: xvfb-run -a -s -noreset pvpython show.py
 In ParaView itself: Run Script of the Python Shell, or Macros > Import new macro; the time is then p.
-The black lines are the impacts, where T jumps.
+The red lines are the impacts, where T jumps.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 try:
-    from paraview import simple  # type: ignore[import-not-found, unused-ignore]
+    from paraview import servermanager, simple  # type: ignore[import-not-found, unused-ignore]
 except ImportError:
     raise SystemExit("this script runs in ParaView's Python: pvpython show.py") from None
 
@@ -32,11 +32,21 @@ BOX = (1.0, 0.75, 0.4)
 LENGTH = 2.0
 """Length of the cylinder, whose radius is 1."""
 CAMERA = {False: (-1.2, -2, 1.6), True: (-1.5, -1.5, 1.3)}
-ANGLE = {False: 28, True: 21}
+ANGLE = {False: 25, True: 26}
 """From where the plane (False) and the cylinder (True) are seen, and the viewing angle in degrees."""
+USUAL = 2.0
+"""The p that is drawn when none is asked for."""
+SAME = 1e-9
+"""p that differ by no more, relative to their size, are one p."""
 SUBDIVISION = 3
 """How often each Lagrange cell is halved to look smooth."""
+GAP = 0.15
+"""Between the rim of the cylinder and what is written beside it."""
+FRONT = 1.6
+"""The radius from which on words before the cylinder do not cover it."""
 BLACK = (0.0, 0.0, 0.0)
+RED = (0.85, 0.1, 0.1)
+QUARTER = math.pi / 2
 
 
 def main(arguments: list[str]) -> None:
@@ -59,13 +69,14 @@ def options(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cylinder", action="store_true", help="wrap (phi, xi) on a cylinder")
     parser.add_argument("--field", default="T", choices=SYMBOLS, help="what to draw (default: T)")
-    parser.add_argument("--p", type=float, default=2.0, help="the moment: the nearest one there is (default: 2)")
-    parser.add_argument("--output", type=Path, help="the picture, .png or .jpg (default: the collection's name, .png)")
+    parser.add_argument("--p", type=float, help=f"the moment (default: {USUAL:g}, or the nearest one there is)")
+    named = "the picture, .png or .jpg (default: named after the collection, the field and the shape)"
+    parser.add_argument("--output", type=Path, help=named)
     parser.add_argument("--collection", type=Path, help="default: eigenfunctions.pvd beside this file")
     chosen = parser.parse_args(arguments)
     chosen.collection = chosen.collection or beside_this_file("eigenfunctions.pvd")
-    shape = "-cylinder" if chosen.cylinder else ""
-    chosen.output = chosen.output or chosen.collection.with_name(f"{chosen.collection.stem}{shape}.png")
+    field, shape = "" if chosen.field == "T" else f"-{chosen.field}", "-cylinder" if chosen.cylinder else ""
+    chosen.output = chosen.output or chosen.collection.with_name(f"{chosen.collection.stem}{field}{shape}.png")
     if not chosen.collection.is_file():
         raise SystemExit(f"there is no {chosen.collection}; name the collection with --collection FILE.pvd")
     if chosen.output.suffix not in (".png", ".jpg"):
@@ -82,10 +93,14 @@ def beside_this_file(name: str) -> Path:
     return next((folder / name for folder in folders if (folder / name).is_file()), folders[-1] / name)
 
 
-def load(collection: Path, p: float) -> tuple[Any, float]:
-    """The collection at the p nearest to the one asked for, and that p."""
+def load(collection: Path, asked: float | None) -> tuple[Any, float]:
+    """The collection at the p asked for, or else at the one nearest to the usual one, and that p."""
     reader = simple.PVDReader(FileName=str(collection))
-    p = min(reader.TimestepValues, key=lambda known: abs(known - p))
+    known = list(reader.TimestepValues)
+    p = min(known, key=lambda each: abs(each - (USUAL if asked is None else asked)))
+    if asked is not None and not abs(p - asked) <= SAME * max(1, abs(p)):
+        there = ", ".join(f"{each:.10g}" for each in known)
+        raise SystemExit(f"--p {asked:g}: {collection} has no such p; choose one of {there}")
     scene = simple.GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
     scene.AnimationTime = p
@@ -101,17 +116,31 @@ def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
     shape = cylinder(marked, limits, bounds) if chosen.cylinder else height(marked)
     display = simple.Show(shape, view)
     if chosen.cylinder:
-        label_cylinder(view, bounds)
+        label_cylinder(view, shape, bounds)
     else:
         label_box(view, display, limits, bounds)
-    lines = simple.Show(impacts(shape, p), view)
-    simple.ColorBy(lines, None)
-    lines.Scale, lines.LineWidth, lines.AmbientColor, lines.DiffuseColor = display.Scale, 3, BLACK, BLACK
+        label_phase(view, display.Scale, limits[0], bounds)
+        mark_impacts(view, display.Scale, limits, bounds)
+    paint_line(impacts(shape, p), view, display.Scale, RED)
     paint(display, view, limits, SYMBOLS[chosen.field])
-    facts = simple.PythonAnnotation(Input=reader, ArrayAssociation="Field Data")
-    facts.Expression = '"p = %g     Lambda(p) = %.6g" % (p[0], round(float(Lambda[0]), 14) + 0.0)'
-    text = simple.Show(facts, view)
-    text.FontSize, text.WindowLocation = 28, "Upper Center"
+    write_title(reader, view)
+
+
+def write_title(reader: Any, view: Any) -> None:
+    """p, Lambda(p), and a line of parameters for the oscillator and for the noise."""
+    sections: dict[str, list[str]] = {}
+    facts = servermanager.Fetch(reader).GetFieldData()
+    for i in range(facts.GetNumberOfArrays()):
+        section, dot, name = facts.GetAbstractArray(i).GetName().partition(".")
+        if dot:
+            value = facts.GetAbstractArray(i).GetVariantValue(0)
+            words = f"{value.ToDouble():g}" if value.IsNumeric() else value.ToString()
+            sections.setdefault(section, []).append(f"{name} = {words}")
+    lines = "".join(f"\n{section}: {', '.join(parts)}" for section, parts in sections.items())
+    title = simple.PythonAnnotation(Input=reader, ArrayAssociation="Field Data")
+    title.Expression = f'"p = %g     Lambda(p) = %.6g" % (p[0], round(float(Lambda[0]), 14) + 0.0) + {lines!r}'
+    text = simple.Show(title, view)
+    text.FontSize, text.WindowLocation, text.Justification = 28, "Upper Center", "Center"
 
 
 def between(source: Any, name: str, low: float, high: float, p: float, every: bool = True) -> Any:
@@ -164,33 +193,74 @@ def impacts(shape: Any, p: float) -> Any:
     return between(edges, "wall", 0, 1e-6, p)
 
 
+def paint_line(lines: Any, view: Any, scale: list[float], colour: tuple[float, float, float]) -> None:
+    """Lines as tubes of one colour, which no surface hides that they lie in."""
+    display = simple.Show(lines, view)
+    display.ColorArrayName = ["POINTS", ""]
+    display.Scale, display.LineWidth, display.RenderLinesAsTubes = scale, 5 if colour == RED else 2, 1
+    display.Ambient, display.Diffuse, display.AmbientColor = 1, 0, colour
+
+
+def mark_impacts(view: Any, scale: list[float], limits: tuple[float, float], bounds: tuple[float, ...]) -> None:
+    """A red line up the back of the box at each impact phase, with a caption on top."""
+    for phi in (QUARTER, 3 * QUARTER):
+        ends = [[phi, bounds[3], limit] for limit in limits]
+        paint_line(simple.Line(Point1=ends[0], Point2=ends[1]), view, scale, RED)
+        caption(view, "impact", [*(ends[1][i] * scale[i] for i in (0, 1)), ends[1][2] * scale[2] + 0.04], "Left", RED)
+
+
+def label_phase(view: Any, scale: list[float], floor: float, bounds: tuple[float, ...]) -> None:
+    """Ticks at the quarters of the circle along the front of the box, and the name of the axis."""
+    edge, tick = bounds[2], 0.02 / scale[1]
+    for k, words in enumerate(("0", "pi/2", "pi", "3 pi/2", "2 pi")):
+        ends = [[k * QUARTER, edge - depth * tick, floor] for depth in (0, 1, 3)]
+        paint_line(simple.Line(Point1=ends[0], Point2=ends[1]), view, scale, BLACK)
+        caption(view, words, [ends[2][i] * scale[i] for i in range(3)], "Left")
+    name = [2.2 * QUARTER, edge - 9 * tick, floor]
+    caption(view, "phase phi", [name[i] * scale[i] for i in range(3)], "Left")
+
+
 def label_box(view: Any, display: Any, limits: tuple[float, float], bounds: tuple[float, ...]) -> None:
-    """A box of pleasing shape with ticks and titles."""
+    """A box of pleasing shape with ticks and titles of xi and of the height."""
     low, high = (*bounds[:4:2], limits[0]), (*bounds[1:4:2], limits[1])
     axes = view.AxesGrid
     display.Scale = axes.DataScale = [BOX[i] / (high[i] - low[i]) for i in range(3)]
-    axes.Visibility, axes.AxesToLabel = 1, 7
-    axes.XTitle, axes.YTitle, axes.ZTitle = "\n\nphi", "xi     ", ""
-    axes.XAxisUseCustomLabels, axes.XAxisLabels = 1, [k * math.pi / 2 for k in range(4)]
-    axes.XAxisNotation, axes.XAxisPrecision = "Fixed", 2
+    axes.Visibility, axes.AxesToLabel = 1, 5  # the height on the left, and xi
+    axes.UseCustomBounds, axes.CustomBounds = 1, [end[i] * axes.DataScale[i] for i in range(3) for end in (low, high)]
+    axes.XTitle, axes.YTitle, axes.ZTitle = "", "noise xi          ", ""
     for axis in "XYZ":
         setattr(axes, f"{axis}TitleFontSize", 30)
         setattr(axes, f"{axis}LabelFontSize", 24)
 
 
-def label_cylinder(view: Any, bounds: tuple[float, ...]) -> None:
+def label_cylinder(view: Any, shape: Any, bounds: tuple[float, ...]) -> None:
     """phi around the upper rim, xi at both ends."""
     view.AxesGrid.Visibility = 0
-    for k, words in enumerate(("phi = 0", "pi/2", "pi", "3 pi/2")):
-        caption(view, words, [2 * math.cos(k * math.pi / 2), 2 * math.sin(k * math.pi / 2), LENGTH])
-    for xi, at in ((bounds[2], 0), (bounds[3], LENGTH)):
-        caption(view, f"xi = {xi:.3g}", [1.2, -1.2, at])
+    points = servermanager.Fetch(shape).GetPoints()
+    nodes = [points.GetPoint(i) for i in range(points.GetNumberOfPoints())]
+    for k, words in enumerate(("phase phi = 0", "impact: pi/2", "pi", "impact: 3 pi/2")):
+        colour = RED if k % 2 else BLACK
+        place = beside(nodes, k * QUARTER, LENGTH, FRONT if k > 1 else 0)
+        caption(view, words, place, "Right" if k in (1, 2) else "Left", colour)
+    for xi, at in ((bounds[2], 0.0), (bounds[3], LENGTH)):
+        caption(view, f"noise xi = {xi:.3g}", beside(nodes, 3.5 * QUARTER, at, FRONT), "Left")
 
 
-def caption(view: Any, words: str, position: list[float]) -> None:
+def beside(nodes: list[tuple[float, ...]], angle: float, at: float, least: float) -> list[float]:
+    """A point a little outside the rim of the cylinder's surface at a height, and not nearer to the axis than told."""
+    c, s = math.cos(angle), math.sin(angle)
+    rim = [math.hypot(x, y) for x, y, z in nodes if abs(z - at) < 1e-6 and x * c + y * s > 0.96 * math.hypot(x, y)]
+    radius = max(*rim, least - GAP) + GAP
+    return [radius * c, radius * s, at]
+
+
+def caption(
+    view: Any, words: str, position: list[float], side: str, colour: tuple[float, float, float] = BLACK
+) -> None:
     """Words at a point of space, facing the observer."""
     display = simple.Show(simple.Text(Text=words), view, "TextSourceRepresentation")
     display.TextPropMode, display.BillboardPosition, display.FontSize = "Billboard 3D Text", position, 28
+    display.Justification, display.Color = side, colour
 
 
 def paint(display: Any, view: Any, limits: tuple[float, float], symbol: str) -> None:

@@ -3,6 +3,7 @@
 import ast
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 import pyvista
 from vtkmodules.vtkCommonDataModel import vtkLagrangeQuadrilateral
 
+from fpsolve.case.case import load_case
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
@@ -23,11 +25,13 @@ from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.output.vtk import copy_show_script, write_density, write_eigenfunctions
+from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE
 from tests.oracles.perturbation import first_order_eigenfunction
 
 HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.2)
 FINE = {"phi_degree": 14, "xi_cells": 8}
+ROOT = Path(__file__).parents[2]
 MOMENTS = (-1.0, 0.0, 2.0)
 INSTALL = "apt-get install --no-install-recommends paraview python3-paraview xvfb xauth"
 QUARTERS = np.pi * np.array([-0.3, 0.1, 0.5, 0.8, 1.2, 1.5, 1.7])
@@ -135,6 +139,35 @@ def test_field_data(solver, grids):
     for p, grid in grids.items():
         assert set(grid.field_data) == {"p", "Lambda"}
         assert grid.field_data["Lambda"][0] == solver.pair(p).value
+
+
+def test_parameters_are_field_data(tmp_path, fig1_solver):
+    pair, parameters = fig1_solver.pair(0.0), {"oscillator.epsilon": 0.1, "oscillator.impact": "delta", "noise.D0": 1.0}
+    _, file = write_eigenfunctions(tmp_path, [pair], pair, parameters=parameters)
+    for path in (file, write_density(tmp_path / "density.vtu", pair, parameters)):
+        found = pyvista.read(path).field_data
+        assert {name: found[name][0] for name in parameters} == parameters
+
+
+def test_files_of_a_curve_hold_its_parameters(tmp_path):
+    case = load_case(ROOT / "cases/minimal.toml", ["oscillator.omega=1.25", 'vary."noise.D0"=[0.5, 0.75]'])
+    run(case, tmp_path)
+    files = sorted(tmp_path.rglob("*.vtu"))
+    assert {file.parent.name for file in files} == {"eigenfunctions", "eigenfunctions-2", case.name}
+    for file in files:
+        data = pyvista.read(file).field_data
+        assert data["noise.D0"][0] == (0.75 if file.parent.name == "eigenfunctions-2" else 0.5)
+        assert data["oscillator.omega"][0] == 1.25
+        assert data["noise.treatment"][0] == "ou-reduction"
+
+
+def test_what_is_shown_first(tmp_path, fig1_solver):
+    """ParaView colours by the active scalars when it opens a file."""
+    pair = fig1_solver.pair(0.0)
+    _, file = write_eigenfunctions(tmp_path, [pair], pair)
+    for path, name in ((file, "T"), (write_density(tmp_path / "density.vtu", pair), "stationary_density")):
+        head, _, _ = path.read_text().partition("<AppendedData")
+        assert f'<PointData Scalars="{name}">' in head
 
 
 def test_periodic_by_pi(grids):
@@ -377,16 +410,97 @@ def assert_picture(file):
     ("arguments", "picture"),
     [
         ([], "eigenfunctions.png"),
-        (["--cylinder", "--field", "tilted_density", "--p", "1.9", "--output", "cylinder.png"], "cylinder.png"),
+        (["--field", "T_adjoint"], "eigenfunctions-T_adjoint.png"),
+        (["--cylinder", "--field", "tilted_density"], "eigenfunctions-tilted_density-cylinder.png"),
+        (["--cylinder", "--p", "2", "--output", "cylinder.png"], "cylinder.png"),
     ],
 )
 def test_show_script(paraview, results, arguments, picture):
+    """Every field and shape has a picture of its own."""
     before = {file: file.read_bytes() for file in results.rglob("*.[pv][vt][du]")}
+    for old in results.glob("*.png"):
+        old.unlink()
     done = paraview(results, "show.py", *arguments)
     assert done.returncode == 0, done.stderr
     assert "p = 2: " in done.stdout
+    assert [file.name for file in results.glob("*.png")] == [picture]
     assert_picture(results / picture)
     assert {file: file.read_bytes() for file in before} == before
+
+
+@pytest.mark.parametrize("p", ["17", "1.9", "nan"])
+def test_show_script_refuses_a_p_that_is_not_there(paraview, results, p):
+    done = paraview(results, "show.py", "--p", p, "--output", "refused.png")
+    assert done.returncode != 0
+    assert f"--p {p}: " in done.stderr
+    assert "choose one of -1, 0, 2" in done.stderr
+    assert not (results / "refused.png").exists()
+
+
+WORDS = """
+import json, sys
+sys.argv = [{script!r}, *{arguments!r}]
+exec(open({script!r}).read(), {{"__name__": "__main__", "__file__": {script!r}}})
+from paraview import servermanager, simple
+view, captions, title = simple.GetActiveView(), [], ""
+for source in simple.GetSources().values():
+    display, kind = simple.GetDisplayProperties(source, view), source.GetXMLName()
+    if kind == "TextSource":
+        captions.append([source.Text, list(display.BillboardPosition)])
+    elif kind == "PythonAnnotation":
+        title = servermanager.Fetch(source).GetRowData().GetAbstractArray(0).GetVariantValue(0).ToString()
+print(json.dumps([title, captions, [view.AxesGrid.XTitle, view.AxesGrid.YTitle]]))
+"""
+
+
+def words(paraview, folder, *arguments):
+    """What show.py writes into a picture: its title, its captions with their places, the titles of the axes grid."""
+    script = folder / "words.py"
+    script.write_text(WORDS.format(script=str(folder / "show.py"), arguments=[*arguments, "--output", "words.png"]))
+    done = paraview(folder, script)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.fixture(scope="module")
+def named_results(tmp_path_factory):
+    """One p only, with parameters."""
+    folder, solver = tmp_path_factory.mktemp("named"), ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
+    parameters = {"oscillator.omega": 1.0, "oscillator.impact": "delta", "noise.D0": 0.5}
+    written(folder, solver, [1.0], parameters=parameters)
+    copy_show_script(folder)
+    return folder
+
+
+def test_words_of_the_picture(paraview, named_results):
+    title, captions, grid = words(paraview, named_results)
+    first, *parameters = title.splitlines()
+    assert first.startswith("p = 1 ")
+    assert parameters == ["oscillator: omega = 1, impact = delta", "noise: D0 = 0.5"]
+    assert [text for text, _ in captions].count("impact") == 2
+    at = {text: place[0] for text, place in captions}
+    ticks = [at[text] for text in ("0", "pi/2", "pi", "3 pi/2", "2 pi")]
+    assert np.diff(ticks) == pytest.approx([ticks[4] / 4] * 4)
+    assert "phase phi" in at
+    assert [word.strip() for word in grid] == ["", "noise xi"]
+
+
+def test_words_around_the_cylinder(paraview, named_results):
+    """Near the rim, whose radius is between 1 and 1.5."""
+    _, captions, _ = words(paraview, named_results, "--cylinder")
+    texts = [text for text, _ in captions]
+    assert texts[:4] == ["phase phi = 0", "impact: pi/2", "pi", "impact: 3 pi/2"]
+    assert len(texts) == 6
+    assert all(text.startswith("noise xi = ") for text in texts[4:])
+    for _, (x, y, _) in captions:
+        assert 1 < np.hypot(x, y) < 1.7
+
+
+def test_the_command_without_a_display_is_the_same_everywhere():
+    """Without -noreset the virtual display restarts under ParaView now and then."""
+    for file in ("README.md", "fpsolve/output/show.py"):
+        commands = re.findall("xvfb-run[^`\n]*", (ROOT / file).read_text(encoding="utf-8"))
+        assert commands == ["xvfb-run -a -s -noreset pvpython show.py"], file
 
 
 MENU = """
