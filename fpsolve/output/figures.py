@@ -9,6 +9,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
+from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, QUANTITIES, Index
 from fpsolve.output.plots import Series, write_figure, write_response_figure
 from fpsolve.study.results import CurveResult, SimulatedCurve
@@ -43,7 +44,13 @@ def _moment_series(result: CurveResult, sample: SimulatedCurve | None) -> Series
     estimates = sample.result.estimates if sample else ()
     dots = [(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]
     rare = np.isin(moments.p, moments.rare)
-    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, _columns(dots), rare)
+    root = _root_in(result.stability_index, line)
+    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, _columns(dots), rare, root)
+
+
+def _root_in(index: Estimate | None, line: FloatArray) -> float | None:
+    """The stability index, if it lies where the curve is drawn."""
+    return index.value if index is not None and line.size and line[0] <= index.value <= line[-1] else None
 
 
 def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:

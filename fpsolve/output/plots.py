@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
+_ROOT: dict[str, Any] = {"marker": "|", "linestyle": "none", "markersize": 16, "markeredgewidth": 2.2, "zorder": 4}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
 
 
@@ -34,6 +35,7 @@ class Series:
         varied: the parameters that tell it from the others, for the legend.
         simulated: x, y and the standard errors of y from a simulation, shape (3, n).
         rare: which of the x have moments that rare paths carry, shape (n,).
+        root: the stability index, which is marked on the zero line; None where there is none among the x.
     """
 
     varied: dict[str, float]
@@ -43,6 +45,12 @@ class Series:
     line_y: FloatArray
     simulated: FloatArray | None = None
     rare: Any = False
+    root: float | None = None
+
+    @property
+    def every(self) -> int:
+        """Of so many x one has a marker."""
+        return max(1, self.x.size // 25)
 
 
 def write_figure(
@@ -57,12 +65,11 @@ def write_figure(
     """
     with _canvas(paths) as figure:
         axes = figure.add_subplot(xlabel=axis_title(ABSCISSAE[x]), ylabel=y.title)
-        axes.set_title(fill(title, 80), parse_math=False)
+        axes.set_title(fill(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
             _draw(axes, item, i)
-        is_simulated, has_rare = any(item.simulated is not None for item in series), any(map(_has_rare, series))
-        _add_legend(axes, y.equation + (", reduced noise" if is_reduced else ""), is_simulated, has_rare)
+        _add_legend(axes, series, y.equation + (", reduced noise" if is_reduced else ""))
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         axes.margins(x=0.03)
 
@@ -123,34 +130,39 @@ def _canvas(paths: Sequence[Path], width: float = 7.2) -> Iterator[Any]:
 
 def _draw(axes: Any, item: Series, i: int) -> None:
     colour, marker = _COLOURS[i % len(_COLOURS)], _MARKERS[i % len(_MARKERS)]
-    every = max(1, item.x.size // 25)
     label = ", ".join(f"{symbol_of(ABSCISSAE[key])} = {value:g}" for key, value in item.varied.items())
     axes.plot(item.line_x, item.line_y, color=colour, linewidth=1.6)
     axes.plot(
         item.x, item.y, marker, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6,
-        markevery=every, label=label or None,
+        markevery=item.every, label=label or None,
     )  # fmt: skip
     if _has_rare(item):
-        filled = item.rare & (np.arange(item.x.size) % every == 0)
+        filled = item.rare & (np.arange(item.x.size) % item.every == 0)
         axes.plot(item.x[filled], item.y[filled], marker, color=colour, markersize=7)
     if item.simulated is not None:
-        x, y, error = item.simulated[:, :: max(1, item.simulated.shape[1] // 16)]
+        x, y, error = item.simulated
         axes.errorbar(x, y, 2 * error, **_DOT)
+    if item.root is not None:
+        axes.plot(item.root, 0, color=colour, **_ROOT)
 
 
 def _has_rare(item: Series) -> bool:
     return bool(np.any(item.rare))
 
 
-def _add_legend(axes: Any, equation: str, is_simulated: bool, has_rare: bool) -> None:
-    """Colours tell the curves apart; two to four grey entries tell the method."""
+def _add_legend(axes: Any, series: Sequence[Series], equation: str) -> None:
+    """Colours tell the curves apart; two to five grey entries tell what is drawn."""
     handles, labels = axes.get_legend_handles_labels()
     grey = {"color": "0.35"}
+    elements = "finite elements" + (", not all marked" if any(item.every > 1 for item in series) else "")
     methods = {
-        "finite elements": axes.plot([], [], "o", markersize=7, markerfacecolor="none", markeredgewidth=1.6, **grey)[0],
-        **({"carried by rare paths": axes.plot([], [], "o", markersize=7, **grey)[0]} if has_rare else {}),
+        elements: axes.plot([], [], "o", markersize=7, markerfacecolor="none", markeredgewidth=1.6, **grey)[0],
         f"perturbation, Eq. {equation}": axes.plot([], [], "-", linewidth=1.6, **grey)[0],
     }
-    if is_simulated:
+    if any(map(_has_rare, series)):
+        methods["carried by rare paths"] = axes.plot([], [], "o", markersize=7, **grey)[0]
+    if any(item.root is not None for item in series):
+        methods[r"stability index $\delta_p$"] = axes.plot([], [], **_ROOT, **grey)[0]
+    if any(item.simulated is not None for item in series):
         methods["Monte Carlo ± 2 standard errors"] = axes.errorbar([], [], [], **_DOT)
     axes.legend([*handles, *methods.values()], [*labels, *methods], frameon=False, fontsize=11)

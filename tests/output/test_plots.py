@@ -1,0 +1,95 @@
+"""What the figures show, read from the drawn figures themselves."""
+
+from pathlib import Path
+
+import matplotlib.figure
+import numpy as np
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.exponent.quantities import MOMENT
+from fpsolve.output.figures import draw
+from fpsolve.output.plots import Series, write_figure
+from fpsolve.study.solve import solve_curves
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures that are drawn while a test runs."""
+    figures = []
+
+    class Recorded(matplotlib.figure.Figure):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options)
+            figures.append(self)
+
+    monkeypatch.setattr(matplotlib.figure, "Figure", Recorded)
+    return figures
+
+
+def series(count=9, scale=1.0, **more):
+    """A parabola through 0 and 1, from -2 to 2."""
+    p = np.linspace(-2, 2, count)
+    return Series({}, p, scale * p * (p - 1), p, scale * p * (p - 1), **more)
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+
+
+@pytest.mark.parametrize("title", ["Short", "A title so long that it fills all of the line above the axes, and more"])
+@pytest.mark.parametrize("scale", [1e-2, 1e-4, 1e-7])
+def test_title_is_clear_of_the_power_of_ten(drawn, tmp_path, title, scale):
+    write_figure([series(scale=scale / 10)], "p", MOMENT, title, [tmp_path / "figure.png"])
+    (axes,) = drawn[0].axes
+    power, words = axes.yaxis.get_offset_text(), axes.title.get_window_extent()
+    assert power.get_text()
+    power = power.get_window_extent()
+    assert max(words.y0 - power.y1, words.x0 - power.x1) > 0.5 * power.height
+    assert words.y1 < drawn[0].bbox.y1
+
+
+@pytest.mark.parametrize("count", [3, 33, 200])
+def test_all_that_is_simulated_is_drawn(drawn, tmp_path, count):
+    p = np.linspace(-2, 2, count)
+    simulated = np.array([p, p * (p - 1), np.full(count, 0.01)])
+    write_figure([series(simulated=simulated)], "p", MOMENT, "Title", [tmp_path / "figure.png"])
+    dots = drawn[0].axes[0].containers[0].lines[0]
+    np.testing.assert_array_equal(dots.get_xydata(), simulated[:2].T)
+    assert "Monte Carlo ± 2 standard errors" in legend(drawn[0])
+
+
+@pytest.mark.parametrize(("count", "words"), [(33, "finite elements"), (100, "finite elements, not all marked")])
+def test_legend_tells_that_markers_are_left_out(drawn, tmp_path, count, words):
+    write_figure([series(count)], "p", MOMENT, "Title", [tmp_path / "figure.png"])
+    assert legend(drawn[0])[0] == words
+
+
+def marks(figure):
+    """x, y and colour of the marks of stability indices."""
+    lines = [line for line in figure.axes[0].lines if line.get_marker() == "|" and line.get_xdata().size]
+    return [(*line.get_xydata()[0], line.get_color()) for line in lines]
+
+
+def test_stability_index_is_marked_on_the_zero_line(drawn, tmp_path):
+    others = [series(root=1.0), series(), series(root=-0.5)]
+    write_figure(others, "p", MOMENT, "Title", [tmp_path / "figure.png"])
+    curves = [line.get_color() for line in drawn[0].axes[0].lines if line.get_marker() in ("o", "s", "D")]
+    assert marks(drawn[0]) == [(1.0, 0.0, curves[0]), (-0.5, 0.0, curves[2])]
+    assert legend(drawn[0]).count(r"stability index $\delta_p$") == 1
+
+
+def test_no_entry_without_a_stability_index(drawn, tmp_path):
+    write_figure([series()], "p", MOMENT, "Title", [tmp_path / "figure.png"])
+    assert not any("stability" in text for text in legend(drawn[0]))
+
+
+@pytest.mark.parametrize(("p", "count"), [("[-1.0, 2.0]", 1), ("[1.0, 2.0]", 0)])
+def test_stability_index_of_a_case_is_marked_where_p_reaches_it(drawn, tmp_path, p, count):
+    case = load_case(ROOT / "cases/minimal.toml", [f"moments.p={p}"])
+    results = list(solve_curves(case))
+    draw(case, results, [], tmp_path)
+    found = [x for x, _, _ in marks(drawn[0])]
+    assert found == [results[0].stability_index.value][:count]
