@@ -19,7 +19,10 @@ from fpsolve.study.simulate import refuse_obstacles, simulate_curves, simulation
 from fpsolve.study.solve import compare, expected, solve_curves, solving_work
 
 Progress = Callable[[], None]
-_OF_SOLVED = re.compile(r"eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)")
+_OF_SOLVED = re.compile(
+    r"summary\.json|moments\.csv|figure\.(png|pdf)|density\.vtu|show\.py"
+    r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
+)
 _OF_SIMULATED = re.compile(r"(monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf))")
 
 
@@ -66,7 +69,8 @@ class Outcome:
 def run(case: Case, out: str | Path = "results", *, progress: Progress = lambda: None) -> tuple[CurveResult, ...]:
     """Solve a case and write `out`/<name of the case>/.
 
-    Tables are written anew after every curve, each file whole or not at all, so that what is finished stays.
+    What an earlier run wrote there is removed first. Tables are written anew after every curve, each file whole or not
+    at all, so that what is finished stays; summary.json says whether all curves are.
 
     Args:
         case: from `load_case`.
@@ -97,6 +101,8 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
         refuse_obstacles(case)
     folder, interrupted = Path(out) / case.name, False
     simulated: list[SimulatedCurve] = []
+    if monte_carlo:
+        _clear(folder, _OF_SIMULATED)
     results = _solve(case, folder, watch)
     try:
         watch.solved(case, results)
@@ -112,8 +118,8 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
 def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Outcome:
     """Simulate a case and write monte_carlo.json into `out`/<name of the case>/; further curves have a number.
 
-    With c₂ or c₃ > 0 the stationary response is written too. An interrupt (Ctrl-C) ends the simulation, and what is
-    done is estimated and written.
+    What an earlier simulation wrote there is removed first; with c₂ or c₃ > 0 the stationary response is written too.
+    An interrupt (Ctrl-C) ends the simulation, and what is done is estimated and written.
 
     Raises:
         OutputError: the folder cannot be made or written to.
@@ -121,8 +127,10 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
         KeyboardInterrupt: nothing was done yet.
     """
     refuse_obstacles(case)
+    folder = Path(out) / case.name
     simulated: list[SimulatedCurve] = []
-    interrupted = _simulate(case, Path(out) / case.name, watch, simulated)
+    _clear(folder, _OF_SIMULATED)
+    interrupted = _simulate(case, folder, watch, simulated)
     watch.simulated(case, simulated, ())
     return Outcome((), tuple(simulated), interrupted)
 
@@ -135,34 +143,34 @@ def check_case(case: Case, *, watch: Watch = NOBODY) -> Outcome:
 
 
 def _solve(case: Case, folder: Path, watch: Watch) -> tuple[CurveResult, ...]:
-    """Solve the curves of a case, and write after each."""
+    """Solve the curves of a case into a folder without those of earlier runs, and write after each."""
     results: list[CurveResult] = []
-    written: set[Path] = set()
-    with writable(folder), watch.bar(case.name, solving_work(case)) as progress:
+    _clear(folder, _OF_SOLVED)
+    with watch.bar(case.name, solving_work(case)) as progress, writable(folder):
+        write_results(case, results, folder)
         for result in solve_curves(case, progress=progress):
-            written |= write_curve(result, folder)
+            write_curve(result, folder)
             results.append(result.without_pairs())
             write_results(case, results, folder)
-        _remove_stale(folder, _OF_SOLVED, written)
     return tuple(results)
 
 
 def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedCurve]) -> bool:
     """Simulate the curves of a case into a list, and write each; whether an interrupt ended it."""
-    written: set[Path] = set()
-    with writable(folder), watch.bar(f"{case.name}, simulation", simulation_work(case)) as progress:
+    with watch.bar(f"{case.name}, simulation", simulation_work(case)) as progress, writable(folder):
         for each in simulate_curves(case, progress=progress):
             simulated.append(each)
-            written |= write_simulation(case, each, folder) | write_response(each, folder)
-            written |= draw_response(case, each, folder)
-        _remove_stale(folder, _OF_SIMULATED, written)
+            write_simulation(case, each, folder)
+            write_response(each, folder)
+            draw_response(case, each, folder)
     return simulated[-1].interrupted or len(simulated) < len(case.curves())
 
 
-def _remove_stale(folder: Path, ours: re.Pattern[str], written: set[Path]) -> None:
-    """What an earlier run left for curves or p that are no more."""
-    for path in {*folder.glob("*"), *folder.glob("*/*")} - written:
-        if ours.fullmatch(path.relative_to(folder).as_posix()):
-            path.unlink()
-            if path.parent != folder and not any(path.parent.iterdir()):
-                path.parent.rmdir()
+def _clear(folder: Path, ours: re.Pattern[str]) -> None:
+    """Make a folder for results, without the files of earlier runs whose names match."""
+    with writable(folder):
+        for path in {*folder.glob("*"), *folder.glob("*/*")}:
+            if ours.fullmatch(path.relative_to(folder).as_posix()) and not path.is_dir():
+                path.unlink()
+                if path.parent != folder and not any(path.parent.iterdir()):
+                    path.parent.rmdir()

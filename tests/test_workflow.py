@@ -2,6 +2,7 @@
 
 import csv
 import json
+from contextlib import nullcontext
 from importlib.metadata import version
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 import fpsolve
 from fpsolve.errors import CaseError, NotConverged, OutputError
 from fpsolve.study.solve import UNRESOLVED, compare, solve_curves, solving_work
-from fpsolve.workflow import check_case, run_case
+from fpsolve.workflow import Watch, check_case, run_case
 
 TEXT = """
 title = "A test"
@@ -51,9 +52,10 @@ def files(folder):
 def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
     results = fpsolve.run(case, tmp_path / "out")
     summary = json.loads((tmp_path / "out" / "test" / "summary.json").read_text(encoding="utf-8"))
-    assert list(summary) == ["case", "title", "fpsolve_version", "curves"]
+    assert list(summary) == ["case", "title", "fpsolve_version", "complete", "planned", "done", "curves"]
     assert (summary["case"], summary["title"]) == ("test", "A test")
     assert summary["fpsolve_version"] == version("fpsolve")
+    assert (summary["complete"], summary["planned"], summary["done"]) == (True, 2, 2)
     for curve, result, D0 in zip(summary["curves"], results, (0.1, 1.0), strict=True):
         assert curve["varied"] == {"noise.D0": D0}
         assert curve["parameters"]["noise.D0"] == D0
@@ -160,19 +162,52 @@ def test_failures_are_values(tmp_path):
     assert files(tmp_path) == {"test.toml", *(f"out/test/{name}" for name in files(tmp_path / "out/test"))}
 
 
-def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
+def raising_at(count, exception):
+    """What raises when it is called for the count-th time."""
     calls = []
 
-    def interrupt():
+    def called():
         calls.append(1)
-        if len(calls) == 5:
-            raise KeyboardInterrupt
+        if len(calls) == count:
+            raise exception
 
+    return called
+
+
+def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        fpsolve.run(case, tmp_path / "out", progress=interrupt)
+        fpsolve.run(case, tmp_path / "out", progress=raising_at(5, KeyboardInterrupt))
     summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
     assert [curve["varied"]["noise.D0"] for curve in summary["curves"]] == [0.1]
+    assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 1)
     assert "eigenfunctions.pvd" in files(tmp_path / "out/test")
+
+
+@pytest.mark.parametrize("exception", [KeyboardInterrupt, RuntimeError])
+def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(case, tmp_path, exception):
+    """It ends in the first curve: there are tables that say so, and the files of others."""
+    fpsolve.run(case, tmp_path)
+    folder = tmp_path / "test"
+    others = {"monte_carlo.json", "response-2.vti", "eigenfunctions.png", "figure.svg", "notes/summary.json"}
+    (folder / "notes").mkdir()
+    for name in others:
+        (folder / name).write_text("mine", encoding="utf-8")
+    with pytest.raises(exception):
+        fpsolve.run(case, tmp_path, progress=raising_at(2, exception))
+    assert files(folder) == {"summary.json", "moments.csv"} | others
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["curves"] == []
+    assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 0)
+
+
+def test_a_run_with_simulation_that_ends_early_leaves_nothing_of_an_earlier_simulation(case, tmp_path):
+    (tmp_path / "test").mkdir()
+    for name in ("monte_carlo.json", "monte_carlo-2.json", "response.vti", "response.csv"):
+        (tmp_path / "test" / name).write_text("{}", encoding="utf-8")
+    watch = Watch(bar=lambda *_: nullcontext(raising_at(1, KeyboardInterrupt)))
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path, monte_carlo=True, watch=watch)
+    assert files(tmp_path / "test") == {"summary.json", "moments.csv"}
 
 
 def test_infinite_moments_are_refused_before_anything_is_written(tmp_path):

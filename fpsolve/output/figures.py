@@ -28,13 +28,12 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     write_figure(series, case.figure.x, quantity, case.title, pictures, is_reduced=case.is_exact)
 
 
-def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> set[Path]:
-    """Draw response.png and response.pdf of a curve, if it has a response; returns the files."""
+def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
+    """Draw response.png and response.pdf of a curve, if it has a response."""
     if simulated.response is None:
-        return set()
+        return
     pictures = [folder / f"response{simulated.curve.suffix}.{ending}" for ending in ("png", "pdf")]
     write_response_figure(simulated.response, case.heading(simulated.curve), pictures)
-    return set(pictures)
 
 
 def _moment_series(result: CurveResult, sample: SimulatedCurve | None) -> Series:

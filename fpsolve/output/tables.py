@@ -22,25 +22,26 @@ if TYPE_CHECKING:
 
 
 def write_results(case: Case, results: Sequence[CurveResult], folder: Path) -> None:
-    """summary.json and moments.csv."""
-    write_json(folder / "summary.json", {**_head(case), "curves": [_summary(result) for result in results]})
+    """summary.json, which says whether all curves of the case are there, and moments.csv."""
+    planned, done = len(case.curves()), len(results)
+    state = {"complete": done == planned, "planned": planned, "done": done}
+    write_json(folder / "summary.json", {**_head(case), **state, "curves": [_summary(result) for result in results]})
     columns = ["p", "value", "derivative", "perturbation", "error_estimate", "residual"]
     rows = ([*result.curve.varied.values(), *row.values()] for result in results for row in _rows(result))
     _write_csv(folder / "moments.csv", [*case.vary, *columns], rows)
 
 
-def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> set[Path]:
-    """monte_carlo.json of a curve, and response.csv where there is a response; returns the files."""
-    summary = folder / f"monte_carlo{simulated.curve.suffix}.json"
-    write_json(summary, {**_head(case), **_simulation_summary(simulated)})
-    if simulated.response is None:
-        return {summary}
-    table, response = folder / f"response{simulated.curve.suffix}.csv", simulated.response
+def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
+    """monte_carlo.json of a curve, and response.csv where there is a response."""
+    suffix, response = simulated.curve.suffix, simulated.response
+    write_json(folder / f"monte_carlo{suffix}.json", {**_head(case), **_simulation_summary(simulated)})
+    if response is None:
+        return
     edges = response.amplitude_edges
     columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
     rows = (map(float, row) for row in zip(*columns, strict=True))
-    _write_csv(table, ["amplitude_from", "amplitude_to", "density", "standard_error"], rows)
-    return {summary, table}
+    header = ["amplitude_from", "amplitude_to", "density", "standard_error"]
+    _write_csv(folder / f"response{suffix}.csv", header, rows)
 
 
 def _head(case: Case) -> dict[str, str]:

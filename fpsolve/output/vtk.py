@@ -95,32 +95,30 @@ def write_density(path: Path, stationary: PrincipalPair, parameters: Facts = Map
     return path
 
 
-def write_curve(result: CurveResult, folder: Path) -> set[Path]:
-    """Write the eigenfunctions of a curve, and return their files; with the first curve the stationary density too."""
+def write_curve(result: CurveResult, folder: Path) -> None:
+    """Write the eigenfunctions of a curve; with the first curve the stationary density too."""
     stationary, curve = result.stationary, result.curve
     if stationary is not None and curve.number == 1:
         write_density(folder / "density.vtu", stationary, curve.parameters)
-    if stationary is None or not result.eigenpairs:
-        return set()
-    copy_show_script(folder)
-    stem = f"eigenfunctions{curve.suffix}"
-    return set(write_eigenfunctions(folder, result.eigenpairs, stationary, stem, curve.parameters))
+    if stationary is not None and result.eigenpairs:
+        copy_show_script(folder)
+        stem = f"eigenfunctions{curve.suffix}"
+        write_eigenfunctions(folder, result.eigenpairs, stationary, stem, curve.parameters)
 
 
-def write_response(simulated: SimulatedCurve, folder: Path) -> set[Path]:
-    """Write the joint density of x and ẋ, if there is one, as cell data `density` of response.vti; return the file."""
+def write_response(simulated: SimulatedCurve, folder: Path) -> None:
+    """Write the joint density of x and ẋ, if there is one, as cell data `density` of response.vti."""
     import pyvista
 
     response = simulated.response
     if response is None:
-        return set()
+        return
     path, x, v = folder / f"response{simulated.curve.suffix}.vti", response.x_edges, response.v_edges
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
     grid = pyvista.ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
     grid.cell_data["density"] = response.density.ravel(order="F")
     with atomic(path) as temporary:
         grid.save(temporary)
-    return {path}
 
 
 def copy_show_script(directory: Path) -> Path:

@@ -113,6 +113,16 @@ def test_each_curve_has_its_file_and_stale_ones_go(case, out):
     assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
 
 
+def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out, monkeypatch):
+    """What is solved in the same folder stays."""
+    (out / "quick").mkdir(parents=True)
+    for name in ("monte_carlo.json", "monte_carlo-2.json", "response.png", "summary.json", "figure.png", "density.vtu"):
+        (out / "quick" / name).write_text("{}", encoding="utf-8")
+    monkeypatch.setattr(simulated, "_simulate_curve", raising(KeyboardInterrupt))
+    assert simulate(case, "--out", out) == 130
+    assert {path.name for path in (out / "quick").iterdir()} == {"summary.json", "figure.png", "density.vtu"}
+
+
 def test_the_nonlinear_response_is_written(case, out):
     nonlinear = [
         f"--set={setting}"
