@@ -1,4 +1,4 @@
-"""Writing files whole or not at all."""
+"""Writing files whole or not at all, into folders that one run has for itself."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import json
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from fpsolve.errors import OutputError, Remedy
+
+LOCK = ".fpsolve.lock"
 
 
 @contextmanager
@@ -51,6 +53,56 @@ def writable(folder: Path) -> Iterator[None]:
         yield
     except OSError as failure:
         raise OutputError(f"{failure.filename or folder} cannot be written: {failure.strerror}") from failure
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Make a folder for results, and keep other runs out of it during the body.
+
+    The lock is one of the operating system on a hidden file, which ends with the process however that ends. The file is
+    removed with the lock still held; only what was killed leaves it, and then it does not hinder the next run. Where
+    there are no such locks, as on Windows, nobody is kept out.
+
+    Raises:
+        OutputError: the folder cannot be made or written to, or another run has it.
+    """
+    path = folder / LOCK
+    with writable(folder):
+        handle = _lock(path)
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            path.unlink()
+        os.close(handle)
+
+
+def _lock(path: Path) -> int:
+    """An open file that is locked and stands at its path; one that its owner removed meanwhile is opened anew."""
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        if not _is_ours(handle):
+            os.close(handle)
+            raise OutputError(f"{path.parent} is being written by another run; wait for it, or {Remedy.FOLDER}")
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(handle), path.stat()):
+                return handle
+        os.close(handle)
+
+
+def _is_ours(handle: int) -> bool:
+    """Lock an open file, unless another has locked it; file systems that know no locks say nothing against it."""
+    try:
+        import fcntl
+    except ImportError:  # on Windows
+        return True
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def write_json(path: Path, data: Any) -> None:

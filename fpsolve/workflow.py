@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.errors import NotConverged
-from fpsolve.files import writable
+from fpsolve.files import alone, writable
 from fpsolve.output.figures import draw, draw_response
 from fpsolve.output.tables import write_results, write_simulation
 from fpsolve.output.vtk import write_curve, write_response
@@ -78,7 +78,7 @@ def run(case: Case, out: str | Path = "results", *, progress: Progress = lambda:
         progress: called after each moment of each curve.
 
     Raises:
-        OutputError: the folder cannot be made or written to; nothing is solved.
+        OutputError: the folder cannot be made or written to, or another run writes into it; nothing is solved.
         NotConverged: some p failed; everything else is written, and `partial` holds it.
     """
     outcome = run_case(case, out, watch=Watch(bar=lambda *_: nullcontext(progress)))
@@ -93,25 +93,25 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
     When the simulation is interrupted or fails, the figure shows what was done.
 
     Raises:
-        OutputError: the folder cannot be made or written to.
+        OutputError: the folder cannot be made or written to, or another run writes into it.
         FpsolveError: a curve cannot be simulated; nothing is solved.
         KeyboardInterrupt: a curve was being solved, or nothing was simulated yet.
     """
     if monte_carlo:
         refuse_obstacles(case)
-    folder, interrupted = Path(out) / case.name, False
+    earlier = (_OF_SOLVED, _OF_SIMULATED) if monte_carlo else (_OF_SOLVED,)
     simulated: list[SimulatedCurve] = []
-    if monte_carlo:
-        _clear(folder, _OF_SIMULATED)
-    results = _solve(case, folder, watch)
-    try:
-        watch.solved(case, results)
-        if monte_carlo:
-            interrupted = _simulate(case, folder, watch, simulated)
-            watch.simulated(case, simulated, results)
-    finally:
-        with writable(folder):
-            draw(case, results, simulated, folder)
+    interrupted = False
+    with _own_folder(case, out, earlier) as folder:
+        results = _solve(case, folder, watch)
+        try:
+            watch.solved(case, results)
+            if monte_carlo:
+                interrupted = _simulate(case, folder, watch, simulated)
+                watch.simulated(case, simulated, results)
+        finally:
+            with writable(folder):
+                draw(case, results, simulated, folder)
     return Outcome(results, tuple(simulated), interrupted)
 
 
@@ -122,16 +122,15 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
     An interrupt (Ctrl-C) ends the simulation, and what is done is estimated and written.
 
     Raises:
-        OutputError: the folder cannot be made or written to.
+        OutputError: the folder cannot be made or written to, or another run writes into it.
         FpsolveError: a curve cannot be simulated; nothing is written.
         KeyboardInterrupt: nothing was done yet.
     """
     refuse_obstacles(case)
-    folder = Path(out) / case.name
     simulated: list[SimulatedCurve] = []
-    _clear(folder, _OF_SIMULATED)
-    interrupted = _simulate(case, folder, watch, simulated)
-    watch.simulated(case, simulated, ())
+    with _own_folder(case, out, [_OF_SIMULATED]) as folder:
+        interrupted = _simulate(case, folder, watch, simulated)
+        watch.simulated(case, simulated, ())
     return Outcome((), tuple(simulated), interrupted)
 
 
@@ -143,9 +142,8 @@ def check_case(case: Case, *, watch: Watch = NOBODY) -> Outcome:
 
 
 def _solve(case: Case, folder: Path, watch: Watch) -> tuple[CurveResult, ...]:
-    """Solve the curves of a case into a folder without those of earlier runs, and write after each."""
+    """Solve the curves of a case, and write after each."""
     results: list[CurveResult] = []
-    _clear(folder, _OF_SOLVED)
     with watch.bar(case.name, solving_work(case)) as progress, writable(folder):
         write_results(case, results, folder)
         for result in solve_curves(case, progress=progress):
@@ -166,11 +164,21 @@ def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedC
     return simulated[-1].interrupted or len(simulated) < len(case.curves())
 
 
-def _clear(folder: Path, ours: re.Pattern[str]) -> None:
-    """Make a folder for results, without the files of earlier runs whose names match."""
-    with writable(folder):
-        for path in {*folder.glob("*"), *folder.glob("*/*")}:
-            if ours.fullmatch(path.relative_to(folder).as_posix()) and not path.is_dir():
-                path.unlink()
-                if path.parent != folder and not any(path.parent.iterdir()):
-                    path.parent.rmdir()
+@contextmanager
+def _own_folder(case: Case, out: str | Path, earlier: Sequence[re.Pattern[str]]) -> Iterator[Path]:
+    """The folder of a case, which other runs keep out of, without the files of earlier ones whose names match."""
+    folder = Path(out) / case.name
+    with alone(folder):
+        with writable(folder):
+            _remove(folder, earlier)
+        yield folder
+
+
+def _remove(folder: Path, patterns: Sequence[re.Pattern[str]]) -> None:
+    """Remove the files in a folder, and one folder below, whose names match."""
+    for path in {*folder.glob("*"), *folder.glob("*/*")}:
+        name = path.relative_to(folder).as_posix()
+        if any(pattern.fullmatch(name) for pattern in patterns) and not path.is_dir():
+            path.unlink()
+            if path.parent != folder and not any(path.parent.iterdir()):
+                path.parent.rmdir()

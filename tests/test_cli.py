@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, NOT_CONVERGED, main
+from fpsolve.files import alone
 from fpsolve.output.terminal import digits
 from tests.test_workflow import HOPELESS, TEXT, files
 
@@ -123,6 +124,15 @@ def test_infinite_moments_exit_2(case, tmp_path, capsys):
 def test_unwritable_output_exits_2(case, capsys):
     assert main(["run", case, "--out", "/proc/none"]) == BAD_INPUT
     assert "choose another --out" in capsys.readouterr().err
+
+
+def test_a_folder_in_use_exits_2(case, tmp_path, capsys):
+    with alone(tmp_path / "results/test"):
+        assert main(["run", case]) == BAD_INPUT
+    out, err = capsys.readouterr()
+    message = "results/test is being written by another run; wait for it, or choose another --out"
+    assert err == f"{message}\n"
+    assert out == ""
 
 
 def test_a_short_interval_gives_a_warning(case, capsys):

@@ -10,8 +10,9 @@ import pytest
 
 import fpsolve
 from fpsolve.errors import CaseError, NotConverged, OutputError
+from fpsolve.files import alone
 from fpsolve.study.solve import UNRESOLVED, compare, solve_curves, solving_work
-from fpsolve.workflow import Watch, check_case, run_case
+from fpsolve.workflow import Watch, check_case, run_case, simulate_case
 
 TEXT = """
 title = "A test"
@@ -272,6 +273,19 @@ def test_an_unwritable_folder_is_refused_before_solving(case, tmp_path):
     with pytest.raises(OutputError, match=r"file/test cannot be made: .*choose another folder"):
         fpsolve.run(case, tmp_path / "file", progress=lambda: calls.append(1))
     assert calls == []
+
+
+@pytest.mark.parametrize("start", [fpsolve.run, simulate_case])
+def test_a_folder_that_another_run_writes_into_is_refused(case, tmp_path, start):
+    (tmp_path / "test").mkdir()
+    for name in ("summary.json", "monte_carlo.json"):
+        (tmp_path / "test" / name).write_text("of the other", encoding="utf-8")
+    with alone(tmp_path / "test"):
+        before = files(tmp_path)
+        with pytest.raises(OutputError, match=r"test is being written by another run; wait for it"):
+            start(case, tmp_path)
+        assert files(tmp_path) == before
+    assert files(tmp_path / "test") == {"summary.json", "monte_carlo.json"}
 
 
 def test_progress_is_called_once_for_each_moment(case, tmp_path):

@@ -1,0 +1,74 @@
+"""Files that are written whole, and folders that one run has for itself."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from fpsolve.errors import OutputError
+from fpsolve.files import LOCK, alone
+
+HOLD = """
+import sys
+from pathlib import Path
+from fpsolve.files import alone
+with alone(Path(sys.argv[1])):
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """Another process that has the folder for itself, until its input ends."""
+    command = [sys.executable, "-c", HOLD, str(tmp_path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "held\n"
+            yield process
+        finally:
+            process.kill()
+
+
+def test_a_folder_is_kept_from_another_process(tmp_path, holder):
+    with pytest.raises(OutputError, match=r"is being written by another run; wait for it, or choose another folder"):
+        alone(tmp_path).__enter__()
+    holder.communicate(timeout=60)
+    with alone(tmp_path):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_lock_ends_with_a_killed_process(tmp_path, holder):
+    holder.send_signal(signal.SIGKILL)
+    holder.wait(timeout=60)
+    assert [path.name for path in tmp_path.iterdir()] == [LOCK]
+    with alone(tmp_path):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_is_kept_from_the_same_process(tmp_path):
+    with alone(tmp_path), pytest.raises(OutputError, match="another run"), alone(tmp_path):
+        raise AssertionError
+    with alone(tmp_path):
+        pass
+
+
+def test_a_lock_that_its_owner_removes_is_taken_anew(tmp_path, monkeypatch):
+    """One run opens the file of another, which ends before the first has locked it."""
+    from fpsolve import files
+
+    original, opened = files._is_ours, []
+
+    def after_the_other_ended(handle):
+        if not opened:
+            (tmp_path / files.LOCK).unlink()
+        opened.append(handle)
+        return original(handle)
+
+    monkeypatch.setattr(files, "_is_ours", after_the_other_ended)
+    with alone(tmp_path):
+        assert len(opened) == 2
+        assert (tmp_path / files.LOCK).exists()
