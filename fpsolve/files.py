@@ -13,6 +13,8 @@ from typing import Any
 from fpsolve.errors import OutputError, Remedy
 
 LOCK = ".fpsolve.lock"
+TEMPORARY = r"\.fpsolve-[a-z0-9_]{8}(\.\w+)?"
+"""The pattern of the names of files that are being written; what is killed leaves them."""
 
 
 @contextmanager
@@ -25,7 +27,7 @@ def atomic(path: Path) -> Iterator[Path]:
         OSError: the folder cannot be made or written to.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=path.suffix)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".fpsolve-", suffix=path.suffix)
     os.close(handle)
     temporary = Path(name)
     try:

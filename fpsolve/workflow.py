@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.errors import NotConverged
-from fpsolve.files import alone, writable
+from fpsolve.files import TEMPORARY, alone, writable
 from fpsolve.output.figures import draw, draw_response
 from fpsolve.output.tables import write_results, write_simulation
 from fpsolve.output.vtk import write_curve, write_response
@@ -23,6 +23,7 @@ _OF_SOLVED = re.compile(
     r"summary\.json|moments\.csv|figure\.(png|pdf)|density\.vtu|show\.py"
     r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
 )
+_UNFINISHED = re.compile(rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}")
 _OF_SIMULATED = re.compile(r"(monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf))")
 
 
@@ -166,11 +167,12 @@ def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedC
 
 @contextmanager
 def _own_folder(case: Case, out: str | Path, earlier: Sequence[re.Pattern[str]]) -> Iterator[Path]:
-    """The folder of a case, which other runs keep out of, without the files of earlier ones whose names match."""
+    """The folder of a case, which other runs keep out of; of earlier ones it holds no files whose names match, and none
+    that were not finished."""
     folder = Path(out) / case.name
     with alone(folder):
         with writable(folder):
-            _remove(folder, earlier)
+            _remove(folder, [_UNFINISHED, *earlier])
         yield folder
 
 

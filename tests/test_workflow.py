@@ -2,6 +2,9 @@
 
 import csv
 import json
+import signal
+import subprocess
+import sys
 from contextlib import nullcontext
 from importlib.metadata import version
 
@@ -246,6 +249,34 @@ def test_files_of_the_user_are_left_alone(case, tmp_path):
         path.write_text("mine", encoding="utf-8")
     fpsolve.run(case, tmp_path / "out")
     assert all(path.read_text(encoding="utf-8") == "mine" for path in mine)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from fpsolve.files import atomic
+begun = [atomic(Path(name)) for name in sys.argv[1:]]
+for each in begun:
+    each.__enter__()
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.parametrize("start", [fpsolve.run, simulate_case])
+def test_what_a_killed_run_left_unfinished_is_removed(tmp_path, start):
+    """Of the user's files none is, nor one that a run in a folder below is writing."""
+    case = write(tmp_path, TEXT, ["monte_carlo={ paths = 64, time = 40.0 }"])
+    folder = tmp_path / "test"
+    ours = [str(folder / name) for name in ("summary.json", "eigenfunctions-2/p+2.0.vtu", "lower/summary.json")]
+    killed = subprocess.run([sys.executable, "-c", KILLED, *ours], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    (folder / ".fpsolve-notes").write_text("mine", encoding="utf-8")
+    (folder / ".notes").write_text("mine", encoding="utf-8")
+    assert len(files(folder)) == 5
+    start(case, tmp_path)
+    left = [name for name in files(folder) if name.split("/")[-1].startswith(".")]
+    assert sorted(name for name in left if "/" not in name) == [".fpsolve-notes", ".notes"]
+    assert [name.split("/")[0] for name in left if "/" in name] == ["lower"]
 
 
 def test_titles_are_plain_text(tmp_path):
