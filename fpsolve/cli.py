@@ -15,6 +15,7 @@ from rich.console import Console
 from fpsolve import __version__
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import CaseError, FpsolveError, NotConverged
+from fpsolve.process import ended_by_signals
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
@@ -175,7 +176,17 @@ def mesh(
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; the exit code is 0 for success, 1 a failed check, 2 bad input, 3 not converged."""
+    """Run a command; the exit code is 0 for success, 1 a failed check, 2 bad input, 3 not converged, 130 interrupted.
+
+    SIGHUP and SIGTERM interrupt it too; the exit code is then 128 and the number of the signal.
+    """
+    with ended_by_signals() as received:
+        code = _run(argv)
+    return 128 + received[0] if received and code == INTERRUPTED else code
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    """Run a command, and say what went wrong."""
     for stream in (sys.stdout, sys.stderr):  # a terminal that has no Greek shows "?" for it
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")

@@ -9,7 +9,7 @@ import pytest
 import fpsolve
 
 ROOMS = {
-    "": ["errors", "arrays", "files"],
+    "": ["errors", "arrays", "files", "process"],
     "model": ["parameters", "plane", "noise", "markov_chain", "vibro_impact", "problem"],
     "theory": ["perturbation", "frozen", "far", "validity"],
     "fem": [

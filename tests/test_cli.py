@@ -1,6 +1,7 @@
 """The command line: exit codes, messages, and where they go."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -133,6 +134,68 @@ def test_a_folder_in_use_exits_2(case, tmp_path, capsys):
     message = "results/test is being written by another run; wait for it, or choose another --out"
     assert err == f"{message}\n"
     assert out == ""
+
+
+LONG = """
+import sys
+from fpsolve.cli import main
+from fpsolve.study import solve
+
+def wait(*_):
+    print("begun", flush=True)
+    sys.stdin.read()
+
+solve._solve_curve = wait
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def begin(case, **options):
+    """A run in another process, which solves its first curve for as long as one likes."""
+    command = [sys.executable, "-c", LONG, "run", case]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+    )
+    try:
+        assert process.stdout.readline() == "begun\n"
+    except BaseException:
+        process.kill()
+        raise
+    return process
+
+
+@pytest.mark.parametrize("name", ["SIGHUP", "SIGTERM"])
+def test_signals_end_a_run_as_ctrl_c_does(case, tmp_path, name):
+    with begin(case) as process:
+        try:
+            process.send_signal(getattr(signal, name))
+            _, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 128 + getattr(signal, name)
+    assert "interrupted" in err
+    assert "Traceback" not in err
+    assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
+
+
+def test_an_ignored_signal_stays_ignored(case):
+    """So that nohup works."""
+    with begin(case, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as process:
+        try:
+            process.send_signal(signal.SIGHUP)
+            with pytest.raises(subprocess.TimeoutExpired):
+                process.wait(timeout=1)
+            process.send_signal(signal.SIGTERM)
+            process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 128 + signal.SIGTERM
+
+
+def test_handlers_are_restored():
+    before = [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM)]
+    assert main(["--version"]) == 0
+    assert [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM)] == before
 
 
 def test_a_short_interval_gives_a_warning(case, capsys):

@@ -1,0 +1,36 @@
+"""What surrounds a command: the signals that end it."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+ENDING = ("SIGHUP", "SIGTERM")
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[list[int]]:
+    """In the body SIGHUP and SIGTERM raise KeyboardInterrupt, as Ctrl-C does; gives the list of those that came.
+
+    A signal that is ignored, as SIGHUP under nohup, or that the caller handles is left alone; so are all outside of the
+    main thread, which alone receives them.
+    """
+    received: list[int] = []
+
+    def interrupt(number: int, _: Any) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    known = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
+    is_main = threading.current_thread() is threading.main_thread()
+    taken = [number for number in known if is_main and signal.getsignal(number) is signal.SIG_DFL]
+    for number in taken:
+        signal.signal(number, interrupt)
+    try:
+        yield received
+    finally:
+        for number in taken:
+            signal.signal(number, signal.SIG_DFL)
