@@ -197,8 +197,8 @@ def _run(argv: Sequence[str] | None) -> int:
     except FpsolveError as failure:
         _print_error(str(failure))
         return NOT_CONVERGED if isinstance(failure, NotConverged) else BAD_INPUT
-    except KeyboardInterrupt:
-        _print_error("interrupted")
+    except KeyboardInterrupt as interrupt:
+        _print_error(str(interrupt) or "interrupted")
         return INTERRUPTED
     return code if isinstance(code, int) else 0
 

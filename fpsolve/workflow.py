@@ -96,7 +96,7 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
         FpsolveError: a curve cannot be simulated; nothing is solved.
-        KeyboardInterrupt: a curve was being solved, or nothing was simulated yet.
+        KeyboardInterrupt: a curve was being solved, or nothing was simulated yet; its text says what is kept.
     """
     if monte_carlo:
         refuse_obstacles(case)
@@ -105,14 +105,15 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
     interrupted = False
     with _own_folder(case, out, earlier) as folder:
         results = _solve(case, folder, watch)
-        try:
-            watch.solved(case, results)
-            if monte_carlo:
-                interrupted = _simulate(case, folder, watch, simulated)
-                watch.simulated(case, simulated, results)
-        finally:
-            with writable(folder):
-                draw(case, results, simulated, folder)
+        with _saying_if_interrupted(lambda: f"; what was solved is kept in {folder}"):
+            try:
+                watch.solved(case, results)
+                if monte_carlo:
+                    interrupted = _simulate(case, folder, watch, simulated)
+                    watch.simulated(case, simulated, results)
+            finally:
+                with writable(folder):
+                    draw(case, results, simulated, folder)
     return Outcome(results, tuple(simulated), interrupted)
 
 
@@ -125,11 +126,14 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
         FpsolveError: a curve cannot be simulated; nothing is written.
-        KeyboardInterrupt: nothing was done yet.
+        KeyboardInterrupt: nothing was done yet, which its text says.
     """
     refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
-    with _own_folder(case, out, [_OF_SIMULATED]) as folder:
+    with (
+        _own_folder(case, out, [_OF_SIMULATED]) as folder,
+        _saying_if_interrupted(lambda: _kept(case, simulated, folder)),
+    ):
         interrupted = _simulate(case, folder, watch, simulated)
         watch.simulated(case, simulated, ())
     return Outcome((), tuple(simulated), interrupted)
@@ -145,12 +149,16 @@ def check_case(case: Case, *, watch: Watch = NOBODY) -> Outcome:
 def _solve(case: Case, folder: Path, watch: Watch) -> tuple[CurveResult, ...]:
     """Solve the curves of a case, and write after each."""
     results: list[CurveResult] = []
-    with watch.bar(case.name, solving_work(case)) as progress, writable(folder):
+    with (
+        _saying_if_interrupted(lambda: _kept(case, results, folder)),
+        watch.bar(case.name, solving_work(case)) as progress,
+        writable(folder),
+    ):
         write_results(case, results, folder)
         for result in solve_curves(case, progress=progress):
             write_curve(result, folder)
+            write_results(case, [*results, result], folder)
             results.append(result.without_pairs())
-            write_results(case, results, folder)
     return tuple(results)
 
 
@@ -174,6 +182,22 @@ def _own_folder(case: Case, out: str | Path, earlier: Sequence[re.Pattern[str]])
         with writable(folder):
             _remove(folder, [_UNFINISHED, *earlier])
         yield folder
+
+
+@contextmanager
+def _saying_if_interrupted(what_is_kept: Callable[[], str]) -> Iterator[None]:
+    """An interrupt of the body says what is kept, and how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted{what_is_kept()}; run it again to start over") from None
+
+
+def _kept(case: Case, done: Sequence[CurveResult] | Sequence[SimulatedCurve], folder: Path) -> str:
+    """How many curves of a case are done, and where these are."""
+    planned = len(case.curves())
+    count = f" after {len(done)} of {planned} curve{'s' if planned > 1 else ''}"
+    return f"{count}; what was done is kept in {folder}" if done else count
 
 
 def _remove(folder: Path, patterns: Sequence[re.Pattern[str]]) -> None:

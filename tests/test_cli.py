@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from fpsolve.cli import BAD_INPUT, CHECK_FAILED, NOT_CONVERGED, main
+from fpsolve.cli import BAD_INPUT, CHECK_FAILED, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.output.terminal import digits
+from fpsolve.study import solve
 from tests.test_workflow import HOPELESS, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -134,6 +135,30 @@ def test_a_folder_in_use_exits_2(case, tmp_path, capsys):
     message = "results/test is being written by another run; wait for it, or choose another --out"
     assert err == f"{message}\n"
     assert out == ""
+
+
+@pytest.mark.parametrize(
+    ("moments", "message"),
+    [
+        (1, "interrupted after 0 of 2 curves; run it again to start over"),
+        (5, "interrupted after 1 of 2 curves; what was done is kept in results/test; run it again to start over"),
+    ],
+)
+def test_an_interrupted_run_says_what_is_kept(case, tmp_path, capsys, monkeypatch, moments, message):
+    original, solved = solve._solve_curve, []
+
+    def interrupted(*arguments):
+        def progress():
+            solved.append(1)
+            if len(solved) == moments:
+                raise KeyboardInterrupt
+
+        return original(*arguments[:-1], progress)
+
+    monkeypatch.setattr(solve, "_solve_curve", interrupted)
+    assert main(["run", case]) == INTERRUPTED
+    assert capsys.readouterr().err.strip() == message
+    assert "summary.json" in files(tmp_path / "results/test")
 
 
 LONG = """

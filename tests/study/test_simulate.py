@@ -113,7 +113,7 @@ def test_each_curve_has_its_file_and_stale_ones_go(case, out):
     assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
 
 
-def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out, monkeypatch):
+def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out, capsys, monkeypatch):
     """What is solved in the same folder stays."""
     (out / "quick").mkdir(parents=True)
     for name in ("monte_carlo.json", "monte_carlo-2.json", "response.png", "summary.json", "figure.png", "density.vtu"):
@@ -121,6 +121,7 @@ def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out
     monkeypatch.setattr(simulated, "_simulate_curve", raising(KeyboardInterrupt))
     assert simulate(case, "--out", out) == 130
     assert {path.name for path in (out / "quick").iterdir()} == {"summary.json", "figure.png", "density.vtu"}
+    assert capsys.readouterr().err.strip() == "interrupted after 0 of 1 curve; run it again to start over"
 
 
 def test_the_nonlinear_response_is_written(case, out):
@@ -188,7 +189,8 @@ def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, ou
     assert (out / "quick/summary.json").exists()
     printed = capsys.readouterr()
     assert "δ_p" in printed.out
-    assert "interrupted" in printed.err
+    message = f"interrupted; what was solved is kept in {out / 'quick'}; run it again to start over"
+    assert printed.err.strip() == message
 
 
 def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, monkeypatch):
