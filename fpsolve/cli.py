@@ -15,13 +15,13 @@ from rich.console import Console
 from fpsolve import __version__
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import CaseError, FpsolveError, NotConverged
-from fpsolve.process import ended_by_signals
+from fpsolve.process import drop_blocked_output, ended_by_signals, flush_output
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
     from fpsolve.workflow import Watch
 
-CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
+CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
 KEPT = "interrupted; what was done is kept"
 
 app = App(
@@ -182,7 +182,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     with ended_by_signals() as received:
         code = _run(argv)
-    return 128 + received[0] if received and code == INTERRUPTED else code
+    return 128 + received[0] if received else code
 
 
 def _run(argv: Sequence[str] | None) -> int:
@@ -191,7 +191,9 @@ def _run(argv: Sequence[str] | None) -> int:
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
     try:
+        _refuse_lost_folder()
         code = app(argv, result_action="return_value", exit_on_error=False, error_console=Console(stderr=True))
+        flush_output()
     except CycloptsError:  # cyclopts has said what is wrong
         return BAD_INPUT
     except FpsolveError as failure:
@@ -200,13 +202,36 @@ def _run(argv: Sequence[str] | None) -> int:
     except KeyboardInterrupt as interrupt:
         _print_error(str(interrupt) or "interrupted")
         return INTERRUPTED
+    except (OSError, SystemExit) as failure:  # rich exits where a pipe is closed
+        return _end_blocked(failure)
     return code if isinstance(code, int) else 0
+
+
+def _end_blocked(failure: OSError | SystemExit) -> int:
+    """End where the output cannot be written: quietly if nobody reads it any more, as with `| head -1`."""
+    drop_blocked_output()
+    if isinstance(failure, BrokenPipeError | SystemExit):
+        return CLOSED_PIPE
+    if failure.filename is not None:
+        raise failure
+    _print_error(f"the output cannot be written: {failure.strerror}; send it to another place")
+    return BAD_INPUT
+
+
+def _refuse_lost_folder() -> None:
+    try:
+        Path.cwd()
+    except OSError:
+        raise FpsolveError("the working folder does not exist any more; change to another folder") from None
 
 
 def _print_error(text: str) -> None:
     from rich.text import Text
 
-    Console(stderr=True).print(Text(in_words_of_a_case(text)), style="bold red", soft_wrap=True)
+    try:
+        Console(stderr=True).print(Text(in_words_of_a_case(text)), style="bold red", soft_wrap=True)
+    except (OSError, SystemExit):  # nobody can be told
+        drop_blocked_output()
 
 
 def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
@@ -251,7 +276,8 @@ def _bar(name: str, total: int) -> Iterator[Callable[[], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(name, total=total)
         yield lambda: progress.advance(task)
 

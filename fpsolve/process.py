@@ -1,8 +1,10 @@
-"""What surrounds a command: the signals that end it."""
+"""What surrounds a command: the signals that end it, and outputs that cannot be written."""
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,3 +36,21 @@ def ended_by_signals() -> Iterator[list[int]]:
     finally:
         for number in taken:
             signal.signal(number, signal.SIG_DFL)
+
+
+def flush_output() -> None:
+    """Write what waits in the standard output. Raises OSError where it cannot be written."""
+    if sys.stdout is not None:  # as it is where the output is closed
+        sys.stdout.flush()
+
+
+def drop_blocked_output() -> None:
+    """Drop what waits in the standard output or errors and cannot be written, so that Python need not at its end."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:
+                stream.flush()
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fpsolve.cli import BAD_INPUT, CHECK_FAILED, INTERRUPTED, NOT_CONVERGED, main
+from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.output.terminal import digits
 from fpsolve.study import solve
@@ -221,6 +221,59 @@ def test_handlers_are_restored():
     before = [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM)]
     assert main(["--version"]) == 0
     assert [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM)] == before
+
+
+def command_line(arguments, unbuffered="", stderr=subprocess.PIPE, **options):
+    """The program in another process."""
+    command, environment = (
+        [sys.executable, "-m", "fpsolve.cli", *arguments],
+        os.environ | {"PYTHONUNBUFFERED": unbuffered},
+    )
+    return subprocess.run(command, env=environment, stderr=stderr, text=True, check=False, timeout=100, **options)
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize(
+    "arguments", [["run", "test.toml"], ["check", "test.toml"], ["mesh", "a.vtu"], ["--help"], ["--version"]]
+)
+def test_a_full_output_is_said_in_one_sentence(case, tmp_path, arguments, unbuffered):
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        done = command_line(arguments, unbuffered, stdout=full)
+    assert done.returncode == BAD_INPUT
+    assert done.stderr == "the output cannot be written: No space left on device; send it to another place\n"
+    if arguments[0] == "run":
+        assert {"summary.json", "figure.png", "figure.pdf"} <= files(tmp_path / "results/test")
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("arguments", [["check", "test.toml"], ["--help"], ["--version"]])
+def test_a_closed_pipe_ends_a_command_quietly(case, arguments, unbuffered):
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        done = command_line(arguments, unbuffered, stdout=write)
+    finally:
+        os.close(write)
+    assert (done.returncode, done.stderr) == (CLOSED_PIPE, "")
+
+
+def test_full_errors_keep_the_exit_code(case, tmp_path):
+    """A run goes on without them."""
+    for arguments, code in ((["run", case], 0), (["run", "none.toml"], BAD_INPUT), (["nonsense"], BAD_INPUT)):
+        with Path("/dev/full").open("w", encoding="utf-8") as full:
+            done = command_line(arguments, stderr=full, stdout=subprocess.DEVNULL)
+        assert done.returncode == code
+    assert "figure.png" in files(tmp_path / "results/test")
+
+
+def test_a_lost_working_folder_exits_2(case, tmp_path):
+    code = f"import os, sys; os.rmdir(os.getcwd()); from fpsolve.cli import main; sys.exit(main(['check', {case!r}]))"
+    (tmp_path / "gone").mkdir()
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path / "gone", capture_output=True, text=True, check=False
+    )
+    assert done.returncode == BAD_INPUT
+    assert done.stderr == "the working folder does not exist any more; change to another folder\n"
 
 
 def test_a_short_interval_gives_a_warning(case, capsys):
