@@ -63,11 +63,15 @@ class Fault:
 
 
 class CaseError(FpsolveError):
-    """A case file that cannot be run; the text has one line for each fault of the file."""
+    """A case file that cannot be run; the text has one line for each fault of the file, at most `SHOWN` of them."""
+
+    SHOWN = 50
 
     def __init__(self, file: str, faults: Sequence[Fault]) -> None:
         self.file, self.faults = file, tuple(faults)
-        super().__init__("\n".join(self._line(fault) for fault in self.faults))
+        lines = [self._line(fault) for fault in self.faults[: self.SHOWN]]
+        more = len(self.faults) - len(lines)
+        super().__init__("\n".join([*lines, f"{file}: and {more} more"] if more else lines))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.file, self.faults)

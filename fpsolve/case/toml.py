@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import stat
 import tomllib
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -224,8 +225,11 @@ def _read(path: str | Path) -> str:
         return CaseError(str(path), [Fault("", line, sentence)])
 
     try:
-        if Path(path).is_dir():
+        mode = Path(path).stat().st_mode
+        if stat.S_ISDIR(mode):
             raise refuse("is a directory; name a case file in it, such as fig1.toml")
+        if not stat.S_ISREG(mode):
+            raise refuse("is a pipe or a device, not a file; write the case into a file and name that")
         content = Path(path).read_bytes()
     except FileNotFoundError:
         raise refuse(f"no such file; look in {Path(path).parent.resolve()} or give the full path") from None

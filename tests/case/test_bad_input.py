@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -552,6 +553,32 @@ def test_missing_file(tmp_path: Path) -> None:
 
 def test_directory(tmp_path: Path) -> None:
     assert only_message(tmp_path) == f"{tmp_path}: is a directory; name a case file in it, such as fig1.toml"
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "/dev/null", "pipe.toml"])
+def test_a_pipe_or_a_device(tmp_path: Path, name: str) -> None:
+    """Reading them might never end."""
+    os.mkfifo(tmp_path / "pipe.toml")
+    path = tmp_path / name
+    sentence = "is a pipe or a device, not a file; write the case into a file and name that"
+    assert only_message(path) == f"{path}: {sentence}"
+
+
+def test_a_link_to_a_case(tmp_path: Path) -> None:
+    (tmp_path / "link.toml").symlink_to(write(tmp_path, GOOD))
+    assert load_case(tmp_path / "link.toml").title == "good"
+
+
+@pytest.mark.parametrize(("count", "last"), [(50, "unknown key"), (51, ": and 1 more"), (3000, ": and 2950 more")])
+def test_of_many_faults_the_first_are_told(tmp_path: Path, count: int, last: str) -> None:
+    path = write(tmp_path, "".join(f"wrong{i} = 1\n" for i in range(count)) + GOOD)
+    with pytest.raises(CaseError) as raised:
+        load_case(path)
+    assert len(raised.value.faults) == count
+    lines = str(raised.value).splitlines()
+    assert len(lines) == min(count, 51)
+    assert [line.split(": ")[:2] for line in lines[:50]] == [[f"{path}:{i + 1}", f"wrong{i}"] for i in range(50)]
+    assert last in lines[-1]
 
 
 def test_file_below_a_file(tmp_path: Path) -> None:
