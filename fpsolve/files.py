@@ -24,18 +24,21 @@ def atomic(path: Path) -> Iterator[Path]:
     Folders are made as needed; when the body fails nothing is left of the file.
 
     Raises:
-        OSError: the folder cannot be made or written to.
+        OSError: the folder cannot be made, or the file cannot be written; it names `path`.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".fpsolve-", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
     try:
-        yield temporary
-        temporary.chmod(0o666 & ~_umask())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".fpsolve-", suffix=path.suffix)
+        os.close(handle)
+        temporary = Path(name)
+        try:
+            yield temporary
+            temporary.chmod(0o666 & ~_umask())
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as failure:
+        raise OSError(failure.errno, failure.strerror or str(failure), str(path)) from failure
 
 
 @contextmanager
@@ -54,7 +57,8 @@ def writable(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as failure:
-        raise OutputError(f"{failure.filename or folder} cannot be written: {failure.strerror}") from failure
+        place = failure.filename or folder
+        raise OutputError(f"{place} cannot be written: {failure.strerror}; {Remedy.FOLDER}") from failure
 
 
 @contextmanager

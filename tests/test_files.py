@@ -1,5 +1,6 @@
 """Files that are written whole, and folders that one run has for itself."""
 
+import errno
 import signal
 import subprocess
 import sys
@@ -7,7 +8,40 @@ import sys
 import pytest
 
 from fpsolve.errors import OutputError
-from fpsolve.files import LOCK, alone
+from fpsolve.files import LOCK, alone, atomic, writable, write_text
+
+FAILURES = [
+    OSError(errno.ENOSPC, "No space left on device"),
+    PermissionError(errno.EACCES, "Permission denied", "/somewhere/.fpsolve-12345678.csv"),
+    OSError("encoder error"),
+]
+
+
+@pytest.mark.parametrize("failure", FAILURES)
+def test_a_failure_names_the_file_that_was_wanted(tmp_path, failure):
+    path = tmp_path / "table.csv"
+    with pytest.raises(OSError, match=r"table\.csv") as raised, atomic(path):
+        raise failure
+    assert type(raised.value) is type(failure)
+    assert (raised.value.filename, raised.value.strerror) == (str(path), failure.strerror or "encoder error")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failure_to_take_a_place_names_it(tmp_path):
+    path = tmp_path / "table.csv"
+    path.mkdir()
+    with pytest.raises(OutputError) as raised, writable(tmp_path):
+        write_text(path, "1, 2")
+    assert str(raised.value) == f"{path} cannot be written: Is a directory; choose another folder"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_that_cannot_be_made_names_the_file(tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(OSError, match=r"table\.csv") as raised:
+        write_text(tmp_path / "file/table.csv", "1, 2")
+    assert raised.value.filename == str(tmp_path / "file/table.csv")
+
 
 HOLD = """
 import sys

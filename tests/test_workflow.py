@@ -286,7 +286,7 @@ def test_titles_are_plain_text(tmp_path):
 
 def test_a_place_that_cannot_be_written_is_an_output_error(case, tmp_path):
     (tmp_path / "out/test/summary.json").mkdir(parents=True)
-    with pytest.raises(OutputError, match=r"cannot be written"):
+    with pytest.raises(OutputError, match=r"out/test/summary\.json cannot be written: Is a directory; choose another"):
         fpsolve.run(case, tmp_path / "out")
 
 
