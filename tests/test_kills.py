@@ -1,0 +1,75 @@
+"""A run that is killed, at any moment, leaves whole files, and the next one begins as if it had not been."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+CASE = """
+title = "Killed"
+[oscillator]
+epsilon = 0.3
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 1.0
+tau0 = 0.5
+r0 = 0.95
+[moments]
+p = [-1.0, 2.0]
+[vary]
+"noise.D0" = [0.5, 1.0, 1.5]
+"""
+ROUNDS = 1
+"""Of four kills; fifteen take three minutes."""
+COMMAND = [sys.executable, "-c", "from fpsolve.cli import main; raise SystemExit(main())"]
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "killed.toml"
+    path.write_text(CASE, encoding="utf-8")
+    return path
+
+
+def started(case, out):
+    """A run in a process of its own; SIGINT is not ignored in it, whatever the parent does."""
+    return subprocess.Popen(
+        [*COMMAND, "run", str(case), "--out", str(out)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+def contents(folder):
+    """The numbers of a summary, and the names of all files but hidden ones."""
+    curves = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
+    return curves, {path.relative_to(folder).as_posix() for path in folder.rglob("[!.]*") if path.is_file()}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_killed_runs_leave_nothing_torn(case, tmp_path):
+    begun = time.monotonic()
+    assert started(case, tmp_path / "whole").wait(timeout=120) == 0
+    duration, whole = time.monotonic() - begun, contents(tmp_path / "whole" / "killed")
+    rng, out = random.Random(3), tmp_path / "out"
+    for kind in (signal.SIGKILL, signal.SIGHUP, signal.SIGINT, signal.SIGTERM) * ROUNDS:
+        process = started(case, out)
+        time.sleep(rng.uniform(0.3, 1.0) * duration)
+        process.send_signal(kind)
+        process.wait(timeout=60)
+        summary = out / "killed" / "summary.json"
+        if summary.exists():
+            left = json.loads(summary.read_text(encoding="utf-8"))
+            assert left["complete"] == (left["done"] == left["planned"])
+            assert left["curves"] == whole[0][: left["done"]]
+    assert started(case, out).wait(timeout=120) == 0
+    assert contents(out / "killed") == whole
+    assert not [path for path in (out / "killed").rglob(".*") if path.name.startswith(".fpsolve-")]
