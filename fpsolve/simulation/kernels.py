@@ -36,8 +36,17 @@ TALLIES = np.dtype(
 )
 """Of the slices of a population, d being the growth of ln Z beyond what is expected: how many; Σd; Σd²; Σd × the d
 before; Σd × the number of the slice, from 0; Σ effective paths among those of a slice ago; the first and the last d."""
-_compiled: Any = njit(nogil=True, cache=True, error_model="numpy")
+_without_cache: Any = njit(nogil=True, error_model="numpy")
+_with_cache: Any = njit(nogil=True, error_model="numpy", cache=True)
 _inlined: Any = njit(nogil=True, error_model="numpy", inline="always")
+
+
+def _compiled(function: Any) -> Any:
+    """A compiled function, kept in numba's cache unless no folder for that can be written to."""
+    try:
+        return _with_cache(function)
+    except RuntimeError:
+        return _without_cache(function)
 
 
 @_compiled
