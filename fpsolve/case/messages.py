@@ -14,9 +14,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from fpsolve.model.parameters import example_of
+from fpsolve.model.parameters import example_of, unit_of
 
 _OWN, _RANGE = "own sentence", "range"
 LIST, TABLE = "<list>", "<table>"
@@ -68,9 +68,16 @@ def _toml(value: Any) -> str:
     return str(value)
 
 
+def own_faults(error: ValidationError) -> Iterator[ErrorDetails]:
+    """What pydantic found, without calling a list too short only because its entries are wrong."""
+    for detail in error.errors(include_url=False):
+        if detail["type"] != "too_short" or not detail["input"]:
+            yield detail
+
+
 def explain(error: ValidationError, model: Any) -> Iterator[tuple[Path, str, str]]:
     """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence."""
-    for detail in error.errors(include_url=False):
+    for detail in own_faults(error):
         path = tuple(part for part in detail["loc"] if part not in (LIST, TABLE))
         yield path, _key(path), _sentence(path, dict(detail), model)
 
@@ -94,7 +101,8 @@ def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
         guess = nearest(str(path[-1]), known)
         return f"unknown key;{guess} known keys: {', '.join(known)}; rename or remove it"
     field = _model_and_field(path, model)[1]
-    must, example = f"must be {_accepted(field)} ({field.description})", example_of(field)
+    meaning = f"{field.description}, in {unit_of(field)}" if unit_of(field) else field.description
+    must, example = f"must be {_accepted(field)} ({meaning})", example_of(field)
     if path[0] == "vary" and len(path) > 1:
         example = example_of(model.__pydantic_fields__["vary"])
         must = must.replace("be", "be a non-empty list, each entry", 1) if len(path) == 2 else must
@@ -148,9 +156,10 @@ def _not_empty(metadata: Iterable[Any]) -> str:
 
 
 def _number(bound: float) -> str:
-    """5/3 as 5/3, not as 1.6666666666666667."""
+    """5/3 as 5/3, not as 1.6666666666666667; 1e15 as it stands here."""
     fraction = Fraction(bound).limit_denominator(99)
-    return str(fraction) if float(fraction) == bound else f"{bound:g}"
+    is_simple = fraction.denominator > 1 and float(fraction) == bound
+    return str(fraction) if is_simple or isinstance(bound, int) else re.sub(r"e\+?(-?)0*", r"e\1", f"{bound:g}")
 
 
 def _choices(annotation: Any) -> list[str]:

@@ -80,8 +80,7 @@ def _obstacle(valid: Known, varied: Mapping[str, float], p: FloatArray, *, with_
             factors = [curve.oscillator.impact_factor(extreme) for extreme in extremes]
             sizes = np.append(theory.scale.moment(p), [theory.stability_index, *factors])
     except ValidationError as error:
-        context = error.errors()[0].get("ctx", {})
-        return str(context.get("error", f"the noise has no finite strength; {_MODERATE}"))
+        return str(error.errors()[0]["ctx"]["error"])
     except (ArithmeticError, NoPerturbationTheory):  # the square of omega may be too small for a number
         sizes = np.array([math.inf])
     if not np.all(np.isfinite(sizes)):
@@ -112,7 +111,7 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     p = np.array(section.p or (0.0,))
     for varied in combinations(valid["vary"]):
         reason, faults = _obstacle(valid, varied, p), {}
-        with suppress(ArithmeticError, ValidationError):  # of parameters that are the reason
+        with suppress(ArithmeticError, ValidationError):  # of a law, or an r0 near to 5/3, that is the reason
             curve = make_curve(valid["oscillator"], valid["noise"], varied)
             faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
         for name, text in faults.items():

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
-from fpsolve.case.messages import Refusal, nearest, refuse
+from fpsolve.case.messages import Refusal, nearest, own_faults, refuse
 from fpsolve.case.sections import Moments, NoiseSection, NonEmpty, Values, flat, same
 from fpsolve.model.parameters import STRICT
 from fpsolve.model.vibro_impact import VibroImpactOscillator
@@ -49,7 +49,7 @@ def _varied_refusals(key: str, values: Any) -> Iterator[Refusal]:
     try:
         numbers = VARIABLE[key].validate_python(values)
     except ValidationError as error:
-        yield from (((key, *detail["loc"]), detail["input"], "") for detail in error.errors())
+        yield from (((key, *detail["loc"]), detail["input"], "") for detail in own_faults(error))
         return
     for i, number in enumerate(numbers):
         if any(same(number, other) for other in numbers[:i]):

@@ -16,13 +16,15 @@ from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, Remedy
-from fpsolve.model.parameters import STRICT, Positive, parameter
+from fpsolve.model.parameters import SIZE, STRICT, Derived, parameter
 
-Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", gt=0)]
-CorrelationTime = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", gt=0)]
+Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
+CorrelationTime = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
 Departure = Annotated[
     float,
-    parameter("departure from Gaussian noise; from 5/3 on the variance (10) is infinite", "r0 = 0.95", "$r_0$"),
+    parameter(
+        "departure from Gaussian noise; from 5/3 on the variance (10) is infinite", "r0 = 0.95", "$r_0$", ge=-1e6
+    ),
 ]
 
 
@@ -76,15 +78,15 @@ class OrnsteinUhlenbeck:
     """Ornstein-Uhlenbeck noise dξ = −α₀ ξ dt + σ₀ dW, Eq. (15).
 
     Args:
-        alpha: relaxation rate α₀ > 0, in 1/time.
-        sigma: coefficient of the Wiener process, σ₀ > 0.
+        alpha: relaxation rate α₀, 1e-32 to 1e32, in 1/time.
+        sigma: coefficient of the Wiener process, σ₀, 1e-32 to 1e32, in time^(-3/2).
 
     Raises:
         pydantic.ValidationError: a parameter is not a finite number in its range.
     """
 
-    alpha: Positive
-    sigma: Positive
+    alpha: Derived
+    sigma: Derived
 
     mean, half_width, end_exponent, moments = 0.0, math.inf, 0.0, (-math.inf, math.inf)
 
@@ -127,9 +129,9 @@ class NonGaussianNoise:
     r₀ = 1 is the Ornstein-Uhlenbeck process; r₀ < 1 has bounded support, r₀ > 1 algebraic tails.
 
     Args:
-        D0: noise intensity D₀ > 0.
-        tau0: correlation time τ₀ > 0.
-        r0: departure from the Gaussian noise, r₀ < 3 (beyond, Eq. (9) cannot be normalised).
+        D0: noise intensity D₀, 1e-15 to 1e15, in 1/time.
+        tau0: correlation time τ₀, 1e-15 to 1e15.
+        r0: departure from the Gaussian noise, −1e6 ≤ r₀ < 3 (beyond, Eq. (9) cannot be normalised).
 
     Raises:
         pydantic.ValidationError: a parameter is not a finite number in its range.

@@ -7,7 +7,10 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field
 from pydantic.fields import FieldInfo
 
-Positive = Annotated[float, Field(gt=0)]
+SIZE = {"ge": 1e-15, "le": 1e15}
+"""The range of a positive parameter: whatever the others are, no formula overflows or divides by nothing."""
+Derived = Annotated[float, Field(ge=1e-32, le=1e32)]
+"""What is made of such parameters."""
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
@@ -44,9 +47,14 @@ def symbol_of(field: FieldInfo) -> str:
     return _extra(field, "symbol")
 
 
+def unit_of(field: FieldInfo) -> str:
+    """The unit of a `parameter`, or nothing."""
+    return _extra(field, "unit")
+
+
 def axis_title(field: FieldInfo) -> str:
     r"""A `parameter` on an axis: "natural frequency $\omega$ (rad/time)"."""
-    unit = _extra(field, "unit")
+    unit = unit_of(field)
     return f"{field.title} {symbol_of(field)}" + (f" ({unit})" if unit else "")
 
 

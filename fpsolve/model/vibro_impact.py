@@ -12,7 +12,7 @@ from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray, identity
-from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import Drive, Kick
 
 IMPACT_PHASES = (math.pi / 2, 3 * math.pi / 2)
@@ -49,11 +49,11 @@ class VibroImpactOscillator:
     """Rayleigh-Van der Pol oscillator that bounces off a wall at x = 0, Eqs. (3) and (6).
 
     Args:
-        omega: natural frequency ω > 0, in radians per unit time.
+        omega: natural frequency ω, 1e-15 to 1e15, in radians per unit time.
         restitution: coefficient of restitution, 0 < r ≤ 1; 1 is no loss.
-        c1: linear damping coefficient, any sign; positive feeds energy in.
-        epsilon: ε > 0 of Eq. (6); 1 is the unscaled system (3).
-        c2, c3: nonlinear damping coefficients ≥ 0; the linear theory does not use them.
+        c1: linear damping coefficient, −1e15 to 1e15, in 1/time; positive feeds energy in.
+        epsilon: ε of Eq. (6), 1e-12 to 1e6; 1 is the unscaled system (3).
+        c2, c3: nonlinear damping coefficients, 0 to 1e15; the linear theory does not use them.
         impact: one of `ImpactLaw`, or its name.
 
     Raises:
@@ -61,19 +61,32 @@ class VibroImpactOscillator:
             would reverse the velocity: 1 − ε²(1 − r) ≤ 0.
     """
 
-    omega: Annotated[float, parameter("natural frequency", "omega = 1.0", r"$\omega$", "rad/time", gt=0)]
+    omega: Annotated[float, parameter("natural frequency", "omega = 1.0", r"$\omega$", "rad/time", **SIZE)]
     restitution: Annotated[
         float, parameter("coefficient of restitution; 1 means no loss", "restitution = 0.8", "$r$", gt=0, le=1)
     ]
     c1: Annotated[
-        float, parameter("linear damping coefficient", "c1 = 0.1", "$c_1$", "1/time", name="damping coefficient")
+        float,
+        parameter(
+            "linear damping coefficient", "c1 = 0.1", "$c_1$", "1/time", name="damping coefficient", ge=-1e15, le=1e15
+        ),
     ]
     epsilon: Annotated[
         float,
-        parameter("small parameter of Eq. (6); 1 is the unscaled system", "epsilon = 0.1", r"$\varepsilon$", gt=0),
+        parameter(
+            "small parameter of Eq. (6); 1 is the unscaled system",
+            "epsilon = 0.1",
+            r"$\varepsilon$",
+            ge=1e-12,
+            le=1e6,
+        ),
     ]
-    c2: Annotated[float, parameter("nonlinear damping coefficient", "c2 = 0.0", "$c_2$", ge=0)] = 0.0
-    c3: Annotated[float, parameter("nonlinear damping coefficient", "c3 = 0.0", "$c_3$", ge=0)] = 0.0
+    c2: Annotated[
+        float, parameter("nonlinear damping coefficient", "c2 = 0.0", "$c_2$", "1/(time length²)", ge=0, le=1e15)
+    ] = 0.0
+    c3: Annotated[
+        float, parameter("nonlinear damping coefficient", "c3 = 0.0", "$c_3$", "time/length²", ge=0, le=1e15)
+    ] = 0.0
     impact: Annotated[ImpactLaw, parameter("impact law", 'impact = "delta"', strict=False)] = ImpactLaw.DELTA
 
     @model_validator(mode="after")

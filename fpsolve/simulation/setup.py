@@ -22,7 +22,7 @@ MAX_PATHS = 10_000_000
 PROGRESS_STEPS = 100
 """How often each stretch of a simulation reports progress."""
 _LONGEST = 1_000_000
-"""Steps in a transient; with more, a simulation would not end."""
+"""Steps in a transient, and transients in all; with more, a simulation would not end."""
 
 
 def simulated_parts(problem: Problem) -> tuple[VibroImpactOscillator, ColouredNoise]:
@@ -65,9 +65,10 @@ def largest_step(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> tup
     a bounded support, where P_s ~ d^a with a = 1/(1 − r₀), the scheme has the order (a + 1)/2 only, which for a < 3
     asks for less.
     """
+    damping = oscillator.epsilon**2 * abs(oscillator.c1)  # may underflow
     limits = {
         "the frequency": 0.5 / oscillator.omega,
-        "the damping": 0.125 / (oscillator.epsilon**2 * abs(oscillator.c1)) if oscillator.c1 else math.inf,
+        "the damping": 0.125 / damping if damping else math.inf,
         "the strength of the noise": 0.125 / (oscillator.epsilon * noise.standard_deviation),
     }
     if isinstance(noise, NonGaussianNoise):
@@ -105,7 +106,9 @@ def obstacles(
     largest, reason = largest_step(oscillator, noise)
     settling = transient(oscillator, noise)
     h = default_step(oscillator, noise) if step is None else step
-    if step is not None and not 0 < step <= largest * (1 + 1e-12):
+    if step is not None and not step > 0:
+        found["step"] = f"got {step:g}; must be > 0 and <= {largest:.4g}; make it positive, or leave it out"
+    elif step is not None and step > largest * (1 + 1e-12):
         found["step"] = (
             f"got {step:g}, too large for {reason}; must be > 0 and <= {largest:.4g}; reduce it, or leave it out"
         )
@@ -114,8 +117,10 @@ def obstacles(
             f"one transient, {settling:.3g}, takes {settling / h:.2g} steps of {h:.3g}, which {reason} asks for; must "
             f"be at most {_LONGEST:.0e}; bring the times of noise and oscillator nearer to each other"
         )
-    if time is not None and not 2 * settling * (1 - 1e-12) <= time < math.inf:
+    if time is not None and not 2 * settling * (1 - 1e-12) <= time:
         found["time"] = (
             f"got {time:g}; must be >= {2 * settling:.4g}, two transients, as growth is measured after one; increase it"
         )
+    elif time is not None and time > _LONGEST * settling:
+        found["time"] = f"got {time:g}; must be <= {_LONGEST * settling:.4g}, a million transients; reduce it"
     return found

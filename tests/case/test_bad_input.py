@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import re
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from fpsolve.case.case import load_case
 from fpsolve.errors import CaseError, Fault
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.mesh_file import write_mesh
+from fpsolve.simulation.setup import default_step, obstacles, transient
 
 GOOD = """\
 title = "good"
@@ -107,18 +109,22 @@ def test_the_good_case_is_good(tmp_path: Path) -> None:
 VALUES = [  # key, its bad line, what the message says
     ("title", "title = 3", "got 3 (a number)|non-empty string|title = "),
     ("title", 'title = ""', 'got ""|non-empty string'),
-    ("oscillator.omega", "omega = -1.0", "got -1.0;|finite number > 0|natural frequency|omega = 1.0"),
-    ("oscillator.omega", "omega = 0", "got 0;|finite number > 0"),
-    ("oscillator.omega", 'omega = "fast"', 'got "fast" (a string)|finite number > 0'),
-    ("oscillator.omega", "omega = nan", "got nan|finite number > 0"),
-    ("oscillator.omega", "omega = inf", "got inf|finite number > 0"),
-    ("oscillator.omega", "omega = true", "got true (a boolean)|finite number > 0"),
-    ("oscillator.omega", "omega = [1.0]", "got [1.0] (a list)|finite number > 0"),
+    (
+        "oscillator.omega",
+        "omega = -1.0",
+        "got -1.0;|finite number >= 1e-15 and <= 1e15|(natural frequency, in rad/time)|omega = 1.0",
+    ),
+    ("oscillator.omega", "omega = 0", "got 0;|finite number >= 1e-15 and <= 1e15"),
+    ("oscillator.omega", 'omega = "fast"', 'got "fast" (a string)|finite number >= 1e-15 and <= 1e15'),
+    ("oscillator.omega", "omega = nan", "got nan|finite number >= 1e-15 and <= 1e15"),
+    ("oscillator.omega", "omega = inf", "got inf|finite number >= 1e-15 and <= 1e15"),
+    ("oscillator.omega", "omega = true", "got true (a boolean)|finite number >= 1e-15 and <= 1e15"),
+    ("oscillator.omega", "omega = [1.0]", "got [1.0] (a list)|finite number >= 1e-15 and <= 1e15"),
     ("oscillator.omega", "omega = 1979-05-27", "got 1979-05-27 (a date or time)|finite number"),
-    ("oscillator.omega", f"omega = {BIG}", "got 1000|...|finite number > 0"),
-    ("oscillator.omega", f"omega = 0x{'f' * 9000}", "too long to show|finite number > 0"),
-    ("oscillator.omega", "omega = { a = 1 }", "got {a = 1} (a table)|finite number > 0"),
-    ("oscillator.epsilon", "epsilon = 0.0", "got 0.0|> 0|Eq. (6)|epsilon = 0.1"),
+    ("oscillator.omega", f"omega = {BIG}", "got 1000|...|finite number >= 1e-15 and <= 1e15"),
+    ("oscillator.omega", f"omega = 0x{'f' * 9000}", "too long to show|finite number >= 1e-15 and <= 1e15"),
+    ("oscillator.omega", "omega = { a = 1 }", "got {a = 1} (a table)|finite number >= 1e-15 and <= 1e15"),
+    ("oscillator.epsilon", "epsilon = 0.0", "got 0.0|>= 1e-12 and <= 1e6|Eq. (6)|epsilon = 0.1"),
     ("oscillator.restitution", "restitution = 1.5", "got 1.5|> 0 and <= 1|restitution = 0.8"),
     ("oscillator.restitution", "restitution = 0.0", "got 0.0|> 0 and <= 1|restitution = 0.8"),
     ("oscillator.c1", 'c1 = "0.1"', 'got "0.1" (a string)|finite number|damping|c1 = 0.1'),
@@ -126,8 +132,8 @@ VALUES = [  # key, its bad line, what the message says
     ("oscillator.c3", "c3 = -inf", "got -inf|>= 0|c3 = 0.0"),
     ("oscillator.impact", 'impact = "dleta"', 'got "dleta"|"delta", "restitution"|you mean "delta"'),
     ("oscillator.impact", "impact = 1", 'got 1|one of "delta", "restitution"'),
-    ("noise.D0", "D0 = -0.1", "got -0.1|> 0|noise intensity|D0 = 0.1"),
-    ("noise.tau0", "tau0 = 0", "got 0|> 0|correlation time|tau0 = 0.5"),
+    ("noise.D0", "D0 = -0.1", "got -0.1|>= 1e-15 and <= 1e15|(noise intensity, in 1/time)|D0 = 0.1"),
+    ("noise.tau0", "tau0 = 0", "got 0|>= 1e-15 and <= 1e15|(correlation time, in time)|tau0 = 0.5"),
     ("noise.r0", "r0 = 1.7", "got 1.7|< 5/3|variance (10) is infinite|r0 = 0.95"),
     ("noise.r0", "r0 = 1.6666666666666667", "got 1.66|< 5/3"),
     ("noise.treatment", 'treatment = "OU"', 'got "OU"|"ou-reduction", "exact"'),
@@ -135,6 +141,7 @@ VALUES = [  # key, its bad line, what the message says
     ("moments.p", "p = 2.0", "got 2.0|list of finite numbers|start, stop, num|p = [1.0"),
     ("moments.p[3]", "p = [-1, 1, 2, nan]", "got nan|finite numbers"),
     ("moments.p[3]", 'p = [-1, 1, 2, "x"]', 'got "x" (a string)|finite numbers'),
+    ("moments.p[0]", "p = [nan]", "got nan|finite numbers"),
     ("moments.p", "p = [1, 2, -1, 2.0]", "2.0 stands twice|differ|remove"),
     ("moments.p.num", "p = { start = 0, stop = 2, num = 1 }", "got 1|>= 2 and <= 100000|num ="),
     ("moments.p.num", "p = { start = 0, stop = 2, num = 3.0 }", "got 3.0|whole number|num ="),
@@ -148,11 +155,11 @@ VALUES = [  # key, its bad line, what the message says
     ("budget.seconds", "seconds = inf", "got inf|finite number > 0"),
     ("budget.unknowns", "unknowns = 99", "got 99|whole number >= 100|unknowns = 60000"),
     ("budget.unknowns", "unknowns = 1e4", "got 10000.0|whole number >= 100"),
-    ('vary."noise.D0"', '"noise.D0" = []', "got []|non-empty list|> 0|[0.1, 0.5, 1.0]"),
-    ('vary."noise.D0"', '"noise.D0" = 0.1', "got 0.1|non-empty list|> 0"),
+    ('vary."noise.D0"', '"noise.D0" = []', "got []|non-empty list|>= 1e-15 and <= 1e15|[0.1, 0.5, 1.0]"),
+    ('vary."noise.D0"', '"noise.D0" = 0.1', "got 0.1|non-empty list|>= 1e-15 and <= 1e15"),
     ('vary."noise.D0"', '"noise.D0" = {}', "got {} (a table)|non-empty list"),
-    ('vary."noise.D0"[1]', '"noise.D0" = [0.1, -1]', "got -1|> 0 (noise intensity)"),
-    ('vary."noise.D0"[1]', '"noise.D0" = [0.1, inf]', "got inf|finite number > 0"),
+    ('vary."noise.D0"[1]', '"noise.D0" = [0.1, -1]', "got -1|>= 1e-15 and <= 1e15 (noise intensity, in 1/time)"),
+    ('vary."noise.D0"[1]', '"noise.D0" = [0.1, inf]', "got inf|finite number >= 1e-15 and <= 1e15"),
     ('vary."noise.D0"[1]', '"noise.D0" = [0.1, 0.1]', "got 0.1 twice|distinct|remove"),
     ("mesh.phi_cells", "phi_cells = -2", "got -2|whole number >= 1|phi_cells = 2"),
     ("mesh.phi_cells", "phi_cells = 2.0", "got 2.0 (a number)|whole number >= 1|phi_cells = 2"),
@@ -191,10 +198,16 @@ LINES = [  # key, a good line, what stands there instead, what the message says
         "known keys",
     ),
     (
-        "vary",
+        'vary."oscillator.omega"[0]',
         '"oscillator.omega" = [1.0, 2.0]',
         '"oscillator.omega" = [1e200]',
-        "with noise.D0 = 0.1, oscillator.omega",
+        "got 1e+200|<= 1e15 (natural",
+    ),
+    (
+        "vary",
+        '"oscillator.omega" = [1.0, 2.0]',
+        '"oscillator.epsilon" = [1e6]\noscillator.restitution = [1e-3]',
+        "with noise.D0 = 0.1, oscillator.epsilon = 1000000.0, oscillator.restitution = 0.001: |overflow",
     ),
     ("mesh.phi_degree", "phi_cells = 2", "phi_degree = 0", "got 0|whole number >= 1|phi_degree = "),
     ("mesh.xi_degree", "xi_cells = 4", "xi_degree = 99", "got 99|whole number >= 1 and <= |xi_degree = 9"),
@@ -382,37 +395,83 @@ def test_key_with_and_without_quotes(tmp_path: Path, old: str, new: str) -> None
     assert "noise.D0 stands twice, once with quotes and once without; remove one" in message
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"tau0": "1e-320", "D0": "1e300"},
-        {"tau0": "1e200"},
-        {"D0": "1e-320", "tau0": "1e5"},
-        {"epsilon": "1e200"},
-        {"omega": "1e-200"},
-        {"r0": "-1e308"},
-        {"r0": "1.6666666666666665"},
-        {"c1": "-1e308", "p": "[1e10]"},
-    ],
-    ids=str,
-)
-def test_extreme_parameters_are_refused(tmp_path: Path, changes: dict[str, str]) -> None:
-    text = GOOD[: GOOD.index("[vary]")]
-    for key, value in changes.items():
-        text = re.sub(rf"^{key} = .*", f"{key} = {value}", text, flags=re.MULTILINE)
+TOO_EXTREME = [
+    *(f"{key} = {value}" for key in ("omega", "D0", "tau0") for value in ("5e-324", "9e-16", "1.1e15", "1e308")),
+    *("epsilon = 1e-170", "epsilon = 1e308", "c1 = -1e308", "c1 = 2e15", "c2 = 1e16", "c3 = 1e308", "r0 = -1e308"),
+]
+
+
+@pytest.mark.parametrize("line", TOO_EXTREME)
+def test_extreme_parameters_are_refused_by_their_range(tmp_path: Path, line: str) -> None:
+    key = line.partition(" ")[0]
+    text = re.sub(rf"^{key} = .*", line, GOOD[: GOOD.index("[vary]")], flags=re.MULTILINE)
+    path = write(tmp_path, text + "[monte_carlo]\nseed = 0\n")
+    place = f"{path}:{text.splitlines().index(line) + 1}"
+    section = "noise" if key in ("D0", "tau0", "r0") else "oscillator"
+    assert re.match(f"{re.escape(place)}: {section}.{key}: got \\S+; must be a finite number >= ", only_message(path))
+
+
+@pytest.mark.parametrize("line", ["r0 = 1.6666666666666665", "p = [1e200]", "p = [-1e10]\nrtol = 1e-3"])
+def test_combinations_that_overflow_are_refused(tmp_path: Path, line: str) -> None:
+    key = line.partition(" ")[0]
+    text = re.sub(rf"^{key} = .*", line, GOOD[: GOOD.index("[vary]")], flags=re.MULTILINE)
+    text = text.replace("rtol = 1e-8", "").replace("epsilon = 0.1", "epsilon = 1e6")
     path = write(tmp_path, text)
     message = only_message(path)
     assert message.startswith(f"{path}:{line_of(text, 'moments')}: moments: ")
     assert "moderate sizes; bring the extreme ones nearer to 1" in message
 
 
-@pytest.mark.parametrize("key", ["epsilon", "tau0"])
-@pytest.mark.parametrize("value", ["1e308", "1e-320"])
-def test_extreme_parameters_are_refused_before_they_are_simulated(tmp_path: Path, key: str, value: str) -> None:
-    text = re.sub(rf"^{key} = .*", f"{key} = {value}", GOOD[: GOOD.index("[vary]")], flags=re.MULTILINE)
-    faults = faults_of(write(tmp_path, text + "[monte_carlo]\nseed = 0\n"))
-    assert [fault.key for fault in faults] == ["moments", "monte_carlo.p"]
-    assert all("moderate sizes" in fault.sentence for fault in faults)
+def between(low: float, high: float) -> st.SearchStrategy[float]:
+    """Log-uniformly, and the ends."""
+    inner = st.floats(math.log10(low), math.log10(high)).map(lambda power: min(max(10.0**power, low), high))
+    return st.sampled_from([low, high]) | inner
+
+
+def either_sign(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.tuples(st.sampled_from([-1, 1]), between(low, high)).map(math.prod)
+
+
+WIDE = between(1e-15, 1e15)
+SIMULATED = ("monte_carlo.p", "monte_carlo.time", "monte_carlo.step")
+
+
+@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    numbers=st.fixed_dictionaries(
+        {"omega": WIDE, "D0": WIDE, "tau0": WIDE, "epsilon": between(1e-12, 1e6), "c1": either_sign(5e-324, 1e15)}
+        | {"c2": between(5e-324, 1e15), "c3": between(5e-324, 1e15), "restitution": between(5e-324, 1.0)}
+        | {"r0": st.floats(-1e6, 5 / 3, exclude_max=True) | either_sign(1e-16, 0.5).map(lambda part: 1 - part)}
+    ),
+    words=st.tuples(st.sampled_from(["delta", "restitution"]), st.sampled_from(["exact", "ou-reduction"])),
+    p=either_sign(5e-324, 1e308),
+    settings_of_time=st.tuples(between(5e-324, 1e308), between(5e-324, 1e308)) | st.none(),
+)
+def test_any_parameters_in_their_ranges_give_a_case_or_messages(
+    tmp_path: Path,
+    numbers: dict[str, float],
+    words: tuple[str, str],
+    p: float,
+    settings_of_time: tuple[float, float] | None,
+) -> None:
+    """And what is said of the simulation of its curves; without obstacles its steps and its length are numbers."""
+    text = GOOD[: GOOD.index("[vary]")]
+    for key, value in numbers.items():
+        text = re.sub(rf"^{key} = .*", f"{key} = {value!r}", text, flags=re.MULTILINE)
+    text = re.sub(r"^p = .*", f"p = [{p!r}]", text, flags=re.MULTILINE)
+    text = text.replace('"delta"', f'"{words[0]}"').replace('"ou-reduction"', f'"{words[1]}"')
+    if settings_of_time:
+        text += "[monte_carlo]\ntime = {!r}\nstep = {!r}\n".format(*settings_of_time)
+    path = write(tmp_path, text)
+    try:
+        case = load_case(path)
+    except CaseError:
+        assert {fault.key for fault in faults_of(path)} <= {"oscillator", "moments", *SIMULATED}
+        return
+    [curve] = case.curves()
+    if not obstacles(curve.oscillator, curve.noise, time=case.monte_carlo.time, step=case.monte_carlo.step):
+        lengths = transient(curve.oscillator, curve.noise), default_step(curve.oscillator, curve.noise)
+        assert all(0 < length < math.inf for length in lengths)
 
 
 def test_all_faults_at_once(tmp_path: Path) -> None:
@@ -600,14 +659,14 @@ def test_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 OVERRIDES = [
-    ("oscillator.omega=-1", "oscillator.omega: got -1; must be a finite number > 0"),
-    ('oscillator.omega="x"', 'oscillator.omega: got "x" (a string); must be a finite number > 0'),
+    ("oscillator.omega=-1", "oscillator.omega: got -1; must be a finite number >= 1e-1"),
+    ('oscillator.omega="x"', 'oscillator.omega: got "x" (a string); must be a finite number >= 1e-1'),
     ("oscillator.omgea=1", 'oscillator.omgea: unknown key; did you mean "omega"?'),
     ("nosie.D0=1", 'nosie: unknown key; did you mean "noise"?'),
-    ("vary.noise.D0=[0.1, -1]", 'vary."noise.D0"[1]: got -1; must be a finite number > 0'),
+    ("vary.noise.D0=[0.1, -1]", 'vary."noise.D0"[1]: got -1; must be a finite number >= 1e-1'),
     ('vary."noise.D0"=[]', 'vary."noise.D0": got [] (a list); must be a non-empty list'),
     ("mesh={xi_cells=0}", "mesh.xi_cells: got 0; must be a whole number >= 1"),
-    ("oscillator={omega=1, restitution=1, c1=0}", "oscillator.epsilon: missing; must be a finite number > 0"),
+    ("oscillator={omega=1, restitution=1, c1=0}", "oscillator.epsilon: missing; must be a finite number >= 1e-1"),
     ('mesh.file="nowhere.vtu"', "mesh.file: a mesh must be either a file or made from numbers"),
     ("oscillator.omega", "a key without a value; write it as in --set oscillator.omega=2.0"),
     ("oscillator.omega=", "cannot read the text"),

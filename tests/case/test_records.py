@@ -63,9 +63,9 @@ def test_figures_name_what_they_are_drawn_over() -> None:
         "oscillator.restitution": ("$r$", "coefficient of restitution $r$"),
         "oscillator.c1": ("$c_1$", "damping coefficient $c_1$ (1/time)"),
         "oscillator.epsilon": (r"$\varepsilon$", r"small parameter of Eq. (6) $\varepsilon$"),
-        "oscillator.c2": ("$c_2$", "nonlinear damping coefficient $c_2$"),
-        "oscillator.c3": ("$c_3$", "nonlinear damping coefficient $c_3$"),
-        "noise.D0": ("$D_0$", "noise intensity $D_0$"),
+        "oscillator.c2": ("$c_2$", "nonlinear damping coefficient $c_2$ (1/(time length²))"),
+        "oscillator.c3": ("$c_3$", "nonlinear damping coefficient $c_3$ (time/length²)"),
+        "noise.D0": ("$D_0$", "noise intensity $D_0$ (1/time)"),
         "noise.tau0": (r"$\tau_0$", r"correlation time $\tau_0$ (time)"),
         "noise.r0": ("$r_0$", "departure from Gaussian noise $r_0$"),
     }

@@ -3,6 +3,7 @@
 import math
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -240,9 +241,13 @@ def test_drift_is_noticed(monkeypatch):
     ("change", "words"),
     [
         ({"step": 1.0}, "too large for the correlation time"),
-        ({"step": -0.1}, "must be > 0"),
+        ({"step": -0.1}, "^step: got -0.1; must be > 0 and <= .*; make it positive"),
+        ({"step": 0.0}, "make it positive"),
+        ({"step": math.nan}, "make it positive"),
         ({"time": 3.0}, "two transients"),
-        ({"time": math.inf}, "two transients"),
+        ({"time": math.nan}, "two transients"),
+        ({"time": math.inf}, "a million transients; reduce it"),
+        ({"time": 1e308}, "a million transients; reduce it"),
         ({"paths": 10}, "32 to"),
         ({"seed": -1}, "seed = -1"),
         ({"estimator": "exact"}, "direct, population"),
@@ -253,6 +258,11 @@ def test_drift_is_noticed(monkeypatch):
 def test_bad_settings_are_refused(change, words):
     with pytest.raises(ValueError, match=words):
         simulate(**({"oscillator": MODERATE, "noise": NOISE, "p": [1.0]} | change))
+
+
+def test_damping_too_small_for_a_number_limits_no_step():
+    tiny = replace(MODERATE, c1=5e-324)
+    assert largest_step(tiny, NOISE) == largest_step(replace(MODERATE, c1=0.0), NOISE)
 
 
 def test_the_largest_good_step_is_named_and_good():
