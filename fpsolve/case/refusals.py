@@ -30,6 +30,8 @@ from fpsolve.case.sections import (
     same,
 )
 from fpsolve.errors import MeshError, NoPerturbationTheory, NoSuchExponent
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.space import Discretisation, noise_space
 from fpsolve.model.noise import check_existence
 from fpsolve.simulation.setup import obstacles
 from fpsolve.theory.perturbation import second_order
@@ -94,14 +96,36 @@ def _obstacle(valid: Known, varied: Mapping[str, float], p: FloatArray, *, with_
 
 
 def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """A mesh that cannot be read or made."""
+    """A mesh that cannot be read or made, is larger than the budget, or too wide for the noise of some curve."""
     try:
         with np.errstate(all="ignore"):
-            mesh.mesh(context.get("folder", Path()))
+            made = mesh.mesh(context.get("folder", Path()))
+            reason = _misfit(made, valid) if made and {"oscillator", "noise", "budget", "vary"} <= valid.keys() else ""
     except (MeshError, OSError, ValueError) as error:
-        reason = in_words_of_a_case(str(error))
+        reason = str(error)
+    if reason:
+        reason = in_words_of_a_case(reason)
         text = f"got {shown(mesh.file)}; {reason}" if mesh.file else reason
         yield ("file",) if mesh.file else (), mesh.file, text
+
+
+def _misfit(mesh: CylinderMesh, valid: Known) -> str:
+    """Why the mesh does not serve some noise, or nothing; in noise units a noise is told by its r0 and treatment."""
+    for varied in combinations({key: values for key, values in valid["vary"].items() if key == "noise.r0"}):
+        noise = make_curve(valid["oscillator"], valid["noise"], varied).noise
+        chosen = Discretisation.on(mesh, noise)
+        size, most = chosen.unknowns(noise), valid["budget"].unknowns
+        if size > most:
+            return (
+                f"{_with(varied)}makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
+                "lower degrees, or a larger [budget]"
+            )
+        try:
+            for each in (chosen, chosen.enriched().enriched()):  # the finer one tells the error
+                noise_space(noise, each, 0.0)
+        except MeshError as failure:
+            return f"{_with(varied)}from xi = {chosen.z_lines[0]:g} to {chosen.z_lines[-1]:g} {failure}"
+    return ""
 
 
 def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) -> Iterator[Refusal]:

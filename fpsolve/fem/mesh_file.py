@@ -10,7 +10,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError, Remedy
-from fpsolve.fem.mesh import NO_ZERO, TOLERANCE, CylinderMesh, make_mesh
+from fpsolve.fem.mesh import MAX_DEGREE, NO_ZERO, TOLERANCE, CylinderMesh, make_mesh
 from fpsolve.files import atomic
 
 MARKERS = {"domain": 0, "impact": 1, "seam": 2, "truncation": 3}
@@ -64,6 +64,7 @@ def read_mesh(path: str | Path) -> CylinderMesh:
             f"{path} holds {', '.join(sorted(others)) or 'no quadrilaterals'}; every cell must be a quadrilateral"
         )
     try:
+        _check_numbers(content.points, quads)
         phi, z = (_grid_lines(content.points[:, k]) for k in (0, 1))
         _check_tensor_grid(np.stack([phi[1], z[1]]), quads, (phi[0].size - 1, z[0].size - 1))
         degrees = {name: _degree(content, name) for name in ("phi_degree", "xi_degree")}
@@ -114,6 +115,15 @@ def _grid_lines(coordinates: FloatArray) -> tuple[FloatArray, Any]:
     return coordinates[order][np.concatenate([[True], steps])], index
 
 
+def _check_numbers(points: Any, quads: Any) -> None:
+    """Points must be finite pairs, and cells made of them."""
+    if points.ndim != 2 or points.shape[1] < 2 or not np.all(np.isfinite(points)):
+        raise MeshError(f"the points must be finite (phi, xi) or (phi, xi, 0); {Remedy.MESH_FILE}")
+    if not np.all((quads >= 0) & (quads < len(points))):
+        strange = quads[(quads < 0) | (quads >= len(points))][0]
+        raise MeshError(f"a cell has the corner {strange}, but points are 0 to {len(points) - 1}; {Remedy.MESH_FILE}")
+
+
 def _check_tensor_grid(index: Any, quads: Any, shape: tuple[int, int]) -> None:
     """Every cell of the grid must be one quadrilateral, with the cell's four corners."""
     corners = index[:, quads]
@@ -132,6 +142,7 @@ def _degree(content: Any, name: str) -> int:
     values = content.point_data.get(name)
     if values is None:
         return int(getattr(make_mesh(), name))
-    if np.ptp(values) != 0 or values[0] != round(float(values[0])):
-        raise MeshError(f"the point data {name} must be one whole number throughout")
-    return int(values[0])
+    degree = np.asarray(values).flat[0] if np.size(values) else 0
+    if np.ndim(values) != 1 or not (np.all(values == degree) and 1 <= degree <= MAX_DEGREE and degree % 1 == 0):
+        raise MeshError(f"the point data {name} must be one whole number from 1 to {MAX_DEGREE} throughout")
+    return int(degree)

@@ -763,6 +763,41 @@ def test_mesh_too_wide_for_numbers(tmp_path: Path) -> None:
     assert only_message(path).startswith(f"{path}:{line_of(GOOD, 'mesh')}: mesh: ")
 
 
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("xi_max = 100.0", "from xi = -8 to 100 P_s underflows in a cell|use a narrower interval"),
+        ("xi_max = 30.0", "from xi = -8 to 30 elements of degree 13 are linearly dependent|use more or lower-degree"),
+        (
+            "xi_cells = 1000",
+            "makes 198022 unknowns; must be at most budget.unknowns = 60000|lower degrees, or a larger",
+        ),
+        (
+            "xi_cells = 4\nphi_degree = 20",
+            "makes 1554 unknowns; must be at most budget.unknowns = 1553; use fewer cells",
+        ),
+    ],
+)
+def test_mesh_too_wide_or_too_large(tmp_path: Path, lines: str, words: str) -> None:
+    """37 functions of ξ, by default, times (20 + 1) · 2 of φ are 1554."""
+    text = edited("xi_cells = 4", lines).replace("unknowns = 60000", f"unknowns = {1553 if '20' in lines else 60000}")
+    path = write(tmp_path, text)
+    message = only_message(path)
+    assert message.startswith(f"{path}:{line_of(text, 'mesh')}: mesh: ")
+    assert all(word in message for word in words.split("|"))
+
+
+def test_mesh_file_too_wide_for_one_of_the_noises(tmp_path: Path) -> None:
+    """Bounded noise cuts the mesh off, Gaussian noise does not."""
+    write_mesh(make_mesh(xi_max=100.0), tmp_path / "wide.vtu")
+    text = edited("phi_cells = 2\nxi_cells = 4", 'file = "wide.vtu"').replace('"ou-reduction"', '"exact"')
+    text = text.replace('"oscillator.omega" = [1.0, 2.0]', '"noise.r0" = [0.5, 1.0]')
+    path = write(tmp_path, text)
+    message = only_message(path)
+    assert message.startswith(f"{path}:{line_of(text, 'mesh.file')}: mesh.file: ")
+    assert 'got "wide.vtu"; with noise.r0 = 1.0: from xi = -8 to 100 P_s underflows' in message
+
+
 TRIES = [
     *(
         "",

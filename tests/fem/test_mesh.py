@@ -194,5 +194,24 @@ def test_meshes_of_other_shapes_are_refused(tmp_path):
     with pytest.raises(MeshError, match=r"2 quadrilaterals .* not the full tensor grid of 1 cells"):
         read_mesh(path)
     write_raw(path, HALF, [[0, 1, 2, 3]], point_data={"phi_degree": np.array([3, 3, 4, 3])})
-    with pytest.raises(MeshError, match=r"phi_degree must be one whole number throughout"):
+    with pytest.raises(MeshError, match=r"phi_degree must be one whole number from 1 to 20 throughout"):
+        read_mesh(path)
+
+
+def test_cells_beyond_the_points_are_refused(tmp_path):
+    path = tmp_path / "mesh.vtu"
+    for corner in (-1, 4):
+        write_raw(path, HALF, [[0, 1, 2, corner]])
+        with pytest.raises(MeshError, match=f"a cell has the corner {corner}, but points are 0 to 3; make one with"):
+            read_mesh(path)
+    write_raw(path, [[np.nan, 0, 0], *HALF[1:]], [[0, 1, 2, 3]])
+    with pytest.raises(MeshError, match="the points must be finite"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize("values", [np.full((4, 3), 5), np.full((4, 1), 5), np.full(4, 1e300), np.full(4, np.nan)])
+def test_degrees_that_are_none_are_refused(tmp_path, values):
+    path = tmp_path / "mesh.vtu"
+    write_raw(path, HALF, [[0, 1, 2, 3]], point_data={"xi_degree": values})
+    with pytest.raises(MeshError, match="xi_degree must be one whole number from 1 to 20 throughout"):
         read_mesh(path)
