@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter, Token
@@ -28,7 +30,9 @@ app = App(
     name="fpsolve",
     help="""Moment Lyapunov exponents of a vibro-impact oscillator under coloured noise, by finite elements.
 
-    Example: fpsolve run cases/fig1.toml""",
+    Example: fpsolve run cases/fig1.toml
+
+    Exit codes: 0 success, 1 a checked value differs, 2 bad input, 3 not converged, 130 interrupted""",
     version=lambda: f"fpsolve {__version__}",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
@@ -176,7 +180,7 @@ def mesh(
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; the exit code is 0 for success, 1 a failed check, 2 bad input, 3 not converged, 130 interrupted.
+    """Run a command; the help of `app` names the exit codes.
 
     SIGHUP and SIGTERM interrupt it too; the exit code is then 128 and the number of the signal.
     """
@@ -243,10 +247,18 @@ def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
         try:
             cases.append(load_case(path, overrides or ()))
         except CaseError as error:
-            errors.append(str(error))
+            errors.append(_stray_assignment(path, overrides) or str(error))
     if errors:
         raise FpsolveError("\n".join(errors))
     return cases
+
+
+def _stray_assignment(path: Path, overrides: Sequence[str] | None) -> str:
+    """What to write where a case that cannot be is an assignment that lacks its --set, or nothing."""
+    if not re.match(r'[\w."-]+ *=', str(path)) or path in path.parent.glob("*"):
+        return ""
+    words = " ".join(f"--set {quote(text)}" for text in [*(overrides or ())[:1], str(path)])
+    return f"{path}: no such file; each --set takes one assignment: write {words}"
 
 
 def _load_to_write(paths: Sequence[Path], overrides: Sequence[str] | None, *, monte_carlo: bool) -> list[Case]:

@@ -52,6 +52,22 @@ def test_out_and_set(case, tmp_path, capsys):
     assert " 0.0002850955" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("word", ["noise.D0=0.2", "mesh.file=a/b.vtu", "vary.noise.D0=[1, 2]", f"title={'x' * 400}"])
+def test_set_takes_one_assignment(case, word, capsys):
+    assert main(["check", case, "--set", "oscillator.omega=2", word]) == BAD_INPUT
+    said = capsys.readouterr().err.strip()
+    shown = f"'{word}'" if "[" in word else word
+    remedy = f"each --set takes one assignment: write --set oscillator.omega=2 --set {shown}"
+    assert said == f"{word}: no such file; {remedy}"
+
+
+def test_a_case_may_have_an_equals_sign_in_its_name(case, tmp_path, capsys):
+    path = tmp_path / "a=1.toml"
+    path.write_text("title = 1", encoding="utf-8")
+    assert main(["check", str(path)]) == BAD_INPUT
+    assert f"{path}:1: title: got 1" in capsys.readouterr().err
+
+
 def test_set_takes_negative_values(case):
     assert main(["check", case, "--set", "oscillator.c1=-0.2"]) == 0
 
@@ -326,6 +342,12 @@ def test_wrong_usage_exits_2(arguments, capsys):
 def test_help_shows_an_example(command, capsys):
     assert main([command, "--help"]) == 0
     assert f"Example: fpsolve {command} " in capsys.readouterr().out
+
+
+def test_help_names_the_exit_codes(capsys):
+    assert main(["--help"]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "Exit codes: 0 success, 1 a checked value differs, 2 bad input, 3 not converged, 130 interrupted" in words
 
 
 def test_version(capsys):

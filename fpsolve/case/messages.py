@@ -97,8 +97,9 @@ def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
     if detail["type"] == "value_error":
         return str(detail["ctx"]["error"])
     if detail["type"] in _UNKNOWN:
-        known = list(_model_and_field(path[:-1], model)[0].__pydantic_fields__)
-        guess = nearest(str(path[-1]), known)
+        fields = _model_and_field(path[:-1], model)[0].__pydantic_fields__
+        known = list(fields)
+        guess = nearest(str(path[-1]), [*known, *_inner_keys(fields)])
         return f"unknown key;{guess} known keys: {', '.join(known)}; rename or remove it"
     field = _model_and_field(path, model)[1]
     meaning = f"{field.description}, in {unit_of(field)}" if unit_of(field) else field.description
@@ -111,6 +112,13 @@ def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
     value = detail["input"]
     guess = nearest(value, _choices(field.annotation)) if isinstance(value, str) else ""
     return f"got {shown(value)}{_kind(value, detail['type'])}; {must};{guess} write, for example, {example}"
+
+
+def _inner_keys(fields: Mapping[str, FieldInfo]) -> Iterator[str]:
+    """The keys of tables among some fields, with the name of their table."""
+    for name, field in fields.items():
+        for key in getattr(field.annotation, "__pydantic_fields__", ()):
+            yield f"{name}.{key}"
 
 
 def _kind(value: Any, error_type: str) -> str:

@@ -662,6 +662,8 @@ OVERRIDES = [
     ("oscillator.omega=-1", "oscillator.omega: got -1; must be a finite number >= 1e-1"),
     ('oscillator.omega="x"', 'oscillator.omega: got "x" (a string); must be a finite number >= 1e-1'),
     ("oscillator.omgea=1", 'oscillator.omgea: unknown key; did you mean "omega"?'),
+    ("omega=2", 'omega: unknown key; did you mean "oscillator.omega"? known keys: title, oscillator, noise'),
+    ("RTOL=2", 'RTOL: unknown key; did you mean "moments.rtol"? known keys: title, oscillator, noise'),
     ("nosie.D0=1", 'nosie: unknown key; did you mean "noise"?'),
     ("vary.noise.D0=[0.1, -1]", 'vary."noise.D0"[1]: got -1; must be a finite number >= 1e-1'),
     ('vary."noise.D0"=[]', 'vary."noise.D0": got [] (a list); must be a non-empty list'),
