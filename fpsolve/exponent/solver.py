@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, real_numbers
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.branch import Branch, Tolerance
@@ -341,9 +341,7 @@ def best_order(p: FloatArray) -> Any:
 
 def checked_moments(p: ArrayLike, problem: Problem) -> FloatArray:
     """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
-    points = np.atleast_1d(np.asarray(p, dtype=float))
-    if points.ndim != 1 or points.size == 0 or not np.all(np.isfinite(points)):
-        raise ValueError(f"p must be a finite number or a non-empty list of finite numbers, got {p!r}")
+    points = real_numbers(p, "p")
     for point in points:
         refuse_infinite(problem, float(point))
     return points

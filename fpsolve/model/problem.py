@@ -27,10 +27,19 @@ class Problem:
     Attributes:
         system: `VibroImpactOscillator`, or a `PlaneSystem`.
         noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands, or a `MarkovChain`.
+
+    Raises:
+        TypeError: one of them is something else.
     """
 
     system: System
     noise: AnyNoise
+
+    def __post_init__(self) -> None:
+        halves = ((self.system, "motion", "drives"), (self.noise, "noise", "spectral_density"))
+        for half, kind, needed in halves:
+            if isinstance(half, type) or not hasattr(half, needed):
+                raise TypeError(f"got {half!r} as a {kind}; the first arguments must be an oscillator and a noise")
 
 
 def refuse_infinite(problem: Problem, p: float) -> None:
@@ -100,13 +109,14 @@ def problem_first(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[Any, .
     if args and isinstance(args[0], Problem):
         return args
     if "problem" in kwargs:
+        if not isinstance(kwargs["problem"], Problem):
+            raise TypeError(
+                f"got problem = {kwargs['problem']!r}; must be a Problem, made of an oscillator and a noise"
+            )
         return (kwargs.pop("problem"), *args)
     halves = list(args[:2])
     for name in ("oscillator", "noise")[len(halves) :]:
         if name not in kwargs:
             raise TypeError(f"{name} is missing; the first arguments must be an oscillator and a noise, or a Problem")
         halves.append(kwargs.pop(name))
-    for half, kind, needed in zip(halves, ("motion", "noise"), ("drives", "spectral_density"), strict=True):
-        if not hasattr(half, needed):
-            raise TypeError(f"got {half!r} as a {kind}; the first arguments must be an oscillator and a noise")
     return (Problem(*halves), *args[2:])

@@ -101,7 +101,7 @@ class MonteCarlo:
 @of_problem
 def simulate(
     problem: Problem,
-    p: Sequence[float],
+    p: float | Sequence[float],
     *,
     estimator: Estimator = "direct",
     paths: int = PATHS,
@@ -118,7 +118,7 @@ def simulate(
 
     Args:
         problem: the oscillator and its noise, in one argument or two; c₂ and c₃ are not used.
-        p: orders of the moments.
+        p: orders of the moments, one or several.
         estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
         paths: how many; a multiple of 32 is used.
         time: length of the paths after the transient; 64 transients if None. Whole transients are used.
@@ -143,7 +143,12 @@ def simulate(
 
 
 def _plan(
-    problem: Problem, p: Sequence[float], estimator: Estimator, paths: int, time: float | None, step: float | None
+    problem: Problem,
+    p: float | Sequence[float],
+    estimator: Estimator,
+    paths: int,
+    time: float | None,
+    step: float | None,
 ) -> Plan:
     oscillator, noise = simulated_parts(problem)
     h = default_step(oscillator, noise) if step is None else step
@@ -154,7 +159,7 @@ def _plan(
         motion=motion(replace(oscillator, c2=0.0, c3=0.0)),
         noise_step=noise_step(noise, h),
         step=h,
-        p=np.array(p, dtype=float),
+        p=np.atleast_1d(np.array(p, dtype=float)),
         estimator=estimator,
         paths=math.ceil(paths / BATCHES),
         slice_steps=round(settling / h),

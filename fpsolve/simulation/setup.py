@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from fpsolve.arrays import real_numbers
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import ColouredNoise, NonGaussianNoise, check_existence, relaxation_time
 from fpsolve.model.problem import Problem
@@ -40,21 +41,24 @@ def simulated_parts(problem: Problem) -> tuple[VibroImpactOscillator, ColouredNo
     )
 
 
-def check_settings(noise: ColouredNoise, p: Sequence[float], estimator: Estimator, paths: int, seed: int) -> None:
+def check_settings(
+    noise: ColouredNoise, p: float | Sequence[float], estimator: Estimator, paths: int, seed: int
+) -> None:
     """Refuse what lengths and steps have no part in, see `obstacles`.
 
     Raises:
         ValueError: the variance of the noise or an order is not finite, or a setting is out of its range.
         NoSuchExponent: some Λ(p) is infinite.
     """
-    if not (math.isfinite(noise.standard_deviation) and np.all(np.isfinite(np.array(p, dtype=float)))):
-        raise ValueError(f"got p = {p} and a noise of variance {noise.standard_deviation**2:g}; all must be finite")
-    for order in p:
+    if not math.isfinite(noise.standard_deviation):
+        raise ValueError("got a noise of infinite variance; must be finite, as for r0 < 5/3")
+    for order in real_numbers(p, "p") if np.size(p) else ():
         check_existence(noise, order)
-    if estimator not in get_args(Estimator) or not BATCHES <= paths <= MAX_PATHS or seed < 0:
+    is_whole = all(isinstance(each, int | np.integer) for each in (paths, seed))
+    if estimator not in get_args(Estimator) or not is_whole or not BATCHES <= paths <= MAX_PATHS or seed < 0:
         raise ValueError(
-            f"got estimator = {estimator!r}, paths = {paths}, seed = {seed}; must be one of "
-            f"{', '.join(get_args(Estimator))}, {BATCHES} to {MAX_PATHS}, and >= 0"
+            f"got estimator = {estimator!r}, paths = {paths!r}, seed = {seed!r}; must be one of "
+            f"{', '.join(get_args(Estimator))}, a whole number from {BATCHES} to {MAX_PATHS}, and one >= 0"
         )
 
 

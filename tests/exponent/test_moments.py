@@ -1,5 +1,8 @@
 """Λ at several p: failures and the root are values, and progress is reported once for each p."""
 
+from decimal import Decimal
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -57,3 +60,21 @@ def test_the_root_is_known_where_many_moments_are_interpolated(fig1_solver):
         assert pair.value == pytest.approx(value, rel=1e-8)
     assert solve_moments(fig1_solver, np.linspace(1, 6, 33)).root is None
     assert solve_moments(fig1_solver, [-1.0, 1.0]).root is None
+
+
+NO_NUMBERS = [
+    *("2", b"2", ["2"], 2j, [1, 2j], True, [True, 2], np.array([True]), None, [None], {1.0}, object(), 10**400),
+    *([], [[1.0, 2.0]], [[1], [1, 2]], np.inf, [np.nan], np.timedelta64(3), np.datetime64("2020-01-01")),
+    np.ma.array([1.0, 2.0], mask=[False, True]),
+]
+
+
+@pytest.mark.parametrize("p", NO_NUMBERS, ids=repr)
+def test_what_is_no_order_of_a_moment_is_refused_in_one_sentence(p):
+    with pytest.raises(ValueError, match=r"^p must be a finite number or a non-empty list of finite numbers, got .+$"):
+        moment_lyapunov(FIG1, WEAK_NOISE, p)
+
+
+@pytest.mark.parametrize("p", [1, (1.0,), np.float32(1), np.array(1), range(1, 2), [Fraction(1)], Decimal(1)], ids=repr)
+def test_all_real_numbers_are_orders_of_moments(p):
+    assert moment_lyapunov(FIG1, WEAK_NOISE, p).value == moment_lyapunov(FIG1, WEAK_NOISE, 1.0).value

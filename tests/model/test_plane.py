@@ -96,3 +96,14 @@ def test_a_problem_in_one_argument_or_two():
         parts(system, p=2.0)
     with pytest.raises(TypeError, match="as a noise"):
         parts(system, 2.0)
+    with pytest.raises(TypeError, match=r"got problem = 'x'; must be a Problem"):
+        parts(problem="x", p=2.0)
+
+
+@pytest.mark.parametrize("wrong", ["x", None, 2.0, VibroImpactOscillator, OrnsteinUhlenbeck], ids=repr)
+def test_problems_are_made_of_a_motion_and_a_noise(wrong):
+    noise = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=0.1)
+    for halves, kind in (((wrong, noise), "motion"), ((oscillator, wrong), "noise")):
+        with pytest.raises(TypeError, match=rf"^got .* as a {kind}; the first arguments must be an oscillator and"):
+            Problem(*halves)

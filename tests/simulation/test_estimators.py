@@ -251,13 +251,22 @@ def test_drift_is_noticed(monkeypatch):
         ({"paths": 10}, "32 to"),
         ({"seed": -1}, "seed = -1"),
         ({"estimator": "exact"}, "direct, population"),
-        ({"p": [math.nan]}, "must be finite"),
+        ({"paths": "64"}, "paths = '64', seed = 0; must be one of .* a whole number from 32 to"),
+        ({"seed": 1.5}, "seed = 1.5"),
+        ({"p": [math.nan]}, "p must be a finite number or a non-empty list of finite numbers"),
+        ({"p": ["2"]}, "p must be a finite number or a non-empty list of finite numbers"),
+        ({"p": np.ma.array([1.0, 2.0], mask=[False, True])}, "p must be a finite number"),
         ({"noise": NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.8)}, "must be finite"),
     ],
 )
 def test_bad_settings_are_refused(change, words):
     with pytest.raises(ValueError, match=words):
         simulate(**({"oscillator": MODERATE, "noise": NOISE, "p": [1.0]} | change))
+
+
+def test_a_single_order_may_stand_without_a_list():
+    settings = {"paths": 64, "time": 2 * transient(MODERATE, NOISE), "seed": 1}
+    assert simulate(MODERATE, NOISE, 0.5, **settings) == simulate(MODERATE, NOISE, [0.5], **settings)
 
 
 def test_damping_too_small_for_a_number_limits_no_step():
