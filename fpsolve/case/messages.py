@@ -75,6 +75,13 @@ def own_faults(error: ValidationError) -> Iterator[ErrorDetails]:
             yield detail
 
 
+def too_long(detail: Mapping[str, Any]) -> str:
+    """What to say of a list with too many entries; nothing of other faults."""
+    if detail["type"] != "too_long":
+        return ""
+    return f"lists {len(detail['input'])} numbers; must be at most {detail['ctx']['max_length']}; list fewer"
+
+
 def explain(error: ValidationError, model: Any) -> Iterator[tuple[Path, str, str]]:
     """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence."""
     for detail in own_faults(error):
@@ -96,6 +103,8 @@ def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
         return str(detail["msg"])
     if detail["type"] == "value_error":
         return str(detail["ctx"]["error"])
+    if detail["type"] == "too_long":
+        return too_long(detail)
     if detail["type"] in _UNKNOWN:
         fields = _model_and_field(path[:-1], model)[0].__pydantic_fields__
         known = list(fields)

@@ -6,7 +6,9 @@ What keys of the oscillator, the noise and the budget mean stands where these do
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -28,7 +30,7 @@ _SAME = 1e-12
 """p that differ by no more are one p; values of a varied key, relative to their size."""
 
 Values = tuple[float, ...]
-NonEmpty = Annotated[Values, Field(strict=False, min_length=1)]
+NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MOMENTS)]
 Text = Annotated[str, Field(min_length=1)]
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
@@ -116,13 +118,19 @@ class Moments(Section):
             return np.linspace(self.p.start, self.p.stop, self.p.num)
         return np.array(self.p)
 
+    @cached_property
+    def increasing(self) -> tuple[float, ...]:
+        """All p, sorted."""
+        return tuple(np.sort(self.values).tolist())
+
     def has(self, p: float) -> bool:
-        with np.errstate(over="ignore"):
-            return bool(np.any(np.abs(self.values - p) <= _SAME))
+        """Whether p is one of them."""
+        at = bisect_left(self.increasing, p)
+        return any(abs(each - p) <= _SAME for each in self.increasing[max(at - 1, 0) : at + 1])
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:
-        values = np.sort(self.values)
+        values = np.array(self.increasing)
         with np.errstate(over="ignore"):
             close = values[1:][np.diff(values) <= _SAME]
         if close.size:
@@ -206,13 +214,15 @@ class OutputSection(Section):
     """[output]: the p whose eigenfunctions are written; None is all of them."""
 
     eigenfunctions: Annotated[
-        Values | None, parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False)
+        Values | None,
+        parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False, max_length=MAX_MOMENTS),
     ] = None
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:
         wanted = self.eigenfunctions or ()
-        twice = ((i, p) for i, p in enumerate(wanted) if p in wanted[:i])
+        first = {p: i for i, p in reversed(list(enumerate(wanted)))}
+        twice = ((i, p) for i, p in enumerate(wanted) if first[p] != i)
         refuse((("eigenfunctions", i), p, f"got {p} twice; values must be distinct; remove one") for i, p in twice)
         return self
 

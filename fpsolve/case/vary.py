@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
-from fpsolve.case.messages import Refusal, nearest, own_faults, refuse
-from fpsolve.case.sections import Moments, NoiseSection, NonEmpty, Values, flat, same
+from fpsolve.case.messages import Refusal, nearest, own_faults, refuse, too_long
+from fpsolve.case.sections import MAX_MOMENTS, Moments, NoiseSection, NonEmpty, Values, flat, same
 from fpsolve.model.parameters import STRICT
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 
@@ -25,7 +26,10 @@ ABSCISSAE: Mapping[str, FieldInfo] = {"p": Moments.__pydantic_fields__["p"], **P
 """What a figure may have along its x-axis, each with its record."""
 VARIABLE: Mapping[str, TypeAdapter[Values]] = {
     key: TypeAdapter(
-        Annotated[tuple[Annotated[float, Field(), *field.metadata], ...], Field(strict=False, min_length=1)],
+        Annotated[
+            tuple[Annotated[float, Field(), *field.metadata], ...],
+            Field(strict=False, min_length=1, max_length=MAX_MOMENTS),
+        ],
         config=STRICT,
     )
     for key, field in PARAMETERS.items()
@@ -49,11 +53,11 @@ def _varied_refusals(key: str, values: Any) -> Iterator[Refusal]:
     try:
         numbers = VARIABLE[key].validate_python(values)
     except ValidationError as error:
-        yield from (((key, *detail["loc"]), detail["input"], "") for detail in own_faults(error))
+        yield from (((key, *detail["loc"]), detail["input"], too_long(detail)) for detail in own_faults(error))
         return
-    for i, number in enumerate(numbers):
-        if any(same(number, other) for other in numbers[:i]):
-            yield (key, i), number, f"got {number} twice; values must be distinct; remove one of them"
+    order = sorted(range(len(numbers)), key=numbers.__getitem__)
+    for i in sorted(max(pair) for pair in pairwise(order) if same(*(numbers[place] for place in pair))):
+        yield (key, i), numbers[i], f"got {numbers[i]} twice; values must be distinct; remove one of them"
 
 
 Vary = Annotated[dict[str, NonEmpty], BeforeValidator(_vary)]

@@ -6,6 +6,7 @@ import itertools
 import math
 import os
 import re
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -161,6 +162,7 @@ VALUES = [  # key, its bad line, what the message says
     ('vary."noise.D0"[1]', '"noise.D0" = [0.1, -1]', "got -1|>= 1e-15 and <= 1e15 (noise intensity, in 1/time)"),
     ('vary."noise.D0"[1]', '"noise.D0" = [0.1, inf]', "got inf|finite number >= 1e-15 and <= 1e15"),
     ('vary."noise.D0"[1]', '"noise.D0" = [0.1, 0.1]', "got 0.1 twice|distinct|remove"),
+    ('vary."noise.D0"[2]', '"noise.D0" = [0.3, 0.1, 0.3, 0.2]', "got 0.3 twice|distinct|remove"),
     ("mesh.phi_cells", "phi_cells = -2", "got -2|whole number >= 1|phi_cells = 2"),
     ("mesh.phi_cells", "phi_cells = 2.0", "got 2.0 (a number)|whole number >= 1|phi_cells = 2"),
     ("mesh.xi_cells", "xi_cells = 0", "got 0|whole number >= 1|xi_cells = 4"),
@@ -170,6 +172,7 @@ VALUES = [  # key, its bad line, what the message says
     ("figure.y", 'y = "stability_index"', 'got "stability_index"|"moment" where x = "p"|key of [vary]'),
     ("output.eigenfunctions", 'eigenfunctions = "all"', 'got "all" (a string)|list of finite'),
     ("output.eigenfunctions[1]", "eigenfunctions = [1, 3]", "got 3.0|among moments.p (3|add it"),
+    ("output.eigenfunctions[2]", "eigenfunctions = [1, 2, 1]", "got 1.0 twice|distinct|remove one"),
     ("output.eigenfunctions[1]", "eigenfunctions = [1, 1]", "got 1.0 twice|distinct|remove one"),
     ("expect[0].quantity", 'quantity = "variance"', 'got "variance"|you mean "variance_rate"?'),
     ("expect[0].p", "p = 7.0", "got 7.0|among moments.p|add it there"),
@@ -381,6 +384,35 @@ def test_too_many_curves(tmp_path: Path) -> None:
     text = edited('"oscillator.omega" = [1.0, 2.0]', f'"oscillator.omega" = {list(range(1, 6001))}')
     message = only_message(write(tmp_path, text))
     assert "vary: makes 12000 curves; must be at most 10000; list fewer values" in message
+
+
+TOO_MANY = f"[{', '.join(f'0.{i:06}' for i in range(1, 100_002))}]"
+
+
+@pytest.mark.parametrize(
+    ("key", "old", "new"),
+    [
+        ("moments.p", "p = [-1.0, 1.0, 2.0]", f"p = {TOO_MANY}"),
+        ('vary."noise.D0"', '"noise.D0" = [0.1, 0.5]', f'"noise.D0" = {TOO_MANY}'),
+        ("output.eigenfunctions", "eigenfunctions = [1.0]", f"eigenfunctions = {TOO_MANY}"),
+        ("monte_carlo.p", "[budget]", f"[monte_carlo]\np = {TOO_MANY}\n[budget]"),
+    ],
+    ids=["moments", "vary", "output", "monte_carlo"],
+)
+def test_too_long_a_list(tmp_path: Path, key: str, old: str, new: str) -> None:
+    fault = next(fault for fault in faults_of(write(tmp_path, edited(old, new))) if fault.key == key)
+    assert fault.sentence == "lists 100001 numbers; must be at most 100000; list fewer"
+    assert fault.line
+
+
+def test_the_longest_lists_take_no_longer_than_reading_them(tmp_path: Path) -> None:
+    """Within seconds; comparing all pairs would take minutes."""
+    longest = TOO_MANY.replace(", 0.100001", "")
+    text = GOOD[: GOOD.index("[vary]")].replace("p = [-1.0, 1.0, 2.0]", f"p = {longest}")
+    started = time.process_time()
+    case = load_case(write(tmp_path, f"{text}[output]\neigenfunctions = {longest}\n"))
+    assert time.process_time() - started < 20
+    assert case.p.size == len(case.output.eigenfunctions or ()) == 100_000
 
 
 @pytest.mark.parametrize(

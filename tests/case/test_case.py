@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from fpsolve.case.case import Case, load_case
 from fpsolve.case.curves import Curve
+from fpsolve.case.sections import Moments
 from fpsolve.case.toml import read_document
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.mesh_file import write_mesh
@@ -363,3 +364,13 @@ def test_every_key_of_a_shipped_case_is_on_its_line(path: Path) -> None:
         assert isinstance(place, int)
         name = next(part for part in reversed(leaf) if not part.isdigit())
         assert re.search(rf'\b{re.escape(name)}"? =', lines[place - 1]) or leaf[-1].isdigit()
+
+
+def test_moments_know_their_orders() -> None:
+    moments = Moments(p=(3.0, 1.0))
+    assert [moments.has(p) for p in (1.0, 3.0, 3 + 5e-13, 3 - 5e-13, 3 + 2e-12, 2.0, -1e308, 1e308)] == [True] * 4 + [
+        False
+    ] * 4
+    assert moments == Moments(p=(3.0, 1.0))
+    assert moments != Moments(p=(1.0, 3.0))
+    assert hash(moments) == hash(Moments(p=(3.0, 1.0)))
