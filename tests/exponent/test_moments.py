@@ -63,7 +63,7 @@ def test_the_root_is_known_where_many_moments_are_interpolated(fig1_solver):
 
 
 NO_NUMBERS = [
-    *("2", b"2", ["2"], 2j, [1, 2j], True, [True, 2], np.array([True]), None, [None], {1.0}, object(), 10**400),
+    *("2", b"2", ["2"], 2j, [1, 2j], True, [True, 2], np.array([True]), None, [None], {1.0}, len, 10**400),
     *([], [[1.0, 2.0]], [[1], [1, 2]], np.inf, [np.nan], np.timedelta64(3), np.datetime64("2020-01-01")),
     np.ma.array([1.0, 2.0], mask=[False, True]),
 ]
