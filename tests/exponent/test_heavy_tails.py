@@ -119,7 +119,7 @@ def test_killed_paths_are_a_lower_bound():
 def test_convex_and_continuous_over_the_change_of_place():
     """The place near 0, λp + ½Λ″p², carries large |p|, the one far out, Kp², the rest; λ > 0 is not the slope at 0."""
     case, p = problem(0.5, 1.0, 1.1, 0.5), np.linspace(-0.9, 0.0, 50)
-    result = moment_lyapunov(case, p)
+    result = moment_lyapunov(case, p, rtol=1e-6)
     solver, value, error = result.solver, result.value, result.error_estimate
     far = np.array([solver.far.holds(solver.pair(each)) for each in p])
     exponent, variance = solver.lyapunov_exponent(), solver.variance_rate()
@@ -220,6 +220,6 @@ def test_the_variance_of_the_growth_is_infinite_for_the_heaviest_tails():
     with pytest.raises(NoSuchExponent, match="the variance of ln ‖x‖ grows faster than time"):
         ExponentSolver(problem(0.5, 1.0, 1.45, 0.3), rtol=1e-5).variance_rate()
     found = ExponentSolver(problem(0.5, 1.0, 1.3, 0.3), rtol=1e-6).variance_rate()
-    wide = make_mesh(phi_cells=8, phi_degree=8, xi_cells=24, xi_degree=6, xi_min=-80, xi_max=80, grading=1.2)
+    wide = make_mesh(phi_cells=8, phi_degree=6, xi_cells=20, xi_degree=6, xi_min=-80, xi_max=80, grading=1.2)
     better = ExponentSolver(problem(0.5, 1.0, 1.3, 0.3), wide).variance_rate()
     assert abs(found.value - better.value) < found.error_estimate
