@@ -15,7 +15,7 @@ from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import doubled, first, first_far, refined
-from fpsolve.exponent.rival import rival
+from fpsolve.exponent.rival import comparable, rival
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Discretisation
@@ -27,8 +27,6 @@ from fpsolve.theory.frozen import frozen_noise
 MAX_STAGES = 30
 WORTH_A_TRY = MAX_DENSE_UNKNOWNS
 """Unknowns of a system that takes less time than finding another one."""
-COMPARABLE = 0.6
-"""Places far out are solved that grow at this share of the best, by their rate for noise that rests."""
 MOST_RESCALING = 0.1
 """Of ln |p|, on which the place far out depends, for one discretisation."""
 MOST_TILT_AWAY = 0.7
@@ -101,8 +99,8 @@ def resolve_far(
     """
     meter = _Meter(problem.noise, p, budget)
     places = far_places(problem, p)
-    best = max(place.rate for place in places)
-    wanted = [place for place in places if place.rate > best - (1 - COMPARABLE) * abs(best)]
+    enough = comparable(max(place.rate for place in places))
+    wanted = [place for place in places if place.rate > enough]
     if start is not None and len(wanted) == 1:
         return _search(problem, start, tolerance, meter)
     found = (_search(problem, first_far(problem, place, rtol), tolerance, meter) for place in wanted)

@@ -29,13 +29,13 @@ def rival(pair: PrincipalPair) -> float | None:
     if z.size < 2:
         return None
     mean, width = _where(pair)
-    far = (np.abs(z - mean) > 3 * width + 2) & (rate > _enough(pair.value))
+    far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
     return float(z[far][np.argmax(rate[far])]) if np.any(far) else None
 
 
 def far_rivals(pair: PrincipalPair) -> list[Place]:
     """The other places of algebraic tails where paths that hold the noise grow about as fast as that of a pair."""
-    places = [place for place in far_places(pair.generator.problem, pair.p) if place.rate > _enough(pair.value)]
+    places = [place for place in far_places(pair.generator.problem, pair.p) if place.rate > comparable(pair.value)]
     mean = _where(pair)[0] if places else 0.0
     return [place for place in places if not place.lower <= mean <= place.upper]
 
@@ -47,5 +47,6 @@ def _where(pair: PrincipalPair) -> tuple[float, float]:
     return mean, math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
 
 
-def _enough(value: float) -> float:
+def comparable(value: float) -> float:
+    """The growth rate from which on a place may outdo one with a value."""
     return value - (1 - RIVAL) * abs(value)

@@ -157,10 +157,6 @@ class ExponentSolver:
             near = self.near.solution(p, tolerance)
         return max((each for each in (near, far) if each), key=lambda each: each.pair.value)
 
-    def largest(self) -> tuple[float, Generator] | None:
-        """The p of the largest size that was solved, and with what; None where none was."""
-        return self.near.largest()
-
     @cached_property
     def scales(self) -> Scale:
         """What errors are measured by: the sizes of the terms of Eq. (37) before they cancel."""

@@ -107,7 +107,7 @@ def _solve_curve(
         estimates=estimates,
         eigenpairs=pairs,
         stationary=None if lost else stationary,
-        discretisation=None if (used := solver.largest()) is None else _discretisation(*used),
+        discretisation=None if (used := solver.near.largest()) is None else _discretisation(*used),
         warnings=tuple(map(in_words_of_a_case, warnings)),
         notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]))),
         failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -58,6 +59,18 @@ def far_places(problem: Problem, p: float) -> list[Place]:
     So Λ has no second root. Where λ, the rate of almost every path, is positive, it is not Λ′(0⁻), which is then 0. And
     e^{Λt} shows up only once the rare paths count, after ln(1/P) over the difference of the rates.
     """
+    try:
+        return _kept(problem, p)
+    except TypeError:  # a motion or a noise of the user's own that cannot be hashed
+        return _far_places(problem, p)
+
+
+@lru_cache(maxsize=64)
+def _kept(problem: Problem, p: float) -> list[Place]:
+    return _far_places(problem, p)
+
+
+def _far_places(problem: Problem, p: float) -> list[Place]:
     frozen = frozen_noise(problem)
     if p == 0 or frozen is None or not has_algebraic_tails(problem.noise):
         return []
