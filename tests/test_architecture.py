@@ -10,7 +10,7 @@ import fpsolve
 
 ROOMS = {
     "": ["errors", "arrays", "files", "process"],
-    "model": ["parameters", "plane", "noise", "markov_chain", "vibro_impact", "problem"],
+    "model": ["parameters", "plane", "noise", "markov_chain", "vibro_impact", "problem", "direction"],
     "theory": ["perturbation", "frozen", "far", "validity"],
     "fem": [
         *("reference", "line", "polynomials", "mesh", "mesh_file", "phase_space", "noise_space", "space"),
@@ -18,10 +18,10 @@ ROOMS = {
     ],
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
     "exponent": [
-        *("rounding", "eigen", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
+        *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
         *("function", "moments", "quantities"),
     ],
-    "analysis": ["density"],
+    "analysis": ["density", "sensitivity"],
     "case": ["toml", "messages", "sections", "vary", "curves", "remedies", "refusals", "case"],
     "study": ["results", "solve", "simulate"],
     "output": ["vtk", "tables", "plots", "figures", "terminal"],

@@ -143,7 +143,7 @@ class ModeEffects:
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects, ModeEffects | None]:
     """The effects along φ, and along ξ unless that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
-    operator = pair.generator.matrix(pair.p, shift=pair.value)
+    operator = pair.generator.matrix(pair.p).shifted(pair.value)
     tables = space.table(pair.right), space.table(pair.left)
     found: list[ModeEffects | None] = []
     lines: tuple[PhaseSpace | NoiseSpace, ...] = (space.phi, space.xi)

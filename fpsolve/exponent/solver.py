@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray, real_numbers
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.bordered import second_derivative, slope_rounding
 from fpsolve.exponent.branch import Branch, Tolerance
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair, second_derivative, slope_rounding
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Estimate, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.refine import WIDER, widened
@@ -220,15 +221,15 @@ class ExponentSolver:
                 "Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time"
             )
         pair, scale = self.near.solution(0.0).pair, 2 * self.scales.quadratic
-        finer = self._finer(pair)
+        finer = self.finer(pair)
         value, better = second_derivative(pair), second_derivative(finer)
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
         beyond = max(1.0, 1 / math.expm1(tail * math.log(WIDER)))  # what is left, over what the wider one has added
         error = beyond * abs(better - value) + rounding
         return checked("Λ″(0)", Estimate(better, error, scale), self.near.remedy)
 
-    def _finer(self, pair: PrincipalPair) -> PrincipalPair:
-        """That of a finer and wider discretisation. Raises `NotConverged`."""
+    def finer(self, pair: PrincipalPair) -> PrincipalPair:
+        """That at p = 0 of a finer and wider discretisation. Raises `NotConverged`."""
         try:
             generator = Generator(self.problem, widened(pair.generator).enriched())
         except MeshError as failure:
