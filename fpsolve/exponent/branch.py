@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cache, cached_property
 
@@ -42,15 +42,17 @@ class Branch:
         budget: what the choice of a discretisation may cost.
         tolerance: the usual one.
         is_far: whether it is that of the places far out of algebraic tails.
+        starts: solutions of a problem with parameters close by, by their p.
     """
 
     problem: Problem
-    mesh: CylinderMesh | None
     _: KW_ONLY
+    mesh: CylinderMesh | None = None
     rtol: float
     budget: Budget
     tolerance: Tolerance
     is_far: bool = False
+    starts: Mapping[float, Solution] = field(default_factory=dict)
     _known: dict[float, Solution] = field(init=False, default_factory=dict)
     _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
 
@@ -93,6 +95,10 @@ class Branch:
         """Whether a pair is one of this branch."""
         return pair.p in self._known and self._known[pair.p].pair is pair
 
+    def known(self) -> Mapping[float, Solution]:
+        """What was solved, by p."""
+        return dict(self._known)
+
     def largest(self) -> tuple[float, Generator] | None:
         """The p of the largest size that was solved, and with what; None where none was."""
         p = max(self._known, key=abs, default=None)
@@ -116,9 +122,10 @@ class Branch:
             return Solution(pair, principal_pair(fine, p, start=pair))
         if abs(p) < SMALL_P and not self.is_far:
             return self._tried(self.near_zero(p, tolerance).pair.generator, p)
-        start = self._from_nearest(p, tolerance)
-        if start is not None and self._meets(start, tolerance) and rival(start.pair) is None:
-            return start
+        for tried in (self._from_start, self._from_nearest):
+            start = tried(p, tolerance)
+            if start is not None and self._meets(start, tolerance) and rival(start.pair) is None:
+                return start
         return (resolve_far if self.is_far else resolve)(
             self.problem,
             p,
@@ -144,6 +151,16 @@ class Branch:
         try:
             return self._tried(generator, p) if fits(generator, nearest, p) else None
         except NotConverged:
+            return None
+
+    def _from_start(self, p: float, tolerance: Tolerance) -> Solution | None:
+        """The solution at p with what was chosen for it in the problem close by, or None."""
+        if p not in self.starts:
+            return None
+        start = self.starts[p].pair
+        try:
+            return Solution(principal_pair(Generator(self.problem, start.generator.chosen), p, start=start))
+        except (NotConverged, MeshError):
             return None
 
     def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Generator:

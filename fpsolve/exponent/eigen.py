@@ -165,6 +165,8 @@ def _carried(pairs: Sequence[PrincipalPair], p: float, generator: Generator) -> 
     kept = [pair for pair in pairs if pair.generator is generator]
     if not kept:
         nearest, space = min(pairs, key=lambda pair: abs(pair.p - p)), generator.space(p)
+        if nearest.generator.chosen is generator.chosen:  # the same functions, of a problem close by
+            return nearest.right, nearest.left
         return space.carry(nearest.right, nearest.space), space.carry(nearest.left, nearest.space)
     nodes = np.array([pair.p for pair in kept])
     weights = np.array([math.prod((p - q) / (node - q) for q in nodes if q != node) for node in nodes])

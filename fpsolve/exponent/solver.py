@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -89,7 +89,7 @@ class MomentLyapunov:
 
     def forgetful(self) -> MomentLyapunov:
         """The same numbers, without the eigenfunctions that the solver keeps."""
-        return replace(self, solver=replace(self.solver))
+        return replace(self, solver=replace(self.solver, starts={}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +101,7 @@ class ExponentSolver:
         mesh: a mesh for all p; None chooses a discretisation for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a discretisation may cost.
+        starts: solutions of a problem with parameters close by, by their p, see `Branch.known`.
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
@@ -112,6 +113,7 @@ class ExponentSolver:
     _: KW_ONLY
     rtol: float = 1e-8
     budget: Budget = field(default_factory=Budget)
+    starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.problem.noise.standard_deviation):
@@ -133,7 +135,8 @@ class ExponentSolver:
 
     def _branch(self, is_far: bool) -> Branch:
         chosen = {"rtol": self.rtol, "budget": self.budget, "tolerance": self.tolerance}
-        return Branch(self.problem, None if is_far else self.mesh, is_far=is_far, **chosen)  # type: ignore[arg-type]
+        own = {} if is_far else {"mesh": self.mesh, "starts": self.starts}
+        return Branch(self.problem, is_far=is_far, **own, **chosen)  # type: ignore[arg-type]
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
