@@ -18,6 +18,7 @@ from fpsolve.exponent.refine import refined
 from fpsolve.exponent.rival import rival
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.space import Discretisation
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem
 
@@ -147,7 +148,10 @@ class Branch:
         nearest = min(self._known, key=lambda q: abs(q - p), default=None)
         if nearest is None:
             return None
-        generator = self._trimmed(self._known[nearest], tolerance)
+        solution = self._known[nearest]
+        chosen, generator = self._trimmed(solution, tolerance), solution.pair.generator
+        if chosen is not generator.chosen:
+            generator = Generator(self.problem, chosen)
         try:
             return self._tried(generator, p) if fits(generator, nearest, p) else None
         except NotConverged:
@@ -157,20 +161,20 @@ class Branch:
         """The solution at p with what was chosen for it in the problem close by, or None."""
         if p not in self.starts:
             return None
-        start = self.starts[p].pair
+        chosen = self._trimmed(self.starts[p], tolerance)
         try:
-            return Solution(principal_pair(Generator(self.problem, start.generator.chosen), p, start=start))
+            return Solution(principal_pair(Generator(self.problem, chosen), p, start=self.starts[p].pair))
         except (NotConverged, MeshError):
             return None
 
-    def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Generator:
-        """The generator of a solution, or a much smaller one that would do."""
-        pair, size = solution.pair, solution.pair.generator.size
-        if abs(pair.p) < SMALL_P or size <= WORTH_A_TRY:
-            return pair.generator
+    def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Discretisation:
+        """That of a solution, or a much smaller one that would do."""
+        pair, chosen = solution.pair, solution.pair.generator.chosen
+        if abs(pair.p) < SMALL_P or pair.generator.size <= WORTH_A_TRY:
+            return chosen
         smaller = refined(solution, tolerance(pair.p, pair.value), 0)
-        is_better = smaller.unknowns(self.problem.noise) <= TRIM * size
-        return Generator(self.problem, smaller) if is_better else pair.generator
+        is_better = smaller.unknowns(self.problem.noise) <= TRIM * pair.generator.size
+        return smaller if is_better else chosen
 
     def _tried(self, generator: Generator, p: float) -> Solution:
         """The solution at p with a generator, from those around p, or from the nearest one."""

@@ -204,7 +204,7 @@ class ExponentSolver:
 
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
-        value, _, error = self.ratio(0.0)
+        value, error = self.ratio_alone(0.0)
         meaning = ALMOST_EVERY if grows_far_out(self.problem) else ""
         return checked("λ", Estimate(value, error, self.scales.linear, meaning), self.near.remedy)
 
@@ -240,19 +240,25 @@ class ExponentSolver:
         return principal_pair(generator, pair.p, start=pair)
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
-        """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0.
+        """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""
+        value, error = self.ratio_alone(p, tolerance)
+        if abs(p) < TINY_P:
+            return value, 0.5 * second_derivative(self.near.solution(p * 0.5, tolerance).pair), error
+        return value, (self.near.solution(p, tolerance).pair.derivative - value) / p, error
+
+    def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
+        """Λ(p)/p and its error.
 
         Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss; its error is that at p = ±`SMALL_P`.
         """
         if abs(p) >= TINY_P:
             solution = self.near.solution(p, tolerance)
-            value = solution.pair.value / p
-            return value, (solution.pair.derivative - value) / p, solution.error / abs(p)
+            return solution.pair.value / p, solution.error / abs(p)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.near.solution(point, tolerance).pair for point in points]
         near = self.near.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
-        return float(np.mean([pair.derivative for pair in pairs])), 0.5 * second_derivative(pairs[0]), error
+        return float(np.mean([pair.derivative for pair in pairs])), error
 
     def _result(self, solutions: Sequence[Solution], failures: Sequence[Failure]) -> MomentLyapunov:
         pairs = tuple(solution.pair for solution in solutions)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -131,3 +131,38 @@ def _curvature_of_log(q: FloatArray) -> FloatArray:
     series = np.polynomial.polynomial.polyval(q, (-1.0) ** n * (1 - 1 / n))
     far = np.where(np.abs(q) < _SMALL, 1.0, q)
     return np.where(np.abs(q) < _SMALL, series, (np.log1p(far) - far / (1 + far)) / far**2)
+
+
+@dataclass(frozen=True)
+class Family:
+    """The problems that differ from one in the values of their parameters.
+
+    Attributes:
+        problem: one of them.
+        original: the noise of Eq. (7) that its noise is the reduction (12)-(14) of; None where it is none.
+    """
+
+    problem: Problem
+    original: NonGaussianNoise | None = None
+
+    def directions(self) -> Mapping[str, Direction]:
+        """Those of the parameters that it has, by their keys."""
+        return directions(self.problem, self.original)
+
+    def at(self, values: Mapping[str, float]) -> Family:
+        """The one with these values of some parameters, by keys such as "oscillator.omega".
+
+        Raises:
+            ValueError: a value is out of range.
+        """
+        halves = {"oscillator": self.problem.system, "noise": self.original or self.problem.noise}
+        for half, old in halves.items():
+            new = {key.partition(".")[2]: value for key, value in values.items() if key.startswith(f"{half}.")}
+            if new:
+                halves[half] = replace(old, **new)  # type: ignore[type-var]
+        if self.original is None:
+            return Family(Problem(**dict(zip(("system", "noise"), halves.values(), strict=True))))  # type: ignore[arg-type]
+        original: NonGaussianNoise = halves["noise"]  # type: ignore[assignment]
+        is_reduced = isinstance(self.problem.noise, OrnsteinUhlenbeck)
+        noise = original.ou_reduction() if is_reduced else original
+        return Family(Problem(halves["oscillator"], noise), original)  # type: ignore[arg-type]
