@@ -219,6 +219,31 @@ def test_signals_end_a_run_as_ctrl_c_does(case, tmp_path, name):
     assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
 
 
+SIGNAL_IN_VTK = """
+import signal, sys
+from fpsolve.cli import main
+
+def interrupt(frame, *_):
+    if "/vtkmodules/" in frame.f_code.co_filename and frame.f_code.co_name == "on_vtk_module_init":
+        sys.setprofile(None)
+        signal.raise_signal(int(sys.argv[1]))
+
+sys.setprofile(interrupt)
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGHUP", "SIGTERM", "SIGINT"])
+def test_a_signal_while_vtk_is_loaded_ends_a_run_in_order(case, tmp_path, name):
+    """Its compiled modules crash where a signal raises an exception in their initialisation."""
+    number = getattr(signal, name)
+    command = [sys.executable, "-c", SIGNAL_IN_VTK, str(int(number)), "run", case]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 128 + number
+    assert done.stderr == "interrupted after 0 of 2 curves; run it again to start over\n"
+    assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
+
+
 def test_an_ignored_signal_stays_ignored(case):
     """So that nohup works."""
     with begin(case, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as process:

@@ -27,6 +27,7 @@ from fpsolve.fem.phase_space import PhaseSpace
 from fpsolve.files import atomic, write_text
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import has_algebraic_tails
+from fpsolve.process import signals_held
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 MAX_ORDER = 4
@@ -108,11 +109,10 @@ def write_curve(result: CurveResult, folder: Path) -> None:
 
 def write_response(simulated: SimulatedCurve, folder: Path) -> None:
     """Write the joint density of x and ẋ, if there is one, as cell data `density` of response.vti."""
-    import pyvista
-
     response = simulated.response
     if response is None:
         return
+    pyvista, _ = _libraries()
     path, x, v = folder / f"response{simulated.curve.suffix}.vti", response.x_edges, response.v_edges
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
     grid = pyvista.ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
@@ -258,9 +258,7 @@ def _vtk_order(k: int) -> list[tuple[int, int]]:
 
 def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes), and the first is shown first."""
-    import pyvista
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
-
+    pyvista, writers = _libraries()
     connectivity = grid.cells()
     count, size = connectivity.shape
     cells = np.column_stack([np.full(count, size), connectivity]).ravel()
@@ -271,11 +269,19 @@ def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: 
     for name, value in facts.items():
         output.field_data[name] = [value]
     output.GetPointData().SetActiveScalars(next(iter(data)))
-    writer = vtkXMLUnstructuredGridWriter()
+    writer = writers.vtkXMLUnstructuredGridWriter()
     writer.SetInputData(output)
     writer.WriteToOutputStringOn()
     writer.Write()
     write_text(path, writer.GetOutputString())
+
+
+def _libraries() -> tuple[Any, Any]:
+    """pyvista and the writers of VTK, whose import no signal interrupts; it takes half a second."""
+    with signals_held():
+        import pyvista
+        from vtkmodules import vtkIOXML
+    return pyvista, vtkIOXML
 
 
 def _collection(names: Mapping[float, str]) -> str:

@@ -88,6 +88,12 @@ def test_monte_carlo_json(case, out, capsys):
     assert sorted(path.name for path in (out / "quick").iterdir()) == ["monte_carlo.json"]
 
 
+def test_vtk_is_not_loaded_where_there_is_no_response(case, out, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    assert simulate(case, "--out", out, *QUICK) == 0
+    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+
+
 def test_options_replace_those_of_the_case(case, out):
     options = ["--paths", "640", "--time", "50", "--seed", "3", "--estimator", "population"]
     assert simulate(case, "--out", out, *options) == 0
