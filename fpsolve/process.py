@@ -15,16 +15,18 @@ ENDING = ("SIGHUP", "SIGTERM")
 
 @contextmanager
 def ended_by_signals() -> Iterator[list[int]]:
-    """In the body SIGHUP and SIGTERM raise KeyboardInterrupt, as Ctrl-C does; gives the list of those that came.
+    """In the body SIGHUP or SIGTERM raises KeyboardInterrupt, as Ctrl-C does; gives a list, with the one that came.
 
-    A signal that is ignored, as SIGHUP under nohup, or that the caller handles is left alone; so are all outside of the
-    main thread, which alone receives them.
+    Later ones change nothing, so that what the first ends can be written and said. A signal that is ignored, as SIGHUP
+    under nohup, or that the caller handles is left alone; so are all outside of the main thread, which alone receives
+    them.
     """
     received: list[int] = []
 
     def interrupt(number: int, _: Any) -> None:
-        received.append(number)
-        raise KeyboardInterrupt
+        if not received:
+            received.append(number)
+            raise KeyboardInterrupt
 
     known = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
     is_main = threading.current_thread() is threading.main_thread()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fpsolve import cli
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.output.terminal import digits
@@ -217,6 +218,19 @@ def test_signals_end_a_run_as_ctrl_c_does(case, tmp_path, name):
     assert "interrupted" in err
     assert "Traceback" not in err
     assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
+
+
+def test_a_second_signal_does_not_hinder_the_message(case, capsys, monkeypatch):
+    original = cli._print_error
+
+    def interrupted(text):
+        signal.raise_signal(signal.SIGHUP)
+        original(text)
+
+    monkeypatch.setattr(solve, "_solve_curve", lambda *_: signal.raise_signal(signal.SIGTERM))
+    monkeypatch.setattr(cli, "_print_error", interrupted)
+    assert main(["run", case]) == 128 + signal.SIGTERM
+    assert capsys.readouterr().err == "interrupted after 0 of 2 curves; run it again to start over\n"
 
 
 SIGNAL_IN_VTK = """

@@ -5,7 +5,18 @@ import threading
 
 import pytest
 
-from fpsolve.process import signals_held
+from fpsolve.process import ended_by_signals, signals_held
+
+
+def test_only_the_first_signal_that_ends_interrupts():
+    with ended_by_signals() as received:
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGHUP)
+        signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert received == [signal.SIGTERM]
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
