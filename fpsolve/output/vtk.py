@@ -24,7 +24,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import Fields, fields, xi_marginal
 from fpsolve.fem.noise_space import LineNoiseSpace, Samples
 from fpsolve.fem.phase_space import PhaseSpace
-from fpsolve.files import atomic, write_text
+from fpsolve.files import write_text
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.process import signals_held
@@ -112,13 +112,12 @@ def write_response(simulated: SimulatedCurve, folder: Path) -> None:
     response = simulated.response
     if response is None:
         return
-    pyvista, _ = _libraries()
+    pyvista, writers = _libraries()
     path, x, v = folder / f"response{simulated.curve.suffix}.vti", response.x_edges, response.v_edges
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
     grid = pyvista.ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
     grid.cell_data["density"] = response.density.ravel(order="F")
-    with atomic(path) as temporary:
-        grid.save(temporary)
+    _write_vtk(path, writers.vtkXMLImageDataWriter(), grid)
 
 
 def copy_show_script(directory: Path) -> Path:
@@ -269,8 +268,12 @@ def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: 
     for name, value in facts.items():
         output.field_data[name] = [value]
     output.GetPointData().SetActiveScalars(next(iter(data)))
-    writer = writers.vtkXMLUnstructuredGridWriter()
-    writer.SetInputData(output)
+    _write_vtk(path, writers.vtkXMLUnstructuredGridWriter(), output)
+
+
+def _write_vtk(path: Path, writer: Any, data: Any) -> None:
+    """Write what a writer of VTK makes of data; as a text, for VTK itself is silent about a full disk."""
+    writer.SetInputData(data)
     writer.WriteToOutputStringOn()
     writer.Write()
     write_text(path, writer.GetOutputString())
