@@ -61,7 +61,7 @@ class NoiseSection(Section):
 
     D0: Intensity
     tau0: CorrelationTime
-    r0: Annotated[Departure, Field(lt=5 / 3)]
+    r0: Annotated[Departure, Field(lt=math.nextafter(5 / 3, 0))]  # at which 5 - 3 r0 is 0 already
     treatment: Annotated[
         Literal["ou-reduction", "exact"], parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"')
     ] = "ou-reduction"
