@@ -170,7 +170,7 @@ def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedC
             write_simulation(case, each, folder)
             write_response(each, folder)
             draw_response(case, each, folder)
-    return simulated[-1].interrupted or len(simulated) < len(case.curves())
+    return simulated[-1].interrupted or len(simulated) < case.planned
 
 
 @contextmanager
@@ -195,8 +195,7 @@ def _saying_if_interrupted(what_is_kept: Callable[[], str]) -> Iterator[None]:
 
 def _kept(case: Case, done: Sequence[CurveResult] | Sequence[SimulatedCurve], folder: Path) -> str:
     """How many curves of a case are done, and where these are."""
-    planned = len(case.curves())
-    count = f" after {len(done)} of {planned} curve{'s' if planned > 1 else ''}"
+    count = f" after {len(done)} of {case.planned} curve{'s' if case.planned > 1 else ''}"
     return f"{count}; what was done is kept in {folder}" if done else count
 
 

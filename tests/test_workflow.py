@@ -14,6 +14,7 @@ import pytest
 import fpsolve
 from fpsolve.errors import CaseError, NotConverged, OutputError
 from fpsolve.files import alone
+from fpsolve.output.tables import write_results
 from fpsolve.study.solve import UNRESOLVED, compare, solve_curves, solving_work
 from fpsolve.workflow import Watch, check_case, run_case, simulate_case
 
@@ -81,6 +82,14 @@ def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
         assert curve["warnings"] == []
     assert summary["curves"][1]["moments"][0]["value"] == pytest.approx(0.0141631436533, rel=1e-10)
     assert summary["curves"][1]["moments"][0]["perturbation"] == pytest.approx(0.014149421727, rel=1e-10)
+
+
+def test_writing_tables_makes_no_curves(case, tmp_path, monkeypatch):
+    """There may be many, and the tables are written after each."""
+    monkeypatch.setattr("fpsolve.case.case.make_curve", None)
+    write_results(case, [], tmp_path / "out")
+    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 0)
 
 
 def test_table_holds_every_curve_and_moment(case, tmp_path):

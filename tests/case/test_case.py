@@ -56,6 +56,7 @@ def test_shipped_case_loads(path: Path) -> None:
     assert case.path == path
     assert case.expect
     assert all(curve.varied.keys() == case.vary.keys() for curve in case.curves())
+    assert case.planned == len(case.curves())
 
 
 CAPTIONS: dict[str, dict[str, float]] = {
