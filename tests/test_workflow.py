@@ -12,7 +12,10 @@ import numpy as np
 import pytest
 
 import fpsolve
+from fpsolve.analysis import stationary_density
+from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import CaseError, NotConverged, OutputError
+from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
 from fpsolve.output.tables import write_results
 from fpsolve.study.solve import UNRESOLVED, compare, solve_curves, solving_work
@@ -372,3 +375,19 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
     told = [text for text in result.warnings if "do not read its picture" in text]
     assert len(told) == sum(defect > UNRESOLVED for defect in pair.sign_defects) == 1
     assert min(pair.sign_defects) < 1e-4
+
+
+@pytest.mark.parametrize("intensity", [4.0, 15.0])
+def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
+    """Of files that are not written nothing else is said."""
+    sets = ["oscillator.epsilon=2.0", "noise.tau0=20.0", f'vary={{"noise.D0"=[{intensity}]}}', "moments.p=[0.0]"]
+    mesh = "mesh={phi_cells=1, xi_cells=2, phi_degree=8, xi_degree=8}"
+    case = write(tmp_path, TEXT, [*sets, "output.eigenfunctions=[0.0]", mesh])
+    (curve,) = case.curves()
+    with pytest.raises(NotConverged, match=r"\d% of it is negative") as refused:
+        stationary_density(ExponentSolver(curve.problem, case.cylinder_mesh()).pair(0.0))
+    (result,) = fpsolve.run(case, tmp_path / "out")
+    reason = in_words_of_a_case(str(refused.value))
+    assert f"neither the stationary density nor eigenfunctions are written: {reason}" in result.warnings
+    assert "do not read its picture" not in " ".join(result.warnings)
+    assert not list((tmp_path / "out").rglob("*.vtu"))

@@ -111,6 +111,6 @@ def test_a_density_that_is_none_is_not_written(tmp_path, capsys):
         encoding="utf-8",
     )
     assert main(["run", str(path), "--out", str(tmp_path)]) == 0
-    assert "the stationary density is not resolved" in " ".join(capsys.readouterr().err.split())
+    assert "the stationary density at p = 0 is not resolved" in " ".join(capsys.readouterr().err.split())
     assert (tmp_path / "slow" / "summary.json").exists()
     assert not list((tmp_path / "slow").rglob("*.vtu"))
