@@ -10,7 +10,7 @@ from numpy.polynomial import Chebyshev
 from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, real_array
 from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
@@ -155,7 +155,7 @@ class MomentLyapunovFunction:
         return nonzero_root(self.solver, search, self.root()) or Absent(no_root(self.solver.problem, search))
 
     def _inside(self, p: ArrayLike) -> FloatArray:
-        points = np.asarray(p, dtype=float)
+        points = real_array(p, "p")
         low, high = self.interval
         slack = 1e-9 * (high - low)
         if not np.all((points >= low - slack) & (points <= high + slack)):

@@ -67,7 +67,7 @@ def solve_moments(
     Raises:
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
-    asked = checked_moments(p, solver.problem) if np.size(p) else np.zeros(0)
+    asked = checked_moments(p, solver.problem, may_be_empty=True)
     points, reports = _each_once(asked), repeat(progress, asked.size)
 
     def report() -> None:

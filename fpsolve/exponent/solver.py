@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_numbers
+from fpsolve.arrays import FloatArray, real_number, real_numbers
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.branch import Branch, Tolerance
@@ -145,6 +145,7 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite.
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
         """
+        p = real_number(p, "p")
         refuse_infinite(self.problem, p)
         if self.mesh is not None or p == 0 or not has_algebraic_tails(self.problem.noise):
             return self.near.solution(p, tolerance)  # on a given mesh `misplaced` warns of other places
@@ -181,7 +182,7 @@ class ExponentSolver:
         Raises:
             NoSuchExponent: Λ(p) is infinite for one of the p.
         """
-        points = checked_moments(p, self.problem) if np.size(p) else np.zeros(0)
+        points = checked_moments(p, self.problem, may_be_empty=True)
         solutions, failures = {}, []
         for i in best_order(points):
             try:
@@ -335,9 +336,9 @@ def best_order(p: FloatArray) -> Any:
     return np.lexsort((-np.abs(p), p < 0))
 
 
-def checked_moments(p: ArrayLike, problem: Problem) -> FloatArray:
+def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = False) -> FloatArray:
     """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
-    points = real_numbers(p, "p")
+    points = real_numbers(p, "p", may_be_empty=may_be_empty)
     for point in points:
         refuse_infinite(problem, float(point))
     return points

@@ -77,6 +77,26 @@ def test_exponents_at_zero_are_the_slope_and_the_curvature(weak):
     assert weak.variance_rate().value == pytest.approx(float(weak.second_derivative(0.0)), rel=1e-6)
 
 
+NO_NUMBERS = [
+    *("1", ["1"], True, [True, 1.0], [[True, 1.0]], np.array([True]), 1j, None, [[1], [1, 2]], np.nan),
+    np.ma.array([1.0, 2.0], mask=[False, True]),
+]
+
+
+@pytest.mark.parametrize("p", NO_NUMBERS, ids=repr)
+def test_arguments_that_are_no_numbers_are_refused(weak, p):
+    for function in (weak, weak.derivative, weak.second_derivative, weak.error_estimate):
+        with pytest.raises(ValueError, match=r"^p must be a finite number or an array of finite numbers, got .+$"):
+            function(p)
+
+
+def test_values_have_the_shape_of_the_arguments(weak):
+    p = np.array([[-1.0, 0.0, 1.0], [2.0, 3.0, 4.0]])
+    np.testing.assert_array_equal(weak(p.tolist()), weak(p.ravel()).reshape(2, 3))
+    assert np.shape(weak(2)) == ()
+    assert weak([]).shape == (0,)
+
+
 def test_arguments_outside_the_interval_are_refused(weak):
     with pytest.raises(ValueError, match=r"p must lie in \[-2, 6\]"):
         weak(6.5)
