@@ -19,13 +19,12 @@ from fpsolve.exponent.solver import (
     ExponentSolver,
     MomentLyapunov,
     best_order,
-    checked_moments,
     misplaced,
     missed,
 )
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.problem import Problem, of_problem_too
+from fpsolve.model.problem import Problem, checked_moments, of_problem_too
 from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.validity import NO_INDEX
 

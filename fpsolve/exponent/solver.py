@@ -7,12 +7,13 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_number, real_numbers
+from fpsolve.arrays import FloatArray, real_number
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.branch import Branch, Tolerance
@@ -24,7 +25,7 @@ from fpsolve.exponent.rival import far_rivals, rival
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import has_algebraic_tails
-from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
 from fpsolve.theory.far import far_places, grows_far_out, growth_beyond, highest_rate, log_tail, variance_tail
 from fpsolve.theory.frozen import FURTHEST
 from fpsolve.theory.perturbation import Scale, scale_of
@@ -35,6 +36,13 @@ LOOSE = 1e-3
 HARDLY_FINITE = 1e-6
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
+
+_KINDS: Sequence[tuple[str, Any, str]] = (
+    ("problem", Problem, "a Problem, made of an oscillator and a noise"),
+    ("mesh", CylinderMesh | None, "a CylinderMesh, or None"),
+    ("budget", Budget, "a Budget"),
+    ("rtol", Real, "a number such as 1e-8"),
+)
 
 
 @dataclass(frozen=True)
@@ -103,6 +111,7 @@ class ExponentSolver:
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
+        TypeError: an argument is of another kind.
         ValueError: rtol is not positive.
     """
 
@@ -113,6 +122,9 @@ class ExponentSolver:
     budget: Budget = field(default_factory=Budget)
 
     def __post_init__(self) -> None:
+        for name, kind, words in _KINDS:
+            if not isinstance(getattr(self, name), kind):
+                raise TypeError(f"got {name} = {getattr(self, name)!r}; must be {words}")
         if not math.isfinite(self.problem.noise.standard_deviation):
             raise NoSuchExponent(
                 "the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"
@@ -334,11 +346,3 @@ def refuse_beyond(problem: Problem, p: float, reached: float) -> None:
 def best_order(p: FloatArray) -> Any:
     """Indices of p, inwards from the largest and then from the smallest: a mesh for a large |p| serves smaller ones."""
     return np.lexsort((-np.abs(p), p < 0))
-
-
-def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = False) -> FloatArray:
-    """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
-    points = real_numbers(p, "p", may_be_empty=may_be_empty)
-    for point in points:
-        refuse_infinite(problem, float(point))
-    return points
