@@ -216,9 +216,8 @@ def _end_blocked(failure: OSError | SystemExit) -> int:
     drop_blocked_output()
     if isinstance(failure, BrokenPipeError | SystemExit):
         return CLOSED_PIPE
-    if failure.filename is not None:
-        raise failure
-    _print_error(f"the output cannot be written: {failure.strerror}; send it to another place")
+    place, reason = failure.filename or "the output", failure.strerror or failure
+    _print_error(f"{place} cannot be written: {reason}; send it to another place")
     return BAD_INPUT
 
 

@@ -51,14 +51,14 @@ def writable(folder: Path) -> Iterator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as failure:
-        raise OutputError(f"{folder} cannot be made: {failure.strerror}; {Remedy.FOLDER}") from failure
+        raise OutputError(f"{folder} cannot be made: {failure.strerror or failure}; {Remedy.FOLDER}") from failure
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder} cannot be written to; {Remedy.FOLDER}")
     try:
         yield
     except OSError as failure:
-        place = failure.filename or folder
-        raise OutputError(f"{place} cannot be written: {failure.strerror}; {Remedy.FOLDER}") from failure
+        place, reason = failure.filename or folder, failure.strerror or failure
+        raise OutputError(f"{place} cannot be written: {reason}; {Remedy.FOLDER}") from failure
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """The command line: exit codes, messages, and where they go."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -178,6 +179,13 @@ def test_an_interrupted_run_says_what_is_kept(case, tmp_path, capsys, monkeypatc
     assert "summary.json" in files(tmp_path / "results/test")
 
 
+def raising(failure):
+    def fail(*_):
+        raise failure
+
+    return fail
+
+
 LONG = """
 import sys
 from fpsolve.cli import main
@@ -298,6 +306,24 @@ def test_a_full_output_is_said_in_one_sentence(case, tmp_path, arguments, unbuff
     assert done.stderr == "the output cannot be written: No space left on device; send it to another place\n"
     if arguments[0] == "run":
         assert {"summary.json", "figure.png", "figure.pdf"} <= files(tmp_path / "results/test")
+
+
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (
+            OSError(errno.ENOSPC, "No space left on device", "cache/a.nbi"),
+            "cache/a.nbi cannot be written: No space left",
+        ),
+        (OSError("encoder error"), "the output cannot be written: encoder error; send it to another place\n"),
+    ],
+)
+def test_any_failure_to_write_is_said_in_one_sentence(case, capsys, monkeypatch, failure, said):
+    monkeypatch.setattr(solve, "_solve_curve", raising(failure))
+    assert main(["check", case]) == BAD_INPUT
+    err = capsys.readouterr().err
+    assert err.startswith(said)
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
