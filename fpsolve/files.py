@@ -66,8 +66,8 @@ def alone(folder: Path) -> Iterator[None]:
     """Make a folder for results, and keep other runs out of it during the body.
 
     The lock is one of the operating system on a hidden file, which ends with the process however that ends. The file is
-    removed with the lock still held; only what was killed leaves it, and then it does not hinder the next run. Where
-    there are no such locks, as on Windows, nobody is kept out.
+    removed with the lock still held; what was killed leaves it, and then it does not hinder the next run. Where there
+    are no such locks nobody is kept out; on Windows, too, where the file, open as it is, cannot be removed and stays.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run has it.
