@@ -19,12 +19,13 @@ from fpsolve.study.simulate import refuse_obstacles, simulate_curves, simulation
 from fpsolve.study.solve import compare, expected, solve_curves, solving_work
 
 Progress = Callable[[], None]
-_OF_SOLVED = re.compile(
+_OURS = re.compile(
     r"summary\.json|moments\.csv|figure\.(png|pdf)|density\.vtu|show\.py"
     r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
+    r"|monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)"
+    rf"|(eigenfunctions(-\d+)?/)?{TEMPORARY}"
 )
-_UNFINISHED = re.compile(rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}")
-_OF_SIMULATED = re.compile(r"(monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf))")
+"""The names of the files that a run or a simulation writes, and of those that it did not finish."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,8 @@ class Outcome:
 def run(case: Case, out: str | Path = "results", *, progress: Progress = lambda: None) -> tuple[CurveResult, ...]:
     """Solve a case and write `out`/<name of the case>/.
 
-    What an earlier run wrote there is removed first. Tables are written anew after every curve, each file whole or not
-    at all, so that what is finished stays; summary.json says whether all curves are.
+    What an earlier run or simulation wrote there is removed first. Tables are written anew after every curve, each file
+    whole or not at all, so that what is finished stays; summary.json says whether all curves are.
 
     Args:
         case: from `load_case`.
@@ -100,10 +101,9 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
     """
     if monte_carlo:
         refuse_obstacles(case)
-    earlier = (_OF_SOLVED, _OF_SIMULATED) if monte_carlo else (_OF_SOLVED,)
     simulated: list[SimulatedCurve] = []
     interrupted = False
-    with _own_folder(case, out, earlier) as folder:
+    with _own_folder(case, out) as folder:
         results = _solve(case, folder, watch)
         with _saying_if_interrupted(lambda: f"; what was solved is kept in {folder}"):
             try:
@@ -120,7 +120,8 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
 def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Outcome:
     """Simulate a case and write monte_carlo.json into `out`/<name of the case>/; further curves have a number.
 
-    What an earlier simulation wrote there is removed first; with c₂ or c₃ > 0 the stationary response is written too.
+    What an earlier run or simulation wrote there is removed first; with c₂ or c₃ > 0 the stationary response is written
+    too.
     An interrupt (Ctrl-C) ends the simulation, and what is done is estimated and written.
 
     Raises:
@@ -131,7 +132,7 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
     refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
     with (
-        _own_folder(case, out, [_OF_SIMULATED]) as folder,
+        _own_folder(case, out) as folder,
         _saying_if_interrupted(lambda: _kept(case, simulated, folder)),
     ):
         interrupted = _simulate(case, folder, watch, simulated)
@@ -174,13 +175,12 @@ def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedC
 
 
 @contextmanager
-def _own_folder(case: Case, out: str | Path, earlier: Sequence[re.Pattern[str]]) -> Iterator[Path]:
-    """The folder of a case, which other runs keep out of; of earlier ones it holds no files whose names match, and none
-    that were not finished."""
+def _own_folder(case: Case, out: str | Path) -> Iterator[Path]:
+    """The folder of a case, which other runs keep out of, and from which what earlier ones wrote is removed."""
     folder = Path(out) / case.name
     with alone(folder):
         with writable(folder):
-            _remove(folder, [_UNFINISHED, *earlier])
+            _remove(folder)
         yield folder
 
 
@@ -199,11 +199,10 @@ def _kept(case: Case, done: Sequence[CurveResult] | Sequence[SimulatedCurve], fo
     return f"{count}; what was done is kept in {folder}" if done else count
 
 
-def _remove(folder: Path, patterns: Sequence[re.Pattern[str]]) -> None:
-    """Remove the files in a folder, and one folder below, whose names match."""
+def _remove(folder: Path) -> None:
+    """Remove our files in a folder, and one folder below."""
     for path in {*folder.glob("*"), *folder.glob("*/*")}:
-        name = path.relative_to(folder).as_posix()
-        if any(pattern.fullmatch(name) for pattern in patterns) and not path.is_dir():
+        if _OURS.fullmatch(path.relative_to(folder).as_posix()) and not path.is_dir():
             path.unlink()
             if path.parent != folder and not any(path.parent.iterdir()):
                 path.parent.rmdir()

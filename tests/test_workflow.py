@@ -199,14 +199,18 @@ def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
     assert "eigenfunctions.pvd" in files(tmp_path / "out/test")
 
 
+SIMULATED = {"monte_carlo.json", "monte_carlo-2.json", "response.vti", "response.csv", "response-2.png"}
+"""Files of simulations."""
+
+
 @pytest.mark.parametrize("exception", [KeyboardInterrupt, RuntimeError])
 def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(case, tmp_path, exception):
     """It ends in the first curve: there are tables that say so, and the files of others."""
     fpsolve.run(case, tmp_path)
     folder = tmp_path / "test"
-    others = {"monte_carlo.json", "response-2.vti", "eigenfunctions.png", "figure.svg", "notes/summary.json"}
+    others = {"monte_carlo.txt", "response-a.vti", "eigenfunctions.png", "figure.svg", "notes/summary.json"}
     (folder / "notes").mkdir()
-    for name in others:
+    for name in others | SIMULATED:
         (folder / name).write_text("mine", encoding="utf-8")
     with pytest.raises(exception):
         fpsolve.run(case, tmp_path, progress=raising_at(2, exception))
@@ -218,7 +222,7 @@ def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(case, tmp_path, 
 
 def test_a_run_with_simulation_that_ends_early_leaves_nothing_of_an_earlier_simulation(case, tmp_path):
     (tmp_path / "test").mkdir()
-    for name in ("monte_carlo.json", "monte_carlo-2.json", "response.vti", "response.csv"):
+    for name in SIMULATED:
         (tmp_path / "test" / name).write_text("{}", encoding="utf-8")
     watch = Watch(bar=lambda *_: nullcontext(raising_at(1, KeyboardInterrupt)))
     with pytest.raises(KeyboardInterrupt):
