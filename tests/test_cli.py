@@ -63,11 +63,16 @@ def test_set_takes_one_assignment(case, word, capsys):
     assert said == f"{word}: no such file; {remedy}"
 
 
+def test_a_stray_assignment_is_told_with_all_others(case, capsys):
+    stated = ["--set", "oscillator.omega=2", "--set", "noise.tau0=0.3"]
+    assert main(["check", case, *stated, "noise.D0=0.2"]) == BAD_INPUT
+    assert capsys.readouterr().err.strip().endswith(f"write {' '.join(stated)} --set noise.D0=0.2")
+
+
 def test_a_case_may_have_an_equals_sign_in_its_name(case, tmp_path, capsys):
-    path = tmp_path / "a=1.toml"
-    path.write_text("title = 1", encoding="utf-8")
-    assert main(["check", str(path)]) == BAD_INPUT
-    assert f"{path}:1: title: got 1" in capsys.readouterr().err
+    (tmp_path / "a=1.toml").write_text("title = 1", encoding="utf-8")
+    assert main(["check", "a=1.toml"]) == BAD_INPUT
+    assert "a=1.toml:1: title: got 1" in capsys.readouterr().err
 
 
 def test_set_takes_negative_values(case):
