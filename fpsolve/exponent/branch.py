@@ -105,8 +105,7 @@ class Branch:
         try:
             return self.solution(q, tolerance)
         except NotConverged as failure:
-            text = str(failure).replace(f"Λ({q:g}) did", f"Λ({q:g}), which stands for p near 0, did")
-            raise NotConverged(text, failure.partial) from failure
+            raise NotConverged(f"p near 0 goes with p = {q:g}: {failure}", failure.partial) from failure
 
     def _found(self, p: float, tolerance: Tolerance) -> Solution:
         """A solution that meets a tolerance, or the one on the given mesh."""
