@@ -68,7 +68,7 @@ def solve_moments(
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
     asked = checked_moments(p, solver.problem, may_be_empty=True)
-    points, reports = _each_once(asked), repeat(progress, asked.size)
+    points, reports = np.array([*dict.fromkeys(asked.tolist())], dtype=float), repeat(progress, asked.size)
 
     def report() -> None:
         next(reports, lambda: None)()
@@ -79,16 +79,10 @@ def solve_moments(
     return result if points.size == asked.size else _at(result, asked)
 
 
-def _each_once(p: FloatArray) -> FloatArray:
-    """The p without those that are equal to one before, in their order."""
-    return p[np.sort(np.unique(p, return_index=True)[1])]
-
-
 def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
     """A result at p some of which are equal, without those that failed."""
-    order = np.argsort(result.p)
-    places = np.minimum(np.searchsorted(result.p[order], p), order.size - 1) if order.size else np.zeros(0, dtype=int)
-    index = order[places[result.p[order[places]] == p]] if order.size else places
+    places = {each: i for i, each in enumerate(result.p.tolist())}
+    index = [places[each] for each in p.tolist() if each in places]
     names = ("p", "value", "derivative", "error_estimate", "residual")
     return replace(result, **{name: getattr(result, name)[index] for name in names})
 
