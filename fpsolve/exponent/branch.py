@@ -74,11 +74,13 @@ class Branch:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure
                 raise failure from None
-            except (ArithmeticError, RuntimeError, ValueError, MeshError) as failure:  # LinAlgError is a ValueError
-                if isinstance(failure, MeshError) and self.mesh is None:
-                    raise NotConverged(f"Λ({p:g}) did not converge: {failure}; {self.remedy}") from failure
-                if isinstance(failure, np.linalg.LinAlgError):
-                    raise NotConverged(f"Λ({p:g}) cannot be solved ({failure}); {self.remedy}") from failure
+            except MeshError as failure:
+                if self.mesh is not None:
+                    raise
+                raise NotConverged(f"Λ({p:g}) did not converge: {failure}; {self.remedy}") from failure
+            except np.linalg.LinAlgError as failure:
+                raise NotConverged(f"Λ({p:g}) cannot be solved ({failure}); {self.remedy}") from failure
+            except (ArithmeticError, RuntimeError, ValueError) as failure:
                 if not is_numerical(failure):
                     raise
                 raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
