@@ -18,7 +18,6 @@ from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.fields import UNRESOLVED
-from fpsolve.exponent.function import no_root
 from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
@@ -26,7 +25,6 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
-from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.perturbation import second_order
 
 
@@ -126,12 +124,14 @@ def _solve_indices(
         if index.name not in names:
             continue
         try:
-            estimates[index.name] = index.solve(solver, root)
+            found = index.solve(solver, root)
         except (NotConverged, NoSuchExponent) as failure:
             failed.setdefault(str(failure), []).append(index.symbol)
             continue
-        if estimates[index.name] is None and not grows_far_out(solver.problem):  # of that a note tells
-            missing.append(f"no stability index: {no_root(solver.problem)}")
+        if isinstance(found, Estimate):
+            estimates[index.name] = found
+        elif found.reason != validity.NO_INDEX:  # of which a note tells
+            missing.append(f"no stability index: {found.reason}")
     return estimates, missing + [f"no {', '.join(symbols)}: {reason}" for reason, symbols in failed.items()]
 
 

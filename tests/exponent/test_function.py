@@ -7,6 +7,7 @@ import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import second_derivative
+from fpsolve.exponent.error import Absent
 from fpsolve.exponent.function import MomentLyapunovFunction, nonzero_root
 from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
@@ -183,9 +184,10 @@ def test_stability_index_near_zero():
     assert np.all(np.abs(np.diff(indices, 2)) < 1e-6)
 
 
-def test_no_stability_index_within_the_interval_is_none():
+def test_without_a_stability_index_within_the_interval_there_is_a_reason():
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
-    assert nonzero_root(ExponentSolver(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)))) is None
+    index = nonzero_root(ExponentSolver(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3))))
+    assert index == Absent("Λ(p) has no root p ≠ 0 in [-20, 20]")
 
 
 @pytest.mark.parametrize("epsilon", [1e-2, 1e-4, 1e-5])
