@@ -230,6 +230,28 @@ def test_a_run_with_simulation_that_ends_early_leaves_nothing_of_an_earlier_simu
     assert files(tmp_path / "test") == {"summary.json", "moments.csv"}
 
 
+def test_a_run_and_a_simulation_of_the_same_parameters_stay_together(case, tmp_path):
+    """Each keeps what the other wrote, unless that is of parameters that the case does not have."""
+    folder = tmp_path / "test"
+    first, second = fpsolve.load_case(case.path), fpsolve.load_case(case.path, ["oscillator.omega=2.0"])
+    fpsolve.run(first, tmp_path)
+    solved = files(folder)
+    parameters = dict(first.curves()[1].parameters)
+    table = json.dumps({"parameters": parameters})
+    (folder / "monte_carlo-2.json").write_text(table, encoding="utf-8")
+    fpsolve.run(first, tmp_path)
+    assert files(folder) == solved | {"monte_carlo-2.json"}
+    fpsolve.run(second, tmp_path)
+    assert files(folder) == solved
+    watch = Watch(bar=lambda *_: nullcontext(raising_at(1, KeyboardInterrupt)))
+    with pytest.raises(KeyboardInterrupt):
+        simulate_case(second, tmp_path, watch=watch)
+    assert files(folder) == solved
+    with pytest.raises(KeyboardInterrupt):
+        simulate_case(first, tmp_path, watch=watch)
+    assert files(folder) == set()
+
+
 def test_infinite_moments_are_refused_before_anything_is_written(tmp_path):
     """The case says so, with the line of the values that are to blame."""
     with pytest.raises(CaseError, match=r"test\.toml:15: vary: with noise\.D0 = 0\.1: Λ\(2\) is infinite"):

@@ -12,10 +12,10 @@ from threadpoolctl import ThreadpoolController
 
 from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import refined
-from fpsolve.exponent.rival import rival
+from fpsolve.exponent.rival import is_far_out, rival
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import has_algebraic_tails
@@ -91,10 +91,6 @@ class Branch:
         """What to do where it is not resolved."""
         return Remedy.BUDGET if self.mesh is None else Remedy.MESH
 
-    def holds(self, pair: PrincipalPair) -> bool:
-        """Whether a pair is one of this branch."""
-        return pair.p in self._known and self._known[pair.p].pair is pair
-
     def largest(self) -> tuple[float, Generator] | None:
         """The p of the largest size that was solved, and with what; None where none was."""
         p = max(self._known, key=abs, default=None)
@@ -143,9 +139,12 @@ class Branch:
             return None
         generator = self._trimmed(self._known[nearest], tolerance)
         try:
-            return self._tried(generator, p) if fits(generator, nearest, p) else None
+            solution = self._tried(generator, p) if fits(generator, nearest, p) else None
         except NotConverged:
             return None
+        if solution is None or self.is_far or nearest == p or not is_far_out(solution.pair):
+            return solution
+        return None  # its interval reaches a place far out, which at this p is not the nearest to ξ = 0
 
     def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Generator:
         """The generator of a solution, or a much smaller one that would do."""

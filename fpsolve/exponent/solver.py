@@ -21,13 +21,12 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair, second_derivat
 from fpsolve.exponent.error import Estimate, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.refine import WIDER, widened
-from fpsolve.exponent.rival import far_rivals, rival
+from fpsolve.exponent.rival import far_rivals, is_far_out, rival
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
-from fpsolve.theory.far import far_places, grows_far_out, growth_beyond, highest_rate, log_tail, variance_tail
-from fpsolve.theory.frozen import FURTHEST
+from fpsolve.theory.far import far_places, grows_far_out, highest_rate, log_tail, refuse_beyond, variance_tail
 from fpsolve.theory.perturbation import Scale, scale_of
 from fpsolve.theory.validity import ALMOST_EVERY
 
@@ -279,7 +278,7 @@ class ExponentSolver:
             solver=self,
             warnings=(*missed(self, p, value, errors), *misplaced(self, pairs)),
             failures=tuple(failures),
-            rare=np.array([pair.p for pair in pairs if self.far.holds(pair)]),
+            rare=np.array([pair.p for pair in pairs if is_far_out(pair)]),
             notes=carried_far_out(self, pairs),
         )
 
@@ -320,27 +319,23 @@ def _elsewhere(pair: PrincipalPair) -> float | None:
 
 def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
     """At which p rare paths carry the moment, and from when on at the first of them, or nothing."""
-    far = [pair for pair in pairs if solver.far.holds(pair)]
+    far = [pair for pair in pairs if is_far_out(pair)]
     if not far:
         return ()
-    (z, density), p = noise_marginal(far[0]), far[0].p
-    mean, near = float(z @ density / density.sum()), solver.loose(p).pair.value
+    nears = [solver.loose(pair.p).pair for pair in far]
+    pair, near = next((each for each in zip(far, nears, strict=True) if not is_far_out(each[1])), (far[0], None))
+    z, density = noise_marginal(pair)
+    mean = float(z @ density / density.sum())
     rarity = -log_tail(solver.problem, mean)
-    return (
-        f"at p = {', '.join(f'{pair.p:g}' for pair in far)} rare paths carry the moment, at p = {p:g} those with noise "
-        f"around {mean:.3g} standard deviations, of probability 1e-{rarity / math.log(10):.0f}; for times up to about "
-        f"{rarity / (far[0].value - near):.1g} they hardly count, and E‖x‖^p grows at {near:.3g}",
+    which = f", at p = {pair.p:g} those" if len(far) > 1 else ", those"
+    text = (
+        f"at p = {', '.join(f'{each.p:g}' for each in far)} rare paths carry the moment{which} with noise around "
+        f"{mean:.3g} standard deviations, of probability 1e-{rarity / math.log(10):.0f}"
     )
-
-
-def refuse_beyond(problem: Problem, p: float, reached: float) -> None:
-    """Refuse a p where paths that hold the noise beyond all z looked at grow as fast as all others, or faster."""
-    beyond = growth_beyond(problem, p)
-    if beyond > 0 and beyond >= reached:
-        raise NotConverged(
-            f"Λ({p:g}) did not converge: it is at least {beyond:.3g}, as much as paths grow that hold the noise beyond "
-            f"{FURTHEST:g} standard deviations, and no eigenfunction belongs to them"
-        )
+    if near is None:  # the place nearest to ξ = 0 is that far out
+        return (text,)
+    wait = rarity / (pair.value - near.value)
+    return (f"{text}; for times up to about {wait:.1g} they hardly count, and E‖x‖^p grows at {near.value:.3g}",)
 
 
 def best_order(p: FloatArray) -> Any:
