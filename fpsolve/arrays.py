@@ -26,26 +26,56 @@ def identity(x: Any) -> Any:
     return x
 
 
-def real_numbers(values: Any, name: str) -> FloatArray:
-    """One number, or several, as an array of shape (n,), n ≥ 1; texts, booleans and masked entries are none.
+def real_number(value: Any, name: str) -> float:
+    """One number; texts and booleans are none. Raises `ValueError` where it is not a finite real number."""
+    array = _finite(value)
+    if array is None or array.ndim:
+        raise ValueError(f"{name} must be a finite number, got {_said(value)}")
+    return float(array)
+
+
+def real_numbers(values: Any, name: str, *, may_be_empty: bool = False) -> FloatArray:
+    """One number, or several, as an array of shape (n,); texts, booleans and masked entries are none.
 
     Raises:
-        ValueError: they are not finite real numbers, or there are none.
+        ValueError: they are not finite real numbers, or there are none and there must be some.
     """
-    with suppress(ValueError, OverflowError):  # of lists in lists, and of whole numbers beyond all floats
-        array = np.atleast_1d(np.asarray(values))
-        listed = values if isinstance(values, list | tuple) else array.tolist() if array.dtype == object else []
+    array = _finite(values)
+    if array is None or array.ndim > 1 or not (array.size or may_be_empty):
+        size = "" if may_be_empty else "non-empty "
+        raise ValueError(f"{name} must be a finite number or a {size}list of finite numbers, got {_said(values)}")
+    return np.atleast_1d(array)
+
+
+def real_array(values: Any, name: str) -> FloatArray:
+    """Numbers as an array of their shape. Raises `ValueError` where they are not finite real numbers."""
+    array = _finite(values)
+    if array is None:
+        raise ValueError(f"{name} must be a finite number or an array of finite numbers, got {_said(values)}")
+    return array
+
+
+def _finite(values: Any) -> FloatArray | None:
+    """Finite real numbers as an array of their shape, or None where they are something else."""
+    with suppress(ValueError, OverflowError):  # of lists of unequal lengths, and of whole numbers beyond all floats
+        array = np.asarray(values)
+        is_listed = not isinstance(values, np.ndarray) or array.dtype == object
+        listed = np.asarray(values, dtype=object).ravel() if is_listed else ()
         is_plain = not np.ma.is_masked(values) and not any(isinstance(each, bool | np.bool_) for each in listed)
         is_real = array.dtype.kind in "iuf" or (
             array.dtype == object and all(isinstance(each, Real | Decimal) for each in listed)
         )
-        if array.ndim == 1 and array.size and is_real and is_plain:
+        if is_real and is_plain:
             numbers = array.astype(float)
             if np.all(np.isfinite(numbers)):
                 return numbers
-    said = " ".join(repr(values).split())
-    said = said if len(said) <= 60 else f"{said[:57]}..."
-    raise ValueError(f"{name} must be a finite number or a non-empty list of finite numbers, got {said}")
+    return None
+
+
+def _said(values: Any) -> str:
+    """What was given, cut to a readable length."""
+    text = " ".join(repr(values).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def dense(matrix: Any) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -216,9 +217,8 @@ def _end_blocked(failure: OSError | SystemExit) -> int:
     drop_blocked_output()
     if isinstance(failure, BrokenPipeError | SystemExit):
         return CLOSED_PIPE
-    if failure.filename is not None:
-        raise failure
-    _print_error(f"the output cannot be written: {failure.strerror}; send it to another place")
+    place, reason = failure.filename or "the output", failure.strerror or failure
+    _print_error(f"{place} cannot be written: {reason}; send it to another place")
     return BAD_INPUT
 
 
@@ -255,9 +255,10 @@ def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
 
 def _stray_assignment(path: Path, overrides: Sequence[str] | None) -> str:
     """What to write where a case that cannot be is an assignment that lacks its --set, or nothing."""
-    if not re.match(r'[\w."-]+ *=', str(path)) or path in path.parent.glob("*"):
+    is_there = os.path.exists(path)  # noqa: PTH110  (Path.exists raises where a name is too long)
+    if is_there or not re.match(r'[\w."-]+ *=', str(path)):
         return ""
-    words = " ".join(f"--set {quote(text)}" for text in [*(overrides or ())[:1], str(path)])
+    words = " ".join(f"--set {quote(text)}" for text in [*(overrides or ()), str(path)])
     return f"{path}: no such file; each --set takes one assignment: write {words}"
 
 

@@ -51,14 +51,14 @@ def writable(folder: Path) -> Iterator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as failure:
-        raise OutputError(f"{folder} cannot be made: {failure.strerror}; {Remedy.FOLDER}") from failure
+        raise OutputError(f"{folder} cannot be made: {failure.strerror or failure}; {Remedy.FOLDER}") from failure
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder} cannot be written to; {Remedy.FOLDER}")
     try:
         yield
     except OSError as failure:
-        place = failure.filename or folder
-        raise OutputError(f"{place} cannot be written: {failure.strerror}; {Remedy.FOLDER}") from failure
+        place, reason = failure.filename or folder, failure.strerror or failure
+        raise OutputError(f"{place} cannot be written: {reason}; {Remedy.FOLDER}") from failure
 
 
 @contextmanager
@@ -66,8 +66,8 @@ def alone(folder: Path) -> Iterator[None]:
     """Make a folder for results, and keep other runs out of it during the body.
 
     The lock is one of the operating system on a hidden file, which ends with the process however that ends. The file is
-    removed with the lock still held; only what was killed leaves it, and then it does not hinder the next run. Where
-    there are no such locks, as on Windows, nobody is kept out.
+    removed with the lock still held; what was killed leaves it, and then it does not hinder the next run. Where there
+    are no such locks nobody is kept out; on Windows, too, where the file, open as it is, cannot be removed and stays.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run has it.

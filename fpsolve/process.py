@@ -1,4 +1,4 @@
-"""What surrounds a command: the signals that end it, and outputs that cannot be written."""
+"""What surrounds work: the signals that end it or have to wait, and outputs that cannot be written."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ ENDING = ("SIGHUP", "SIGTERM")
 
 @contextmanager
 def ended_by_signals() -> Iterator[list[int]]:
-    """In the body SIGHUP and SIGTERM raise KeyboardInterrupt, as Ctrl-C does; gives the list of those that came.
+    """In the body SIGHUP or SIGTERM raises KeyboardInterrupt, as Ctrl-C does; gives a list, with the one that came.
 
-    A signal that is ignored, as SIGHUP under nohup, or that the caller handles is left alone; so are all outside of the
-    main thread, which alone receives them.
+    Later ones change nothing, so that what the first ends can be written and said. A signal that is ignored, as SIGHUP
+    under nohup, or that the caller handles is left alone; so are all outside of the main thread, which alone receives
+    them.
     """
     received: list[int] = []
 
     def interrupt(number: int, _: Any) -> None:
-        received.append(number)
-        raise KeyboardInterrupt
+        if not received:
+            received.append(number)
+            raise KeyboardInterrupt
 
     known = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
     is_main = threading.current_thread() is threading.main_thread()
@@ -36,6 +38,27 @@ def ended_by_signals() -> Iterator[list[int]]:
     finally:
         for number in taken:
             signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def signals_held() -> Iterator[None]:
+    """Signals that interrupt wait until the body has ended: an import of compiled modules may crash where one comes.
+
+    Those that Python does not handle are left alone; so are all outside of the main thread, which alone receives them.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    known = [getattr(signal, name) for name in ("SIGINT", *ENDING) if is_main and hasattr(signal, name)]
+    handlers = {number: signal.getsignal(number) for number in known if callable(signal.getsignal(number))}
+    held: list[int] = []
+    try:
+        for number in handlers:
+            signal.signal(number, lambda number, _: held.append(number))
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in held:
+            signal.raise_signal(number)
 
 
 def flush_output() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -19,12 +20,13 @@ from fpsolve.study.simulate import refuse_obstacles, simulate_curves, simulation
 from fpsolve.study.solve import compare, expected, solve_curves, solving_work
 
 Progress = Callable[[], None]
-_OF_SOLVED = re.compile(
+SOLVED, SIMULATED = (
     r"summary\.json|moments\.csv|figure\.(png|pdf)|density\.vtu|show\.py"
-    r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
+    r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)",
+    r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)",
 )
-_UNFINISHED = re.compile(rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}")
-_OF_SIMULATED = re.compile(r"(monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf))")
+"""The names of the files that a run writes, and of those of a simulation."""
+_UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,9 @@ class Outcome:
 def run(case: Case, out: str | Path = "results", *, progress: Progress = lambda: None) -> tuple[CurveResult, ...]:
     """Solve a case and write `out`/<name of the case>/.
 
-    What an earlier run wrote there is removed first. Tables are written anew after every curve, each file whole or not
-    at all, so that what is finished stays; summary.json says whether all curves are.
+    What an earlier run wrote there is removed first, and a simulation of other parameters. Tables are written anew
+    after every curve, each file whole or not at all, so that what is finished stays; summary.json says whether all
+    curves are.
 
     Args:
         case: from `load_case`.
@@ -100,10 +103,10 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
     """
     if monte_carlo:
         refuse_obstacles(case)
-    earlier = (_OF_SOLVED, _OF_SIMULATED) if monte_carlo else (_OF_SOLVED,)
     simulated: list[SimulatedCurve] = []
     interrupted = False
-    with _own_folder(case, out, earlier) as folder:
+    replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
+    with _own_folder(case, out, replaced) as folder:
         results = _solve(case, folder, watch)
         with _saying_if_interrupted(lambda: f"; what was solved is kept in {folder}"):
             try:
@@ -120,7 +123,8 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
 def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Outcome:
     """Simulate a case and write monte_carlo.json into `out`/<name of the case>/; further curves have a number.
 
-    What an earlier simulation wrote there is removed first; with c₂ or c₃ > 0 the stationary response is written too.
+    What an earlier simulation wrote there is removed first, and a run with other parameters; with c₂ or c₃ > 0 the
+    stationary response is written too.
     An interrupt (Ctrl-C) ends the simulation, and what is done is estimated and written.
 
     Raises:
@@ -131,7 +135,7 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
     refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
     with (
-        _own_folder(case, out, [_OF_SIMULATED]) as folder,
+        _own_folder(case, out, (SIMULATED,)) as folder,
         _saying_if_interrupted(lambda: _kept(case, simulated, folder)),
     ):
         interrupted = _simulate(case, folder, watch, simulated)
@@ -170,18 +174,30 @@ def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedC
             write_simulation(case, each, folder)
             write_response(each, folder)
             draw_response(case, each, folder)
-    return simulated[-1].interrupted or len(simulated) < len(case.curves())
+    return simulated[-1].interrupted or len(simulated) < case.planned
 
 
 @contextmanager
-def _own_folder(case: Case, out: str | Path, earlier: Sequence[re.Pattern[str]]) -> Iterator[Path]:
-    """The folder of a case, which other runs keep out of; of earlier ones it holds no files whose names match, and none
-    that were not finished."""
+def _own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator[Path]:
+    """The folder of a case, which other runs keep out of; nothing is in it that is replaced, or of other parameters."""
     folder = Path(out) / case.name
     with alone(folder):
         with writable(folder):
-            _remove(folder, [_UNFINISHED, *earlier])
+            stale = [names for names in (SOLVED, SIMULATED) if names in replaced or not _agrees(case, folder)]
+            _remove(folder, "|".join([*stale, _UNFINISHED]))
         yield folder
+
+
+def _agrees(case: Case, folder: Path) -> bool:
+    """Whether the tables in a folder are all of parameters that the case has."""
+    tables = [*folder.glob("summary.json"), *folder.glob("monte_carlo*.json")]
+    known = [dict(curve.parameters) for curve in case.curves()] if tables else []
+    try:
+        contents = [json.loads(table.read_text(encoding="utf-8")) for table in tables]
+        found = [curve["parameters"] for content in contents for curve in content.get("curves", [content])]
+    except (ValueError, KeyError, TypeError, AttributeError):  # it is no table of ours
+        return False
+    return all(each in known for each in found)
 
 
 @contextmanager
@@ -195,16 +211,14 @@ def _saying_if_interrupted(what_is_kept: Callable[[], str]) -> Iterator[None]:
 
 def _kept(case: Case, done: Sequence[CurveResult] | Sequence[SimulatedCurve], folder: Path) -> str:
     """How many curves of a case are done, and where these are."""
-    planned = len(case.curves())
-    count = f" after {len(done)} of {planned} curve{'s' if planned > 1 else ''}"
+    count = f" after {len(done)} of {case.planned} curve{'s' if case.planned > 1 else ''}"
     return f"{count}; what was done is kept in {folder}" if done else count
 
 
-def _remove(folder: Path, patterns: Sequence[re.Pattern[str]]) -> None:
-    """Remove the files in a folder, and one folder below, whose names match."""
+def _remove(folder: Path, names: str) -> None:
+    """Remove files with names that match, in a folder and one below."""
     for path in {*folder.glob("*"), *folder.glob("*/*")}:
-        name = path.relative_to(folder).as_posix()
-        if any(pattern.fullmatch(name) for pattern in patterns) and not path.is_dir():
+        if re.fullmatch(names, path.relative_to(folder).as_posix()) and not path.is_dir():
             path.unlink()
             if path.parent != folder and not any(path.parent.iterdir()):
                 path.parent.rmdir()

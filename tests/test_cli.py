@@ -1,5 +1,6 @@
 """The command line: exit codes, messages, and where they go."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from fpsolve import cli
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.output.terminal import digits
@@ -61,11 +63,16 @@ def test_set_takes_one_assignment(case, word, capsys):
     assert said == f"{word}: no such file; {remedy}"
 
 
+def test_a_stray_assignment_is_told_with_all_others(case, capsys):
+    stated = ["--set", "oscillator.omega=2", "--set", "noise.tau0=0.3"]
+    assert main(["check", case, *stated, "noise.D0=0.2"]) == BAD_INPUT
+    assert capsys.readouterr().err.strip().endswith(f"write {' '.join(stated)} --set noise.D0=0.2")
+
+
 def test_a_case_may_have_an_equals_sign_in_its_name(case, tmp_path, capsys):
-    path = tmp_path / "a=1.toml"
-    path.write_text("title = 1", encoding="utf-8")
-    assert main(["check", str(path)]) == BAD_INPUT
-    assert f"{path}:1: title: got 1" in capsys.readouterr().err
+    (tmp_path / "a=1.toml").write_text("title = 1", encoding="utf-8")
+    assert main(["check", "a=1.toml"]) == BAD_INPUT
+    assert "a=1.toml:1: title: got 1" in capsys.readouterr().err
 
 
 def test_set_takes_negative_values(case):
@@ -177,6 +184,13 @@ def test_an_interrupted_run_says_what_is_kept(case, tmp_path, capsys, monkeypatc
     assert "summary.json" in files(tmp_path / "results/test")
 
 
+def raising(failure):
+    def fail(*_):
+        raise failure
+
+    return fail
+
+
 LONG = """
 import sys
 from fpsolve.cli import main
@@ -216,6 +230,44 @@ def test_signals_end_a_run_as_ctrl_c_does(case, tmp_path, name):
     assert process.returncode == 128 + getattr(signal, name)
     assert "interrupted" in err
     assert "Traceback" not in err
+    assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
+
+
+def test_a_second_signal_does_not_hinder_the_message(case, capsys, monkeypatch):
+    original = cli._print_error
+
+    def interrupted(text):
+        signal.raise_signal(signal.SIGHUP)
+        original(text)
+
+    monkeypatch.setattr(solve, "_solve_curve", lambda *_: signal.raise_signal(signal.SIGTERM))
+    monkeypatch.setattr(cli, "_print_error", interrupted)
+    assert main(["run", case]) == 128 + signal.SIGTERM
+    assert capsys.readouterr().err == "interrupted after 0 of 2 curves; run it again to start over\n"
+
+
+SIGNAL_IN_VTK = """
+import signal, sys
+from fpsolve.cli import main
+
+def interrupt(frame, *_):
+    if "/vtkmodules/" in frame.f_code.co_filename and frame.f_code.co_name == "on_vtk_module_init":
+        sys.setprofile(None)
+        signal.raise_signal(int(sys.argv[1]))
+
+sys.setprofile(interrupt)
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGHUP", "SIGTERM", "SIGINT"])
+def test_a_signal_while_vtk_is_loaded_ends_a_run_in_order(case, tmp_path, name):
+    """Its compiled modules crash where a signal raises an exception in their initialisation."""
+    number = getattr(signal, name)
+    command = [sys.executable, "-c", SIGNAL_IN_VTK, str(int(number)), "run", case]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 128 + number
+    assert done.stderr == "interrupted after 0 of 2 curves; run it again to start over\n"
     assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
 
 
@@ -259,6 +311,24 @@ def test_a_full_output_is_said_in_one_sentence(case, tmp_path, arguments, unbuff
     assert done.stderr == "the output cannot be written: No space left on device; send it to another place\n"
     if arguments[0] == "run":
         assert {"summary.json", "figure.png", "figure.pdf"} <= files(tmp_path / "results/test")
+
+
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (
+            OSError(errno.ENOSPC, "No space left on device", "cache/a.nbi"),
+            "cache/a.nbi cannot be written: No space left",
+        ),
+        (OSError("encoder error"), "the output cannot be written: encoder error; send it to another place\n"),
+    ],
+)
+def test_any_failure_to_write_is_said_in_one_sentence(case, capsys, monkeypatch, failure, said):
+    monkeypatch.setattr(solve, "_solve_curve", raising(failure))
+    assert main(["check", case]) == BAD_INPUT
+    err = capsys.readouterr().err
+    assert err.startswith(said)
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])

@@ -36,6 +36,12 @@ def test_a_failure_to_take_a_place_names_it(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_failure_without_a_number_is_told_by_its_text(tmp_path):
+    with pytest.raises(OutputError) as raised, writable(tmp_path):
+        raise OSError("encoder error")
+    assert str(raised.value) == f"{tmp_path} cannot be written: encoder error; choose another folder"
+
+
 def test_a_folder_that_cannot_be_made_names_the_file(tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(OSError, match=r"table\.csv") as raised:

@@ -12,8 +12,12 @@ import numpy as np
 import pytest
 
 import fpsolve
+from fpsolve.analysis import stationary_density
+from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import CaseError, NotConverged, OutputError
+from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
+from fpsolve.output.tables import write_results
 from fpsolve.study.solve import UNRESOLVED, compare, solve_curves, solving_work
 from fpsolve.workflow import Watch, check_case, run_case, simulate_case
 
@@ -81,6 +85,14 @@ def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
         assert curve["warnings"] == []
     assert summary["curves"][1]["moments"][0]["value"] == pytest.approx(0.0141631436533, rel=1e-10)
     assert summary["curves"][1]["moments"][0]["perturbation"] == pytest.approx(0.014149421727, rel=1e-10)
+
+
+def test_writing_tables_makes_no_curves(case, tmp_path, monkeypatch):
+    """There may be many, and the tables are written after each."""
+    monkeypatch.setattr("fpsolve.case.case.make_curve", None)
+    write_results(case, [], tmp_path / "out")
+    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 0)
 
 
 def test_table_holds_every_curve_and_moment(case, tmp_path):
@@ -187,14 +199,18 @@ def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
     assert "eigenfunctions.pvd" in files(tmp_path / "out/test")
 
 
+SIMULATED = {"monte_carlo.json", "monte_carlo-2.json", "response.vti", "response.csv", "response-2.png"}
+"""Files of simulations."""
+
+
 @pytest.mark.parametrize("exception", [KeyboardInterrupt, RuntimeError])
 def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(case, tmp_path, exception):
     """It ends in the first curve: there are tables that say so, and the files of others."""
     fpsolve.run(case, tmp_path)
     folder = tmp_path / "test"
-    others = {"monte_carlo.json", "response-2.vti", "eigenfunctions.png", "figure.svg", "notes/summary.json"}
+    others = {"monte_carlo.txt", "response-a.vti", "eigenfunctions.png", "figure.svg", "notes/summary.json"}
     (folder / "notes").mkdir()
-    for name in others:
+    for name in others | SIMULATED:
         (folder / name).write_text("mine", encoding="utf-8")
     with pytest.raises(exception):
         fpsolve.run(case, tmp_path, progress=raising_at(2, exception))
@@ -206,12 +222,34 @@ def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(case, tmp_path, 
 
 def test_a_run_with_simulation_that_ends_early_leaves_nothing_of_an_earlier_simulation(case, tmp_path):
     (tmp_path / "test").mkdir()
-    for name in ("monte_carlo.json", "monte_carlo-2.json", "response.vti", "response.csv"):
+    for name in SIMULATED:
         (tmp_path / "test" / name).write_text("{}", encoding="utf-8")
     watch = Watch(bar=lambda *_: nullcontext(raising_at(1, KeyboardInterrupt)))
     with pytest.raises(KeyboardInterrupt):
         run_case(case, tmp_path, monte_carlo=True, watch=watch)
     assert files(tmp_path / "test") == {"summary.json", "moments.csv"}
+
+
+def test_a_run_and_a_simulation_of_the_same_parameters_stay_together(case, tmp_path):
+    """Each keeps what the other wrote, unless that is of parameters that the case does not have."""
+    folder = tmp_path / "test"
+    first, second = fpsolve.load_case(case.path), fpsolve.load_case(case.path, ["oscillator.omega=2.0"])
+    fpsolve.run(first, tmp_path)
+    solved = files(folder)
+    parameters = dict(first.curves()[1].parameters)
+    table = json.dumps({"parameters": parameters})
+    (folder / "monte_carlo-2.json").write_text(table, encoding="utf-8")
+    fpsolve.run(first, tmp_path)
+    assert files(folder) == solved | {"monte_carlo-2.json"}
+    fpsolve.run(second, tmp_path)
+    assert files(folder) == solved
+    watch = Watch(bar=lambda *_: nullcontext(raising_at(1, KeyboardInterrupt)))
+    with pytest.raises(KeyboardInterrupt):
+        simulate_case(second, tmp_path, watch=watch)
+    assert files(folder) == solved
+    with pytest.raises(KeyboardInterrupt):
+        simulate_case(first, tmp_path, watch=watch)
+    assert files(folder) == set()
 
 
 def test_infinite_moments_are_refused_before_anything_is_written(tmp_path):
@@ -363,3 +401,19 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
     told = [text for text in result.warnings if "do not read its picture" in text]
     assert len(told) == sum(defect > UNRESOLVED for defect in pair.sign_defects) == 1
     assert min(pair.sign_defects) < 1e-4
+
+
+@pytest.mark.parametrize("intensity", [4.0, 15.0])
+def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
+    """Of files that are not written nothing else is said."""
+    sets = ["oscillator.epsilon=2.0", "noise.tau0=20.0", f'vary={{"noise.D0"=[{intensity}]}}', "moments.p=[0.0]"]
+    mesh = "mesh={phi_cells=1, xi_cells=2, phi_degree=8, xi_degree=8}"
+    case = write(tmp_path, TEXT, [*sets, "output.eigenfunctions=[0.0]", mesh])
+    (curve,) = case.curves()
+    with pytest.raises(NotConverged, match=r"\d% of it is negative") as refused:
+        stationary_density(ExponentSolver(curve.problem, case.cylinder_mesh()).pair(0.0))
+    (result,) = fpsolve.run(case, tmp_path / "out")
+    reason = in_words_of_a_case(str(refused.value))
+    assert f"neither the stationary density nor eigenfunctions are written: {reason}" in result.warnings
+    assert "do not read its picture" not in " ".join(result.warnings)
+    assert not list((tmp_path / "out").rglob("*.vtu"))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NotConverged
+from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
 from fpsolve.model.plane import growth_rate, phase_speed
@@ -108,8 +108,7 @@ def _judged(pair: PrincipalPair, density: Density, name: str) -> Density:
     share = float(np.sum(sizes[density.values < 0]) / np.sum(sizes))
     if share > MOST_NEGATIVE:
         raise NotConverged(
-            f"the {name} at p = {pair.p:g} is not resolved, {share:.0%} of it is negative; use a mesh with more cells, "
-            "in the phase and in the noise",
+            f"the {name} at p = {pair.p:g} is not resolved, {share:.0%} of it is negative; {Remedy.CELLS}",
             density,
         )
     return density

@@ -31,12 +31,12 @@ from fpsolve.exponent.bordered import Bordered
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.exponent.solver import ExponentSolver, checked_moments
+from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.direction import Direction, directions
 from fpsolve.model.noise import NonGaussianNoise
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem, checked_moments, of_problem
 
 SMALL_P = 1e-4
 """For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
@@ -135,7 +135,7 @@ def sensitivities(
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
     solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
-    points = checked_moments(p, problem) if np.size(p) else np.zeros(0)
+    points = checked_moments(p, problem, may_be_empty=True)
     return solve_sensitivities(solver, points, directions(problem, original))
 
 
@@ -161,7 +161,7 @@ def solve_sensitivities(
 
     def of_root() -> Slopes:
         index = nonzero_root(solver, guess=root)
-        return found.root(index.value) if index else {}
+        return found.root(index.value) if isinstance(index, Estimate) else {}
 
     moments = tuple(tried(f"Λ({each:g})", partial(found.moment, float(each))) for each in p)
     indices = {

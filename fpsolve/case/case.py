@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -100,6 +101,11 @@ class Case(Section):
     def is_exact(self) -> bool:
         """Whether the noise is Eq. (7) as it stands; perturbation theory then has its reduction only."""
         return self.noise.treatment == "exact"
+
+    @property
+    def planned(self) -> int:
+        """How many curves there are, without making them."""
+        return math.prod(map(len, self.vary.values()))
 
     def curves(self) -> tuple[Curve, ...]:
         """One curve for each combination of the varied values, the last key varying fastest."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import json
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
@@ -173,9 +174,9 @@ def _not_empty(metadata: Iterable[Any]) -> str:
 
 
 def _number(bound: float) -> str:
-    """5/3 as 5/3, not as 1.6666666666666667; 1e15 as it stands here."""
+    """5/3, and the float below it, as 5/3, not as 1.6666666666666667; 1e15 as it stands here."""
     fraction = Fraction(bound).limit_denominator(99)
-    is_simple = fraction.denominator > 1 and float(fraction) == bound
+    is_simple = fraction.denominator > 1 and math.isclose(fraction, bound, rel_tol=1e-15)
     return str(fraction) if is_simple or isinstance(bound, int) else re.sub(r"e\+?(-?)0*", r"e\1", f"{bound:g}")
 
 

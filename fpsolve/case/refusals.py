@@ -29,7 +29,7 @@ from fpsolve.case.sections import (
     Values,
     same,
 )
-from fpsolve.errors import MeshError, NoPerturbationTheory, NoSuchExponent
+from fpsolve.errors import MeshError, NoSuchExponent
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Discretisation, noise_space
 from fpsolve.model.noise import check_existence
@@ -83,7 +83,7 @@ def _obstacle(valid: Known, varied: Mapping[str, float], p: FloatArray, *, with_
             sizes = np.append(theory.scale.moment(p), [theory.stability_index, *factors])
     except ValidationError as error:
         return str(error.errors()[0]["ctx"]["error"])
-    except (ArithmeticError, NoPerturbationTheory):  # the square of omega may be too small for a number
+    except OverflowError:  # of R^p
         sizes = np.array([math.inf])
     if not np.all(np.isfinite(sizes)):
         return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
@@ -135,7 +135,7 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     p = np.array(section.p or (0.0,))
     for varied in combinations(valid["vary"]):
         reason, faults = _obstacle(valid, varied, p), {}
-        with suppress(ArithmeticError, ValidationError):  # of a law, or an r0 near to 5/3, that is the reason
+        with suppress(ValidationError):  # that is the reason
             curve = make_curve(valid["oscillator"], valid["noise"], varied)
             faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
         for name, text in faults.items():

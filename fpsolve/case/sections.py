@@ -26,7 +26,8 @@ from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
-_SAME = 1e-12
+_DIGITS = 12
+_SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
 
 Values = tuple[float, ...]
@@ -61,7 +62,7 @@ class NoiseSection(Section):
 
     D0: Intensity
     tau0: CorrelationTime
-    r0: Annotated[Departure, Field(lt=5 / 3)]
+    r0: Annotated[Departure, Field(lt=math.nextafter(5 / 3, 0))]  # at which 5 - 3 r0 is 0 already
     treatment: Annotated[
         Literal["ou-reduction", "exact"], parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"')
     ] = "ou-reduction"
@@ -91,6 +92,12 @@ class Sweep(Section):
             )
         return self
 
+    @property
+    def values(self) -> FloatArray:
+        """The numbers, those between the ends without the rounding errors of the division, and 0 without a sign."""
+        inner = np.linspace(self.start, self.stop, self.num)[1:-1].tolist()
+        return np.array([self.start, *(round(p, _DIGITS) for p in inner), self.stop]) + 0.0
+
 
 def _list_or_table(value: Any) -> str | None:
     return LIST if isinstance(value, list | tuple) else TABLE if isinstance(value, dict | Sweep) else None
@@ -115,7 +122,7 @@ class Moments(Section):
     def values(self) -> FloatArray:
         """All p, in the file's order."""
         if isinstance(self.p, Sweep):
-            return np.linspace(self.p.start, self.p.stop, self.p.num)
+            return self.p.values
         return np.array(self.p)
 
     @cached_property

@@ -4,6 +4,7 @@ from .eigen import PrincipalPair as PrincipalPair
 from .eigen import principal_pair as principal_pair
 from .eigen import spectrum as spectrum
 from .error import Estimate as Estimate
+from .error import Failure as Failure
 from .function import MomentLyapunovFunction as MomentLyapunovFunction
 from .moments import moment_lyapunov as moment_lyapunov
 from .moments import solve_moments as solve_moments
@@ -14,5 +15,4 @@ from .quantities import Quantity as Quantity
 from .quantities import lyapunov_exponent as lyapunov_exponent
 from .quantities import stability_index as stability_index
 from .solver import ExponentSolver as ExponentSolver
-from .solver import Failure as Failure
 from .solver import MomentLyapunov as MomentLyapunov

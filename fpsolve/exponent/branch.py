@@ -12,10 +12,10 @@ from threadpoolctl import ThreadpoolController
 
 from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import refined
-from fpsolve.exponent.rival import rival
+from fpsolve.exponent.rival import is_far_out, rival
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Discretisation
@@ -77,11 +77,13 @@ class Branch:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure
                 raise failure from None
-            except (ArithmeticError, RuntimeError, ValueError, MeshError) as failure:  # LinAlgError is a ValueError
-                if isinstance(failure, MeshError) and self.mesh is None:
-                    raise NotConverged(f"Λ({p:g}) did not converge: {failure}; {self.remedy}") from failure
-                if isinstance(failure, np.linalg.LinAlgError):
-                    raise NotConverged(f"Λ({p:g}) cannot be solved ({failure}); {self.remedy}") from failure
+            except MeshError as failure:
+                if self.mesh is not None:
+                    raise
+                raise NotConverged(f"Λ({p:g}) did not converge: {failure}; {self.remedy}") from failure
+            except np.linalg.LinAlgError as failure:
+                raise NotConverged(f"Λ({p:g}) cannot be solved ({failure}); {self.remedy}") from failure
+            except (ArithmeticError, RuntimeError, ValueError) as failure:
                 if not is_numerical(failure):
                     raise
                 raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
@@ -91,10 +93,6 @@ class Branch:
     def remedy(self) -> Remedy:
         """What to do where it is not resolved."""
         return Remedy.BUDGET if self.mesh is None else Remedy.MESH
-
-    def holds(self, pair: PrincipalPair) -> bool:
-        """Whether a pair is one of this branch."""
-        return pair.p in self._known and self._known[pair.p].pair is pair
 
     def known(self) -> Mapping[float, Solution]:
         """What was solved, by p."""
@@ -112,8 +110,7 @@ class Branch:
         try:
             return self.solution(q, tolerance)
         except NotConverged as failure:
-            text = str(failure).replace(f"Λ({q:g}) did", f"Λ({q:g}), which stands for p near 0, did")
-            raise NotConverged(text, failure.partial) from failure
+            raise NotConverged(f"p near 0 goes with p = {q:g}: {failure}", failure.partial) from failure
 
     def _found(self, p: float, tolerance: Tolerance) -> Solution:
         """A solution that meets a tolerance, or the one on the given mesh."""
@@ -123,8 +120,9 @@ class Branch:
             return Solution(pair, principal_pair(fine, p, start=pair))
         if abs(p) < SMALL_P and not self.is_far:
             return self._tried(self.near_zero(p, tolerance).pair.generator, p)
+        start = None
         for tried in (self._from_start, self._from_nearest):
-            start = tried(p, tolerance)
+            start = tried(p, tolerance) or start
             if start is not None and self._meets(start, tolerance) and rival(start.pair) is None:
                 return start
         return (resolve_far if self.is_far else resolve)(
@@ -148,14 +146,17 @@ class Branch:
         nearest = min(self._known, key=lambda q: abs(q - p), default=None)
         if nearest is None:
             return None
-        solution = self._known[nearest]
-        chosen, generator = self._trimmed(solution, tolerance), solution.pair.generator
+        known = self._known[nearest]
+        chosen, generator = self._trimmed(known, tolerance), known.pair.generator
         if chosen is not generator.chosen:
             generator = Generator(self.problem, chosen)
         try:
-            return self._tried(generator, p) if fits(generator, nearest, p) else None
+            solution = self._tried(generator, p) if fits(generator, nearest, p) else None
         except NotConverged:
             return None
+        if solution is None or self.is_far or nearest == p or not is_far_out(solution.pair):
+            return solution
+        return None  # its interval reaches a place far out, which at this p is not the nearest to ξ = 0
 
     def _from_start(self, p: float, tolerance: Tolerance) -> Solution | None:
         """The solution at p with what was chosen for it in the problem close by, or None."""

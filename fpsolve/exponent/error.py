@@ -62,6 +62,19 @@ class Absent:
         return f"none: {self.reason}"
 
 
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no Λ(p), or none to be trusted.
+
+    Attributes:
+        p: the moment; None where all of them are doubtful.
+        reason: what happened, and what to do.
+    """
+
+    p: float | None
+    reason: str
+
+
 def checked(name: str, estimate: Estimate, remedy: str) -> Estimate:
     """An estimate whose error leaves it a meaning. Raises `NotConverged`."""
     if not estimate.relative_error <= MEANINGLESS:

@@ -10,7 +10,7 @@ from numpy.polynomial import Chebyshev
 from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, real_array
 from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
@@ -19,13 +19,12 @@ from fpsolve.exponent.solver import (
     ExponentSolver,
     MomentLyapunov,
     best_order,
-    checked_moments,
     misplaced,
     missed,
 )
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.problem import Problem, of_problem_too
+from fpsolve.model.problem import Problem, checked_moments, of_problem_too
 from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.validity import NO_INDEX
 
@@ -152,10 +151,10 @@ class MomentLyapunovFunction:
 
     def stability_index(self, search: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | Absent:
         """δ_p, see `nonzero_root`, from `root` on, or why there is none. Raises `NotConverged`."""
-        return nonzero_root(self.solver, search, self.root()) or Absent(no_root(self.solver.problem, search))
+        return nonzero_root(self.solver, search, self.root())
 
     def _inside(self, p: ArrayLike) -> FloatArray:
-        points = np.asarray(p, dtype=float)
+        points = real_array(p, "p")
         low, high = self.interval
         slack = 1e-9 * (high - low)
         if not np.all((points >= low - slack) & (points <= high + slack)):
@@ -247,21 +246,19 @@ def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str 
     )
 
 
-def no_root(problem: Problem, interval: tuple[float, float] = SEARCH_INTERVAL) -> str:
-    """Why Λ(p) has no root p ≠ 0."""
-    if grows_far_out(problem):
-        return NO_INDEX
+def _no_root(problem: Problem, interval: tuple[float, float]) -> Absent:
+    """That Λ(p) has no root p ≠ 0 in an interval."""
     low, high = np.clip(interval, *problem.noise.moments)
     text = f"Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]"
     is_bounded = isinstance(problem.noise, MarkovChain) or math.isfinite(problem.noise.half_width)
     remark = ", and may have none at all: with bounded noise P(sup ‖x‖ > A) may fall faster than any power of A"
-    return text + remark * is_bounded
+    return Absent(text + remark * is_bounded)
 
 
 def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
-) -> Estimate | None:
-    """δ_p, the non-zero root of Λ(p); None where Λ has none in the interval, as for noise with algebraic tails.
+) -> Estimate | Absent:
+    """δ_p, the non-zero root of Λ(p), or why Λ has none in the interval, as for noise with algebraic tails.
 
     Λ is convex, so Λ(p)/p increases and has one root at most: a safeguarded Newton iteration on it.
 
@@ -269,7 +266,7 @@ def nonzero_root(
         NotConverged: some p on the way is not resolved.
     """
     if grows_far_out(solver.problem):
-        return None
+        return Absent(NO_INDEX)
     low, high = (float(end) for end in np.clip(interval, *solver.problem.noise.moments))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)
@@ -287,7 +284,7 @@ def nonzero_root(
             estimate = Estimate(p, error / slope + abs(new - p), scale=1.0)
             return checked("the stability index", estimate, solver.near.remedy)
         if low == high:
-            return None
+            return _no_root(solver.problem, interval)
         if not low < new < high:
             new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
         p = new

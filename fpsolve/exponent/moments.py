@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.error import Failure
 from fpsolve.exponent.function import MomentLyapunovFunction, broken_convexity
-from fpsolve.exponent.solver import ExponentSolver, Failure, MomentLyapunov, checked_moments
+from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem, checked_moments, of_problem
 from fpsolve.theory.far import grows_far_out
 
 FEW_MOMENTS = 9
@@ -67,8 +68,8 @@ def solve_moments(
     Raises:
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
-    asked = checked_moments(p, solver.problem) if np.size(p) else np.zeros(0)
-    points, reports = _each_once(asked), repeat(progress, asked.size)
+    asked = checked_moments(p, solver.problem, may_be_empty=True)
+    points, reports = np.array([*dict.fromkeys(asked.tolist())], dtype=float), repeat(progress, asked.size)
 
     def report() -> None:
         next(reports, lambda: None)()
@@ -79,16 +80,10 @@ def solve_moments(
     return result if points.size == asked.size else _at(result, asked)
 
 
-def _each_once(p: FloatArray) -> FloatArray:
-    """The p without those that are equal to one before, in their order."""
-    return p[np.sort(np.unique(p, return_index=True)[1])]
-
-
 def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
     """A result at p some of which are equal, without those that failed."""
-    order = np.argsort(result.p)
-    places = np.minimum(np.searchsorted(result.p[order], p), order.size - 1) if order.size else np.zeros(0, dtype=int)
-    index = order[places[result.p[order[places]] == p]] if order.size else places
+    places = {each: i for i, each in enumerate(result.p.tolist())}
+    index = [places[each] for each in p.tolist() if each in places]
     names = ("p", "value", "derivative", "error_estimate", "residual")
     return replace(result, **{name: getattr(result, name)[index] for name in names})
 

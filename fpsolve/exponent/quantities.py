@@ -9,7 +9,7 @@ from typing import Literal
 
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate
-from fpsolve.exponent.function import SEARCH_INTERVAL, no_root, nonzero_root
+from fpsolve.exponent.function import SEARCH_INTERVAL, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.problem import Problem, of_problem
@@ -42,13 +42,13 @@ class Index(Quantity):
     """A quantity that is one number, and not one for each p.
 
     Attributes:
-        solve: finds it, from a solver and the `root` of its `MomentLyapunov`; None where there is none in `interval`.
+        solve: finds it, from a solver and the `root` of its `MomentLyapunov`, or says why there is none in `interval`.
             Raises `NotConverged`.
         theory: what perturbation theory makes of it.
         interval: where it is sought.
     """
 
-    solve: Callable[[ExponentSolver, float | None], Estimate | None]
+    solve: Callable[[ExponentSolver, float | None], Estimate | Absent]
     theory: Callable[[SecondOrder], float]
     interval: tuple[float, float] = (-math.inf, math.inf)
 
@@ -118,5 +118,4 @@ def stability_index(
         ValueError: rtol is not positive.
         NotConverged: some p on the way to it is not resolved on the mesh, or within the budget.
     """
-    solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
-    return nonzero_root(solver) or Absent(no_root(problem))
+    return nonzero_root(ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()))

@@ -40,6 +40,13 @@ def far_rivals(pair: PrincipalPair) -> list[Place]:
     return [place for place in places if not place.lower <= mean <= place.upper]
 
 
+def is_far_out(pair: PrincipalPair) -> bool:
+    """Whether a pair is that of a place far out in algebraic tails, whatever found it."""
+    places = far_places(pair.generator.problem, pair.p)
+    mean = _where(pair)[0] if places else 0.0
+    return any(place.lower <= mean <= place.upper for place in places)
+
+
 def _where(pair: PrincipalPair) -> tuple[float, float]:
     """Mean and standard deviation of z in the tilted density of a pair."""
     at, density = noise_marginal(pair)

@@ -7,27 +7,27 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_numbers
+from fpsolve.arrays import FloatArray, real_number
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.bordered import second_derivative, slope_rounding
 from fpsolve.exponent.branch import Branch, Tolerance
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.error import Estimate, Solution, checked
+from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.refine import WIDER, widened
-from fpsolve.exponent.rival import far_rivals, rival
+from fpsolve.exponent.rival import far_rivals, is_far_out, rival
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import has_algebraic_tails
-from fpsolve.model.problem import Problem, refuse_infinite
-from fpsolve.theory.far import far_places, grows_far_out, growth_beyond, highest_rate, log_tail, variance_tail
-from fpsolve.theory.frozen import FURTHEST
+from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
+from fpsolve.theory.far import far_places, grows_far_out, highest_rate, log_tail, refuse_beyond, variance_tail
 from fpsolve.theory.perturbation import Scale, scale_of
 from fpsolve.theory.validity import ALMOST_EVERY
 
@@ -37,18 +37,12 @@ HARDLY_FINITE = 1e-6
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 
-
-@dataclass(frozen=True)
-class Failure:
-    """Why there is no Λ(p), or none to be trusted.
-
-    Attributes:
-        p: the moment; None where all of them are doubtful.
-        reason: what happened, and what to do.
-    """
-
-    p: float | None
-    reason: str
+_KINDS: Sequence[tuple[str, Any, str]] = (
+    ("problem", Problem, "a Problem, made of an oscillator and a noise"),
+    ("mesh", CylinderMesh | None, "a CylinderMesh, or None"),
+    ("budget", Budget, "a Budget"),
+    ("rtol", Real, "a number such as 1e-8"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +99,7 @@ class ExponentSolver:
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
+        TypeError: an argument is of another kind.
         ValueError: rtol is not positive.
     """
 
@@ -116,6 +111,9 @@ class ExponentSolver:
     starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
+        for name, kind, words in _KINDS:
+            if not isinstance(getattr(self, name), kind):
+                raise TypeError(f"got {name} = {getattr(self, name)!r}; must be {words}")
         if not math.isfinite(self.problem.noise.standard_deviation):
             raise NoSuchExponent(
                 "the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"
@@ -149,6 +147,7 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite.
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
         """
+        p = real_number(p, "p")
         refuse_infinite(self.problem, p)
         if self.mesh is not None or p == 0 or not has_algebraic_tails(self.problem.noise):
             return self.near.solution(p, tolerance)  # on a given mesh `misplaced` warns of other places
@@ -185,7 +184,7 @@ class ExponentSolver:
         Raises:
             NoSuchExponent: Λ(p) is infinite for one of the p.
         """
-        points = checked_moments(p, self.problem) if np.size(p) else np.zeros(0)
+        points = checked_moments(p, self.problem, may_be_empty=True)
         solutions, failures = {}, []
         for i in best_order(points):
             try:
@@ -276,7 +275,7 @@ class ExponentSolver:
             solver=self,
             warnings=(*missed(self, p, value, errors), *misplaced(self, pairs)),
             failures=tuple(failures),
-            rare=np.array([pair.p for pair in pairs if self.far.holds(pair)]),
+            rare=np.array([pair.p for pair in pairs if is_far_out(pair)]),
             notes=carried_far_out(self, pairs),
         )
 
@@ -317,37 +316,25 @@ def _elsewhere(pair: PrincipalPair) -> float | None:
 
 def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
     """At which p rare paths carry the moment, and from when on at the first of them, or nothing."""
-    far = [pair for pair in pairs if solver.far.holds(pair)]
+    far = [pair for pair in pairs if is_far_out(pair)]
     if not far:
         return ()
-    (z, density), p = noise_marginal(far[0]), far[0].p
-    mean, near = float(z @ density / density.sum()), solver.loose(p).pair.value
+    nears = [solver.loose(pair.p).pair for pair in far]
+    pair, near = next((each for each in zip(far, nears, strict=True) if not is_far_out(each[1])), (far[0], None))
+    z, density = noise_marginal(pair)
+    mean = float(z @ density / density.sum())
     rarity = -log_tail(solver.problem, mean)
-    return (
-        f"at p = {', '.join(f'{pair.p:g}' for pair in far)} rare paths carry the moment, at p = {p:g} those with noise "
-        f"around {mean:.3g} standard deviations, of probability 1e-{rarity / math.log(10):.0f}; for times up to about "
-        f"{rarity / (far[0].value - near):.1g} they hardly count, and E‖x‖^p grows at {near:.3g}",
+    which = f", at p = {pair.p:g} those" if len(far) > 1 else ", those"
+    text = (
+        f"at p = {', '.join(f'{each.p:g}' for each in far)} rare paths carry the moment{which} with noise around "
+        f"{mean:.3g} standard deviations, of probability 1e-{rarity / math.log(10):.0f}"
     )
-
-
-def refuse_beyond(problem: Problem, p: float, reached: float) -> None:
-    """Refuse a p where paths that hold the noise beyond all z looked at grow as fast as all others, or faster."""
-    beyond = growth_beyond(problem, p)
-    if beyond > 0 and beyond >= reached:
-        raise NotConverged(
-            f"Λ({p:g}) did not converge: it is at least {beyond:.3g}, as much as paths grow that hold the noise beyond "
-            f"{FURTHEST:g} standard deviations, and no eigenfunction belongs to them"
-        )
+    if near is None:  # the place nearest to ξ = 0 is that far out
+        return (text,)
+    wait = rarity / (pair.value - near.value)
+    return (f"{text}; for times up to about {wait:.1g} they hardly count, and E‖x‖^p grows at {near.value:.3g}",)
 
 
 def best_order(p: FloatArray) -> Any:
     """Indices of p, inwards from the largest and then from the smallest: a mesh for a large |p| serves smaller ones."""
     return np.lexsort((-np.abs(p), p < 0))
-
-
-def checked_moments(p: ArrayLike, problem: Problem) -> FloatArray:
-    """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
-    points = real_numbers(p, "p")
-    for point in points:
-        refuse_infinite(problem, float(point))
-    return points

@@ -156,7 +156,12 @@ class NonGaussianNoise:
     @property
     def variance(self) -> float:
         """⟨ξ²⟩ of Eq. (10): 2D₀/(τ₀(5 − 3r₀)) for r₀ < 5/3, otherwise ∞."""
-        return 2 * self.D0 / (self.tau0 * (5 - 3 * self.r0)) if self.r0 < 5 / 3 else math.inf
+        return 2 * self.D0 / (self.tau0 * self._bracket) if self._bracket > 0 else math.inf
+
+    @property
+    def _bracket(self) -> float:
+        """5 − 3r₀ of Eqs. (10) and (12), which rounding makes 0 for an r₀ just below 5/3."""
+        return 5 - 3 * self.r0
 
     @property
     def standard_deviation(self) -> float:
@@ -210,8 +215,8 @@ class NonGaussianNoise:
 
     @property
     def correlation_time(self) -> float:
-        """τ₁ of Eq. (12), that of the reduced noise."""
-        return 2 * (2 - self.r0) / (5 - 3 * self.r0) * self.tau0
+        """τ₁ of Eq. (12), that of the reduced noise, for r₀ < 5/3, otherwise ∞."""
+        return 2 * (2 - self.r0) / self._bracket * self.tau0 if self._bracket > 0 else math.inf
 
     @property
     def moments(self) -> tuple[float, float]:
@@ -228,7 +233,7 @@ class NonGaussianNoise:
         Raises:
             ValueError: r₀ ≥ 5/3, where ⟨ξ²⟩ is infinite and Eq. (11) has no meaning.
         """
-        if self.r0 >= 5 / 3:
+        if self._bracket <= 0:
             raise ValueError(
                 f"r0 = {self.r0} has no Ornstein-Uhlenbeck reduction: Eqs. (11)-(12) need r0 < 5/3, "
                 "where the variance (10) is finite"

@@ -9,7 +9,9 @@ from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from fpsolve.arrays import FloatArray, real_numbers
 from fpsolve.errors import NoSuchExponent
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import Diffusion, check_existence
@@ -68,6 +70,14 @@ def refuse_infinite(problem: Problem, p: float) -> None:
                 f"{kick.phase:.6g}, where ‖x‖^p grows by a factor > {most:.3g} each time; choose a p nearer to 0, or a "
                 "ray on which no noise acts"
             )
+
+
+def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = False) -> FloatArray:
+    """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
+    points = real_numbers(p, "p", may_be_empty=may_be_empty)
+    for point in points:
+        refuse_infinite(problem, float(point))
+    return points
 
 
 class OfProblem(Protocol[P, R_co]):

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 def write_results(case: Case, results: Sequence[CurveResult], folder: Path) -> None:
     """summary.json, which says whether all curves of the case are there, and moments.csv."""
-    planned, done = len(case.curves()), len(results)
-    state = {"complete": done == planned, "planned": planned, "done": done}
+    state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
     write_json(folder / "summary.json", {**_head(case), **state, "curves": [_summary(result) for result in results]})
     columns = ["p", "value", "derivative", "perturbation", "error_estimate", "residual"]
     rows = ([*result.curve.varied.values(), *row.values()] for result in results for row in _rows(result))

@@ -24,9 +24,10 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import Fields, fields, xi_marginal
 from fpsolve.fem.noise_space import LineNoiseSpace, Samples
 from fpsolve.fem.phase_space import PhaseSpace
-from fpsolve.files import atomic, write_text
+from fpsolve.files import write_text
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import has_algebraic_tails
+from fpsolve.process import signals_held
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 MAX_ORDER = 4
@@ -108,17 +109,15 @@ def write_curve(result: CurveResult, folder: Path) -> None:
 
 def write_response(simulated: SimulatedCurve, folder: Path) -> None:
     """Write the joint density of x and ẋ, if there is one, as cell data `density` of response.vti."""
-    import pyvista
-
     response = simulated.response
     if response is None:
         return
+    pyvista, writers = _libraries()
     path, x, v = folder / f"response{simulated.curve.suffix}.vti", response.x_edges, response.v_edges
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
     grid = pyvista.ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
     grid.cell_data["density"] = response.density.ravel(order="F")
-    with atomic(path) as temporary:
-        grid.save(temporary)
+    _write_vtk(path, writers.vtkXMLImageDataWriter(), grid)
 
 
 def copy_show_script(directory: Path) -> Path:
@@ -258,9 +257,7 @@ def _vtk_order(k: int) -> list[tuple[int, int]]:
 
 def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes), and the first is shown first."""
-    import pyvista
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
-
+    pyvista, writers = _libraries()
     connectivity = grid.cells()
     count, size = connectivity.shape
     cells = np.column_stack([np.full(count, size), connectivity]).ravel()
@@ -271,11 +268,23 @@ def _write_grid(path: Path, grid: _Grid, data: Mapping[str, FloatArray], facts: 
     for name, value in facts.items():
         output.field_data[name] = [value]
     output.GetPointData().SetActiveScalars(next(iter(data)))
-    writer = vtkXMLUnstructuredGridWriter()
-    writer.SetInputData(output)
+    _write_vtk(path, writers.vtkXMLUnstructuredGridWriter(), output)
+
+
+def _write_vtk(path: Path, writer: Any, data: Any) -> None:
+    """Write what a writer of VTK makes of data; as a text, for VTK itself is silent about a full disk."""
+    writer.SetInputData(data)
     writer.WriteToOutputStringOn()
     writer.Write()
     write_text(path, writer.GetOutputString())
+
+
+def _libraries() -> tuple[Any, Any]:
+    """pyvista and the writers of VTK, whose import no signal interrupts; it takes half a second."""
+    with signals_held():
+        import pyvista
+        from vtkmodules import vtkIOXML
+    return pyvista, vtkIOXML
 
 
 def _collection(names: Mapping[float, str]) -> str:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, real_number
 from fpsolve.errors import NotConverged
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
@@ -132,6 +132,7 @@ def simulate(
         NoSuchExponent: some Λ(p) is infinite.
     """
     oscillator, noise = simulated_parts(problem)
+    time, step = (None if each is None else real_number(each, name) for name, each in (("time", time), ("step", step)))
     check_settings(noise, p, estimator, paths, seed)
     for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
         raise ValueError(f"{name}: {sentence}")

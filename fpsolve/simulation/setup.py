@@ -52,7 +52,7 @@ def check_settings(
     """
     if not math.isfinite(noise.standard_deviation):
         raise ValueError("got a noise of infinite variance; must be finite, as for r0 < 5/3")
-    for order in real_numbers(p, "p") if np.size(p) else ():
+    for order in real_numbers(p, "p", may_be_empty=True):
         check_existence(noise, order)
     is_whole = all(isinstance(each, int | np.integer) for each in (paths, seed))
     if estimator not in get_args(Estimator) or not is_whole or not BATCHES <= paths <= MAX_PATHS or seed < 0:

@@ -10,9 +10,9 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.curves import Curve
 from fpsolve.case.sections import Expectation
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
-from fpsolve.exponent.solver import Failure, MomentLyapunov
+from fpsolve.exponent.solver import MomentLyapunov
 
 if TYPE_CHECKING:  # numba takes half a second to import
     from fpsolve.simulation.estimators import MonteCarlo

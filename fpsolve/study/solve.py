@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fpsolve.analysis.density import stationary_density
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
@@ -16,8 +17,7 @@ from fpsolve.case.sections import Expectation
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
-from fpsolve.exponent.function import no_root
+from fpsolve.exponent.fields import UNRESOLVED
 from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
@@ -25,7 +25,6 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
-from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.perturbation import second_order
 
 
@@ -97,9 +96,9 @@ def _solve_curve(
     attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
     stationary = _pair(solver, 0.0) if wanted.density else None
-    lost = [] if stationary is None or stationary.sign_defects[1] <= MOST_NEGATIVE else [_lost(stationary)]
-    pictures = [*_unresolved(pairs), *lost]
-    warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None), *pictures]
+    lost = _lost(stationary)
+    warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None)]
+    warnings += lost or _unresolved(pairs)
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -125,12 +124,14 @@ def _solve_indices(
         if index.name not in names:
             continue
         try:
-            estimates[index.name] = index.solve(solver, root)
+            found = index.solve(solver, root)
         except (NotConverged, NoSuchExponent) as failure:
             failed.setdefault(str(failure), []).append(index.symbol)
             continue
-        if estimates[index.name] is None and not grows_far_out(solver.problem):  # of that a note tells
-            missing.append(f"no stability index: {no_root(solver.problem)}")
+        if isinstance(found, Estimate):
+            estimates[index.name] = found
+        elif found.reason != validity.NO_INDEX:  # of which a note tells
+            missing.append(f"no stability index: {found.reason}")
     return estimates, missing + [f"no {', '.join(symbols)}: {reason}" for reason, symbols in failed.items()]
 
 
@@ -157,12 +158,14 @@ def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
     ]
 
 
-def _lost(stationary: PrincipalPair) -> str:
-    """That there is no stationary density."""
-    return (
-        f"the stationary density is not resolved, {stationary.sign_defects[1]:.0%} of it has the wrong sign; it is not "
-        f"written, nor are eigenfunctions; {Remedy.CELLS}"
-    )
+def _lost(stationary: PrincipalPair | None) -> list[str]:
+    """Why the stationary density of a pair at p = 0 is not written, or nothing."""
+    try:
+        if stationary is not None:
+            stationary_density(stationary)
+    except NotConverged as failure:
+        return [f"neither the stationary density nor eigenfunctions are written: {failure}"]
+    return []
 
 
 def _imprecise(estimates: Mapping[str, Estimate | None], rtol: float, is_adaptive: bool) -> list[str]:

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 
+from fpsolve.errors import NotConverged
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem
-from fpsolve.theory.frozen import FrozenNoise, eigenvalues_at, frozen_noise
+from fpsolve.theory.frozen import FURTHEST, FrozenNoise, eigenvalues_at, frozen_noise
 
 NEAR = 4.0
 """z up to which a place is reached from 0 with ease."""
@@ -159,3 +160,13 @@ def _held(problem: Problem, p: float, inner: float, outer: float) -> Place:
     tilted = vector[:, 0] ** 2 / np.exp(size[2:-1:2])
     held = z[2:-1:2][tilted > NEGLIGIBLE * np.max(tilted)]
     return Place(float(value[0]), float(np.min(held)), float(np.max(held)))
+
+
+def refuse_beyond(problem: Problem, p: float, reached: float) -> None:
+    """Refuse a p where paths that hold the noise beyond all z looked at grow as fast as all others, or faster."""
+    beyond = growth_beyond(problem, p)
+    if beyond > 0 and beyond >= reached:
+        raise NotConverged(
+            f"Λ({p:g}) did not converge: it is at least {beyond:.3g}, as much as paths grow that hold the noise beyond "
+            f"{FURTHEST:g} standard deviations, and no eigenfunction belongs to them"
+        )

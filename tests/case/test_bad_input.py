@@ -137,6 +137,7 @@ VALUES = [  # key, its bad line, what the message says
     ("noise.tau0", "tau0 = 0", "got 0|>= 1e-15 and <= 1e15|(correlation time, in time)|tau0 = 0.5"),
     ("noise.r0", "r0 = 1.7", "got 1.7|< 5/3|variance (10) is infinite|r0 = 0.95"),
     ("noise.r0", "r0 = 1.6666666666666667", "got 1.66|< 5/3"),
+    ("noise.r0", "r0 = 1.6666666666666665", "got 1.66|< 5/3"),
     ("noise.treatment", 'treatment = "OU"', 'got "OU"|"ou-reduction", "exact"'),
     ("moments.p", "p = []", "got []|non-empty list|start, stop, num|p = [1.0, 2.0]"),
     ("moments.p", "p = 2.0", "got 2.0|list of finite numbers|start, stop, num|p = [1.0"),
@@ -443,10 +444,9 @@ def test_extreme_parameters_are_refused_by_their_range(tmp_path: Path, line: str
     assert re.match(f"{re.escape(place)}: {section}.{key}: got \\S+; must be a finite number >= ", only_message(path))
 
 
-@pytest.mark.parametrize("line", ["r0 = 1.6666666666666665", "p = [1e200]", "p = [-1e10]\nrtol = 1e-3"])
+@pytest.mark.parametrize("line", ["p = [1e200]", "p = [-1e10]\nrtol = 1e-3"])
 def test_combinations_that_overflow_are_refused(tmp_path: Path, line: str) -> None:
-    key = line.partition(" ")[0]
-    text = re.sub(rf"^{key} = .*", line, GOOD[: GOOD.index("[vary]")], flags=re.MULTILINE)
+    text = re.sub(r"^p = .*", line, GOOD[: GOOD.index("[vary]")], flags=re.MULTILINE)
     text = text.replace("rtol = 1e-8", "").replace("epsilon = 0.1", "epsilon = 1e6")
     path = write(tmp_path, text)
     message = only_message(path)
@@ -473,7 +473,10 @@ SIMULATED = ("monte_carlo.p", "monte_carlo.time", "monte_carlo.step")
     numbers=st.fixed_dictionaries(
         {"omega": WIDE, "D0": WIDE, "tau0": WIDE, "epsilon": between(1e-12, 1e6), "c1": either_sign(5e-324, 1e15)}
         | {"c2": between(5e-324, 1e15), "c3": between(5e-324, 1e15), "restitution": between(5e-324, 1.0)}
-        | {"r0": st.floats(-1e6, 5 / 3, exclude_max=True) | either_sign(1e-16, 0.5).map(lambda part: 1 - part)}
+        | {
+            "r0": st.floats(-1e6, math.nextafter(5 / 3, 0), exclude_max=True)
+            | either_sign(1e-16, 0.5).map(lambda part: 1 - part)
+        }
     ),
     words=st.tuples(st.sampled_from(["delta", "restitution"]), st.sampled_from(["exact", "ou-reduction"])),
     p=either_sign(5e-324, 1e308),

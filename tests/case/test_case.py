@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from fpsolve.case.case import Case, load_case
 from fpsolve.case.curves import Curve
-from fpsolve.case.sections import Moments
+from fpsolve.case.sections import Moments, Sweep
 from fpsolve.case.toml import read_document
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.mesh_file import write_mesh
@@ -56,6 +56,7 @@ def test_shipped_case_loads(path: Path) -> None:
     assert case.path == path
     assert case.expect
     assert all(curve.varied.keys() == case.vary.keys() for curve in case.curves())
+    assert case.planned == len(case.curves())
 
 
 CAPTIONS: dict[str, dict[str, float]] = {
@@ -374,3 +375,19 @@ def test_moments_know_their_orders() -> None:
     assert moments == Moments(p=(3.0, 1.0))
     assert moments != Moments(p=(1.0, 3.0))
     assert hash(moments) == hash(Moments(p=(3.0, 1.0)))
+
+
+@pytest.mark.parametrize(
+    ("sweep", "values"),
+    [
+        ((-0.2, 0.2, 9), [-0.2, -0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2]),
+        ((-1.0, 0.2, 5), [-1.0, -0.7, -0.4, -0.1, 0.2]),
+        ((-0.3, 0.1, 5), [-0.3, -0.2, -0.1, 0.0, 0.1]),
+        ((-0.0, 1e300, 3), [0.0, 5e299, 1e300]),
+        ((0.1234567890123456, 1.1234567890123457, 2), [0.1234567890123456, 1.1234567890123457]),
+    ],
+)
+def test_equidistant_p_are_without_rounding_errors(sweep: tuple[float, float, int], values: list[float]) -> None:
+    start, stop, num = sweep
+    found = Sweep(start=start, stop=stop, num=num).values.tolist()
+    assert list(map(repr, found)) == list(map(repr, values))

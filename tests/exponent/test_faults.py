@@ -8,6 +8,7 @@ from fpsolve import (
     NonGaussianNoise,
     Problem,
     VibroImpactOscillator,
+    lyapunov_exponent,
     moment_lyapunov,
     stability_index,
 )
@@ -107,5 +108,11 @@ def test_where_there_is_no_stability_index_the_reason_is_told():
 
 def test_near_zero_the_reason_names_the_moment_that_stands_for_it():
     solver = ExponentSolver(SLOW, budget=Budget(unknowns=100))
-    with pytest.raises(NotConverged, match=r"^Λ\(0\.01\), which stands for p near 0, did not converge"):
+    with pytest.raises(NotConverged, match=r"^p near 0 goes with p = 0\.01: Λ\(0\.01\) did not converge"):
         solver.lyapunov_exponent()
+
+
+def test_near_zero_the_moment_is_named_whatever_the_reason(monkeypatch):
+    monkeypatch.setattr(branch, "resolve", lambda *_, **__: (_ for _ in ()).throw(np.linalg.LinAlgError("singular")))
+    with pytest.raises(NotConverged, match=r"^p near 0 goes with p = 0\.01: Λ\(0\.01\) cannot be solved"):
+        lyapunov_exponent(FIG1)

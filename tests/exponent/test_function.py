@@ -7,6 +7,7 @@ import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.bordered import second_derivative
+from fpsolve.exponent.error import Absent
 from fpsolve.exponent.function import MomentLyapunovFunction, nonzero_root
 from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
@@ -75,6 +76,26 @@ def test_derivatives_of_the_interpolant_and_of_the_eigenvectors_agree(name, requ
 def test_exponents_at_zero_are_the_slope_and_the_curvature(weak):
     assert weak.lyapunov_exponent().value == pytest.approx(float(weak.derivative(0.0)), rel=1e-7)
     assert weak.variance_rate().value == pytest.approx(float(weak.second_derivative(0.0)), rel=1e-6)
+
+
+NO_NUMBERS = [
+    *("1", ["1"], True, [True, 1.0], [[True, 1.0]], np.array([True]), 1j, None, [[1], [1, 2]], np.nan),
+    np.ma.array([1.0, 2.0], mask=[False, True]),
+]
+
+
+@pytest.mark.parametrize("p", NO_NUMBERS, ids=repr)
+def test_arguments_that_are_no_numbers_are_refused(weak, p):
+    for function in (weak, weak.derivative, weak.second_derivative, weak.error_estimate):
+        with pytest.raises(ValueError, match=r"^p must be a finite number or an array of finite numbers, got .+$"):
+            function(p)
+
+
+def test_values_have_the_shape_of_the_arguments(weak):
+    p = np.array([[-1.0, 0.0, 1.0], [2.0, 3.0, 4.0]])
+    np.testing.assert_array_equal(weak(p.tolist()), weak(p.ravel()).reshape(2, 3))
+    assert np.shape(weak(2)) == ()
+    assert weak([]).shape == (0,)
 
 
 def test_arguments_outside_the_interval_are_refused(weak):
@@ -163,9 +184,10 @@ def test_stability_index_near_zero():
     assert np.all(np.abs(np.diff(indices, 2)) < 1e-6)
 
 
-def test_no_stability_index_within_the_interval_is_none():
+def test_without_a_stability_index_within_the_interval_there_is_a_reason():
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
-    assert nonzero_root(ExponentSolver(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)))) is None
+    index = nonzero_root(ExponentSolver(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3))))
+    assert index == Absent("Λ(p) has no root p ≠ 0 in [-20, 20]")
 
 
 @pytest.mark.parametrize("epsilon", [1e-2, 1e-4, 1e-5])

@@ -21,6 +21,7 @@ from fpsolve import (
 )
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
+from fpsolve.exponent.rival import is_far_out
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model import Drive
@@ -121,7 +122,7 @@ def test_convex_and_continuous_over_the_change_of_place():
     case, p = problem(0.5, 1.0, 1.1, 0.5), np.linspace(-0.9, 0.0, 50)
     result = moment_lyapunov(case, p, rtol=1e-6)
     solver, value, error = result.solver, result.value, result.error_estimate
-    far = np.array([solver.far.holds(solver.pair(each)) for each in p])
+    far = np.array([is_far_out(solver.pair(each)) for each in p])
     exponent, variance = solver.lyapunov_exponent(), solver.variance_rate()
     closed, _ = hydrogen(case.noise, 0.5, 1.0)
     assert np.array_equal(far[:-1], p[:-1] > -exponent.value / (variance.value / 2 - closed))
@@ -223,3 +224,15 @@ def test_the_variance_of_the_growth_is_infinite_for_the_heaviest_tails():
     wide = make_mesh(phi_cells=8, phi_degree=6, xi_cells=20, xi_degree=6, xi_min=-80, xi_max=80, grading=1.2)
     better = ExponentSolver(problem(0.5, 1.0, 1.3, 0.3), wide).variance_rate()
     assert abs(found.value - better.value) < found.error_estimate
+
+
+def test_rare_moments_are_told_whatever_else_is_asked():
+    """At p = −0.9 the place nearest to ξ = 0 is that far out; the solve at −½ must not follow it there."""
+    oscillator = VibroImpactOscillator(omega=2.0, restitution=0.7, c1=-0.05, epsilon=0.3)
+    case = Problem(oscillator, NonGaussianNoise(D0=0.5, tau0=5.0, r0=1.1))
+    alone, together = (moment_lyapunov(case, p, rtol=1e-5) for p in ([-0.5], [-0.9, -0.5]))
+    assert alone.rare.tolist() == [-0.5]
+    assert together.rare.tolist() == [-0.9, -0.5]
+    rates = [result.notes[0].rpartition("grows at ")[2] for result in (alone, together)]
+    assert float(rates[0]) == pytest.approx(float(rates[1]), rel=1e-2)
+    assert float(rates[0]) < 0.05 * alone.value[0]

@@ -75,6 +75,21 @@ def test_what_is_no_order_of_a_moment_is_refused_in_one_sentence(p):
         moment_lyapunov(FIG1, WEAK_NOISE, p)
 
 
+@pytest.mark.parametrize("p", [[[1], [1, 2]], "2", [[1.0, 2.0]]], ids=repr)
+def test_what_is_no_order_is_refused_also_where_there_may_be_none(p):
+    solver = ExponentSolver(Problem(FIG1, WEAK_NOISE))
+    for solve in (solver.moments, lambda p: solve_moments(solver, p)):
+        assert solve([]).p.shape == (0,)
+        with pytest.raises(ValueError, match=r"^p must be a finite number or a list of finite numbers, got .+$"):
+            solve(p)
+
+
+@pytest.mark.parametrize("p", ["1", True, 1j, None, [1.0], [[1], [1, 2]], np.nan], ids=repr)
+def test_a_pair_is_of_one_number(p):
+    with pytest.raises(ValueError, match=r"^p must be a finite number, got .+$"):
+        ExponentSolver(Problem(FIG1, WEAK_NOISE)).pair(p)
+
+
 @pytest.mark.parametrize("p", [1, (1.0,), np.float32(1), np.array(1), range(1, 2), [Fraction(1)], Decimal(1)], ids=repr)
 def test_all_real_numbers_are_orders_of_moments(p):
     assert moment_lyapunov(FIG1, WEAK_NOISE, p).value == moment_lyapunov(FIG1, WEAK_NOISE, 1.0).value

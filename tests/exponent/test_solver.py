@@ -267,3 +267,19 @@ def test_infinite_variance_is_refused():
 def test_bad_p_is_refused(p):
     with pytest.raises(ValueError, match="p must be a finite number or a non-empty list"):
         moment_lyapunov(FIG1, UNIT_NOISE, p)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"problem": "x"}, "got problem = 'x'; must be a Problem, made of an oscillator and a noise"),
+        ({"mesh": "x"}, "got mesh = 'x'; must be a CylinderMesh, or None"),
+        ({"budget": "x"}, "got budget = 'x'; must be a Budget"),
+        ({"rtol": "x"}, "got rtol = 'x'; must be a number such as 1e-8"),
+        ({"rtol": None}, "got rtol = None; must be a number such as 1e-8"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(change, words):
+    with pytest.raises(TypeError) as raised:
+        ExponentSolver(**({"problem": Problem(FIG1, UNIT_NOISE)} | change))
+    assert str(raised.value) == words

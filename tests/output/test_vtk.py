@@ -9,6 +9,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib.image
 import numpy as np
@@ -24,7 +25,7 @@ from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.output.vtk import copy_show_script, write_density, write_eigenfunctions
+from fpsolve.output.vtk import copy_show_script, write_density, write_eigenfunctions, write_response
 from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE
 from tests.oracles.perturbation import first_order_eigenfunction
@@ -284,6 +285,35 @@ def test_density_file(tmp_path, solver):
     width = 16 * UNIT_NOISE.standard_deviation
     assert integral(grid, "phi_marginal") == pytest.approx(width, rel=1e-8)
     np.testing.assert_allclose(grid["xi_marginal"], UNIT_NOISE.density(grid.points[:, 1]), atol=1e-10)
+
+
+@pytest.fixture
+def simulated():
+    """A simulated curve with a joint density of x and v."""
+    edges, density = np.linspace(0, 3, 101), np.random.default_rng(0).random((100, 80))
+    response = SimpleNamespace(x_edges=edges, v_edges=np.linspace(-2, 2, 81), density=density)
+    return SimpleNamespace(response=response, curve=SimpleNamespace(suffix="-2"))
+
+
+def test_response_file(tmp_path, simulated):
+    write_response(simulated, tmp_path)
+    grid = pyvista.read(tmp_path / "response-2.vti")
+    assert grid.bounds == pytest.approx((0, 3, -2, 2, 0, 0))
+    np.testing.assert_array_equal(grid.cell_data["density"].reshape(80, 100).T, simulated.response.density)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits of POSIX")
+def test_a_response_that_does_not_fit_on_the_disk_is_not_left_in_part(tmp_path, simulated):
+    import resource
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        with pytest.raises(OSError, match=r"response-2\.vti"):
+            write_response(simulated, tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_writing_loads_nothing_that_draws(tmp_path):

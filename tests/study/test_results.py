@@ -96,8 +96,8 @@ def test_what_did_not_converge_is_printed_once(case, tmp_path, capsys):
     printed = capsys.readouterr()
     assert "┃" not in printed.out
     said = " ".join(printed.err.split())
-    assert said.count("which stands for p near 0, did not converge") == 1
-    assert "no δ_p, λ, Λ″(0): Λ(0.01), which stands for p near 0" in said
+    assert said.count("p near 0 goes with p = 0.01") == 1
+    assert "no δ_p, λ, Λ″(0): p near 0 goes with p = 0.01: Λ(0.01) did not converge" in said
     assert "[mesh]" not in said  # there is none
 
 
@@ -111,6 +111,6 @@ def test_a_density_that_is_none_is_not_written(tmp_path, capsys):
         encoding="utf-8",
     )
     assert main(["run", str(path), "--out", str(tmp_path)]) == 0
-    assert "the stationary density is not resolved" in " ".join(capsys.readouterr().err.split())
+    assert "the stationary density at p = 0 is not resolved" in " ".join(capsys.readouterr().err.split())
     assert (tmp_path / "slow" / "summary.json").exists()
     assert not list((tmp_path / "slow").rglob("*.vtu"))

@@ -88,6 +88,12 @@ def test_monte_carlo_json(case, out, capsys):
     assert sorted(path.name for path in (out / "quick").iterdir()) == ["monte_carlo.json"]
 
 
+def test_vtk_is_not_loaded_where_there_is_no_response(case, out, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    assert simulate(case, "--out", out, *QUICK) == 0
+    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+
+
 def test_options_replace_those_of_the_case(case, out):
     options = ["--paths", "640", "--time", "50", "--seed", "3", "--estimator", "population"]
     assert simulate(case, "--out", out, *options) == 0
@@ -115,13 +121,14 @@ def test_each_curve_has_its_file_and_stale_ones_go(case, out):
 
 
 def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out, capsys, monkeypatch):
-    """What is solved in the same folder stays."""
+    """Nor of a run, whose figure may have its dots."""
     (out / "quick").mkdir(parents=True)
-    for name in ("monte_carlo.json", "monte_carlo-2.json", "response.png", "summary.json", "figure.png", "density.vtu"):
+    earlier = {"monte_carlo.json", "monte_carlo-2.json", "response.png", "summary.json", "figure.png", "density.vtu"}
+    for name in (*earlier, "notes.txt"):
         (out / "quick" / name).write_text("{}", encoding="utf-8")
     monkeypatch.setattr(simulated, "_simulate_curve", raising(KeyboardInterrupt))
     assert simulate(case, "--out", out) == 130
-    assert {path.name for path in (out / "quick").iterdir()} == {"summary.json", "figure.png", "density.vtu"}
+    assert [path.name for path in (out / "quick").iterdir()] == ["notes.txt"]
     assert capsys.readouterr().err.strip() == "interrupted after 0 of 1 curve; run it again to start over"
 
 
