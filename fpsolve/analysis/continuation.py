@@ -33,7 +33,7 @@ TOLERANCE = 1e-10
 """|F| over its scale on a curve; a tenth of what the solves of F leave."""
 
 
-FRAME = "frame"
+FRAME = "leaves the frame"
 """The label of a point where a curve leaves the frame."""
 
 

@@ -1,4 +1,4 @@
-"""Where stability ends: the lines λ = 0, Λ(p) = 0 and δ_p = v in a plane of two parameters.
+"""Where stability ends: the lines λ = 0, Λ(p) = 0 and δ_p = v in a frame of two parameters.
 
 F is λ, or Λ(p)/p; δ_p = v is the line Λ(v) = 0. Its gradient is exact, see `analysis.sensitivity`, and every solve
 starts from that at the point before.
@@ -6,146 +6,26 @@ starts from that at the point before.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations, product
 
 import numpy as np
-from pydantic.dataclasses import dataclass as checked_dataclass
 
-from fpsolve.analysis.continuation import Sample
-from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
+from fpsolve.analysis.continuation import LONGEST, Scan, Trace, corrected, found, scanned, traced
+from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
+from fpsolve.analysis.zero import Axis, Quantity, Zero, zero_of
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import FpsolveError
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.bordered import Bordered
-from fpsolve.exponent.error import Solution
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.direction import Family
-from fpsolve.model.parameters import STRICT
+from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.problem import Problem, of_problem
 
-RTOL = 1e-10
-"""Of F, relative to its scale."""
 SCAN_RTOL = 1e-5
+"""Of F on the grid of a scan."""
 NODES = 13
 """Of a scan, each way."""
-
-
-@checked_dataclass(frozen=True, config=STRICT)
-class Axis:
-    """One side of a chart.
-
-    Args:
-        key: of a parameter, such as "oscillator.omega".
-        start, stop: its smallest and its largest value.
-        scale: "linear" or "log".
-        at: values at which the points of a line are wanted exactly.
-
-    Raises:
-        pydantic.ValidationError: start ≥ stop, or not positive on a log scale, or an `at` is not between them.
-    """
-
-    key: str
-    start: float
-    stop: float
-    scale: Literal["linear", "log"] = "linear"
-    at: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        if not self.start < self.stop:
-            raise ValueError(f"got start = {self.start}, stop = {self.stop}; must be start < stop; exchange the two")
-        if self.scale == "log" and self.start <= 0:
-            raise ValueError(f'got start = {self.start}; must be > 0 where scale = "log"; use scale = "linear"')
-        for value in self.at:
-            if not self.start <= value <= self.stop:
-                raise ValueError(f"got at = {value}; must be from start = {self.start} to stop = {self.stop}")
-
-    def value(self, share: Any) -> Any:
-        """The parameter at a share of the way from start to stop."""
-        if self.scale == "log":
-            value = self.start * (self.stop / self.start) ** np.asarray(share)
-        else:
-            value = self.start + (self.stop - self.start) * np.asarray(share)
-        return np.clip(value, self.start, self.stop)[()]
-
-    def share(self, value: float) -> float:
-        """The inverse of `value`."""
-        if self.scale == "log":
-            return math.log(value / self.start) / math.log(self.stop / self.start)
-        return (value - self.start) / (self.stop - self.start)
-
-    def slope(self, share: float) -> float:
-        """d value/d share."""
-        if self.scale == "log":
-            return float(self.value(share)) * math.log(self.stop / self.start)
-        return self.stop - self.start
-
-
-@dataclass(frozen=True)
-class Zero:
-    """What is zero on a line.
-
-    Attributes:
-        kind: of the quantity.
-        p: the order of the moment, or the value of δ_p; 0 for λ.
-    """
-
-    kind: Literal["lyapunov_exponent", "moment", "stability_index"]
-    p: float = 0.0
-
-    @property
-    def name(self) -> str:
-        """ "lyapunov_exponent", "moment 2", "stability_index -1"."""
-        return self.kind if self.kind == "lyapunov_exponent" else f"{self.kind} {self.p:g}"
-
-    @property
-    def symbol(self) -> str:
-        """F, as a sentence has it."""
-        return "λ" if self.p == 0 else f"Λ({self.p:g})" if self.kind == "moment" else f"Λ({self.p:g})/({self.p:g})"
-
-
-class Quantity:
-    """F over the unit square: λ or Λ(p)/p, with its gradient.
-
-    Args:
-        zero: which of them.
-        family: the problems.
-        axes: the parameters.
-        budget: for a solve.
-        rtol: of F, relative to its scale.
-    """
-
-    def __init__(self, zero: Zero, family: Family, axes: tuple[Axis, Axis], budget: Budget, rtol: float = RTOL) -> None:
-        self._zero, self._family, self._axes = zero, family, axes
-        self._rtol, self._budget = rtol, budget
-        self._starts: Mapping[float, Solution] = {}
-
-    def __call__(self, at: FloatArray) -> Sample:
-        """F at (u, v). Raises `FpsolveError` where there is none."""
-        values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}
-        try:
-            family = self._family.at(values)
-        except ValueError as failure:
-            raise FpsolveError(f"no such problem: {failure}") from failure
-        solver = ExponentSolver(family.problem, rtol=self._rtol, budget=self._budget, starts=self._starts)
-        value, error = solver.ratio_alone(self._zero.p)
-        directions = family.directions()
-        slopes = self._slopes(solver, [directions[axis.key] for axis in self._axes])
-        gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
-        self._starts = solver.near.known()
-        scale = solver.scale(self._zero.p) / abs(self._zero.p) if self._zero.p else solver.scales.linear
-        return Sample(at, value, gradient, error, scale)
-
-    def _slopes(self, solver: ExponentSolver, along: Sequence[Any]) -> FloatArray:
-        """∂F/∂θ."""
-        p = self._zero.p
-        if abs(p) >= SMALL_P:
-            pair = solver.near.solution(p).pair
-            return np.array([changed_value(pair, by).value / p for by in along])
-        around = Bordered(solver.near.solution(0.0).pair)
-        more = [0.5 * p * changed_curvature(around, by).value if p else 0.0 for by in along]
-        return np.array([changed_slope(around, by).value for by in along]) + more
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,11 +34,11 @@ class Branch:
 
     Attributes:
         x, y: the values of the two parameters, shape (n,).
-        width: how far the line may be off, |error of F|/|∇F|, as a share of the sides of the chart, shape (n,).
-        labels: what is special about a point: "frame", where it leaves the chart, "fold in oscillator.omega", "crossing
-            with moment 2", "noise.D0 = 1", "obstacle"; empty for ordinary ones.
+        width: how far the line may be off, |error of F|/|∇F|, as a share of the sides of the frame, shape (n,).
+        labels: what is special about a point: "leaves the frame", "fold in x", "fold in y", "crossing with moment 2",
+            "at noise.D0 = 1"; empty for ordinary ones.
         closed: whether the last point is followed by the first.
-        obstacles: why it ends inside of the chart, if it does.
+        obstacles: why it ends inside of the frame, if it does.
     """
 
     x: FloatArray
@@ -167,3 +47,171 @@ class Branch:
     labels: tuple[str, ...]
     closed: bool = False
     obstacles: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """A line F = 0 in a frame of two parameters; it pickles.
+
+    Attributes:
+        zero: what F is.
+        x, y: the frame.
+        family: the problems, one of which has the values of the other parameters.
+        traces: its branches, in shares of the sides of the frame.
+        scan: F on the grid in which they were looked for; None where they were started from points.
+        step: the longest step between two points, in sides of the frame.
+        budget: for a solve.
+    """
+
+    zero: Zero
+    x: Axis
+    y: Axis
+    family: Family
+    traces: tuple[Trace, ...] = ()
+    scan: Scan | None = None
+    step: float = LONGEST
+    budget: Budget = field(default_factory=Budget)
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """The branches in the parameters themselves."""
+        return tuple(self._branch(trace) for trace in self.traces)
+
+    @property
+    def quantity(self) -> Quantity:
+        """F over the unit square."""
+        return Quantity(self.zero, self.family, (self.x, self.y), self.budget)
+
+    def remark(self) -> str:
+        """That there is no line, if so; and what the scan could not see."""
+        if self.traces or self.scan is None:
+            return ""
+        values = self.scan.values[np.isfinite(self.scan.values)]
+        if not values.size:
+            return f"{self.zero.symbol} exists nowhere in the frame"
+        if np.any(values > 0) and np.any(values < 0):
+            return f"no line {self.zero.symbol} = 0 was found, though it changes its sign in the frame"
+        return f"{self.zero.symbol} {'<' if values[0] < 0 else '>'} 0 everywhere in the frame"
+
+    def refined(self, step: float) -> Boundary:
+        """The same with shorter steps, in sides of the frame."""
+        return replace(self, step=step, traces=())._from(trace.points[0].sample.at for trace in self.traces)
+
+    def extended(self, x: Axis | None = None, y: Axis | None = None) -> Boundary:
+        """Its branches in another, such as a wider, frame of the same parameters; branches elsewhere are not sought."""
+        other = replace(self, x=x or self.x, y=y or self.y, traces=(), scan=None)
+        if (other.x.key, other.y.key) != (self.x.key, self.y.key):
+            raise ValueError(f"a frame of {other.x.key}, {other.y.key}: use `started_from` for other parameters")
+        seeds = (
+            np.array([other.x.share(x), other.y.share(y)])
+            for branch in self.branches
+            for x, y in zip(branch.x, branch.y, strict=True)
+        )
+        return other._from(seeds)
+
+    def started_from(self, branch: int, point: int, x: Axis, y: Axis) -> Boundary:
+        """The branch through one of its points in another pair of parameters; all others are held as they are there."""
+        here = self.branches[branch]
+        values = {self.x.key: float(here.x[point]), self.y.key: float(here.y[point])}
+        family = self.family.at(values)
+        directions = family.directions()
+        start = np.array([axis.share(directions[axis.key].theta) for axis in (x, y)])
+        return replace(self, x=x, y=y, family=family, traces=(), scan=None)._from([start])
+
+    def grown(self, progress: Callable[[], None] = lambda: None) -> Iterator[Boundary]:
+        """The scan, then one branch after the other: what there is so far, each time."""
+        rough = Quantity(self.zero, self.family, (self.x, self.y), self.budget, SCAN_RTOL)
+        nodes = NODES if self.scan is None else self.scan.nodes.size
+        scan = scanned(rough, nodes, progress)
+        now = replace(self, scan=scan, traces=())
+        yield now
+        for trace in found(self.quantity, scan, self.step):
+            now = replace(now, traces=(*now.traces, self._special(trace)))
+            yield now
+
+    def _from(self, seeds: Iterable[FloatArray]) -> Boundary:
+        """With the branches through some points, or near to them."""
+        quantity, traces = self.quantity, list[Trace]()
+        for seed in seeds:
+            if np.any((seed < 0) | (seed > 1)) or any(trace.holds(seed, 2 * self.step) for trace in traces):
+                continue
+            start = corrected(quantity, seed)
+            if start is not None:
+                traces.append(self._special(traced(quantity, start, self.step)))
+        return replace(self, traces=tuple(traces))
+
+    def _special(self, trace: Trace) -> Trace:
+        """A branch with its folds, and the points that the axes ask for."""
+        quantity = self.quantity
+        trace = with_folds(quantity, trace, ("x", "y"))
+        for number, axis in enumerate((self.x, self.y)):
+            wanted = [(axis.share(value), f"at {axis.key} = {value:g}") for value in axis.at]
+            trace = with_values(quantity, trace, number, wanted)
+        return trace
+
+    def _branch(self, trace: Trace) -> Branch:
+        at = np.array([point.sample.at for point in trace.points])
+        return Branch(
+            x=np.asarray(self.x.value(at[:, 0])),
+            y=np.asarray(self.y.value(at[:, 1])),
+            width=np.array([point.sample.width for point in trace.points]),
+            labels=tuple(point.label for point in trace.points),
+            closed=trace.closed,
+            obstacles=trace.obstacles,
+        )
+
+
+@of_problem
+def boundary(
+    problem: Problem,
+    zero: str | Mapping[str, float],
+    x: Axis,
+    y: Axis,
+    *,
+    original: NonGaussianNoise | None = None,
+    step: float = LONGEST,
+    nodes: int = NODES,
+    budget: Budget | None = None,
+) -> Boundary:
+    """The line λ = 0, Λ(p) = 0 or δ_p = v in a frame of two parameters.
+
+    Args:
+        problem: a motion and its noise, in one argument or two; its other parameters are held.
+        zero: "lyapunov_exponent", {"moment": p} or {"stability_index": v}.
+        x, y: the frame.
+        original: the noise of Eq. (7) that an Ornstein-Uhlenbeck noise is the reduction (12)-(14) of; then its
+            parameters are those of the frame.
+        step: the longest step between two points, in sides of the frame.
+        nodes: of the grid in which branches are looked for, each way.
+        budget: for a solve.
+
+    Raises:
+        ValueError: an axis is no parameter of the problem, both are the same, or `zero` is none of these.
+        NoSuchExponent: Λ(p) is infinite in the frame.
+    """
+    family = Family(problem, original)
+    known = family.directions()
+    for axis in (x, y):
+        if axis.key not in known:
+            raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known)}")
+    if x.key == y.key:
+        raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
+    empty = Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
+    line = Boundary(zero_of(zero), x, y, family, scan=empty, step=step, budget=budget or Budget())
+    *_, whole = line.grown()
+    return whole
+
+
+def crossed(lines: Sequence[Boundary]) -> list[Boundary]:
+    """Lines in one frame, each with the points that it has in common with the others."""
+    new = defaultdict[tuple[int, int], list[Placed]](list)
+    for (i, one), (j, other) in combinations(enumerate(lines), 2):
+        fields = one.quantity, other.quantity
+        for (a, trace), (b, crossing) in product(enumerate(one.traces), enumerate(other.traces)):
+            for (place, point), (other_place, other_point) in crossings(trace, crossing, fields):
+                new[i, a].append((place, replace(point, label=f"crossing with {other.zero.name}")))
+                new[j, b].append((other_place, replace(other_point, label=f"crossing with {one.zero.name}")))
+    return [
+        replace(line, traces=tuple(with_points(trace, new[i, a]) for a, trace in enumerate(line.traces)))
+        for i, line in enumerate(lines)
+    ]

@@ -98,11 +98,6 @@ class Branch:
         """What was solved, by p."""
         return dict(self._known)
 
-    def largest(self) -> tuple[float, Generator] | None:
-        """The p of the largest size that was solved, and with what; None where none was."""
-        p = max(self._known, key=abs, default=None)
-        return None if p is None else (p, self._known[p].pair.generator)
-
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
         side = p or (-1.0 if has_algebraic_tails(self.problem.noise) else 1.0)  # where Λ is finite
@@ -146,9 +141,8 @@ class Branch:
         nearest = min(self._known, key=lambda q: abs(q - p), default=None)
         if nearest is None:
             return None
-        known = self._known[nearest]
-        chosen, generator = self._trimmed(known, tolerance), known.pair.generator
-        if chosen is not generator.chosen:
+        generator = self._known[nearest].pair.generator
+        if (chosen := self._trimmed(self._known[nearest], tolerance)) is not generator.chosen:
             generator = Generator(self.problem, chosen)
         try:
             solution = self._tried(generator, p) if fits(generator, nearest, p) else None

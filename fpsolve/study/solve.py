@@ -21,7 +21,6 @@ from fpsolve.exponent.fields import UNRESOLVED
 from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
-from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
@@ -106,7 +105,7 @@ def _solve_curve(
         estimates=estimates,
         eigenpairs=pairs,
         stationary=None if lost else stationary,
-        discretisation=None if (used := solver.near.largest()) is None else _discretisation(*used),
+        discretisation=_discretisation(solver),
         warnings=tuple(map(in_words_of_a_case, warnings)),
         notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]))),
         failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),
@@ -197,8 +196,13 @@ def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
     return Comparison(expectation, dict(result.curve.varied), value, tolerance, met)
 
 
-def _discretisation(p: float, generator: Generator) -> dict[str, Any]:
-    """That of one p, z in noise units."""
+def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
+    """That of the p of the largest size that was solved, z in noise units; None where none was."""
+    known = solver.near.known()
+    p = max(known, key=abs, default=None)
+    if p is None:
+        return None
+    generator = known[p].pair.generator
     chosen, noise = generator.chosen, generator.problem.noise
     interval = {"xi_min": float(chosen.z_lines[0]), "xi_max": float(chosen.z_lines[-1])} if chosen.z_lines.size else {}
     return {
