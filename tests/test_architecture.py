@@ -22,7 +22,7 @@ ROOMS = {
         *("function", "moments", "quantities"),
     ],
     "analysis": ["density", "sensitivity", "continuation", "special_points", "zero", "stability"],
-    "case": ["toml", "messages", "sections", "vary", "curves", "remedies", "refusals", "case"],
+    "case": ["toml", "messages", "sections", "vary", "chart", "curves", "remedies", "refusals", "case"],
     "study": ["results", "solve", "simulate"],
     "output": ["vtk", "tables", "plots", "figures", "terminal"],
     "workflow": [],
