@@ -21,10 +21,10 @@ ROOMS = {
         *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
         *("function", "moments", "quantities"),
     ],
-    "analysis": ["density", "sensitivity", "continuation", "special_points", "zero", "stability"],
+    "analysis": ["density", "sensitivity", "continuation", "special_points", "zero", "stability", "regions"],
     "case": ["toml", "messages", "sections", "vary", "chart", "curves", "remedies", "refusals", "case"],
-    "study": ["results", "solve", "simulate"],
-    "output": ["vtk", "tables", "plots", "figures", "terminal"],
+    "study": ["results", "solve", "simulate", "chart"],
+    "output": ["vtk", "tables", "plots", "figures", "charts", "terminal"],
     "workflow": [],
     "cli": [],
 }

@@ -98,6 +98,11 @@ class Zero:
         """F, as a sentence has it."""
         return "λ" if self.p == 0 else f"Λ({self.p:g})" if self.kind == "moment" else f"Λ({self.p:g})/({self.p:g})"
 
+    @property
+    def equation(self) -> str:
+        """What holds on the line: λ = 0, Λ(2) = 0, δ_p = -1."""
+        return f"δ_p = {self.p:g}" if self.kind == "stability_index" else f"{self.symbol} = 0"
+
 
 def zero_of(value: str | Mapping[str, float]) -> Zero:
     """What "lyapunov_exponent", {"moment": 2.0} or {"stability_index": -1.0} says. Raises `ValueError`."""

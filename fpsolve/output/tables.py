@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES
-from fpsolve.files import atomic, write_json
+from fpsolve.files import write_csv, write_json
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory.perturbation import second_order
 
@@ -24,26 +23,27 @@ if TYPE_CHECKING:
 def write_results(case: Case, results: Sequence[CurveResult], folder: Path) -> None:
     """summary.json, which says whether all curves of the case are there, and moments.csv."""
     state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
-    write_json(folder / "summary.json", {**_head(case), **state, "curves": [_summary(result) for result in results]})
+    write_json(folder / "summary.json", {**head(case), **state, "curves": [_summary(result) for result in results]})
     columns = ["p", "value", "derivative", "perturbation", "error_estimate", "residual"]
     rows = ([*result.curve.varied.values(), *row.values()] for result in results for row in _rows(result))
-    _write_csv(folder / "moments.csv", [*case.vary, *columns], rows)
+    write_csv(folder / "moments.csv", [*case.vary, *columns], rows)
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
     """monte_carlo.json of a curve, and response.csv where there is a response."""
     suffix, response = simulated.curve.suffix, simulated.response
-    write_json(folder / f"monte_carlo{suffix}.json", {**_head(case), **_simulation_summary(simulated)})
+    write_json(folder / f"monte_carlo{suffix}.json", {**head(case), **_simulation_summary(simulated)})
     if response is None:
         return
     edges = response.amplitude_edges
     columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
     rows = (map(float, row) for row in zip(*columns, strict=True))
     header = ["amplitude_from", "amplitude_to", "density", "standard_error"]
-    _write_csv(folder / f"response{suffix}.csv", header, rows)
+    write_csv(folder / f"response{suffix}.csv", header, rows)
 
 
-def _head(case: Case) -> dict[str, str]:
+def head(case: Case) -> dict[str, str]:
+    """What every table begins with."""
     return {"case": case.name, "title": case.title, "fpsolve_version": __version__}
 
 
@@ -109,10 +109,3 @@ def _response_summary(response: Response) -> dict[str, Any]:
 
 def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
     return {name: {"value": value, "standard_error": error} for name, (value, error) in numbers.items()}
-
-
-def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
-    with atomic(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(columns)
-        table.writerows(rows)

@@ -14,6 +14,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, VARIANCE_RATE, Quantity
+from fpsolve.study.chart import Chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.perturbation import second_order
@@ -163,6 +164,28 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
 def _theory(case: Case, quantity: Quantity) -> str:
     """Heading of a column of perturbation theory, starred where it has another noise than the solution."""
     return f"Eq. {quantity.equation}{'*' if case.is_exact else ''}"
+
+
+def print_chart(case: Case, chart: Chart) -> None:
+    """The special points of every line, and what the regions are."""
+    assert case.chart is not None
+    names = (axis.key.partition(".")[2] for axis in (case.chart.x, case.chart.y))
+    table = _table(case.title, Column("line"), "branch", "points", *names, Column("special point"))
+    for line in chart.lines:
+        for number, branch in enumerate(line.branches, start=1):
+            special = [i for i, label in enumerate(branch.labels) if label]
+            count = f"{branch.x.size}{', closed' if branch.closed else ''}"
+            table.add_row(line.zero.equation, str(number), count, "", "", "", end_section=not special)
+            for i in special:
+                place = f"{branch.x[i]:.7g}", f"{branch.y[i]:.7g}"
+                label = branch.labels[i].replace("oscillator.", "").replace("noise.", "")
+                table.add_row("", "", "", *place, label, end_section=i == special[-1])
+    console = Console()
+    console.print(table)
+    for region in () if chart.regions is None else chart.regions.each:
+        console.print(f"{region.share:5.1%}  {region.name}", highlight=False)
+    for text in chart.remarks:
+        Console(stderr=True).print(Text(f"note: {case.name}: {text}"), style="cyan", soft_wrap=True)
 
 
 def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
