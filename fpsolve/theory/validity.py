@@ -18,7 +18,7 @@ WEAK = 0.05
 
 def reduction_note(noise: NonGaussianNoise) -> str | None:
     """On the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
-    if abs(noise.r0 - 1) <= NEAR_GAUSSIAN:
+    if abs(noise.r0 - 1) <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
         return None
     reduced = noise.ou_reduction().standard_deviation ** 2
     return (

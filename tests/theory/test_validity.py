@@ -12,7 +12,7 @@ from tests.conftest import FIG1, FIG1_NOISE
 from tests.oracles import perturbation
 
 
-@pytest.mark.parametrize("r0", [0.95, 1.0, 1.05])
+@pytest.mark.parametrize("r0", [0.9, 0.95, 1.0, 1.05, 1.1])
 def test_the_reduction_near_gaussian_noise_needs_no_note(r0):
     assert validity.reduction_note(NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0)) is None
 
