@@ -13,6 +13,7 @@ from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_C
 from fpsolve.files import alone
 from fpsolve.output.terminal import digits
 from fpsolve.study import solve
+from tests.conftest import heed_signals
 from tests.test_workflow import HOPELESS, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -192,12 +193,11 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-def begin(case, **options):
+def begin(case, prepare=heed_signals):
     """A run in another process, which solves its first curve for as long as one likes."""
     command = [sys.executable, "-c", LONG, "run", case]
-    process = subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
-    )
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    process = subprocess.Popen(command, **pipes, text=True, preexec_fn=prepare)
     try:
         assert process.stdout.readline() == "begun\n"
     except BaseException:
@@ -252,7 +252,7 @@ def test_a_signal_while_vtk_is_loaded_ends_a_run_in_order(case, tmp_path, name):
     """Its compiled modules crash where a signal raises an exception in their initialisation."""
     number = getattr(signal, name)
     command = [sys.executable, "-c", SIGNAL_IN_VTK, str(int(number)), "run", case]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, preexec_fn=heed_signals)
     assert done.returncode == 128 + number
     assert done.stderr == "interrupted after 0 of 2 curves; run it again to start over\n"
     assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
@@ -260,7 +260,7 @@ def test_a_signal_while_vtk_is_loaded_ends_a_run_in_order(case, tmp_path, name):
 
 def test_an_ignored_signal_stays_ignored(case):
     """So that nohup works."""
-    with begin(case, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as process:
+    with begin(case, lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as process:
         try:
             process.send_signal(signal.SIGHUP)
             with pytest.raises(subprocess.TimeoutExpired):

@@ -10,6 +10,8 @@ import time
 
 import pytest
 
+from tests.conftest import heed_signals
+
 CASE = """
 title = "Killed"
 [oscillator]
@@ -39,12 +41,12 @@ def case(tmp_path):
 
 
 def started(case, out):
-    """A run in a process of its own; SIGINT is not ignored in it, whatever the parent does."""
+    """A run in a process of its own."""
     return subprocess.Popen(
         [*COMMAND, "run", str(case), "--out", str(out)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=heed_signals,
     )
 
 

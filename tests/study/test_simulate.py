@@ -19,6 +19,7 @@ from fpsolve.files import LOCK
 from fpsolve.output import figures
 from fpsolve.simulation import response
 from fpsolve.study import simulate as simulated
+from tests.conftest import heed_signals
 
 CASE = """
 title = "A quick simulation"
@@ -245,11 +246,6 @@ def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
     assert "64 paths" in printed.out
 
 
-def heed_interrupts():
-    """What runs in the background inherits that SIGINT is ignored."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
 def wait_for(path):
     """Until a process has begun to write."""
     end = time.monotonic() + 60
@@ -265,7 +261,7 @@ def test_a_real_interrupt(case, out):
     command[-1] = "400000"
     with subprocess.Popen(
         [*command, "--time", "4000"],
-        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, preexec_fn=heed_interrupts,
+        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, preexec_fn=heed_signals,
     ) as process:  # fmt: skip
         try:
             wait_for(out / "quick" / LOCK)
