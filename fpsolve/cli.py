@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from fpsolve.workflow import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
-KEPT = "interrupted; what was done is kept"
 
 app = App(
     name="fpsolve",
@@ -72,13 +71,13 @@ def run(
     code = 0
     for case in _load_to_write(cases, overrides, monte_carlo=monte_carlo):
         outcome = run_case(case, out, monte_carlo=monte_carlo, watch=_watch())
-        if outcome.interrupted:
-            _print_error(KEPT)
+        if outcome.interruption:
+            _print_error(outcome.interruption)
         if monte_carlo and case.figure.y == STABILITY_INDEX.name:
             note = "note: a simulation gives no stability index, so that the figure has no dots"
             Console(stderr=True).print(note, style="cyan")
         print(f"written: {out / case.name}")
-        if outcome.interrupted:
+        if outcome.interruption:
             return INTERRUPTED
         if outcome.failures:
             code = NOT_CONVERGED
@@ -111,10 +110,10 @@ def simulate(
     stated = [f"monte_carlo.{name}={value}" for name, value in options.items() if value is not None]
     for case in _load_to_write(cases, [*(overrides or ()), *stated], monte_carlo=True):
         outcome = simulate_case(case, out, watch=_watch())
-        if outcome.interrupted:
-            _print_error(KEPT)
+        if outcome.interruption:
+            _print_error(outcome.interruption)
         print(f"written: {out / case.name}")
-        if outcome.interrupted:
+        if outcome.interruption:
             return INTERRUPTED
     return 0
 

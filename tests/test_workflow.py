@@ -172,7 +172,7 @@ def test_failures_are_values(tmp_path):
         assert [sorted((each.p for each in result.failures), reverse=True) for result in results] == [[], failed]
         assert not {failure.reason for failure in results[1].failures} & set(results[1].warnings)
     assert (len(outcome.failures), len(checked.failures)) == (2, 1)
-    assert not outcome.interrupted
+    assert not outcome.interruption
     curves = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
     assert curves[1]["warnings"] == [*outcome.results[1].warnings, *outcome.failures]
     assert files(tmp_path) == {"test.toml", *(f"out/test/{name}" for name in files(tmp_path / "out/test"))}

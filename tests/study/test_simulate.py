@@ -219,6 +219,27 @@ def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, m
     assert "the simulation overflowed" in capsys.readouterr().err
 
 
+def kept(out, curve, planned):
+    """The message of a simulation that was interrupted when something was done."""
+    place = f"in the simulation of curve {curve} of {planned}"
+    return f"interrupted {place}; what was done is kept in {out / 'quick'}; run it again to start over"
+
+
+def test_an_interrupted_simulation_of_a_run_says_how_to_go_on(case, out, capsys, monkeypatch):
+    original = simulated._simulate_curve
+
+    def interrupted(case, curve, progress):
+        if curve.number == 2:
+            raise KeyboardInterrupt
+        return original(case, curve, progress)
+
+    monkeypatch.setattr(simulated, "_simulate_curve", interrupted)
+    sets = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", "monte_carlo.time=100.0"]
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *sets]) == 130
+    assert capsys.readouterr().err.strip() == kept(out, 2, 2)
+    assert {"summary.json", "monte_carlo.json", "figure.png"} <= {path.name for path in (out / "quick").iterdir()}
+
+
 def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys, monkeypatch):
     monkeypatch.setattr(response, "stationary_response", raising(KeyboardInterrupt))
     sets = ["oscillator.c2=0.5", "oscillator.c1=0.8", 'vary."noise.D0"=[0.1, 0.2]']
@@ -226,7 +247,7 @@ def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys,
     assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
     found = read(out / "quick/monte_carlo.json")
     assert "no stationary response: stopped before it was reached" in found["warnings"]
-    assert "what was done is kept" in capsys.readouterr().err
+    assert kept(out, 1, 2) in capsys.readouterr().err
 
 
 def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
@@ -242,7 +263,7 @@ def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
     assert simulate(case, "--out", out, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]') == 130
     assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
     printed = capsys.readouterr()
-    assert "what was done is kept" in printed.err
+    assert kept(out, 2, 2) in printed.err
     assert "64 paths" in printed.out
 
 
@@ -302,7 +323,7 @@ def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
     assert any("stopped early" in text for text in second["warnings"])
     assert second["time"] < 0.7 * first["time"]
     assert len(list((out / "quick").iterdir())) == 2  # an earlier third one is gone
-    assert "what was done is kept" in capsys.readouterr().err
+    assert kept(out, 2, 3) in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
