@@ -178,6 +178,22 @@ def test_failures_are_values(tmp_path):
     assert files(tmp_path) == {"test.toml", *(f"out/test/{name}" for name in files(tmp_path / "out/test"))}
 
 
+@pytest.mark.parametrize("small", [0.0, 0.001])
+def test_what_fails_for_small_p_is_said_once(tmp_path, small):
+    """λ, Λ″(0) and δ_p need the same solve; Λ(0) = 0 needs none."""
+    sets = [f"moments.p=[9.0, {small}]", "oscillator.epsilon=2.0", "budget.unknowns=100", "output.eigenfunctions=[]"]
+    outcome = run_case(write(tmp_path, TEXT, [*sets, 'vary={"noise.D0"=[1.0]}']), tmp_path / "out")
+    (curve,) = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    assert [failure.p for failure in outcome.results[0].failures] == [9.0, small][: 2 if small else 1]
+    assert sum("the next mesh has" in text for text in curve["warnings"]) == 2
+    row = {"p": 0.0, "value": 0.0, "derivative": None, "perturbation": 0.0, "error_estimate": 0.0, "residual": None}
+    assert curve["moments"] == ([] if small else [row])
+    assert curve["warnings"][0].startswith("no δ_p, λ, Λ″(0): ")
+    assert curve["warnings"][0].endswith("as there is no Λ(0.001)") == bool(small)
+    with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
+        assert [row["derivative"] for row in csv.DictReader(file)] == [""] * (not small)
+
+
 def raising_at(count, exception):
     """What raises when it is called for the count-th time."""
     calls = []

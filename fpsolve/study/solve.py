@@ -94,7 +94,7 @@ def _solve_curve(
 ) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
     moments = solve_moments(solver, wanted.p, progress=progress)
-    estimates, missing = _solve_indices(solver, wanted.indices, moments.root)
+    estimates, missing = _solve_indices(solver, wanted.indices, moments)
     attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
     stationary = _pair(solver, 0.0) if wanted.density else None
@@ -116,7 +116,7 @@ def _solve_curve(
 
 
 def _solve_indices(
-    solver: ExponentSolver, names: Sequence[str], root: float | None
+    solver: ExponentSolver, names: Sequence[str], moments: MomentLyapunov
 ) -> tuple[dict[str, Estimate | None], list[str]]:
     """Indices, δ_p first, None for those not asked for; and why some of those asked for are missing."""
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
@@ -126,13 +126,15 @@ def _solve_indices(
         if index.name not in names:
             continue
         try:
-            estimates[index.name] = index.solve(solver, root)
+            estimates[index.name] = index.solve(solver, moments.root)
         except (NotConverged, NoSuchExponent) as failure:
             failed.setdefault(str(failure), []).append(index.symbol)
             continue
         if estimates[index.name] is None and not grows_far_out(solver.problem):  # of that a note tells
             missing.append(f"no stability index: {no_root(solver.problem)}")
-    return estimates, missing + [f"no {', '.join(symbols)}: {reason}" for reason, symbols in failed.items()]
+    told = {failure.reason: f"as there is no Λ({failure.p:g})" for failure in moments.failures if failure.p is not None}
+    reasons = {reason: told.get(reason, reason) for reason in failed}
+    return estimates, missing + [f"no {', '.join(failed[each])}: {reason}" for each, reason in reasons.items()]
 
 
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:

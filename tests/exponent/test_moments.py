@@ -8,6 +8,7 @@ import pytest
 
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import moments
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.moments import FEW_MOMENTS, moment_lyapunov, solve_moments
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
@@ -27,6 +28,20 @@ def test_a_failed_moment_is_a_value():
     (failure,) = found.failures
     assert failure.p == 6.0
     assert "use more cells" in failure.reason
+
+
+def test_the_moment_zero_needs_no_solve():
+    """Its slope λ does, and is not known here."""
+    stronger = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=2.0)
+    solver = ExponentSolver(Problem(stronger, WEAK_NOISE), budget=Budget(unknowns=100))
+    for p, kept in (([6.0, 0.0, 5.0], [0.0]), ([0.0], [0.0]), ([0.0, 6.0, 0.0], [0.0, 0.0])):
+        found = solve_moments(solver, p)
+        np.testing.assert_array_equal(found.p, kept)
+        assert not np.any(found.value)
+        assert not np.any(found.error_estimate)
+        assert np.all(np.isnan(found.derivative))
+        assert np.all(np.isnan(found.residual))
+        assert [failure.p for failure in found.failures] == [each for each in p if each]
 
 
 def test_what_is_raised_is_the_result_with_its_failures():
