@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -192,6 +193,18 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     assert curve["warnings"][0].endswith("as there is no Λ(0.001)") == bool(small)
     with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
         assert [row["derivative"] for row in csv.DictReader(file)] == [""] * (not small)
+
+
+def test_zero_has_no_sign(tmp_path):
+    sets = [
+        "moments.p=[-0.0, 2.0, -1.0]",
+        "oscillator.c1=-0.0",
+        "oscillator.restitution=1.0",
+        "output.eigenfunctions=[-0.0]",
+    ]
+    run_case(write(tmp_path, TEXT, [*sets, "monte_carlo={ paths = 64, time = 40.0 }"]), tmp_path, monte_carlo=True)
+    for name in ("summary.json", "moments.csv", "monte_carlo.json", "eigenfunctions.pvd"):
+        assert "-0.0" not in re.findall(r"-?[\d.e+-]+", (tmp_path / "test" / name).read_text(encoding="utf-8")), name
 
 
 def raising_at(count, exception):

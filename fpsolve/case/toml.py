@@ -159,7 +159,7 @@ class Document:
         try:
             text_as_toml = _quoted_if_bare(text)
             path = _override_path(text_as_toml)
-            value: Any = tomllib.loads(text_as_toml)
+            value: Any = _loads(text_as_toml)
             for key in path:
                 value = value[key]
             _assign(self.data, dotted(path).split("."), value)
@@ -208,7 +208,7 @@ def read_document(path: str | Path, overrides: Sequence[str] = ()) -> Document:
     """
     text = _read(path)
     try:
-        data = tomllib.loads(text)
+        data = _loads(text)
         document = Document(str(path), data, dict(_Scanner(text).scan().lines))
     except RecursionError:
         fault = Fault("", None, "lists or tables are nested too deeply; a case needs three levels")
@@ -218,6 +218,11 @@ def read_document(path: str | Path, overrides: Sequence[str] = ()) -> Document:
     for override in overrides:
         document.override(override)
     return document
+
+
+def _loads(text: str) -> dict[str, Any]:
+    """The data of TOML, 0 without a sign. Raises ValueError where it is none."""
+    return tomllib.loads(text, parse_float=lambda number: float(number) + 0.0)
 
 
 def _read(path: str | Path) -> str:

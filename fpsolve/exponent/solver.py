@@ -340,4 +340,4 @@ def checked_moments(p: ArrayLike, problem: Problem) -> FloatArray:
     points = real_numbers(p, "p")
     for point in points:
         refuse_infinite(problem, float(point))
-    return points
+    return points + 0.0  # 0 without a sign
