@@ -15,7 +15,7 @@ import pytest
 import fpsolve
 from fpsolve.analysis import stationary_density
 from fpsolve.case.remedies import in_words_of_a_case
-from fpsolve.errors import CaseError, NotConverged, OutputError
+from fpsolve.errors import CaseError, NotConverged, OutputError, Remedy
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
 from fpsolve.output.tables import write_results
@@ -406,6 +406,12 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
     assert min(pair.sign_defects) < 1e-4
 
 
+def test_no_cells_are_asked_for_without_a_mesh(case, tmp_path, monkeypatch):
+    monkeypatch.setattr("fpsolve.analysis.density.MOST_NEGATIVE", -1.0)
+    for result in fpsolve.run(case, tmp_path):
+        assert result.warnings[-1].endswith("0% of it is negative; use a smaller rtol")
+
+
 @pytest.mark.parametrize("intensity", [4.0, 15.0])
 def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     """Of files that are not written nothing else is said."""
@@ -416,7 +422,7 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     with pytest.raises(NotConverged, match=r"\d% of it is negative") as refused:
         stationary_density(ExponentSolver(curve.problem, case.cylinder_mesh()).pair(0.0))
     (result,) = fpsolve.run(case, tmp_path / "out")
-    reason = in_words_of_a_case(str(refused.value))
-    assert f"neither the stationary density nor eigenfunctions are written: {reason}" in result.warnings
+    told = f"neither the stationary density nor eigenfunctions are written: {refused.value.reason}; {Remedy.MESH}"
+    assert in_words_of_a_case(told) in result.warnings
     assert "do not read its picture" not in " ".join(result.warnings)
     assert not list((tmp_path / "out").rglob("*.vtu"))

@@ -172,7 +172,7 @@ class _Meter:
             if isinstance(self.failure, NotConverged):
                 text += ", as the layers of slow, strong noise are too thin"
             if self.failure:
-                text += f" ({self.failure})"
+                text += f" ({self.failure.reason if isinstance(self.failure, NotConverged) else self.failure})"
             raise NotConverged(f"Λ({self.p:g}) did not converge: {reason}; {text}; {Remedy.BUDGET}")
         best = self.best
         raise NotConverged(

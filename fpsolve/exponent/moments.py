@@ -109,7 +109,9 @@ def _interpolated(solver: ExponentSolver, p: FloatArray, progress: Callable[[], 
 def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov:
     result = solver.moments(p, progress=progress)
     obstacle = None if result.failures else broken_convexity(result.pairs, result.error_estimate)
-    return replace(result, failures=(Failure(None, obstacle),)) if obstacle else _with_zero(result, p)
+    if obstacle:
+        return replace(result, failures=(Failure(None, f"{obstacle}; {solver.near.refinement}"),))
+    return _with_zero(result, p)
 
 
 def _with_zero(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:

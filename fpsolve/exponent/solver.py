@@ -233,7 +233,7 @@ class ExponentSolver:
             generator = Generator(self.problem, widened(pair.generator).enriched())
         except MeshError as failure:
             raise NotConverged(f"Λ″(0) did not converge: {failure}; {self.near.remedy}") from failure
-        return principal_pair(generator, pair.p, start=pair)
+        return self.near.remedied(lambda: principal_pair(generator, pair.p, start=pair))
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0.
@@ -340,4 +340,4 @@ def checked_moments(p: ArrayLike, problem: Problem) -> FloatArray:
     points = real_numbers(p, "p")
     for point in points:
         refuse_infinite(problem, float(point))
-    return points + 0.0  # 0 without a sign
+    return points

@@ -98,7 +98,7 @@ def _solve_curve(
     attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
     stationary = _pair(solver, 0.0) if wanted.density else None
-    lost = _lost(stationary)
+    lost = _lost(stationary, solver.near.refinement)
     warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None)]
     warnings += lost or _unresolved(pairs)
     return CurveResult(
@@ -160,13 +160,13 @@ def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
     ]
 
 
-def _lost(stationary: PrincipalPair | None) -> list[str]:
-    """Why the stationary density of a pair at p = 0 is not written, or nothing."""
+def _lost(stationary: PrincipalPair | None, remedy: str) -> list[str]:
+    """Why the stationary density of a pair at p = 0 is not written, and what to do, or nothing."""
     try:
         if stationary is not None:
             stationary_density(stationary)
     except NotConverged as failure:
-        return [f"neither the stationary density nor eigenfunctions are written: {failure}"]
+        return [f"neither the stationary density nor eigenfunctions are written: {failure.reason}; {remedy}"]
     return []
 
 

@@ -212,3 +212,13 @@ def test_a_tolerance_below_rounding_is_refused():
 def test_bad_budgets_are_refused(budget):
     with pytest.raises(ValueError, match=r"unknowns|seconds"):
         Budget(**budget)
+
+
+def test_no_cells_are_asked_for_where_the_mesh_is_chosen():
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=3.0)
+    noise = NonGaussianNoise(D0=2.0, tau0=5.0, r0=0.95).ou_reduction()
+    with pytest.raises(
+        NotConverged, match=r"was not found on this mesh: .*; use a larger rtol or a larger budget$"
+    ) as said:
+        moment_lyapunov(oscillator, noise, -3.0, rtol=1e-4, budget=Budget(unknowns=200))
+    assert "use more cells" not in str(said.value)
