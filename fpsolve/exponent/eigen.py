@@ -248,6 +248,7 @@ class _Iterate(NamedTuple):
     y: FloatArray
 
 
+@np.errstate(divide="ignore", over="ignore", invalid="ignore")  # a start may be useless, as its residual tells then
 def _rayleigh_iteration(generator: Generator, p: float, x: FloatArray, y: FloatArray) -> PrincipalPair:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
     space, operator = generator.space(p), generator.matrix(p)
