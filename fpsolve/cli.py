@@ -66,6 +66,7 @@ def run(
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
     from fpsolve.exponent.quantities import STABILITY_INDEX
+    from fpsolve.output.terminal import print_remark
     from fpsolve.workflow import run_case
 
     code = 0
@@ -75,7 +76,7 @@ def run(
             _print_error(outcome.interruption)
         if monte_carlo and case.figure.y == STABILITY_INDEX.name:
             note = "note: a simulation gives no stability index, so that the figure has no dots"
-            Console(stderr=True).print(note, style="cyan")
+            print_remark(note, "cyan")
         print(f"written: {out / case.name}")
         if outcome.interruption:
             return INTERRUPTED

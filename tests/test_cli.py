@@ -438,6 +438,6 @@ def test_theories_outside_their_range_are_noted(tmp_path, capsys):
         "moments.rtol=1e-6",
     ]
     assert main(["run", str(CASES / "minimal.toml"), *sets, "--out", str(tmp_path)]) == 0
-    err = capsys.readouterr().err
+    err = " ".join(capsys.readouterr().err.split())
     assert "note: minimal: the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = 0.3 > 0.1" in err
     assert "note: minimal: Eq. (37) is for weak noise" in err
