@@ -137,17 +137,18 @@ class Case(Section):
         return section
 
 
-def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
+def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[str, str] | None = None) -> Case:
     """Read and check a case file.
 
     Args:
         path: a TOML file.
         overrides: texts such as "oscillator.omega=2.0", each a key with its sections and a TOML value.
+        options: more of these, by how messages shall call them.
 
     Raises:
         CaseError: with every fault of the file and of the overrides, each with its line and its remedy.
     """
-    document = read_document(path, overrides)
+    document = read_document(path, overrides, options)
     faults = list(document.faults)
     try:
         case = Case.model_validate(

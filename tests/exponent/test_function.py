@@ -7,6 +7,7 @@ import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import second_derivative
+from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import MomentLyapunovFunction, nonzero_root
 from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
@@ -114,6 +115,10 @@ def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):
 def test_zero_as_a_node_is_no_fault(interval):
     function = MomentLyapunovFunction(FIG1, WEAK_NOISE, interval, rtol=1e-6)
     assert np.any(function.nodes == 0)
+
+
+def test_an_estimate_is_printed_with_its_error():
+    assert str(Estimate(-0.37345849855446, 1.04e-12, 1.0)) == "-0.3734584986 ± 1e-12"
 
 
 def test_moments_one_by_one_are_checked_for_convexity(monkeypatch):

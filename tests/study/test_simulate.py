@@ -329,12 +329,12 @@ def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--paths", "5"], "monte_carlo.paths: got 5; must be a whole number >= 32"),
+        (["--paths", "5"], "quick.toml: --paths 5: monte_carlo.paths: got 5; must be a whole number >= 32"),
         (["--paths", "2.5"], "--paths"),
-        (["--time", "1"], r"monte_carlo.time: got 1; must be >= \d+\.\d+, two transients"),
+        (["--time", "1"], r"quick\.toml: --time 1: monte_carlo\.time: got 1; must be >= \d+\.\d+, two transients"),
         (["--time", "nan"], "monte_carlo.time"),
         (["--seed", "-1"], "monte_carlo.seed: got -1; must be a whole number >= 0"),
-        (["--estimator", "exact"], 'must be one of "direct", "population"'),
+        (["--estimator", "exact"], '--estimator exact: .* must be one of "direct", "population"'),
         (["--set", "monte_carlo.step=0.9"], r"too large for the correlation time of the noise; must be > 0 and <= 0\."),
         (["--set", "monte_carlo.step=0.2", "--set", "oscillator.omega=9.0"], r"the frequency; .* <= 0\.05556"),
         (["--set", "monte_carlo.step=0.2", "--set", "noise.D0=500.0"], "too large for the strength of the noise"),
