@@ -43,11 +43,17 @@ def refuse(refusals: Iterable[Refusal]) -> None:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """' did you mean "omega"?' or nothing; a key without its section finds the key with it."""
+    """' did you mean "omega"?' or nothing."""
+    guess = _guess(name, known)
+    return f' did you mean "{guess}"?' if guess else ""
+
+
+def _guess(name: str, known: Iterable[str]) -> str | None:
+    """The known name that is most like another; a key without its section finds the key with it."""
     keys = {key.lower(): key for key in known}
     name = name.lower()
     found = [key for key in keys if key.endswith(f".{name}")] or get_close_matches(name, keys, n=1)
-    return f' did you mean "{keys[found[0]]}"?' if found else ""
+    return keys[found[0]] if found else None
 
 
 def shown(value: Any) -> str:
@@ -84,10 +90,27 @@ def too_long(detail: Mapping[str, Any]) -> str:
 
 
 def explain(error: ValidationError, model: Any) -> Iterator[tuple[Path, str, str]]:
-    """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence."""
-    for detail in own_faults(error):
-        path = tuple(part for part in detail["loc"] if part not in (LIST, TABLE))
-        yield path, _key(path), _sentence(path, dict(detail), model)
+    """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence.
+
+    What is missing where a key is misspelt is not another fault.
+    """
+    faults = [(tuple(part for part in each["loc"] if part not in (LIST, TABLE)), each) for each in own_faults(error)]
+    misspelt = {_meant(path, model) for path, detail in faults if detail["type"] in _UNKNOWN}
+    for path, detail in faults:
+        if detail["type"] != "missing" or path not in misspelt:
+            yield path, _key(path), _sentence(path, dict(detail), model)
+
+
+def _meant(path: Path, model: Any) -> Path | None:
+    """The path of the known key that an unknown one is most like."""
+    guess = _guess(str(path[-1]), _known_keys(path, model))
+    return (*path[:-1], *guess.split(".")) if guess else None
+
+
+def _known_keys(path: Path, model: Any) -> list[str]:
+    """The keys beside a path, and those of the tables among them."""
+    fields = _model_and_field(path[:-1], model)[0].__pydantic_fields__
+    return [*fields, *_inner_keys(fields)]
 
 
 def _key(path: Path) -> str:
@@ -107,10 +130,9 @@ def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
     if detail["type"] == "too_long":
         return too_long(detail)
     if detail["type"] in _UNKNOWN:
-        fields = _model_and_field(path[:-1], model)[0].__pydantic_fields__
-        known = list(fields)
-        guess = nearest(str(path[-1]), [*known, *_inner_keys(fields)])
-        return f"unknown key;{guess} known keys: {', '.join(known)}; rename or remove it"
+        known = _known_keys(path, model)
+        beside = ", ".join(key for key in known if "." not in key)
+        return f"unknown key;{nearest(str(path[-1]), known)} known keys: {beside}; rename or remove it"
     field = _model_and_field(path, model)[1]
     meaning = f"{field.description}, in {unit_of(field)}" if unit_of(field) else field.description
     must, example = f"must be {_accepted(field)} ({meaning})", example_of(field)
