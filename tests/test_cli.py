@@ -54,6 +54,18 @@ def test_out_and_set(case, tmp_path, capsys):
     assert " 0.0002850955" in capsys.readouterr().out
 
 
+def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("fpsolve.output.figures.write_figure", lambda *arguments, **_: drawn.append(arguments[3]))
+    sets = ["oscillator.omega = 2.0", "moments.p=[1.0]", "budget.seconds=9.0", "output.eigenfunctions=[]"]
+    assert main(["run", case, *(f"--set={text}" for text in sets)]) == 0
+    assert drawn == ["A test\nwith oscillator.omega = 2.0, moments.p = [1.0]"]
+    told = " ".join(capsys.readouterr().out.split())
+    assert told.startswith("A test: noise.D0 = 0.1 with oscillator.omega = 2.0, moments.p = [1.0] ┏")
+    assert main(["run", case, "--set", "output.eigenfunctions=[]"]) == 0
+    assert drawn[1:] == ["A test"]
+
+
 @pytest.mark.parametrize("word", ["noise.D0=0.2", "mesh.file=a/b.vtu", "vary.noise.D0=[1, 2]", f"title={'x' * 400}"])
 def test_set_takes_one_assignment(case, word, capsys):
     assert main(["check", case, "--set", "oscillator.omega=2", word]) == BAD_INPUT

@@ -62,6 +62,11 @@ def shown(value: Any) -> str:
         text = _toml(value)
     except (ValueError, RecursionError):
         text = "a value too long to show"
+    return shortened(text)
+
+
+def shortened(text: str) -> str:
+    """A text cut to a readable length."""
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 

@@ -65,7 +65,7 @@ def write_figure(
     """
     with _canvas(paths) as figure:
         axes = figure.add_subplot(xlabel=axis_title(ABSCISSAE[x]), ylabel=y.title)
-        axes.set_title(fill(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
+        axes.set_title(_filled(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
             _draw(axes, item, i)
@@ -79,11 +79,16 @@ def write_response_figure(response: Response, title: str, paths: Sequence[Path])
     share = np.cumsum(response.amplitude_density * np.diff(response.amplitude_edges))
     seen = float(response.amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
     with _canvas(paths, width=10.5) as figure:
-        figure.suptitle(fill(title, 100), fontsize=12, parse_math=False)
+        figure.suptitle(_filled(title, 100), fontsize=12, parse_math=False)
         plane, radial = figure.subplots(1, 2)
         picture = _draw_plane(plane, response, seen)
         figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$")
         _draw_amplitude(radial, response, seen)
+
+
+def _filled(text: str, width: int) -> str:
+    """A text in lines that fit, each of its own lines for itself."""
+    return "\n".join(fill(line, width) for line in text.splitlines())
 
 
 def _draw_plane(axes: Any, response: Response, seen: float) -> Any:

@@ -123,7 +123,7 @@ def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult
 def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Table:
     """One row for each parameter set: λ by simulation and by finite elements."""
     names = (key.partition(".")[2] for key in case.vary)
-    table = _table(case.title, *names, LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away")
+    table = _table(case.headline, *names, LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away")
     for each, result in pairs:
         value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
         known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
@@ -176,7 +176,7 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     indices = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
     names = (key.partition(".")[2] for key in case.vary)
     headings = (text for index in indices for text in (index.symbol, _theory(case, index)))
-    table = _table(case.title, *names, *headings)
+    table = _table(case.headline, *names, *headings)
     _explain_star(table, case)
     for result in results:
         theory = second_order(result.curve.problem)
@@ -199,7 +199,7 @@ def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
         console.print(f"{case.name}: nothing is expected; add [[expect]] to the case", markup=False)
         return
     table = _table(
-        f"{case.name}: {case.title}", Column("quantity", overflow="fold"), "expected", "computed", "difference", ""
+        f"{case.name}: {case.headline}", Column("quantity", overflow="fold"), "expected", "computed", "difference", ""
     )
     for item in comparisons:
         expectation = item.expectation

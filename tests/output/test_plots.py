@@ -39,7 +39,9 @@ def legend(figure):
     return [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
 
 
-@pytest.mark.parametrize("title", ["Short", "A title so long that it fills all of the line above the axes, and more"])
+@pytest.mark.parametrize(
+    "title", ["Short", "A title so long that it fills all of the line above the axes, and more", "A\nB"]
+)
 @pytest.mark.parametrize("scale", [1e-2, 1e-4, 1e-7])
 def test_title_is_clear_of_the_power_of_ten(drawn, tmp_path, title, scale):
     write_figure([series(scale=scale / 10)], "p", MOMENT, title, [tmp_path / "figure.png"])
