@@ -82,7 +82,8 @@ def write_response_figure(response: Response, title: str, paths: Sequence[Path])
         figure.suptitle(_filled(title, 100), fontsize=12, parse_math=False)
         plane, radial = figure.subplots(1, 2)
         picture = _draw_plane(plane, response, seen)
-        figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$")
+        figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$ (time/length²)")
+        figure.get_layout_engine().set(wspace=0.1)
         _draw_amplitude(radial, response, seen)
 
 
@@ -99,7 +100,7 @@ def _draw_plane(axes: Any, response: Response, seen: float) -> Any:
     scale = LogNorm(max(density[density > 0].min(), density.max() * 1e-4), density.max())
     visited = np.ma.masked_equal(density.T, 0)
     velocity = seen * v[-1] / x[-1]
-    axes.set(xlabel="$x$", ylabel=r"$\dot{x}$ (1/time)", xlim=(0, seen), ylim=(-velocity, velocity))
+    axes.set(xlabel="$x$ (length)", ylabel=r"$\dot{x}$ (length/time)", xlim=(0, seen), ylim=(-velocity, velocity))
     return axes.pcolormesh(x, v, visited, cmap="viridis", norm=scale, rasterized=True)
 
 
@@ -109,8 +110,8 @@ def _draw_amplitude(axes: Any, response: Response, seen: float) -> None:
     middle, low, high = (edges[1:] + edges[:-1]) / 2, density - 2 * error, density + 2 * error
     axes.fill_between(middle, low, high, color=_COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")
     axes.plot(middle, density, color=_COLOURS[0], linewidth=1.6, label="simulation")
-    axes.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", ylabel="density of $A$", xlim=(0, seen))
-    axes.set_ylim(0, 1.25 * high.max())
+    axes.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$ (length)", ylabel="density of $A$ (1/length)")
+    axes.set(xlim=(0, seen), ylim=(0, 1.25 * high.max()))
     axes.legend(frameon=False, fontsize=11, loc="upper right")
 
 
