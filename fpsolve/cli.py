@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
 
+UNITS = "Units: omega in rad/time, c1 in 1/time, D0 in 1/time, tau0 in time"
+
 app = App(
     name="fpsolve",
     help="""Moment Lyapunov exponents of a vibro-impact oscillator under coloured noise, by finite elements.
@@ -39,7 +41,9 @@ app = App(
 Cases = Annotated[list[Path], Parameter(help="Case files.", consume_multiple=True, negative="")]
 Overrides = Annotated[
     list[str] | None,
-    Parameter(name="--set", help="Another value for a key of the case, e.g. oscillator.omega=2.0.", negative=""),
+    Parameter(
+        name="--set", help=f"Another value for a key of the case, e.g. oscillator.omega=2.0. {UNITS}.", negative=""
+    ),
 ]
 
 

@@ -1,6 +1,7 @@
 """The command line: exit codes, messages, and where they go."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -9,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from fpsolve import cli
+from fpsolve.case.vary import PARAMETERS
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
+from fpsolve.model.parameters import unit_of
 from fpsolve.output.terminal import digits
 from fpsolve.study import solve
 from tests.conftest import heed_signals
@@ -80,6 +83,15 @@ def test_a_case_may_have_an_equals_sign_in_its_name(case, tmp_path, capsys):
     path.write_text("title = 1", encoding="utf-8")
     assert main(["check", str(path)]) == BAD_INPUT
     assert f"{path}:1: title: got 1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["run", "check", "simulate"])
+def test_the_help_names_the_units(command, capsys):
+    assert main([command, "--help"]) == 0
+    told = " ".join(re.sub("[│╭╮╰╯─]", " ", capsys.readouterr().out).split())
+    units = dict(re.findall(r"(\w+) in ([\w/]+)", told.partition("Units: ")[2].partition(".")[0]))
+    keys = {"omega": "oscillator", "c1": "oscillator", "D0": "noise", "tau0": "noise"}
+    assert units == {key: unit_of(PARAMETERS[f"{section}.{key}"]) for key, section in keys.items()}
 
 
 def test_set_takes_negative_values(case):
