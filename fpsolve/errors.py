@@ -1,4 +1,4 @@
-"""What fpsolve raises. Bad arguments of the dataclasses raise pydantic's `ValidationError`, a `ValueError`."""
+"""What fpsolve raises. Bad parameters raise `model.faults.ParameterError`, a `ValueError`."""
 
 from __future__ import annotations
 
