@@ -68,4 +68,15 @@ def _sentence(detail: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
         return f"{what}: unknown; the parameters are {', '.join(fields)}"
     meaning = meaning_of(fields[name])
     must = f"must be {accepted(fields[name])}" + (f" ({meaning})" if meaning else "")
-    return f"{name}: missing; {must}" if detail["type"] == "missing" else f"{name}: got {detail['input']!r}; {must}"
+    return (
+        f"{name}: missing; {must}" if detail["type"] == "missing" else f"{name}: got {_shown(detail['input'])}; {must}"
+    )
+
+
+def _shown(value: Any) -> str:
+    """A value as Python writes it, in one line of a readable length."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # of a whole number with thousands of digits
+        return "a number too long to show"
+    return text if len(text) <= 60 else f"{text[:57]}..."

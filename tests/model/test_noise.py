@@ -116,6 +116,8 @@ def test_each_fault_has_a_sentence_with_its_unit():
         ((), {"tau0": 1.0, "r0": 0.9, "DO": 1.0}, [
             f"D0: missing; {size} (noise intensity, in 1/time)", "DO: unknown; the parameters are D0, tau0, r0",
         ]),
+        ((10**5000, 1.0, 0.9), {}, [f"D0: got a number too long to show; {size} (noise intensity, in 1/time)"]),
+        ((1.0, [0.5] * 99, 0.9), {}, [f"tau0: got [{'0.5, ' * 11}0...; {size} (correlation time, in time)"]),
         ((1.0, 0.0, 0.9), {}, [f"tau0: got 0.0; {size} (correlation time, in time)"]),
         ((1.0, 1.0, 0.9, 2.0), {}, ["argument 4: unknown; the parameters are D0, tau0, r0"]),
     ):  # fmt: skip
