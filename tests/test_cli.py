@@ -85,6 +85,17 @@ def test_a_case_may_have_an_equals_sign_in_its_name(case, tmp_path, capsys):
     assert f"{path}:1: title: got 1" in capsys.readouterr().err
 
 
+def test_what_refers_to_other_p_can_be_left_out(capsys):
+    """As the messages say."""
+    command = ["check", str(CASES / "fig1.toml"), "--set", "moments.p=[1.5]", "--set", "vary={}"]
+    assert main(command) == BAD_INPUT
+    err = capsys.readouterr().err
+    remedies = set(re.findall(r"or go without by --set '(.+)'", err))
+    assert remedies == {"output.eigenfunctions=[]", "expect=[]"}
+    assert all("or go without by" in line for line in err.splitlines())
+    assert main([*command, *(f"--set={remedy}" for remedy in remedies)]) == 0
+
+
 @pytest.mark.parametrize("command", ["run", "check", "simulate"])
 def test_the_help_names_the_units(command, capsys):
     assert main([command, "--help"]) == 0
