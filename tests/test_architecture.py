@@ -10,7 +10,7 @@ import fpsolve
 
 ROOMS = {
     "": ["errors", "arrays", "files", "process"],
-    "model": ["parameters", "plane", "noise", "markov_chain", "vibro_impact", "problem"],
+    "model": ["parameters", "words", "faults", "plane", "noise", "markov_chain", "vibro_impact", "problem"],
     "theory": ["perturbation", "frozen", "far", "validity"],
     "fem": [
         *("reference", "line", "polynomials", "mesh", "mesh_file", "phase_space", "noise_space", "space"),

@@ -12,7 +12,7 @@ from threadpoolctl import ThreadpoolController
 
 from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
-from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import refined
 from fpsolve.exponent.rival import is_far_out, rival
@@ -91,6 +91,18 @@ class Branch:
         """What to do where it is not resolved."""
         return Remedy.BUDGET if self.mesh is None else Remedy.MESH
 
+    @property
+    def refinement(self) -> str:
+        """What to do where it should be resolved better."""
+        return "use a smaller rtol" if self.mesh is None else Remedy.MESH
+
+    def remedied(self, solve: Callable[[], PrincipalPair]) -> PrincipalPair:
+        """A pair; where it is not found, the failure has the remedy of this branch."""
+        try:
+            return solve()
+        except NotConverged as failure:
+            raise NotConverged(failure.reason, failure.partial, self.remedy) from failure
+
     def largest(self) -> tuple[float, Generator] | None:
         """The p of the largest size that was solved, and with what; None where none was."""
         p = max(self._known, key=abs, default=None)
@@ -110,7 +122,7 @@ class Branch:
         if self.mesh is not None:
             coarse, fine = self._given
             pair = self._tried(coarse, p).pair
-            return Solution(pair, principal_pair(fine, p, start=pair))
+            return Solution(pair, self.remedied(lambda: principal_pair(fine, p, start=pair)))
         if abs(p) < SMALL_P and not self.is_far:
             return self._tried(self.near_zero(p, tolerance).pair.generator, p)
         start = self._from_nearest(p, tolerance)
@@ -159,7 +171,7 @@ class Branch:
         """The solution at p with a generator, from those around p, or from the nearest one."""
         known = (solution.pair for solution in self._known.values())
         near = sorted(known, key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
-        return Solution(principal_pair(generator, p, start=near))
+        return Solution(self.remedied(lambda: principal_pair(generator, p, start=near)))
 
     def _meets(self, solution: Solution, tolerance: Tolerance) -> bool:
         """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
