@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from fpsolve.workflow import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
-KEPT = "interrupted; what was done is kept"
+
+UNITS = "Units: omega in rad/time, c1 in 1/time, D0 in 1/time, tau0 in time"
 
 app = App(
     name="fpsolve",
@@ -41,7 +42,9 @@ app = App(
 Cases = Annotated[list[Path], Parameter(help="Case files.", consume_multiple=True, negative="")]
 Overrides = Annotated[
     list[str] | None,
-    Parameter(name="--set", help="Another value for a key of the case, e.g. oscillator.omega=2.0.", negative=""),
+    Parameter(
+        name="--set", help=f"Another value for a key of the case, e.g. oscillator.omega=2.0. {UNITS}.", negative=""
+    ),
 ]
 
 
@@ -68,18 +71,19 @@ def run(
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
     from fpsolve.exponent.quantities import STABILITY_INDEX
+    from fpsolve.output.terminal import print_remark
     from fpsolve.workflow import run_case
 
     code = 0
-    for case in _load_to_write(cases, overrides, monte_carlo=monte_carlo):
+    for case in _load_to_write(cases, overrides, {}, monte_carlo=monte_carlo):
         outcome = run_case(case, out, monte_carlo=monte_carlo, watch=_watch())
-        if outcome.interrupted:
-            _print_error(KEPT)
+        if outcome.interruption:
+            _print_error(outcome.interruption)
         if monte_carlo and case.figure.y == STABILITY_INDEX.name:
             note = "note: a simulation gives no stability index, so that the figure has no dots"
-            Console(stderr=True).print(note, style="cyan")
+            print_remark(note, "cyan")
         print(f"written: {out / case.name}")
-        if outcome.interrupted:
+        if outcome.interruption:
             return INTERRUPTED
         if outcome.failures:
             code = NOT_CONVERGED
@@ -108,14 +112,18 @@ def simulate(
     """
     from fpsolve.workflow import simulate_case
 
-    options = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
-    stated = [f"monte_carlo.{name}={value}" for name, value in options.items() if value is not None]
-    for case in _load_to_write(cases, [*(overrides or ()), *stated], monte_carlo=True):
+    stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
+    options = {
+        f"--{name} {value:{'g' if name == 'time' else ''}}": f"monte_carlo.{name}={value}"
+        for name, value in stated.items()
+        if value is not None
+    }
+    for case in _load_to_write(cases, overrides, options, monte_carlo=True):
         outcome = simulate_case(case, out, watch=_watch())
-        if outcome.interrupted:
-            _print_error(KEPT)
+        if outcome.interruption:
+            _print_error(outcome.interruption)
         print(f"written: {out / case.name}")
-        if outcome.interrupted:
+        if outcome.interruption:
             return INTERRUPTED
     return 0
 
@@ -130,7 +138,7 @@ def check(cases: Cases, *, overrides: Overrides = None) -> int:
     from fpsolve.workflow import check_case
 
     code = 0
-    for case in _load(cases, overrides):
+    for case in _load(cases, overrides, {}):
         outcome = check_case(case, watch=_watch())
         print_comparisons(case, outcome.comparisons)
         print_warnings(case, outcome.results)
@@ -156,7 +164,7 @@ def chart(
     from fpsolve.study.chart import refuse_no_chart
     from fpsolve.workflow import chart_case
 
-    code, loaded = 0, _load_to_write(cases, overrides, monte_carlo=False)
+    code, loaded = 0, _load_to_write(cases, overrides, {}, monte_carlo=False)
     for case in loaded:
         refuse_no_chart(case)
     for case in loaded:
@@ -265,14 +273,14 @@ def _print_error(text: str) -> None:
         drop_blocked_output()
 
 
-def _load(paths: Sequence[Path], overrides: Sequence[str] | None) -> list[Case]:
+def _load(paths: Sequence[Path], overrides: Sequence[str] | None, options: Mapping[str, str]) -> list[Case]:
     """All cases, or one error that lists the faults of all of them."""
     from fpsolve.case.case import load_case
 
     cases, errors = [], []
     for path in paths:
         try:
-            cases.append(load_case(path, overrides or ()))
+            cases.append(load_case(path, overrides or (), options))
         except CaseError as error:
             errors.append(_stray_assignment(path, overrides) or str(error))
     if errors:
@@ -289,11 +297,13 @@ def _stray_assignment(path: Path, overrides: Sequence[str] | None) -> str:
     return f"{path}: no such file; each --set takes one assignment: write {words}"
 
 
-def _load_to_write(paths: Sequence[Path], overrides: Sequence[str] | None, *, monte_carlo: bool) -> list[Case]:
+def _load_to_write(
+    paths: Sequence[Path], overrides: Sequence[str] | None, options: Mapping[str, str], *, monte_carlo: bool
+) -> list[Case]:
     """All cases, or an error where two would write into one folder, or one that shall be simulated cannot be."""
     from fpsolve.study.simulate import refuse_obstacles
 
-    cases = _load(paths, overrides)
+    cases = _load(paths, overrides, options)
     names = [case.name for case in cases]
     for name in names:
         if names.count(name) > 1:

@@ -1,4 +1,4 @@
-"""What fpsolve raises. Bad arguments of the dataclasses raise pydantic's `ValidationError`, a `ValueError`."""
+"""What fpsolve raises. Bad parameters raise `model.faults.ParameterError`, a `ValueError`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Remedy(StrEnum):
     """What to do about a failure, as it ends a message; those who work with case files are told in their own words."""
 
     MESH = "use more cells or a wider noise interval, or let the mesh be chosen"
-    CELLS = "use a smaller rtol, or more cells in the mesh"
+    CELLS = "use more cells in a given mesh, or a smaller rtol where it is chosen"
     REACH = "use a mesh that reaches there, or let it be chosen"
     BUDGET = "use a larger rtol or a larger budget"
     MESH_FILE = "make one with `write_mesh`"
@@ -45,12 +45,13 @@ class NotConverged(FpsolveError):
     """The eigenvalue iteration did not settle.
 
     Attributes:
+        reason: what happened.
         partial: the best result that was reached, or None where there is none.
     """
 
-    def __init__(self, message: str, partial: Any = None) -> None:
-        super().__init__(message)
-        self.partial = partial
+    def __init__(self, reason: str, partial: Any = None, remedy: str = "") -> None:
+        super().__init__(f"{reason}; {remedy}" if remedy else reason)
+        self.reason, self.partial = reason, partial
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from fpsolve.study.simulate import refuse_obstacles, simulate_curves, simulation
 from fpsolve.study.solve import compare, expected, solve_curves, solving_work
 
 Progress = Callable[[], None]
+AGAIN = "run it again to start over"
 SOLVED, SIMULATED = (
     r"summary\.json|moments\.csv|figure\.(png|pdf)|density\.vtu|show\.py"
     r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)",
@@ -57,13 +58,13 @@ class Outcome:
     Attributes:
         results: its curves, solved; what did not converge is in their `failures`.
         simulated: its curves, simulated.
-        interrupted: whether an interrupt ended the simulation.
+        interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty where none came.
         comparisons: what it expects beside what was computed.
     """
 
     results: tuple[CurveResult, ...] = ()
     simulated: tuple[SimulatedCurve, ...] = ()
-    interrupted: bool = False
+    interruption: str = ""
     comparisons: tuple[Comparison, ...] = ()
 
     @property
@@ -107,7 +108,7 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
     if monte_carlo:
         refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
-    interrupted = False
+    interruption = ""
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
     with _own_folder(case, out, replaced) as folder:
         results = _solve(case, folder, watch)
@@ -115,12 +116,12 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
             try:
                 watch.solved(case, results)
                 if monte_carlo:
-                    interrupted = _simulate(case, folder, watch, simulated)
+                    interruption = _simulate(case, folder, watch, simulated)
                     watch.simulated(case, simulated, results)
             finally:
                 with writable(folder):
                     draw(case, results, simulated, folder)
-    return Outcome(results, tuple(simulated), interrupted)
+    return Outcome(results, tuple(simulated), interruption)
 
 
 def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Outcome:
@@ -141,9 +142,9 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
         _own_folder(case, out, (SIMULATED,)) as folder,
         _saying_if_interrupted(lambda: _kept(case, simulated, folder)),
     ):
-        interrupted = _simulate(case, folder, watch, simulated)
+        interruption = _simulate(case, folder, watch, simulated)
         watch.simulated(case, simulated, ())
-    return Outcome((), tuple(simulated), interrupted)
+    return Outcome((), tuple(simulated), interruption)
 
 
 def chart_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Chart:
@@ -197,15 +198,19 @@ def _solve(case: Case, folder: Path, watch: Watch) -> tuple[CurveResult, ...]:
     return tuple(results)
 
 
-def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedCurve]) -> bool:
-    """Simulate the curves of a case into a list, and write each; whether an interrupt ended it."""
+def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedCurve]) -> str:
+    """Simulate the curves of a case into a list, and write each; what to say where an interrupt ended it."""
     with watch.bar(f"{case.name}, simulation", simulation_work(case)) as progress, writable(folder):
         for each in simulate_curves(case, progress=progress):
             simulated.append(each)
             write_simulation(case, each, folder)
             write_response(each, folder)
             draw_response(case, each, folder)
-    return simulated[-1].interrupted or len(simulated) < case.planned
+    whole = len(simulated) - simulated[-1].interrupted
+    if whole == case.planned:
+        return ""
+    place = f"in the simulation of curve {whole + 1} of {case.planned}"
+    return f"interrupted {place}; what was done is kept in {folder}; {AGAIN}"
 
 
 @contextmanager
@@ -237,7 +242,7 @@ def _saying_if_interrupted(what_is_kept: Callable[[], str]) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted{what_is_kept()}; run it again to start over") from None
+        raise KeyboardInterrupt(f"interrupted{what_is_kept()}; {AGAIN}") from None
 
 
 def _kept(case: Case, done: Sequence[CurveResult] | Sequence[SimulatedCurve], folder: Path) -> str:

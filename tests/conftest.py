@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 
 if "PYTEST_XDIST_WORKER" in os.environ:  # one worker for each processor: more threads would only wait for each other
     os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -29,6 +30,12 @@ def fig1_solver() -> ExponentSolver:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20)
+
+
+def heed_signals() -> None:
+    """For a process that is being started: nohup and a shell's & leave signals ignored, which it would inherit."""
+    for name in ("SIGHUP", "SIGINT", "SIGTERM"):
+        signal.signal(getattr(signal, name), signal.SIG_DFL)
 
 
 def oracle_arguments(oscillator: VibroImpactOscillator, noise: OrnsteinUhlenbeck) -> dict[str, float]:

@@ -10,7 +10,17 @@ import fpsolve
 
 ROOMS = {
     "": ["errors", "arrays", "files", "process"],
-    "model": ["parameters", "plane", "noise", "markov_chain", "vibro_impact", "problem", "direction"],
+    "model": [
+        "parameters",
+        "words",
+        "faults",
+        "plane",
+        "noise",
+        "markov_chain",
+        "vibro_impact",
+        "problem",
+        "direction",
+    ],
     "theory": ["perturbation", "frozen", "far", "validity"],
     "fem": [
         *("reference", "line", "polynomials", "mesh", "mesh_file", "phase_space", "noise_space", "space"),

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,10 +11,13 @@ from pathlib import Path
 import pytest
 
 from fpsolve import cli
+from fpsolve.case.vary import PARAMETERS
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
+from fpsolve.model.parameters import unit_of
 from fpsolve.output.terminal import digits
 from fpsolve.study import solve
+from tests.conftest import heed_signals
 from tests.test_workflow import HOPELESS, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -54,6 +58,18 @@ def test_out_and_set(case, tmp_path, capsys):
     assert " 0.0002850955" in capsys.readouterr().out
 
 
+def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("fpsolve.output.figures.write_figure", lambda *arguments, **_: drawn.append(arguments[3]))
+    sets = ["oscillator.omega = 2.0", "moments.p=[1.0]", "budget.seconds=9.0", "output.eigenfunctions=[]"]
+    assert main(["run", case, *(f"--set={text}" for text in sets)]) == 0
+    assert drawn == ["A test\nwith oscillator.omega = 2.0, moments.p = [1.0]"]
+    told = " ".join(capsys.readouterr().out.split())
+    assert told.startswith("A test: noise.D0 = 0.1 with oscillator.omega = 2.0, moments.p = [1.0] ┏")
+    assert main(["run", case, "--set", "output.eigenfunctions=[]"]) == 0
+    assert drawn[1:] == ["A test"]
+
+
 @pytest.mark.parametrize("word", ["noise.D0=0.2", "mesh.file=a/b.vtu", "vary.noise.D0=[1, 2]", f"title={'x' * 400}"])
 def test_set_takes_one_assignment(case, word, capsys):
     assert main(["check", case, "--set", "oscillator.omega=2", word]) == BAD_INPUT
@@ -73,6 +89,26 @@ def test_a_case_may_have_an_equals_sign_in_its_name(case, tmp_path, capsys):
     (tmp_path / "a=1.toml").write_text("title = 1", encoding="utf-8")
     assert main(["check", "a=1.toml"]) == BAD_INPUT
     assert "a=1.toml:1: title: got 1" in capsys.readouterr().err
+
+
+def test_what_refers_to_other_p_can_be_left_out(capsys):
+    """As the messages say."""
+    command = ["check", str(CASES / "fig1.toml"), "--set", "moments.p=[1.5]", "--set", "vary={}"]
+    assert main(command) == BAD_INPUT
+    err = capsys.readouterr().err
+    remedies = set(re.findall(r"or go without by --set '(.+)'", err))
+    assert remedies == {"output.eigenfunctions=[]", "expect=[]"}
+    assert all("or go without by" in line for line in err.splitlines())
+    assert main([*command, *(f"--set={remedy}" for remedy in remedies)]) == 0
+
+
+@pytest.mark.parametrize("command", ["run", "check", "simulate"])
+def test_the_help_names_the_units(command, capsys):
+    assert main([command, "--help"]) == 0
+    told = " ".join(re.sub("[│╭╮╰╯─]", " ", capsys.readouterr().out).split())
+    units = dict(re.findall(r"(\w+) in ([\w/]+)", told.partition("Units: ")[2].partition(".")[0]))
+    keys = {"omega": "oscillator", "c1": "oscillator", "D0": "noise", "tau0": "noise"}
+    assert units == {key: unit_of(PARAMETERS[f"{section}.{key}"]) for key, section in keys.items()}
 
 
 def test_set_takes_negative_values(case):
@@ -205,12 +241,11 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-def begin(case, **options):
+def begin(case, prepare=heed_signals):
     """A run in another process, which solves its first curve for as long as one likes."""
     command = [sys.executable, "-c", LONG, "run", case]
-    process = subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
-    )
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    process = subprocess.Popen(command, **pipes, text=True, preexec_fn=prepare)
     try:
         assert process.stdout.readline() == "begun\n"
     except BaseException:
@@ -265,7 +300,7 @@ def test_a_signal_while_vtk_is_loaded_ends_a_run_in_order(case, tmp_path, name):
     """Its compiled modules crash where a signal raises an exception in their initialisation."""
     number = getattr(signal, name)
     command = [sys.executable, "-c", SIGNAL_IN_VTK, str(int(number)), "run", case]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, preexec_fn=heed_signals)
     assert done.returncode == 128 + number
     assert done.stderr == "interrupted after 0 of 2 curves; run it again to start over\n"
     assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
@@ -273,7 +308,7 @@ def test_a_signal_while_vtk_is_loaded_ends_a_run_in_order(case, tmp_path, name):
 
 def test_an_ignored_signal_stays_ignored(case):
     """So that nohup works."""
-    with begin(case, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as process:
+    with begin(case, lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as process:
         try:
             process.send_signal(signal.SIGHUP)
             with pytest.raises(subprocess.TimeoutExpired):
@@ -469,6 +504,6 @@ def test_theories_outside_their_range_are_noted(tmp_path, capsys):
         "moments.rtol=1e-6",
     ]
     assert main(["run", str(CASES / "minimal.toml"), *sets, "--out", str(tmp_path)]) == 0
-    err = capsys.readouterr().err
+    err = " ".join(capsys.readouterr().err.split())
     assert "note: minimal: the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = 0.3 > 0.1" in err
     assert "note: minimal: Eq. (37) is for weak noise" in err

@@ -10,6 +10,8 @@ import time
 
 import pytest
 
+from tests.conftest import heed_signals
+
 CASE = """
 title = "Killed"
 [oscillator]
@@ -45,7 +47,7 @@ def started(case, out):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=heed_signals,
     )
     assert process.stdout.readline() == "begun\n"
     return process

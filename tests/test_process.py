@@ -8,6 +8,15 @@ import pytest
 from fpsolve.process import ended_by_signals, signals_held
 
 
+@pytest.fixture
+def _interrupts():
+    """SIGINT interrupts, also where the tests run in the background."""
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, former)
+
+
+@pytest.mark.usefixtures("_interrupts")
 def test_only_the_first_signal_that_ends_interrupts():
     with ended_by_signals() as received:
         with pytest.raises(KeyboardInterrupt):

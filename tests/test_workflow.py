@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pytest
 import fpsolve
 from fpsolve.analysis import stationary_density
 from fpsolve.case.remedies import in_words_of_a_case
-from fpsolve.errors import CaseError, NotConverged, OutputError
+from fpsolve.errors import CaseError, NotConverged, OutputError, Remedy
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
 from fpsolve.output.tables import write_results
@@ -172,10 +173,38 @@ def test_failures_are_values(tmp_path):
         assert [sorted((each.p for each in result.failures), reverse=True) for result in results] == [[], failed]
         assert not {failure.reason for failure in results[1].failures} & set(results[1].warnings)
     assert (len(outcome.failures), len(checked.failures)) == (2, 1)
-    assert not outcome.interrupted
+    assert not outcome.interruption
     curves = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
     assert curves[1]["warnings"] == [*outcome.results[1].warnings, *outcome.failures]
     assert files(tmp_path) == {"test.toml", *(f"out/test/{name}" for name in files(tmp_path / "out/test"))}
+
+
+@pytest.mark.parametrize("small", [0.0, 0.001])
+def test_what_fails_for_small_p_is_said_once(tmp_path, small):
+    """λ, Λ″(0) and δ_p need the same solve; Λ(0) = 0 needs none."""
+    sets = [f"moments.p=[9.0, {small}]", "oscillator.epsilon=2.0", "budget.unknowns=100", "output.eigenfunctions=[]"]
+    outcome = run_case(write(tmp_path, TEXT, [*sets, 'vary={"noise.D0"=[1.0]}']), tmp_path / "out")
+    (curve,) = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    assert [failure.p for failure in outcome.results[0].failures] == [9.0, small][: 2 if small else 1]
+    assert sum("the next mesh has" in text for text in curve["warnings"]) == 2
+    row = {"p": 0.0, "value": 0.0, "derivative": None, "perturbation": 0.0, "error_estimate": 0.0, "residual": None}
+    assert curve["moments"] == ([] if small else [row])
+    assert curve["warnings"][0].startswith("no δ_p, λ, Λ″(0): ")
+    assert curve["warnings"][0].endswith("as there is no Λ(0.001)") == bool(small)
+    with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
+        assert [row["derivative"] for row in csv.DictReader(file)] == [""] * (not small)
+
+
+def test_zero_has_no_sign(tmp_path):
+    sets = [
+        "moments.p=[-0.0, 2.0, -1.0]",
+        "oscillator.c1=-0.0",
+        "oscillator.restitution=1.0",
+        "output.eigenfunctions=[-0.0]",
+    ]
+    run_case(write(tmp_path, TEXT, [*sets, "monte_carlo={ paths = 64, time = 40.0 }"]), tmp_path, monte_carlo=True)
+    for name in ("summary.json", "moments.csv", "monte_carlo.json", "eigenfunctions.pvd"):
+        assert "-0.0" not in re.findall(r"-?[\d.e+-]+", (tmp_path / "test" / name).read_text(encoding="utf-8")), name
 
 
 def raising_at(count, exception):
@@ -403,6 +432,12 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
     assert min(pair.sign_defects) < 1e-4
 
 
+def test_no_cells_are_asked_for_without_a_mesh(case, tmp_path, monkeypatch):
+    monkeypatch.setattr("fpsolve.analysis.density.MOST_NEGATIVE", -1.0)
+    for result in fpsolve.run(case, tmp_path):
+        assert result.warnings[-1].endswith("0% of it is negative; use a smaller rtol")
+
+
 @pytest.mark.parametrize("intensity", [4.0, 15.0])
 def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     """Of files that are not written nothing else is said."""
@@ -413,7 +448,7 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     with pytest.raises(NotConverged, match=r"\d% of it is negative") as refused:
         stationary_density(ExponentSolver(curve.problem, case.cylinder_mesh()).pair(0.0))
     (result,) = fpsolve.run(case, tmp_path / "out")
-    reason = in_words_of_a_case(str(refused.value))
-    assert f"neither the stationary density nor eigenfunctions are written: {reason}" in result.warnings
+    told = f"neither the stationary density nor eigenfunctions are written: {refused.value.reason}; {Remedy.MESH}"
+    assert in_words_of_a_case(told) in result.warnings
     assert "do not read its picture" not in " ".join(result.warnings)
     assert not list((tmp_path / "out").rglob("*.vtu"))

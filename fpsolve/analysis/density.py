@@ -108,8 +108,9 @@ def _judged(pair: PrincipalPair, density: Density, name: str) -> Density:
     share = float(np.sum(sizes[density.values < 0]) / np.sum(sizes))
     if share > MOST_NEGATIVE:
         raise NotConverged(
-            f"the {name} at p = {pair.p:g} is not resolved, {share:.0%} of it is negative; {Remedy.CELLS}",
+            f"the {name} at p = {pair.p:g} is not resolved, {share:.0%} of it is negative",
             density,
+            Remedy.CELLS,
         )
     return density
 

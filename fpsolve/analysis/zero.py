@@ -146,7 +146,7 @@ class Quantity:
         directions = family.directions()
         slopes = self._slopes(solver, [directions[axis.key] for axis in self._axes])
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
-        self._starts = solver.near.known()
+        self._starts = solver.near.known
         scale = solver.scale(self._zero.p) / abs(self._zero.p) if self._zero.p else solver.scales.linear
         return Sample(at, value, gradient, error, scale)
 

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, Valid
 from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartSection
 from fpsolve.case.curves import Curve, combinations, make_curve
-from fpsolve.case.messages import explain, refuse
+from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
     Expectation,
@@ -37,6 +37,10 @@ from fpsolve.model.vibro_impact import VibroImpactOscillator
 
 def _from_table(kind: Any) -> BeforeValidator:
     return BeforeValidator(lambda value: kind(**value) if isinstance(value, dict) else value)
+
+
+COMPUTED = ("oscillator", "noise", "moments", "vary", "mesh")
+"""The sections that say what is computed."""
 
 
 class Case(Section):
@@ -65,6 +69,7 @@ class Case(Section):
     chart: Annotated[ChartSection | None, parameter("where stability ends", "[chart]")] = None
     expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
     _path: Path = PrivateAttr(default=Path("case.toml"))
+    _overrides: tuple[str, ...] = PrivateAttr(default=())
 
     @property
     def path(self) -> Path:
@@ -120,9 +125,19 @@ class Case(Section):
         """The case's parameter set with some parameters replaced, by their dotted keys."""
         return make_curve(self.oscillator, self.noise, varied)
 
+    @property
+    def headline(self) -> str:
+        """The title, and in a second line what the command line has changed of what is computed."""
+        return self._with_changes(self.title)
+
     def heading(self, curve: Curve) -> str:
-        """The title, and which of the curves."""
-        return f"{self.title}: {curve.label}" if curve.varied else self.title
+        """The headline, with which of the curves."""
+        return self._with_changes(f"{self.title}: {curve.label}" if curve.varied else self.title)
+
+    def _with_changes(self, title: str) -> str:
+        split = [(key.strip(), value.strip()) for key, _, value in (text.partition("=") for text in self._overrides)]
+        told = [f"{key} = {value}" for key, value in split if key.partition(".")[0] in COMPUTED]
+        return f"{title}\nwith {', '.join(shortened(text) for text in told)}" if told else title
 
     def place(self, curve: Curve) -> str:
         """The name of the case, and which of the curves."""
@@ -139,17 +154,18 @@ class Case(Section):
         return section
 
 
-def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
+def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[str, str] | None = None) -> Case:
     """Read and check a case file.
 
     Args:
         path: a TOML file.
         overrides: texts such as "oscillator.omega=2.0", each a key with its sections and a TOML value.
+        options: more of these, by how messages shall call them.
 
     Raises:
         CaseError: with every fault of the file and of the overrides, each with its line and its remedy.
     """
-    document = read_document(path, overrides)
+    document = read_document(path, overrides, options)
     faults = list(document.faults)
     try:
         case = Case.model_validate(
@@ -162,7 +178,7 @@ def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
     if faults:
         raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
-    case._path = Path(path)
+    case._path, case._overrides = Path(path), tuple(overrides)
     return case
 
 

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import enum
 import json
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
-from fractions import Fraction
-from itertools import chain
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Any, get_args
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from fpsolve.model.parameters import example_of, unit_of
+from fpsolve.model.parameters import example_of, meaning_of
+from fpsolve.model.words import accepted, choices
 
 _OWN, _RANGE = "own sentence", "range"
 LIST, TABLE = "<list>", "<table>"
 """Tags of a discriminated union: parts of pydantic's error locations that are no keys."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
-_BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
-_NOUNS: dict[Any, str] = {float: "finite number", int: "whole number", str: "string"}
 _KINDS = {bool: "a boolean", str: "a string", list: "a list", dict: "a table", int: "a number", float: "a number"}
 
 Path = tuple[str | int, ...]
@@ -43,11 +37,17 @@ def refuse(refusals: Iterable[Refusal]) -> None:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """' did you mean "omega"?' or nothing; a key without its section finds the key with it."""
+    """' did you mean "omega"?' or nothing."""
+    guess = _guess(name, known)
+    return f' did you mean "{guess}"?' if guess else ""
+
+
+def _guess(name: str, known: Iterable[str]) -> str | None:
+    """The known name that is most like another; a key without its section finds the key with it."""
     keys = {key.lower(): key for key in known}
     name = name.lower()
     found = [key for key in keys if key.endswith(f".{name}")] or get_close_matches(name, keys, n=1)
-    return f' did you mean "{keys[found[0]]}"?' if found else ""
+    return keys[found[0]] if found else None
 
 
 def shown(value: Any) -> str:
@@ -56,6 +56,11 @@ def shown(value: Any) -> str:
         text = _toml(value)
     except (ValueError, RecursionError):
         text = "a value too long to show"
+    return shortened(text)
+
+
+def shortened(text: str) -> str:
+    """A text cut to a readable length."""
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
@@ -84,10 +89,27 @@ def too_long(detail: Mapping[str, Any]) -> str:
 
 
 def explain(error: ValidationError, model: Any) -> Iterator[tuple[Path, str, str]]:
-    """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence."""
-    for detail in own_faults(error):
-        path = tuple(part for part in detail["loc"] if part not in (LIST, TABLE))
-        yield path, _key(path), _sentence(path, dict(detail), model)
+    """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence.
+
+    What is missing where a key is misspelt is not another fault.
+    """
+    faults = [(tuple(part for part in each["loc"] if part not in (LIST, TABLE)), each) for each in own_faults(error)]
+    misspelt = {_meant(path, model) for path, detail in faults if detail["type"] in _UNKNOWN}
+    for path, detail in faults:
+        if detail["type"] != "missing" or path not in misspelt:
+            yield path, _key(path), _sentence(path, dict(detail), model)
+
+
+def _meant(path: Path, model: Any) -> Path | None:
+    """The path of the known key that an unknown one is most like."""
+    guess = _guess(str(path[-1]), _known_keys(path, model))
+    return (*path[:-1], *guess.split(".")) if guess else None
+
+
+def _known_keys(path: Path, model: Any) -> list[str]:
+    """The keys beside a path, and those of the tables among them."""
+    fields = _model_and_field(path[:-1], model)[0].__pydantic_fields__
+    return [*fields, *_inner_keys(fields)]
 
 
 def _key(path: Path) -> str:
@@ -107,20 +129,18 @@ def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
     if detail["type"] == "too_long":
         return too_long(detail)
     if detail["type"] in _UNKNOWN:
-        fields = _model_and_field(path[:-1], model)[0].__pydantic_fields__
-        known = list(fields)
-        guess = nearest(str(path[-1]), [*known, *_inner_keys(fields)])
-        return f"unknown key;{guess} known keys: {', '.join(known)}; rename or remove it"
+        known = _known_keys(path, model)
+        beside = ", ".join(key for key in known if "." not in key)
+        return f"unknown key;{nearest(str(path[-1]), known)} known keys: {beside}; rename or remove it"
     field = _model_and_field(path, model)[1]
-    meaning = f"{field.description}, in {unit_of(field)}" if unit_of(field) else field.description
-    must, example = f"must be {_accepted(field)} ({meaning})", example_of(field)
+    must, example = f"must be {accepted(field)} ({meaning_of(field)})", example_of(field)
     if path[0] == "vary" and len(path) > 1:
         example = example_of(model.__pydantic_fields__["vary"])
         must = must.replace("be", "be a non-empty list, each entry", 1) if len(path) == 2 else must
     if detail["type"] == "missing":
         return f"missing; {must}; add it, for example {example}"
     value = detail["input"]
-    guess = nearest(value, _choices(field.annotation)) if isinstance(value, str) else ""
+    guess = nearest(value, choices(field.annotation)) if isinstance(value, str) else ""
     return f"got {shown(value)}{_kind(value, detail['type'])}; {must};{guess} write, for example, {example}"
 
 
@@ -153,52 +173,3 @@ def _nested(annotation: Any) -> Any:
     if hasattr(annotation, "__pydantic_fields__"):
         return annotation
     return next(filter(None, map(_nested, get_args(annotation))), None)
-
-
-def _accepted(field: FieldInfo) -> str:
-    """The range of a key, read off its field: "a finite number > 0 and <= 1"."""
-    choices = _choices(field.annotation)
-    if choices:
-        return "one of " + ", ".join(f'"{choice}"' for choice in choices)
-    bounds = (
-        f"{sign} {_number(getattr(constraint, name))}"
-        for constraint in field.metadata
-        for name, sign in _BOUNDS.items()
-        if hasattr(constraint, name)
-    )
-    return f"a {_not_empty(field.metadata)}{_noun(field.annotation)} {' and '.join(bounds)}".rstrip()
-
-
-def _not_empty(metadata: Iterable[Any]) -> str:
-    return "non-empty " if any(hasattr(constraint, "min_length") for constraint in metadata) else ""
-
-
-def _number(bound: float) -> str:
-    """5/3, and the float below it, as 5/3, not as 1.6666666666666667; 1e15 as it stands here."""
-    fraction = Fraction(bound).limit_denominator(99)
-    is_simple = fraction.denominator > 1 and math.isclose(fraction, bound, rel_tol=1e-15)
-    return str(fraction) if is_simple or isinstance(bound, int) else re.sub(r"e\+?(-?)0*", r"e\1", f"{bound:g}")
-
-
-def _choices(annotation: Any) -> list[str]:
-    if get_origin(annotation) is Literal:
-        return list(get_args(annotation))
-    is_enum = isinstance(annotation, type) and issubclass(annotation, enum.Enum)
-    return [member.value for member in annotation] if is_enum else []
-
-
-def _noun(annotation: Any, plural: str = "") -> str:
-    """An annotation in words: tuple[float, ...] as "list of finite numbers"."""
-    if hasattr(annotation, "__pydantic_fields__"):
-        return f"table{plural} with the keys {', '.join(annotation.__pydantic_fields__)}"
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin is Annotated:
-        inner = chain.from_iterable(getattr(extra, "metadata", ()) for extra in arguments[1:])
-        return _not_empty(inner) + _noun(arguments[0], plural)
-    if origin in (Union, UnionType):
-        return " or a ".join(_noun(argument, plural) for argument in arguments if argument is not NoneType)
-    if origin is tuple:
-        return f"list{plural} of {_noun(arguments[0], 's')}"
-    if origin is dict:
-        return f"table{plural} of {_noun(arguments[1], 's')}"
-    return _NOUNS[annotation] + plural

@@ -159,12 +159,13 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
 
 
 def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    return _of_orders(valid, ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ())))
+    wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
+    return _of_orders(valid, wanted, "output.eigenfunctions")
 
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
     """Each p that is not among the moments, and each key of a `where` that is not varied, or not with that value."""
-    yield from _of_orders(valid, (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None))
+    yield from _of_orders(valid, (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None), "expect")
     vary: Mapping[str, Values] | None = valid.get("vary")
     if vary is None:
         return
@@ -172,10 +173,12 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
     for i, key, value in stated:
         if key not in vary:
             guess, known = nearest(key, vary), ", ".join(vary) or "none"
-            yield (i, "where", key), value, f"is not varied;{guess} varied keys: {known}; add it to [vary]"
+            text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {_without('expect')}"
+            yield (i, "where", key), value, text
         elif not any(same(value, other) for other in vary[key]):
             known = shown(vary[key])
-            yield (i, "where", key), value, f"got {value}; must be one of {known}; add it to [vary]"
+            text = f"got {value}; must be one of {known}; add it to [vary], {_without('expect')}"
+            yield (i, "where", key), value, text
 
 
 def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -206,14 +209,19 @@ def _ends(axis: ChartAxis) -> tuple[float, float]:
     return axis.start, axis.stop
 
 
-def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float]]) -> Iterator[Refusal]:
-    """Each wanted p, with its path, that is not among the moments."""
+def _without(key: str) -> str:
+    """How to go on without what a key lists."""
+    return f"or go without by --set '{key}=[]'"
+
+
+def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float]], key: str) -> Iterator[Refusal]:
+    """Each wanted p of a key, with its path, that is not among the moments."""
     moments: Moments | None = valid.get("moments")
     for path, p in wanted:
         if moments is not None and not moments.has(p):
             first, last = moments.values[[0, -1]]
             known = f"moments.p ({moments.values.size} values, {first:g} to {last:g})"
-            yield path, p, f"got {p}; must be among {known}; add it there, or choose one of them"
+            yield path, p, f"got {p}; must be among {known}; add it there, choose one of them, {_without(key)}"
 
 
 REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {

@@ -8,7 +8,7 @@ from fpsolve.errors import Remedy
 
 CASE_WORDS: Mapping[Remedy, str] = {
     Remedy.MESH: "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]",
-    Remedy.CELLS: "use a smaller rtol, or more cells in [mesh]",
+    Remedy.CELLS: "use more cells in [mesh], or a smaller rtol where there is none",
     Remedy.REACH: "use a [mesh] that reaches there, or no [mesh]",
     Remedy.BUDGET: "use a larger rtol or a larger [budget]",
     Remedy.MESH_FILE: "make one with `fpsolve mesh`",

@@ -6,7 +6,7 @@ import re
 import stat
 import tomllib
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -137,7 +137,7 @@ class Document:
     Attributes:
         file: its name, for messages.
         data: what `tomllib` made of it.
-        places: the line of each dotted key, or the text of the `--set` that gave it.
+        places: the line of each dotted key, or the `--set` or other option that gave it.
         faults: what is wrong with the changes.
     """
 
@@ -154,24 +154,24 @@ class Document:
             return Fault(f"{place}: {key}", None, sentence)
         return Fault(key, place, sentence)
 
-    def override(self, text: str) -> None:
-        """Apply one `key=value` of the command line; what is wrong with it joins the faults."""
+    def override(self, text: str, typed: str) -> None:
+        """Apply one `key=value` of the command line, with what was typed; what is wrong with it joins the faults."""
         try:
             text_as_toml = _quoted_if_bare(text)
             path = _override_path(text_as_toml)
-            value: Any = tomllib.loads(text_as_toml)
+            value: Any = _loads(text_as_toml)
             for key in path:
                 value = value[key]
             _assign(self.data, dotted(path).split("."), value)
         except (ValueError, RecursionError) as error:
             examples = "--set oscillator.omega=2.0 or --set 'oscillator.impact=\"delta\"'"
-            self.faults.append(Fault(f"--set {text}", None, f"{error}; write it as in {examples}"))
+            self.faults.append(Fault(typed, None, f"{error}; write it as in {examples}"))
         else:
             inside = dotted(path) + "."
             self.places = {key: place for key, place in self.places.items() if not key.startswith(inside)}
-            self.places[dotted(path)] = f"--set {text}"
+            self.places[dotted(path)] = typed
             for end in range(1, len(path)):
-                self.places.setdefault(dotted(path[:end]), f"--set {text}")
+                self.places.setdefault(dotted(path[:end]), typed)
 
 
 def _quoted_if_bare(text: str) -> str:
@@ -200,15 +200,17 @@ def _assign(table: dict[str, Any], path: Sequence[str], value: Any) -> None:
     _assign(child, path[1:], value)
 
 
-def read_document(path: str | Path, overrides: Sequence[str] = ()) -> Document:
-    """Read a TOML file and apply the command line's `key=value` texts.
+def read_document(
+    path: str | Path, overrides: Sequence[str] = (), options: Mapping[str, str] | None = None
+) -> Document:
+    """Read a TOML file and apply the command line's `key=value` texts, and those that its options stand for.
 
     Raises:
         CaseError: the file cannot be read or is not TOML.
     """
     text = _read(path)
     try:
-        data = tomllib.loads(text)
+        data = _loads(text)
         document = Document(str(path), data, dict(_Scanner(text).scan().lines))
     except RecursionError:
         fault = Fault("", None, "lists or tables are nested too deeply; a case needs three levels")
@@ -216,8 +218,15 @@ def read_document(path: str | Path, overrides: Sequence[str] = ()) -> Document:
     except ValueError as error:
         raise CaseError(str(path), [_syntax_fault(text, str(error))]) from None
     for override in overrides:
-        document.override(override)
+        document.override(override, f"--set {override}")
+    for option, text in (options or {}).items():
+        document.override(text, option)
     return document
+
+
+def _loads(text: str) -> dict[str, Any]:
+    """The data of TOML, 0 without a sign. Raises ValueError where it is none."""
+    return tomllib.loads(text, parse_float=lambda number: float(number) + 0.0)
 
 
 def _read(path: str | Path) -> str:

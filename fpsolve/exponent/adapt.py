@@ -19,6 +19,7 @@ from fpsolve.exponent.rival import comparable, rival
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Discretisation
+from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.problem import AnyNoise, Problem
 from fpsolve.theory.far import far_places
@@ -35,6 +36,7 @@ SECONDS_PER_UNKNOWN = 3e-8
 """A solve takes about this times the power 1.5 of the number of unknowns; it is corrected by the last one."""
 
 
+@told_in_words
 @pydantic_dataclass(frozen=True, config=STRICT)
 class Budget:
     """What one Λ(p) may cost.
@@ -45,7 +47,7 @@ class Budget:
             more.
 
     Raises:
-        pydantic.ValidationError: a number is out of its range.
+        ParameterError: a number is out of its range.
     """
 
     unknowns: Annotated[int, parameter("unknowns of the largest system", "unknowns = 60000", ge=100)] = 60_000
@@ -172,7 +174,7 @@ class _Meter:
             if isinstance(self.failure, NotConverged):
                 text += ", as the layers of slow, strong noise are too thin"
             if self.failure:
-                text += f" ({self.failure})"
+                text += f" ({self.failure.reason if isinstance(self.failure, NotConverged) else self.failure})"
             raise NotConverged(f"Λ({self.p:g}) did not converge: {reason}; {text}; {Remedy.BUDGET}")
         best = self.best
         raise NotConverged(

@@ -12,7 +12,7 @@ from threadpoolctl import ThreadpoolController
 
 from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
-from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import refined
 from fpsolve.exponent.rival import is_far_out, rival
@@ -44,6 +44,9 @@ class Branch:
         tolerance: the usual one.
         is_far: whether it is that of the places far out of algebraic tails.
         starts: solutions of a problem with parameters close by, by their p.
+
+    Attributes:
+        known: what was solved, by p.
     """
 
     problem: Problem
@@ -54,7 +57,7 @@ class Branch:
     tolerance: Tolerance
     is_far: bool = False
     starts: Mapping[float, Solution] = field(default_factory=dict)
-    _known: dict[float, Solution] = field(init=False, default_factory=dict)
+    known: dict[float, Solution] = field(init=False, default_factory=dict)
     _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
@@ -66,10 +69,10 @@ class Branch:
         if tolerance is None and p in self._failed:
             raise self._failed[p]
         allowed = tolerance or self.tolerance
-        if p not in self._known or (self.mesh is None and not self._meets(self._known[p], allowed)):
+        if p not in self.known or (self.mesh is None and not self._meets(self.known[p], allowed)):
             try:
                 with _one_thread().limit(limits=1):
-                    self._known[p] = self._found(p, allowed)
+                    self.known[p] = self._found(p, allowed)
             except NotConverged as failure:
                 if self.is_far:
                     text = f"{failure}; this moment is carried by rare paths, with noise far out in its tails"
@@ -87,16 +90,24 @@ class Branch:
                 if not is_numerical(failure):
                     raise
                 raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
-        return self._known[p]
+        return self.known[p]
 
     @property
     def remedy(self) -> Remedy:
         """What to do where it is not resolved."""
         return Remedy.BUDGET if self.mesh is None else Remedy.MESH
 
-    def known(self) -> Mapping[float, Solution]:
-        """What was solved, by p."""
-        return dict(self._known)
+    @property
+    def refinement(self) -> str:
+        """What to do where it should be resolved better."""
+        return "use a smaller rtol" if self.mesh is None else Remedy.MESH
+
+    def remedied(self, solve: Callable[[], PrincipalPair]) -> PrincipalPair:
+        """A pair; where it is not found, the failure has the remedy of this branch."""
+        try:
+            return solve()
+        except NotConverged as failure:
+            raise NotConverged(failure.reason, failure.partial, self.remedy) from failure
 
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
@@ -112,7 +123,7 @@ class Branch:
         if self.mesh is not None:
             coarse, fine = self._given
             pair = self._tried(coarse, p).pair
-            return Solution(pair, principal_pair(fine, p, start=pair))
+            return Solution(pair, self.remedied(lambda: principal_pair(fine, p, start=pair)))
         if abs(p) < SMALL_P and not self.is_far:
             return self._tried(self.near_zero(p, tolerance).pair.generator, p)
         start = None
@@ -138,11 +149,11 @@ class Branch:
 
     def _from_nearest(self, p: float, tolerance: Tolerance) -> Solution | None:
         """The solution at p with what was chosen for the nearest p, where that is likely to do."""
-        nearest = min(self._known, key=lambda q: abs(q - p), default=None)
+        nearest = min(self.known, key=lambda q: abs(q - p), default=None)
         if nearest is None:
             return None
-        generator = self._known[nearest].pair.generator
-        if (chosen := self._trimmed(self._known[nearest], tolerance)) is not generator.chosen:
+        generator = self.known[nearest].pair.generator
+        if (chosen := _trimmed(self.known[nearest], tolerance)) is not generator.chosen:
             generator = Generator(self.problem, chosen)
         try:
             solution = self._tried(generator, p) if fits(generator, nearest, p) else None
@@ -156,32 +167,33 @@ class Branch:
         """The solution at p with what was chosen for it in the problem close by, or None."""
         if p not in self.starts:
             return None
-        chosen = self._trimmed(self.starts[p], tolerance)
+        chosen = _trimmed(self.starts[p], tolerance)
         try:
             return Solution(principal_pair(Generator(self.problem, chosen), p, start=self.starts[p].pair))
         except (NotConverged, MeshError):
             return None
 
-    def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Discretisation:
-        """That of a solution, or a much smaller one that would do."""
-        pair, chosen = solution.pair, solution.pair.generator.chosen
-        if abs(pair.p) < SMALL_P or pair.generator.size <= WORTH_A_TRY:
-            return chosen
-        smaller = refined(solution, tolerance(pair.p, pair.value), 0)
-        is_better = smaller.unknowns(self.problem.noise) <= TRIM * pair.generator.size
-        return smaller if is_better else chosen
-
     def _tried(self, generator: Generator, p: float) -> Solution:
         """The solution at p with a generator, from those around p, or from the nearest one."""
-        known = (solution.pair for solution in self._known.values())
+        known = (solution.pair for solution in self.known.values())
         near = sorted(known, key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
-        return Solution(principal_pair(generator, p, start=near))
+        return Solution(self.remedied(lambda: principal_pair(generator, p, start=near)))
 
     def _meets(self, solution: Solution, tolerance: Tolerance) -> bool:
         """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
         pair = solution.pair
         is_small = abs(pair.p) < SMALL_P and not self.is_far
         return is_small or solution.error <= tolerance(pair.p, pair.value)
+
+
+def _trimmed(solution: Solution, tolerance: Tolerance) -> Discretisation:
+    """The discretisation of a solution, or a much smaller one that would do."""
+    pair, generator = solution.pair, solution.pair.generator
+    if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
+        return generator.chosen
+    smaller = refined(solution, tolerance(pair.p, pair.value), 0)
+    is_better = smaller.unknowns(generator.problem.noise) <= TRIM * generator.size
+    return smaller if is_better else generator.chosen
 
 
 def is_numerical(failure: Exception) -> bool:

@@ -116,8 +116,9 @@ def principal_pair(
         raise NotConverged(
             f"the principal eigenvalue at p = {p:g} was not found on this mesh: backward error {pair.residual:.1e} "
             f"(at most {BACKWARD_ERROR_LIMIT:g}), and {min(pair.sign_defects):.1e} of the more positive of T and "
-            f"T* has the wrong sign (at most {POSITIVE:g}); use more cells, in the phase and in the noise",
+            f"T* has the wrong sign (at most {POSITIVE:g})",
             pair,
+            "use more cells, in the phase and in the noise",
         )
     return _rightmost(pair)
 
@@ -133,8 +134,9 @@ def _rightmost(pair: PrincipalPair) -> PrincipalPair:
         if abs(rightmost - pair.value) > 1e-6 * max(abs(rightmost), generator.unit_rate):
             raise NotConverged(
                 f"at p = {pair.p:g} the eigenvalue {rightmost:.6g} lies right of {pair.value:.6g}, though that has "
-                "eigenfunctions of one sign; use more cells in the phase",
+                "eigenfunctions of one sign",
                 pair,
+                "use more cells in the phase",
             )
     return pair
 
@@ -220,6 +222,7 @@ class _Iterate(NamedTuple):
     y: FloatArray
 
 
+@np.errstate(divide="ignore", over="ignore", invalid="ignore")  # a start may be useless, as its residual tells then
 def _rayleigh_iteration(generator: Generator, p: float, x: FloatArray, y: FloatArray) -> PrincipalPair:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
     space, operator = generator.space(p), generator.matrix(p)

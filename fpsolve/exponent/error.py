@@ -44,6 +44,9 @@ class Estimate:
         """The error over the larger of |value| and the scale."""
         return self.error_estimate / max(abs(self.value), self.scale, sys.float_info.min)
 
+    def __str__(self) -> str:
+        return f"{self.value:.10g} ± {self.error_estimate:.0e}"
+
 
 @dataclass(frozen=True)
 class Absent:

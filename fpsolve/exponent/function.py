@@ -11,7 +11,7 @@ from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_array
-from fpsolve.errors import NotConverged, Remedy
+from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
@@ -89,7 +89,7 @@ class MomentLyapunovFunction:
                 break
         self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
         if obstacle := broken_convexity(self._pairs, np.abs(self.nodes) * self._errors):
-            raise NotConverged(obstacle)
+            raise NotConverged(obstacle, remedy=self.solver.near.refinement)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
         """Λ(p), per unit time, of the shape of p. Raises `ValueError` outside the interval."""
@@ -242,7 +242,7 @@ def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str 
         return None
     return (
         f"Λ(p) is not convex between p = {p[i]:g} and p = {np.append(p, 0.0)[j]:g}, which the exponent always is: "
-        f"a wrong eigenvalue was found; {Remedy.CELLS}"
+        "a wrong eigenvalue was found"
     )
 
 
@@ -276,7 +276,7 @@ def nonzero_root(
         tried.add(p)
         ratio, slope, error = solver.ratio(p)
         if not slope > 0:
-            raise NotConverged(f"Λ(p)/p does not increase at p = {p:g}, as convexity demands; use a smaller rtol")
+            raise NotConverged(f"Λ(p)/p does not increase at p = {p:g}, as convexity demands; {solver.near.refinement}")
         low, high = (p, high) if ratio < 0 else (low, p)
         new = p - ratio / slope
         least = 1e-13 * max(1.0, abs(p))
@@ -288,4 +288,4 @@ def nonzero_root(
         if not low < new < high:
             new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
         p = new
-    raise NotConverged(f"the stability index did not settle, last near p = {p:g}; use a smaller rtol")
+    raise NotConverged(f"the stability index did not settle, last near p = {p:g}; {solver.near.refinement}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import repeat
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -103,4 +104,18 @@ def _interpolated(solver: ExponentSolver, p: FloatArray, progress: Callable[[], 
 def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov:
     result = solver.moments(p, progress=progress)
     obstacle = None if result.failures else broken_convexity(result.pairs, result.error_estimate)
-    return replace(result, failures=(Failure(None, obstacle),)) if obstacle else result
+    if obstacle:
+        return replace(result, failures=(Failure(None, f"{obstacle}; {solver.near.refinement}"),))
+    return _with_zero(result, p)
+
+
+def _with_zero(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
+    """A result with Λ(0) = 0, which needs no solve; where its eigenpair failed, Λ′ and residual are NaN."""
+    failures = tuple(failure for failure in result.failures if failure.p != 0)
+    if len(failures) == len(result.failures):
+        return result
+    failed = {failure.p for failure in failures}
+    place = [float(each) for each in p if each not in failed].index(0.0)
+    row = {"p": 0.0, "value": 0.0, "derivative": np.nan, "error_estimate": 0.0, "residual": np.nan}
+    columns: dict[str, Any] = {name: np.insert(getattr(result, name), place, number) for name, number in row.items()}
+    return replace(result, failures=failures, **columns)

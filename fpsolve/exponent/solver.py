@@ -52,10 +52,10 @@ class MomentLyapunov:
     Attributes:
         p: the moments, shape (n,), in the order asked for, without those that failed.
         value: Λ(p), per unit time, shape (n,).
-        derivative: Λ′(p), shape (n,).
+        derivative: Λ′(p), shape (n,); NaN at p = 0 where λ did not converge, as Λ(0) = 0 needs no solve.
         error_estimate: estimate of |error of `value`|, from the highest modes, the ends of a noise interval and the
             bound of rounding, shape (n,).
-        residual: backward error of the eigenpairs, shape (n,).
+        residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
         solver: what solved them.
         warnings: sentences on p where `error_estimate` exceeds rtol.
         root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
@@ -95,7 +95,7 @@ class ExponentSolver:
         mesh: a mesh for all p; None chooses a discretisation for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a discretisation may cost.
-        starts: solutions of a problem with parameters close by, by their p, see `Branch.known`.
+        starts: solutions of a problem with parameters close by, by their p, see `Branch`.
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
@@ -236,7 +236,7 @@ class ExponentSolver:
             generator = Generator(self.problem, widened(pair.generator).enriched())
         except MeshError as failure:
             raise NotConverged(f"Λ″(0) did not converge: {failure}; {self.near.remedy}") from failure
-        return principal_pair(generator, pair.p, start=pair)
+        return self.near.remedied(lambda: principal_pair(generator, pair.p, start=pair))
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""

@@ -16,6 +16,7 @@ from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, Remedy
+from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, Derived, parameter
 
 Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
@@ -73,6 +74,7 @@ class Diffusion(Noise, Protocol):
         """P_s(ξ); 0 outside the support."""
 
 
+@told_in_words
 @dataclass(frozen=True, config=STRICT)
 class OrnsteinUhlenbeck:
     """Ornstein-Uhlenbeck noise dξ = −α₀ ξ dt + σ₀ dW, Eq. (15).
@@ -82,7 +84,7 @@ class OrnsteinUhlenbeck:
         sigma: coefficient of the Wiener process, σ₀, 1e-32 to 1e32, in time^(-3/2).
 
     Raises:
-        pydantic.ValidationError: a parameter is not a finite number in its range.
+        ParameterError: a parameter is not a finite number in its range.
     """
 
     alpha: Derived
@@ -122,6 +124,7 @@ class OrnsteinUhlenbeck:
         return self.sigma**2 / (self.alpha**2 + omega**2)
 
 
+@told_in_words
 @dataclass(frozen=True, config=STRICT)
 class NonGaussianNoise:
     """Non-Gaussian coloured noise dξ = −V′(ξ)/τ₀ dt + (√(2D₀)/τ₀) dW, Eqs. (7)-(8).
@@ -134,7 +137,7 @@ class NonGaussianNoise:
         r0: departure from the Gaussian noise, −1e6 ≤ r₀ < 3 (beyond, Eq. (9) cannot be normalised).
 
     Raises:
-        pydantic.ValidationError: a parameter is not a finite number in its range.
+        ParameterError: a parameter is not a finite number in its range.
     """
 
     D0: Intensity

@@ -52,6 +52,12 @@ def unit_of(field: FieldInfo) -> str:
     return _extra(field, "unit")
 
 
+def meaning_of(field: FieldInfo) -> str:
+    """What a `parameter` is, with its unit."""
+    unit, meaning = unit_of(field), field.description or ""
+    return f"{meaning}, in {unit}" if unit else meaning
+
+
 def axis_title(field: FieldInfo) -> str:
     r"""A `parameter` on an axis: "natural frequency $\omega$ (rad/time)"."""
     unit = unit_of(field)

@@ -12,6 +12,7 @@ from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray, identity
+from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import Drive, Kick, by_epsilon
 
@@ -44,6 +45,7 @@ def q1(phi: ArrayLike) -> FloatArray:
     return Drive(1, DAMPING).q(phi)
 
 
+@told_in_words
 @dataclass(frozen=True, config=STRICT)
 class VibroImpactOscillator:
     """Rayleigh-Van der Pol oscillator that bounces off a wall at x = 0, Eqs. (3) and (6).
@@ -57,7 +59,7 @@ class VibroImpactOscillator:
         impact: one of `ImpactLaw`, or its name.
 
     Raises:
-        pydantic.ValidationError: a parameter is not a finite number in its range, or the restitution law
+        ParameterError: a parameter is not a finite number in its range, or the restitution law
             would reverse the velocity: 1 − ε²(1 − r) ≤ 0.
     """
 

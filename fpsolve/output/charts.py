@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.vary import PARAMETERS
 from fpsolve.files import write_csv, write_json
 from fpsolve.model.parameters import axis_title
-from fpsolve.output.plots import COLOURS, canvas
+from fpsolve.output.plots import COLOURS, canvas, filled
 from fpsolve.output.tables import head
 from fpsolve.study.chart import Chart
 
@@ -45,7 +44,7 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
         axes.set(xscale=x.scale, yscale=y.scale, xlim=(x.start, x.stop), ylim=(y.start, y.stop))
         for side, frame in ((axes.xaxis, x), (axes.yaxis, y)):
             _number(side, frame)
-        axes.set_title(fill(case.title, 80), parse_math=False)
+        axes.set_title(filled(case.headline, 80), parse_math=False)
         if chart.regions is not None:
             _shade(axes, chart.regions, (x, y))
         entries = {}

@@ -25,7 +25,7 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     series = [_moment_series(*pair) for pair in pairs] if case.figure.x == "p" else _over_parameter(case, pairs)
     pictures = [folder / "figure.png", folder / "figure.pdf"]
     quantity = QUANTITIES[case.figure.y]
-    write_figure(series, case.figure.x, quantity, case.title, pictures, is_reduced=case.is_exact)
+    write_figure(series, case.figure.x, quantity, case.headline, pictures, is_reduced=case.is_exact)
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:

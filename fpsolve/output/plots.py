@@ -65,7 +65,7 @@ def write_figure(
     """
     with canvas(paths) as figure:
         axes = figure.add_subplot(xlabel=axis_title(ABSCISSAE[x]), ylabel=y.title)
-        axes.set_title(fill(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
+        axes.set_title(filled(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
             _draw(axes, item, i)
@@ -79,11 +79,17 @@ def write_response_figure(response: Response, title: str, paths: Sequence[Path])
     share = np.cumsum(response.amplitude_density * np.diff(response.amplitude_edges))
     seen = float(response.amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
     with canvas(paths, width=10.5) as figure:
-        figure.suptitle(fill(title, 100), fontsize=12, parse_math=False)
+        figure.suptitle(filled(title, 100), fontsize=12, parse_math=False)
         plane, radial = figure.subplots(1, 2)
         picture = _draw_plane(plane, response, seen)
-        figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$")
+        figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$ (time/length²)")
+        figure.get_layout_engine().set(wspace=0.1)
         _draw_amplitude(radial, response, seen)
+
+
+def filled(text: str, width: int) -> str:
+    """A text in lines that fit, each of its own lines for itself."""
+    return "\n".join(fill(line, width) for line in text.splitlines())
 
 
 def _draw_plane(axes: Any, response: Response, seen: float) -> Any:
@@ -94,7 +100,7 @@ def _draw_plane(axes: Any, response: Response, seen: float) -> Any:
     scale = LogNorm(max(density[density > 0].min(), density.max() * 1e-4), density.max())
     visited = np.ma.masked_equal(density.T, 0)
     velocity = seen * v[-1] / x[-1]
-    axes.set(xlabel="$x$", ylabel=r"$\dot{x}$ (1/time)", xlim=(0, seen), ylim=(-velocity, velocity))
+    axes.set(xlabel="$x$ (length)", ylabel=r"$\dot{x}$ (length/time)", xlim=(0, seen), ylim=(-velocity, velocity))
     return axes.pcolormesh(x, v, visited, cmap="viridis", norm=scale, rasterized=True)
 
 
@@ -104,8 +110,8 @@ def _draw_amplitude(axes: Any, response: Response, seen: float) -> None:
     middle, low, high = (edges[1:] + edges[:-1]) / 2, density - 2 * error, density + 2 * error
     axes.fill_between(middle, low, high, color=COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")
     axes.plot(middle, density, color=COLOURS[0], linewidth=1.6, label="simulation")
-    axes.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", ylabel="density of $A$", xlim=(0, seen))
-    axes.set_ylim(0, 1.25 * high.max())
+    axes.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$ (length)", ylabel="density of $A$ (1/length)")
+    axes.set(xlim=(0, seen), ylim=(0, 1.25 * high.max()))
     axes.legend(frameon=False, fontsize=11, loc="upper right")
 
 

@@ -27,6 +27,8 @@ SYMBOLS = {"T": "T", "T_adjoint": "T*", "tilted_density": "T T*", "stationary_de
 COLOURS = "Viridis (matplotlib)"
 NEGLIGIBLE = 1e-3
 """xi is shown where the stationary or the tilted density exceeds this share of its maximum."""
+NEXT_TO_ZERO = 0.05
+"""A least value below this share of the maximum is drawn as 0, which rounding and small errors miss."""
 BOX = (1.0, 0.75, 0.4)
 """Edges of the picture's box along phi, xi and the height."""
 LENGTH = 2.0
@@ -123,11 +125,11 @@ def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
         mark_impacts(view, display.Scale, limits, bounds)
     paint_line(impacts(shape, p), view, display.Scale, RED)
     paint(display, view, limits, SYMBOLS[chosen.field])
-    write_title(reader, view)
+    write_title(reader, view, chosen.field)
 
 
-def write_title(reader: Any, view: Any) -> None:
-    """p, Lambda(p), and a line of parameters for the oscillator and for the noise."""
+def write_title(reader: Any, view: Any, field: str) -> None:
+    """p, Lambda(p), and a line of parameters for the oscillator and for the noise; of what has no p, its name."""
     sections: dict[str, list[str]] = {}
     facts = servermanager.Fetch(reader).GetFieldData()
     for i in range(facts.GetNumberOfArrays()):
@@ -138,7 +140,9 @@ def write_title(reader: Any, view: Any) -> None:
             sections.setdefault(section, []).append(f"{name} = {words}")
     lines = "".join(f"\n{section}: {', '.join(parts)}" for section, parts in sections.items())
     title = simple.PythonAnnotation(Input=reader, ArrayAssociation="Field Data")
-    title.Expression = f'"p = %g     Lambda(p) = %.6g" % (p[0], round(float(Lambda[0]), 14) + 0.0) + {lines!r}'
+    of_p = '"p = %g     Lambda(p) = %.6g (1/time)" % (p[0], round(float(Lambda[0]), 14) + 0.0)'
+    head = repr("stationary density (p = 0)") if field == "stationary_density" else of_p
+    title.Expression = f"{head} + {lines!r}"
     text = simple.Show(title, view)
     text.FontSize, text.WindowLocation, text.Justification = 28, "Upper Center", "Center"
 
@@ -167,7 +171,7 @@ def scaled(source: Any, field: str, p: float) -> tuple[Any, tuple[float, float]]
     result = simple.PythonCalculator(Input=source, Expression=f"{field}/max({field})", ArrayName="scaled")
     result.UpdatePipeline(p)
     low, high = result.PointData["scaled"].GetRange()
-    return result, (low if high - low > 1e-6 else 0.0, high)
+    return result, (0.0 if abs(low) < NEXT_TO_ZERO or high - low < 1e-6 else low, high)
 
 
 def height(source: Any) -> Any:
@@ -217,7 +221,7 @@ def label_phase(view: Any, scale: list[float], floor: float, bounds: tuple[float
         paint_line(simple.Line(Point1=ends[0], Point2=ends[1]), view, scale, BLACK)
         caption(view, words, [ends[2][i] * scale[i] for i in range(3)], "Left")
     name = [2.2 * QUARTER, edge - 9 * tick, floor]
-    caption(view, "phase phi", [name[i] * scale[i] for i in range(3)], "Left")
+    caption(view, "phase phi (rad)", [name[i] * scale[i] for i in range(3)], "Left")
 
 
 def label_box(view: Any, display: Any, limits: tuple[float, float], bounds: tuple[float, ...]) -> None:
@@ -227,14 +231,14 @@ def label_box(view: Any, display: Any, limits: tuple[float, float], bounds: tupl
     display.Scale = axes.DataScale = [BOX[i] / (high[i] - low[i]) for i in range(3)]
     axes.Visibility, axes.AxesToLabel = 1, 5  # the height on the left, and xi
     axes.UseCustomBounds, axes.CustomBounds = 1, [end[i] * axes.DataScale[i] for i in range(3) for end in (low, high)]
-    axes.XTitle, axes.YTitle, axes.ZTitle = "", "noise xi          ", ""
+    axes.XTitle, axes.YTitle, axes.ZTitle = "", "noise xi (1/time)          ", ""
     for axis in "XYZ":
         setattr(axes, f"{axis}TitleFontSize", 30)
         setattr(axes, f"{axis}LabelFontSize", 24)
 
 
 def label_cylinder(view: Any, shape: Any, bounds: tuple[float, ...]) -> None:
-    """phi around the upper rim, xi at both ends."""
+    """phi around the upper rim, xi at both ends, on the side that has no colour bar."""
     view.AxesGrid.Visibility = 0
     points = servermanager.Fetch(shape).GetPoints()
     nodes = [points.GetPoint(i) for i in range(points.GetNumberOfPoints())]
@@ -243,7 +247,7 @@ def label_cylinder(view: Any, shape: Any, bounds: tuple[float, ...]) -> None:
         place = beside(nodes, k * QUARTER, LENGTH, FRONT if k > 1 else 0)
         caption(view, words, place, "Right" if k in (1, 2) else "Left", colour)
     for xi, at in ((bounds[2], 0.0), (bounds[3], LENGTH)):
-        caption(view, f"noise xi = {xi:.3g}", beside(nodes, 3.5 * QUARTER, at, FRONT), "Left")
+        caption(view, f"noise xi = {xi:.3g} (1/time)", beside(nodes, 1.5 * QUARTER, at, FRONT), "Right")
 
 
 def beside(nodes: list[tuple[float, ...]], angle: float, at: float, least: float) -> list[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -63,7 +64,8 @@ def _summary(result: CurveResult) -> dict[str, Any]:
     }
 
 
-def _rows(result: CurveResult) -> list[dict[str, float]]:
+def _rows(result: CurveResult) -> list[dict[str, float | None]]:
+    """One row for each p; what is not known is None."""
     moments = result.moments
     columns = {
         "p": moments.p,
@@ -73,7 +75,8 @@ def _rows(result: CurveResult) -> list[dict[str, float]]:
         "error_estimate": moments.error_estimate,
         "residual": moments.residual,
     }
-    return [{name: float(values[i]) for name, values in columns.items()} for i in range(moments.p.size)]
+    known = {name: [None if math.isnan(x) else x for x in values.tolist()] for name, values in columns.items()}
+    return [dict(zip(known, row, strict=True)) for row in zip(*known.values(), strict=True)]
 
 
 def _estimate(estimate: Estimate | None, theory: float) -> dict[str, float] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from textwrap import wrap
 
 from rich.console import Console
 from rich.markup import escape
@@ -28,7 +29,7 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
             if result.moments.p.size:
                 console.print(_moment_table(case, result))
             if any(result.estimates.values()):
-                console.print(_indices(result), highlight=False)
+                _print_lines(console, [*_packed(_indices(result), console.width), ""])
     else:
         console.print(_curve_table(case, results))
     print_warnings(case, results)
@@ -44,7 +45,32 @@ def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
 
 def _remark(case: Case, curve: Curve, kind: str, style: str, texts: Sequence[str]) -> None:
     for text in texts:
-        Console(stderr=True).print(Text(f"{kind}: {case.place(curve)}: {text}"), style=style, soft_wrap=True)
+        print_remark(f"{kind}: {case.place(curve)}: {text}", style)
+
+
+def print_remark(text: str, style: str) -> None:
+    """A sentence on the standard error, in lines that fit, indented from the second on."""
+    console = Console(stderr=True)
+    width = max(console.width - 1, 20)
+    lines = wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    _print_lines(console, lines, style)
+
+
+def _print_lines(console: Console, lines: Sequence[str], style: str = "") -> None:
+    """Lines as they are."""
+    for line in lines:
+        console.print(Text(line), style=style, soft_wrap=True)
+
+
+def _packed(parts: Sequence[str], width: int) -> list[str]:
+    """Texts in as few lines as hold them whole."""
+    lines: list[str] = []
+    for part in parts:
+        if lines and len(lines[-1]) + 3 + len(part) < width:
+            lines[-1] += f"   {part}"
+        else:
+            lines.append(part)
+    return lines
 
 
 def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:
@@ -55,27 +81,28 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
     if case.figure.x == "p":
         for each, result in pairs:
             console.print(_simulation_table(case, each, result))
-            console.print(_simulation_line(each, result), highlight=False, soft_wrap=True)
+            found = each.result
+            size = f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}"
+            _print_lines(console, [*_packed(_simulated_indices(each, result), console.width), size, ""])
     else:
         console.print(_exponent_table(case, pairs))
     for each in simulated:
         if each.response:
-            means = "   ".join(f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items())
-            text = f"{case.place(each.curve)}: stationary means: {means}\n"
-            console.print(text, highlight=False, soft_wrap=True)
+            means = [f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items()]
+            lines = [f"  {line}" for line in _packed(means, console.width - 2)]
+            _print_lines(console, [f"{case.place(each.curve)}: stationary means", *lines, ""])
         _remark(case, each.curve, "warning", "yellow", each.warnings)
 
 
-def _simulation_line(simulated: SimulatedCurve, result: CurveResult | None) -> str:
-    """λ, Λ″(0) and the size of the simulation."""
+def _simulated_indices(simulated: SimulatedCurve, result: CurveResult | None) -> list[str]:
+    """λ, with the value by finite elements where it is known, and Λ″(0)."""
     found = simulated.result
     value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
     text = f"{LYAPUNOV_EXPONENT.symbol} = {_with_error(value, error)}"
     if result and result.lyapunov_exponent:
         exact = result.lyapunov_exponent.value
         text += f" (finite elements {exact:.6g}, {_deviation(value, error, exact)} s.e. away)"
-    text += f"   {VARIANCE_RATE.symbol} = {_with_error(found.variance_rate, found.variance_rate_error)}"
-    return f"{text}\n{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}\n"
+    return [text, f"{VARIANCE_RATE.symbol} = {_with_error(found.variance_rate, found.variance_rate_error)}"]
 
 
 def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Table:
@@ -97,7 +124,7 @@ def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult
 def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Table:
     """One row for each parameter set: λ by simulation and by finite elements."""
     names = (key.partition(".")[2] for key in case.vary)
-    table = _table(case.title, *names, LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away")
+    table = _table(case.headline, *names, LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away")
     for each, result in pairs:
         value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
         known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
@@ -136,13 +163,13 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
     return table
 
 
-def _indices(result: CurveResult) -> str:
-    """λ, δ_p and Λ″(0) in a line."""
+def _indices(result: CurveResult) -> list[str]:
+    """λ, δ_p and Λ″(0), each with its error."""
     parts = []
     for name, estimate in result.estimates.items():
         error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
         parts.append(f"{INDICES[name].symbol} = {_digits_of(estimate, result, most=9)}{error}")
-    return "   ".join(parts) + "\n"
+    return parts
 
 
 def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
@@ -150,7 +177,7 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     indices = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
     names = (key.partition(".")[2] for key in case.vary)
     headings = (text for index in indices for text in (index.symbol, _theory(case, index)))
-    table = _table(case.title, *names, *headings)
+    table = _table(case.headline, *names, *headings)
     _explain_star(table, case)
     for result in results:
         theory = second_order(result.curve.problem)
@@ -170,7 +197,7 @@ def print_chart(case: Case, chart: Chart) -> None:
     """The special points of every line, and what the regions are."""
     assert case.chart is not None
     names = (axis.key.partition(".")[2] for axis in (case.chart.x, case.chart.y))
-    table = _table(case.title, Column("line"), "branch", "points", *names, Column("special point"))
+    table = _table(case.headline, Column("line"), "branch", "points", *names, Column("special point"))
     for line in chart.lines:
         for number, branch in enumerate(line.branches, start=1):
             special = [i for i, label in enumerate(branch.labels) if label]
@@ -185,7 +212,7 @@ def print_chart(case: Case, chart: Chart) -> None:
     for region in () if chart.regions is None else chart.regions.each:
         console.print(f"{region.share:5.1%}  {region.name}", highlight=False)
     for text in chart.remarks:
-        Console(stderr=True).print(Text(f"note: {case.name}: {text}"), style="cyan", soft_wrap=True)
+        print_remark(f"note: {case.name}: {text}", "cyan")
 
 
 def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
@@ -195,7 +222,7 @@ def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
         console.print(f"{case.name}: nothing is expected; add [[expect]] to the case", markup=False)
         return
     table = _table(
-        f"{case.name}: {case.title}", Column("quantity", overflow="fold"), "expected", "computed", "difference", ""
+        f"{case.name}: {case.headline}", Column("quantity", overflow="fold"), "expected", "computed", "difference", ""
     )
     for item in comparisons:
         expectation = item.expectation

@@ -109,14 +109,19 @@ def obstacles(
     found = {}
     largest, reason = largest_step(oscillator, noise)
     settling = transient(oscillator, noise)
-    h = default_step(oscillator, noise) if step is None else step
+    h, least = default_step(oscillator, noise), settling / _LONGEST
     if step is not None and not step > 0:
         found["step"] = f"got {step:g}; must be > 0 and <= {largest:.4g}; make it positive, or leave it out"
     elif step is not None and step > largest * (1 + 1e-12):
         found["step"] = (
             f"got {step:g}, too large for {reason}; must be > 0 and <= {largest:.4g}; reduce it, or leave it out"
         )
-    elif settling / h > _LONGEST:
+    elif step is not None and step < least <= largest:
+        found["step"] = (
+            f"got {step:g}, too small: a transient, {settling:.3g}, must take at most {_LONGEST:.0e} steps; must be >= "
+            f"{least:.4g} and <= {largest:.4g}; increase it, or leave it out"
+        )
+    elif (h if step is None else step) < least:
         found["step"] = (
             f"one transient, {settling:.3g}, takes {settling / h:.2g} steps of {h:.3g}, which {reason} asks for; must "
             f"be at most {_LONGEST:.0e}; bring the times of noise and oscillator nearer to each other"

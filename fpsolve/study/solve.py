@@ -91,11 +91,11 @@ def _solve_curve(
 ) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
     moments = solve_moments(solver, wanted.p, progress=progress)
-    estimates, missing = _solve_indices(solver, wanted.indices, moments.root)
+    estimates, missing = _solve_indices(solver, wanted.indices, moments)
     attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
     stationary = _pair(solver, 0.0) if wanted.density else None
-    lost = _lost(stationary)
+    lost = _lost(stationary, solver.near.refinement)
     warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None)]
     warnings += lost or _unresolved(pairs)
     return CurveResult(
@@ -113,7 +113,7 @@ def _solve_curve(
 
 
 def _solve_indices(
-    solver: ExponentSolver, names: Sequence[str], root: float | None
+    solver: ExponentSolver, names: Sequence[str], moments: MomentLyapunov
 ) -> tuple[dict[str, Estimate | None], list[str]]:
     """Indices, δ_p first, None for those not asked for; and why some of those asked for are missing."""
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
@@ -123,7 +123,7 @@ def _solve_indices(
         if index.name not in names:
             continue
         try:
-            found = index.solve(solver, root)
+            found = index.solve(solver, moments.root)
         except (NotConverged, NoSuchExponent) as failure:
             failed.setdefault(str(failure), []).append(index.symbol)
             continue
@@ -131,7 +131,9 @@ def _solve_indices(
             estimates[index.name] = found
         elif found.reason != validity.NO_INDEX:  # of which a note tells
             missing.append(f"no stability index: {found.reason}")
-    return estimates, missing + [f"no {', '.join(symbols)}: {reason}" for reason, symbols in failed.items()]
+    told = {failure.reason: f"as there is no Λ({failure.p:g})" for failure in moments.failures if failure.p is not None}
+    reasons = {reason: told.get(reason, reason) for reason in failed}
+    return estimates, missing + [f"no {', '.join(failed[each])}: {reason}" for each, reason in reasons.items()]
 
 
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:
@@ -157,13 +159,13 @@ def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
     ]
 
 
-def _lost(stationary: PrincipalPair | None) -> list[str]:
-    """Why the stationary density of a pair at p = 0 is not written, or nothing."""
+def _lost(stationary: PrincipalPair | None, remedy: str) -> list[str]:
+    """Why the stationary density of a pair at p = 0 is not written, and what to do, or nothing."""
     try:
         if stationary is not None:
             stationary_density(stationary)
     except NotConverged as failure:
-        return [f"neither the stationary density nor eigenfunctions are written: {failure}"]
+        return [f"neither the stationary density nor eigenfunctions are written: {failure.reason}; {remedy}"]
     return []
 
 
@@ -198,7 +200,7 @@ def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
 
 def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
     """That of the p of the largest size that was solved, z in noise units; None where none was."""
-    known = solver.near.known()
+    known = solver.near.known
     p = max(known, key=abs, default=None)
     if p is None:
         return None

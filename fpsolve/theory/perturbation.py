@@ -57,7 +57,7 @@ class SecondOrder:
     def moment_exponent(self, p: ArrayLike) -> Any:
         """ε²Λ₂(p), Eq. (37); an array for an array of p."""
         p = np.asarray(p, dtype=float)
-        return (p * (self.quadratic * p + self.lyapunov_exponent))[()]
+        return (p * (self.quadratic * p + self.lyapunov_exponent) + 0.0)[()]  # 0 without a sign
 
     @property
     def lyapunov_exponent(self) -> float:
@@ -67,7 +67,7 @@ class SecondOrder:
     @property
     def stability_index(self) -> float:
         """δ_p, the non-zero root of ε²Λ₂(p), Eq. (38)."""
-        return -self.lyapunov_exponent / self.quadratic
+        return -self.lyapunov_exponent / self.quadratic + 0.0
 
     @property
     def variance_rate(self) -> float:

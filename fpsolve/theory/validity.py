@@ -18,7 +18,7 @@ WEAK = 0.05
 
 def reduction_note(noise: NonGaussianNoise) -> str | None:
     """On the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
-    if abs(noise.r0 - 1) <= NEAR_GAUSSIAN:
+    if abs(noise.r0 - 1) <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
         return None
     reduced = noise.ou_reduction().standard_deviation ** 2
     return (
@@ -73,7 +73,8 @@ def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> str |
         return None
     reduced = ", and here for the reduced one" if isinstance(problem.noise, NonGaussianNoise) else ""
     worst, first = int(np.argmax(shares)), float(p[beyond][np.argmin(np.abs(p[beyond]))])
+    most = f"at p = {p[worst]:.3g}, where it is {rest[worst]:.3g}, {shares[worst]:.0%}"
     return (
         f"Eq. (37) is for weak noise{reduced}: from |p| = {abs(first):.3g} on, what it leaves out, epsilon^4 and "
-        f"higher, exceeds {WEAK:.0%} of its terms; at p = {p[worst]:.3g} it is {rest[worst]:.3g}, {shares[worst]:.0%}"
+        f"higher, exceeds {WEAK:.0%} of its terms, most {most}"
     )

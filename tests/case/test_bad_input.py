@@ -334,11 +334,33 @@ def test_section_that_is_no_table(tmp_path: Path, section: str) -> None:
 
 
 def test_misspelt_section(tmp_path: Path) -> None:
+    """It is told once, not as a missing one too."""
     text = edited("[noise]", "[nois]")
-    faults = {fault.key: fault for fault in faults_of(write(tmp_path, text))}
-    assert faults.keys() == {"noise", "nois"}
-    assert faults["nois"].line == line_of(text, "nois")
-    assert 'did you mean "noise"?' in faults["nois"].sentence
+    message = only_message(write(tmp_path, text))
+    assert f'bad.toml:{line_of(text, "nois")}: nois: unknown key; did you mean "noise"? known keys: title' in message
+
+
+@pytest.mark.parametrize(
+    ("line", "misspelt", "key"),
+    [
+        ("omega = 1.0", "omgea = 1.0", "oscillator.omgea"),
+        ("D0 = 0.1", "d0 = 0.1", "noise.d0"),
+        ("p = [-1.0, 1.0, 2.0]", "P = [-1.0, 1.0, 2.0]", "moments.P"),
+        ("value = 0.01416", "vale = 0.01416", "expect[0].vale"),
+        ('title = "good"', 'titel = "good"', "titel"),
+    ],
+)
+def test_a_misspelt_key_that_is_needed_is_told_once(tmp_path: Path, line: str, misspelt: str, key: str) -> None:
+    message = only_message(write(tmp_path, edited(line, misspelt)))
+    assert f": {key}: unknown key; did you mean " in message
+    assert "missing" not in message
+
+
+def test_what_is_missing_is_told_beside_another_misspelt_key(tmp_path: Path) -> None:
+    text = edited("omega = 1.0", "epsilom = 0.1").replace("epsilon = 0.1\n", "")
+    faults = {fault.key: fault.sentence for fault in faults_of(write(tmp_path, text))}
+    assert faults.keys() == {"oscillator.epsilom", "oscillator.omega"}
+    assert faults["oscillator.omega"].startswith("missing")
 
 
 def test_single_expect_table(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from fpsolve.theory.validity import reduction_note
 
 WORDS = {
     "MESH": "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]",
-    "CELLS": "use a smaller rtol, or more cells in [mesh]",
+    "CELLS": "use more cells in [mesh], or a smaller rtol where there is none",
     "REACH": "use a [mesh] that reaches there, or no [mesh]",
     "BUDGET": "use a larger rtol or a larger [budget]",
     "MESH_FILE": "make one with `fpsolve mesh`",

@@ -212,3 +212,23 @@ def test_a_tolerance_below_rounding_is_refused():
 def test_bad_budgets_are_refused(budget):
     with pytest.raises(ValueError, match=r"unknowns|seconds"):
         Budget(**budget)
+
+
+def test_no_cells_are_asked_for_where_the_mesh_is_chosen():
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=3.0)
+    noise = NonGaussianNoise(D0=2.0, tau0=5.0, r0=0.95).ou_reduction()
+    with pytest.raises(
+        NotConverged, match=r"was not found on this mesh: .*; use a larger rtol or a larger budget$"
+    ) as said:
+        moment_lyapunov(oscillator, noise, -3.0, rtol=1e-4, budget=Budget(unknowns=200))
+    assert "use more cells" not in str(said.value)
+
+
+def test_a_start_that_is_of_no_use_gives_no_warning():
+    """The eigenfunctions of slow noise at p = 8, carried to those near p = 0, are next to orthogonal."""
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0)
+    noise = NonGaussianNoise(D0=2.0, tau0=50.0, r0=0.95).ou_reduction()
+    solver = ExponentSolver(Problem(oscillator, noise), rtol=1e-4)
+    found = solver.moments([-3.0, 8.0])
+    assert np.all(found.value > 0)
+    assert solver.lyapunov_exponent().value < 0

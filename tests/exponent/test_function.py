@@ -7,7 +7,7 @@ import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.bordered import second_derivative
-from fpsolve.exponent.error import Absent
+from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.function import MomentLyapunovFunction, nonzero_root
 from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
@@ -127,7 +127,7 @@ def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):
         return true(self, p, tolerance)
 
     monkeypatch.setattr(ExponentSolver, "ratio", fooled)
-    with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex"):
+    with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex .*; use a smaller rtol$"):
         MomentLyapunovFunction(FIG1, WEAK_NOISE, (1.9, 2.1), solver=solver)
 
 
@@ -135,6 +135,10 @@ def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):
 def test_zero_as_a_node_is_no_fault(interval):
     function = MomentLyapunovFunction(FIG1, WEAK_NOISE, interval, rtol=1e-6)
     assert np.any(function.nodes == 0)
+
+
+def test_an_estimate_is_printed_with_its_error():
+    assert str(Estimate(-0.37345849855446, 1.04e-12, 1.0)) == "-0.3734584986 ± 1e-12"
 
 
 def test_moments_one_by_one_are_checked_for_convexity(monkeypatch):
@@ -147,7 +151,7 @@ def test_moments_one_by_one_are_checked_for_convexity(monkeypatch):
         return solution
 
     monkeypatch.setattr(ExponentSolver, "solution", fooled)
-    with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex") as caught:
+    with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex .*; use a smaller rtol$") as caught:
         moment_lyapunov(FIG1, WEAK_NOISE, [1.9, 2.0, 2.1])
     np.testing.assert_array_equal(caught.value.partial.p, [1.9, 2.0, 2.1])
 

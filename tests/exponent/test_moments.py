@@ -8,6 +8,7 @@ import pytest
 
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import moments
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.moments import FEW_MOMENTS, moment_lyapunov, solve_moments
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
@@ -29,6 +30,20 @@ def test_a_failed_moment_is_a_value():
     assert "use more cells" in failure.reason
 
 
+def test_the_moment_zero_needs_no_solve():
+    """Its slope λ does, and is not known here."""
+    stronger = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=2.0)
+    solver = ExponentSolver(Problem(stronger, WEAK_NOISE), budget=Budget(unknowns=100))
+    for p, kept in (([6.0, 0.0, 5.0], [0.0]), ([0.0], [0.0]), ([0.0, 6.0, 0.0], [0.0, 0.0])):
+        found = solve_moments(solver, p)
+        np.testing.assert_array_equal(found.p, kept)
+        assert not np.any(found.value)
+        assert not np.any(found.error_estimate)
+        assert np.all(np.isnan(found.derivative))
+        assert np.all(np.isnan(found.residual))
+        assert [failure.p for failure in found.failures] == [each for each in p if each]
+
+
 def test_what_is_raised_is_the_result_with_its_failures():
     with pytest.raises(NotConverged) as caught:
         moment_lyapunov(STRONG, WEAK_NOISE, [6.0, -5.0, 0.0], mesh=HOPELESS)
@@ -41,7 +56,7 @@ def test_a_curve_that_is_not_convex_is_a_failure_of_all(monkeypatch):
     monkeypatch.setattr(moments, "broken_convexity", lambda pairs, errors: "not convex")
     found = solve_moments(ExponentSolver(Problem(FIG1, WEAK_NOISE)), [1.0, 2.0])
     np.testing.assert_array_equal(found.p, [1.0, 2.0])
-    assert [(failure.p, failure.reason) for failure in found.failures] == [(None, "not convex")]
+    assert [(failure.p, failure.reason) for failure in found.failures] == [(None, "not convex; use a smaller rtol")]
 
 
 @pytest.mark.parametrize("count", [2, FEW_MOMENTS, FEW_MOMENTS + 1, 40])

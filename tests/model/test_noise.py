@@ -1,6 +1,8 @@
 """Eqs. (7)-(16): the noise, its densities and its moments."""
 
 import math
+import pickle
+import re
 
 import numpy as np
 import pytest
@@ -99,5 +101,27 @@ def test_no_reduction_where_the_variance_is_infinite(r0):
     [("D0", 0.0), ("D0", -1.0), ("tau0", math.inf), ("tau0", "1"), ("r0", 3.0), ("r0", math.nan), ("D0", True)],
 )
 def test_bad_parameters_are_refused_by_name(name, value):
-    with pytest.raises(ValidationError, match=rf"(?s)1 validation error.*{name}"):
+    with pytest.raises(ValidationError) as refused:
         NonGaussianNoise(**({"D0": 1.0, "tau0": 0.5, "r0": 0.95} | {name: value}))
+    said = rf"NonGaussianNoise: {name}: got {re.escape(repr(value))}; must be a finite number >= \S+ and <=? \S+ \(.+\)"
+    assert re.fullmatch(said, str(refused.value))
+
+
+def test_each_fault_has_a_sentence_with_its_unit():
+    size = "must be a finite number >= 1e-15 and <= 1e15"
+    for arguments, named, said in (
+        ((), {"D0": -1.0, "tau0": math.nan, "r0": 0.9}, [
+            f"D0: got -1.0; {size} (noise intensity, in 1/time)", f"tau0: got nan; {size} (correlation time, in time)",
+        ]),
+        ((), {"tau0": 1.0, "r0": 0.9, "DO": 1.0}, [
+            f"D0: missing; {size} (noise intensity, in 1/time)", "DO: unknown; the parameters are D0, tau0, r0",
+        ]),
+        ((10**5000, 1.0, 0.9), {}, [f"D0: got a number too long to show; {size} (noise intensity, in 1/time)"]),
+        ((1.0, [0.5] * 99, 0.9), {}, [f"tau0: got [{'0.5, ' * 11}0...; {size} (correlation time, in time)"]),
+        ((1.0, 0.0, 0.9), {}, [f"tau0: got 0.0; {size} (correlation time, in time)"]),
+        ((1.0, 1.0, 0.9, 2.0), {}, ["argument 4: unknown; the parameters are D0, tau0, r0"]),
+    ):  # fmt: skip
+        with pytest.raises(ValidationError) as refused:
+            NonGaussianNoise(*arguments, **named)
+        assert str(refused.value).splitlines() == [f"NonGaussianNoise: {sentence}" for sentence in said]
+        assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)

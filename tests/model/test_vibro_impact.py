@@ -1,6 +1,7 @@
 """Eqs. (3)-(6), (17)-(18): the oscillator and its impact laws."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -74,5 +75,7 @@ def test_restitution_law_must_not_reverse_the_velocity():
 )
 def test_bad_parameters_are_refused_by_name(name, value):
     good = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1}
-    with pytest.raises(ValidationError, match=rf"(?s)1 validation error.*{name}"):
+    with pytest.raises(ValidationError) as refused:
         VibroImpactOscillator(**(good | {name: value}))
+    said = rf"VibroImpactOscillator: {name}: got {re.escape(repr(value))}; must be (a finite number|one of) .*\(.+\)"
+    assert re.fullmatch(said, str(refused.value))

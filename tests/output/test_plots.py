@@ -1,6 +1,7 @@
 """What the figures show, read from the drawn figures themselves."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib.figure
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from fpsolve.case.case import load_case
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.output.figures import draw
-from fpsolve.output.plots import Series, write_figure
+from fpsolve.output.plots import Series, write_figure, write_response_figure
 from fpsolve.study.solve import solve_curves
 
 ROOT = Path(__file__).parents[2]
@@ -39,7 +40,9 @@ def legend(figure):
     return [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
 
 
-@pytest.mark.parametrize("title", ["Short", "A title so long that it fills all of the line above the axes, and more"])
+@pytest.mark.parametrize(
+    "title", ["Short", "A title so long that it fills all of the line above the axes, and more", "A\nB"]
+)
 @pytest.mark.parametrize("scale", [1e-2, 1e-4, 1e-7])
 def test_title_is_clear_of_the_power_of_ten(drawn, tmp_path, title, scale):
     write_figure([series(scale=scale / 10)], "p", MOMENT, title, [tmp_path / "figure.png"])
@@ -84,6 +87,21 @@ def test_stability_index_is_marked_on_the_zero_line(drawn, tmp_path):
 def test_no_entry_without_a_stability_index(drawn, tmp_path):
     write_figure([series()], "p", MOMENT, "Title", [tmp_path / "figure.png"])
     assert not any("stability" in text for text in legend(drawn[0]))
+
+
+def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
+    edges, density = np.linspace(0, 3, 31), np.exp(-np.linspace(0, 3, 30))
+    response = SimpleNamespace(
+        x_edges=edges, v_edges=np.linspace(-3, 3, 21), density=np.ones((30, 20)), amplitude_edges=edges,
+        amplitude_density=density, amplitude_error=0.01 * density,
+    )  # fmt: skip
+    write_response_figure(response, "Title", [tmp_path / "response.png"])
+    plane, radial, bar = drawn[0].axes
+    labels = [plane.xaxis.label, plane.yaxis.label, bar.yaxis.label, radial.xaxis.label, radial.yaxis.label]
+    units = ["(length)", "(length/time)", "(time/length²)", "(length)", "(1/length)"]
+    assert [label.get_text().rpartition(" ")[2] for label in labels] == units
+    left, right = bar.yaxis.label.get_window_extent(), radial.yaxis.label.get_window_extent()
+    assert right.x0 - left.x1 > 1.5 * left.width
 
 
 @pytest.mark.parametrize(("p", "count"), [("[-1.0, 2.0]", 1), ("[1.0, 2.0]", 0)])

@@ -477,14 +477,17 @@ for source in simple.GetSources().values():
     display, kind = simple.GetDisplayProperties(source, view), source.GetXMLName()
     if kind == "TextSource":
         captions.append([source.Text, list(display.BillboardPosition)])
+    elif kind == "PythonCalculator":
+        lowest = simple.GetColorTransferFunction("scaled").RGBPoints[0]
     elif kind == "PythonAnnotation":
         title = servermanager.Fetch(source).GetRowData().GetAbstractArray(0).GetVariantValue(0).ToString()
-print(json.dumps([title, captions, [view.AxesGrid.XTitle, view.AxesGrid.YTitle]]))
+print(json.dumps([title, captions, [view.AxesGrid.XTitle, view.AxesGrid.YTitle], lowest]))
 """
 
 
 def words(paraview, folder, *arguments):
-    """What show.py writes into a picture: its title, its captions with their places, the titles of the axes grid."""
+    """What show.py writes into a picture: its title, its captions with their places, the titles of the axes grid, and
+    the lowest value of the colours."""
     script = folder / "words.py"
     script.write_text(WORDS.format(script=str(folder / "show.py"), arguments=[*arguments, "--output", "words.png"]))
     done = paraview(folder, script)
@@ -503,25 +506,33 @@ def named_results(tmp_path_factory):
 
 
 def test_words_of_the_picture(paraview, named_results):
-    title, captions, grid = words(paraview, named_results)
+    title, captions, grid, lowest = words(paraview, named_results)
     first, *parameters = title.splitlines()
     assert first.startswith("p = 1 ")
+    assert first.endswith(" (1/time)")
+    assert 0 < lowest < 1
     assert parameters == ["oscillator: omega = 1, impact = delta", "noise: D0 = 0.5"]
     assert [text for text, _ in captions].count("impact") == 2
     at = {text: place[0] for text, place in captions}
     ticks = [at[text] for text in ("0", "pi/2", "pi", "3 pi/2", "2 pi")]
     assert np.diff(ticks) == pytest.approx([ticks[4] / 4] * 4)
-    assert "phase phi" in at
-    assert [word.strip() for word in grid] == ["", "noise xi"]
+    assert "phase phi (rad)" in at
+    assert [word.strip() for word in grid] == ["", "noise xi (1/time)"]
+
+
+def test_the_stationary_density_is_that_at_p_0(paraview, named_results):
+    title, *_, lowest = words(paraview, named_results, "--field", "stationary_density")
+    assert title.splitlines()[0] == "stationary density (p = 0)"
+    assert lowest == 0
 
 
 def test_words_around_the_cylinder(paraview, named_results):
     """Near the rim, whose radius is between 1 and 1.5."""
-    _, captions, _ = words(paraview, named_results, "--cylinder")
+    _, captions, *_ = words(paraview, named_results, "--cylinder")
     texts = [text for text, _ in captions]
     assert texts[:4] == ["phase phi = 0", "impact: pi/2", "pi", "impact: 3 pi/2"]
     assert len(texts) == 6
-    assert all(text.startswith("noise xi = ") for text in texts[4:])
+    assert all(re.fullmatch(r"noise xi = \S+ \(1/time\)", text) for text in texts[4:])
     for _, (x, y, _) in captions:
         assert 1 < np.hypot(x, y) < 1.7
 

@@ -19,6 +19,7 @@ from fpsolve.files import LOCK
 from fpsolve.output import figures
 from fpsolve.simulation import response
 from fpsolve.study import simulate as simulated
+from tests.conftest import heed_signals
 
 CASE = """
 title = "A quick simulation"
@@ -219,6 +220,27 @@ def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, m
     assert "the simulation overflowed" in capsys.readouterr().err
 
 
+def kept(out, curve, planned):
+    """The message of a simulation that was interrupted when something was done."""
+    place = f"in the simulation of curve {curve} of {planned}"
+    return f"interrupted {place}; what was done is kept in {out / 'quick'}; run it again to start over"
+
+
+def test_an_interrupted_simulation_of_a_run_says_how_to_go_on(case, out, capsys, monkeypatch):
+    original = simulated._simulate_curve
+
+    def interrupted(case, curve, progress):
+        if curve.number == 2:
+            raise KeyboardInterrupt
+        return original(case, curve, progress)
+
+    monkeypatch.setattr(simulated, "_simulate_curve", interrupted)
+    sets = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", "monte_carlo.time=100.0"]
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *sets]) == 130
+    assert capsys.readouterr().err.strip() == kept(out, 2, 2)
+    assert {"summary.json", "monte_carlo.json", "figure.png"} <= {path.name for path in (out / "quick").iterdir()}
+
+
 def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys, monkeypatch):
     monkeypatch.setattr(response, "stationary_response", raising(KeyboardInterrupt))
     sets = ["oscillator.c2=0.5", "oscillator.c1=0.8", 'vary."noise.D0"=[0.1, 0.2]']
@@ -226,7 +248,7 @@ def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys,
     assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
     found = read(out / "quick/monte_carlo.json")
     assert "no stationary response: stopped before it was reached" in found["warnings"]
-    assert "what was done is kept" in capsys.readouterr().err
+    assert kept(out, 1, 2) in capsys.readouterr().err
 
 
 def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
@@ -242,13 +264,8 @@ def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
     assert simulate(case, "--out", out, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]') == 130
     assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
     printed = capsys.readouterr()
-    assert "what was done is kept" in printed.err
+    assert kept(out, 2, 2) in printed.err
     assert "64 paths" in printed.out
-
-
-def heed_interrupts():
-    """What runs in the background inherits that SIGINT is ignored."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def wait_for(path):
@@ -266,7 +283,7 @@ def test_a_real_interrupt(case, out):
     command[-1] = "400000"
     with subprocess.Popen(
         [*command, "--time", "4000"],
-        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, preexec_fn=heed_interrupts,
+        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, preexec_fn=heed_signals,
     ) as process:  # fmt: skip
         try:
             wait_for(out / "quick" / LOCK)
@@ -307,22 +324,24 @@ def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
     assert any("stopped early" in text for text in second["warnings"])
     assert second["time"] < 0.7 * first["time"]
     assert len(list((out / "quick").iterdir())) == 2  # an earlier third one is gone
-    assert "what was done is kept" in capsys.readouterr().err
+    assert kept(out, 2, 3) in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--paths", "5"], "monte_carlo.paths: got 5; must be a whole number >= 32"),
+        (["--paths", "5"], "quick.toml: --paths 5: monte_carlo.paths: got 5; must be a whole number >= 32"),
         (["--paths", "2.5"], "--paths"),
-        (["--time", "1"], r"monte_carlo.time: got 1; must be >= \d+\.\d+, two transients"),
+        (["--time", "1"], r"quick\.toml: --time 1: monte_carlo\.time: got 1; must be >= \d+\.\d+, two transients"),
         (["--time", "nan"], "monte_carlo.time"),
         (["--seed", "-1"], "monte_carlo.seed: got -1; must be a whole number >= 0"),
-        (["--estimator", "exact"], 'must be one of "direct", "population"'),
+        (["--estimator", "exact"], '--estimator exact: .* must be one of "direct", "population"'),
         (["--set", "monte_carlo.step=0.9"], r"too large for the correlation time of the noise; must be > 0 and <= 0\."),
         (["--set", "monte_carlo.step=0.2", "--set", "oscillator.omega=9.0"], r"the frequency; .* <= 0\.05556"),
         (["--set", "monte_carlo.step=0.2", "--set", "noise.D0=500.0"], "too large for the strength of the noise"),
-        (["--set", "noise.tau0=1e-8"], "takes .* steps"),
+        (["--set", "noise.tau0=1e-8"], "takes .* steps of .*, which the correlation time of the noise asks for"),
+        (["--set", "monte_carlo.step=1e-308"], r"got 1e-308, too small: .*; must be >= 6\.283e-06 and <= 0\.\d+; inc"),
+        (["--set", "monte_carlo.step=1e-9", "--set", "noise.tau0=1e-8"], "the correlation time of the noise asks for"),
         (["--set", "monte_carlo.p=[]"], "non-empty"),
         (["--set", 'monte_carlo.p="x"'], "monte_carlo.p"),
         (["--set", "monte_carlo.p=[inf]"], "finite"),

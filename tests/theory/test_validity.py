@@ -12,7 +12,7 @@ from tests.conftest import FIG1, FIG1_NOISE
 from tests.oracles import perturbation
 
 
-@pytest.mark.parametrize("r0", [0.95, 1.0, 1.05])
+@pytest.mark.parametrize("r0", [0.9, 0.95, 1.0, 1.05, 1.1])
 def test_the_reduction_near_gaussian_noise_needs_no_note(r0):
     assert validity.reduction_note(NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0)) is None
 
@@ -44,4 +44,5 @@ def test_weak_noise_needs_no_note_and_strong_noise_gets_its_size():
     note = validity.weak_noise_note(Problem(strong, noise), p, values[1])
     rest = values[1] - perturbation.moment_exponent(strong, noise, p)
     shares = np.abs(rest[p != 0]) / perturbation.moment_scale(strong, noise, p[p != 0])
-    assert f"it is {rest[p != 0][shares.argmax()]:.3g}, {shares.max():.0%}" in note
+    worst = shares.argmax()
+    assert f", most at p = {p[p != 0][worst]:g}, where it is {rest[p != 0][worst]:.3g}, {shares.max():.0%}" in note

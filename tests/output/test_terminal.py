@@ -1,0 +1,48 @@
+"""What is printed fits the terminal, and no number is broken."""
+
+import re
+
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.output.terminal import print_remark, print_results, print_simulation
+from fpsolve.study.simulate import simulate_curves
+from fpsolve.study.solve import solve_curves
+from tests.test_workflow import TEXT
+
+NONLINEAR = ["vary={}", "oscillator.c1=0.8", "oscillator.c2=0.5", "monte_carlo={ paths = 64, time = 100.0 }"]
+QUANTITY = re.compile(r"(\S+) = \S+ ± \S+")
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    path = tmp_path_factory.mktemp("terminal") / "quick.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    return load_case(path, NONLINEAR)
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_quantities_are_whole(case, width, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    results, simulated = tuple(solve_curves(case)), tuple(simulate_curves(case))
+    capsys.readouterr()
+    for show, names in (
+        (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)"}),
+        (lambda: print_simulation(case, simulated), {"λ", "Λ″(0)", *simulated[0].response.means}),
+    ):
+        show()
+        lines = capsys.readouterr().out.splitlines()
+        assert {name for line in lines for name in QUANTITY.findall(line)} == names
+        assert max(map(len, lines)) <= width
+        assert not [line for line in lines if line.rstrip().endswith("±") or line.startswith("±")]
+
+
+@pytest.mark.parametrize("width", [50, 80, 120])
+def test_remarks_are_wrapped(width, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    text = "warning: case: " + "Λ(2) may be 1e-10 or [less] than " * 10 + "a_word_as_long_as_a_path/" * 6
+    print_remark(text, "yellow")
+    first, *others = capsys.readouterr().err.splitlines()
+    assert all(line.startswith("  ") for line in others)
+    assert " ".join([first, *(line.strip() for line in others)]) == text
+    assert all(len(line) < width for line in [first, *others[:-1]])
