@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -131,14 +131,8 @@ class Branch:
             start = tried(p, tolerance) or start
             if start is not None and self._meets(start, tolerance) and rival(start.pair) is None:
                 return start
-        return (resolve_far if self.is_far else resolve)(
-            self.problem,
-            p,
-            tolerance=lambda value: tolerance(p, value),
-            rtol=self.rtol,
-            budget=self.budget,
-            start=start,
-        )
+        search, allowed = resolve_far if self.is_far else resolve, partial(tolerance, p)
+        return search(self.problem, p, tolerance=allowed, rtol=self.rtol, budget=self.budget, start=start)
 
     @cached_property
     def _given(self) -> tuple[Generator, Generator]:
