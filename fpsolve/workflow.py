@@ -13,7 +13,7 @@ from fpsolve.case.case import Case
 from fpsolve.errors import NotConverged
 from fpsolve.files import TEMPORARY, alone, writable
 from fpsolve.output.charts import draw_chart, write_chart
-from fpsolve.output.figures import draw, draw_response
+from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_results, write_simulation
 from fpsolve.output.vtk import write_curve, write_response
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
@@ -24,7 +24,7 @@ from fpsolve.study.solve import compare, expected, solve_curves, solving_work
 Progress = Callable[[], None]
 AGAIN = "run it again to start over"
 SOLVED, SIMULATED = (
-    r"summary\.json|moments\.csv|figure\.(png|pdf)|density\.vtu|show\.py"
+    r"summary\.json|moments\.csv|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu|show\.py"
     r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)",
     r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)",
 )
@@ -193,6 +193,8 @@ def _solve(case: Case, folder: Path, watch: Watch) -> tuple[CurveResult, ...]:
         write_results(case, results, folder)
         for result in solve_curves(case, progress=progress):
             write_curve(result, folder)
+            if case.output.sensitivities:
+                draw_sensitivities(case, result, folder)
             write_results(case, [*results, result], folder)
             results.append(result.without_pairs())
     return tuple(results)

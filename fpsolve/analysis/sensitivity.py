@@ -38,6 +38,8 @@ from fpsolve.model.direction import Direction, directions
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem, checked_moments, of_problem
 
+DIFFERENTIATED = ("lyapunov_exponent", "stability_index", "variance_rate")
+"""The quantities that are no function of p."""
 SMALL_P = 1e-4
 """For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
 Operator = Callable[[FloatArray], FloatArray]
@@ -140,7 +142,12 @@ def sensitivities(
 
 
 def solve_sensitivities(
-    solver: ExponentSolver, p: FloatArray, along: Mapping[str, Direction], root: float | None = None
+    solver: ExponentSolver,
+    p: FloatArray,
+    along: Mapping[str, Direction],
+    *,
+    indices: Sequence[str] = DIFFERENTIATED,
+    root: float | None = None,
 ) -> Sensitivities:
     """The same with a solver of the problem, along some directions.
 
@@ -148,6 +155,7 @@ def solve_sensitivities(
         solver: of the problem.
         p: the moments, shape (n,), for which Λ is finite.
         along: the directions, by name.
+        indices: those wanted.
         root: near δ_p, if it is known.
     """
     found, notes = Gradient(solver, along), list[str]()
@@ -164,16 +172,13 @@ def solve_sensitivities(
         return found.root(index.value) if isinstance(index, Estimate) else {}
 
     moments = tuple(tried(f"Λ({each:g})", partial(found.moment, float(each))) for each in p)
-    indices = {
-        "lyapunov_exponent": tried("λ", found.lyapunov_exponent),
-        "stability_index": tried("δ_p", of_root),
-        "variance_rate": tried("Λ″(0)", found.variance_rate),
-    }
+    solves = dict(zip(DIFFERENTIATED, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
+    slopes = {name: tried(name, solves[name]) for name in indices}
     return Sensitivities(
         theta={key: by.theta for key, by in along.items()},
         p=p,
         moments=moments,
-        indices={name: each for name, each in indices.items() if each},
+        indices={name: each for name, each in slopes.items() if each},
         notes=(*notes, *_one_sided(solver.problem, along)),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,6 +72,21 @@ def write_figure(
         _add_legend(axes, series, y.equation + (", reduced noise" if is_reduced else ""))
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         axes.margins(x=0.03)
+
+
+def write_bars(bars: Mapping[str, Sequence[float]], names: Sequence[str], title: str, paths: Sequence[Path]) -> None:
+    """Draw groups of bars, one group for each name, and in it one bar for each label."""
+    with canvas(paths) as figure:
+        axes = figure.add_subplot(xlabel=r"$\theta\,\partial/\partial\theta$ over the scale")
+        axes.set_title(filled(title, 80), parse_math=False)
+        axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
+        height, middles = 0.8 / max(len(bars), 1), np.arange(len(names))
+        for i, (label, values) in enumerate(bars.items()):
+            places = middles + (i - 0.5 * (len(bars) - 1)) * height
+            axes.barh(places, values, 0.9 * height, color=COLOURS[i % len(COLOURS)], label=label)
+        axes.set_yticks(middles, names)
+        axes.invert_yaxis()
+        axes.legend(frameon=False, fontsize=11)
 
 
 def write_response_figure(response: Response, title: str, paths: Sequence[Path]) -> None:

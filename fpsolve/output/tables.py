@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fpsolve import __version__
+from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.files import write_csv, write_json
 from fpsolve.study.results import CurveResult, SimulatedCurve
@@ -58,6 +59,7 @@ def _summary(result: CurveResult) -> dict[str, Any]:
         **_parameters(result.curve),
         "moments": _rows(result),
         **{name: _estimate(result.estimates[name], index.theory(theory)) for name, index in INDICES.items()},
+        "sensitivities": None if result.sensitivities is None else _sensitivities(result.sensitivities),
         "discretisation": result.discretisation,
         "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
         "notes": list(result.notes),
@@ -83,6 +85,21 @@ def _estimate(estimate: Estimate | None, theory: float) -> dict[str, float] | No
     if estimate is None:
         return None
     return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": theory}
+
+
+def _sensitivities(found: Sensitivities) -> dict[str, Any]:
+    """∂/∂θ by the key of θ, null where its error leaves it no meaning, and the estimates of these errors alike."""
+
+    def numbers(of: Callable[[Estimate], float]) -> dict[str, Any]:
+        def row(slopes: Slopes) -> dict[str, float | None]:
+            return {key: of(each) if each.relative_error <= MEANINGLESS else None for key, each in slopes.items()}
+
+        moments = zip(found.p.tolist(), found.moments, strict=True)
+        indices = {name: row(found.indices[name]) if name in found.indices else None for name in DIFFERENTIATED}
+        return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
+
+    errors = numbers(lambda each: each.error_estimate)
+    return {**numbers(lambda each: each.value), "error_estimates": errors}
 
 
 def _simulation_summary(simulated: SimulatedCurve) -> dict[str, Any]:

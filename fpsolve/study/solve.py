@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.analysis.density import stationary_density
+from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
@@ -22,6 +23,7 @@ from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model.direction import directions
 from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
 from fpsolve.theory.perturbation import second_order
@@ -36,17 +38,19 @@ class Wanted:
         indices: names of `INDICES`.
         shown: the p whose eigenfunctions are kept.
         density: whether the stationary density is.
+        sensitivities: whether derivatives by the parameters are wanted, too.
     """
 
     p: FloatArray
     indices: tuple[str, ...]
     shown: tuple[float, ...] = ()
     density: bool = False
+    sensitivities: bool = False
 
 
 def everything(case: Case, curve: Curve) -> Wanted:
-    """All moments and indices, and the eigenfunctions to be drawn."""
-    return Wanted(case.p, tuple(INDICES), tuple(case.shown), density=True)
+    """All moments and indices, their sensitivities, and the eigenfunctions to be drawn."""
+    return Wanted(case.p, tuple(INDICES), tuple(case.shown), density=True, sensitivities=True)
 
 
 def expected(case: Case, curve: Curve) -> Wanted:
@@ -98,6 +102,8 @@ def _solve_curve(
     lost = _lost(stationary, solver.near.refinement)
     warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None)]
     warnings += lost or _unresolved(pairs)
+    slopes = _sensitivities(solver, curve, moments, estimates) if wanted.sensitivities else None
+    notes = [*_notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]), *(slopes.notes if slopes else ())]
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -107,7 +113,8 @@ def _solve_curve(
         stationary=None if lost else stationary,
         discretisation=_discretisation(solver),
         warnings=tuple(map(in_words_of_a_case, warnings)),
-        notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]))),
+        sensitivities=slopes,
+        notes=tuple(map(in_words_of_a_case, notes)),
         failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),
     )
 
@@ -134,6 +141,20 @@ def _solve_indices(
     told = {failure.reason: f"as there is no Λ({failure.p:g})" for failure in moments.failures if failure.p is not None}
     reasons = {reason: told.get(reason, reason) for reason in failed}
     return estimates, missing + [f"no {', '.join(failed[each])}: {reason}" for each, reason in reasons.items()]
+
+
+def _sensitivities(
+    solver: ExponentSolver, curve: Curve, moments: MomentLyapunov, estimates: Mapping[str, Estimate | None]
+) -> Sensitivities:
+    """The derivatives of what was found by all parameters of the case."""
+    index = estimates[STABILITY_INDEX.name]
+    return solve_sensitivities(
+        solver,
+        moments.p,
+        directions(curve.problem, curve.original_noise),
+        indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
+        root=None if index is None else index.value,
+    )
 
 
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:
