@@ -18,10 +18,11 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.bordered import Bordered
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.direction import Family
+from fpsolve.model.direction import Direction, Family
 from fpsolve.model.parameters import STRICT
 from fpsolve.model.problem import refuse_infinite
 
+_LOSS = "oscillator.restitution"
 RTOL = 1e-10
 """Of F, relative to its scale."""
 
@@ -120,6 +121,9 @@ def zero_of(value: str | Mapping[str, float]) -> Zero:
 class Quantity:
     """F over the unit square: λ or Λ(p)/p, with its gradient.
 
+    λ and its slopes are affine in ln R where nothing else changes: a bounce multiplies the whole state and leaves the
+    phase alone. So two of its values at different r give all others.
+
     Args:
         zero: which of them.
         family: the problems.
@@ -132,6 +136,10 @@ class Quantity:
         self._zero, self._family, self._axes = zero, family, axes
         self._rtol, self._budget = rtol, budget
         self._starts: Mapping[float, Solution] = {}
+        keys = [axis.key for axis in axes]
+        is_affine = zero.p == 0 and _LOSS in keys and "oscillator.epsilon" not in keys  # ln R changes with both
+        self._bounce = keys.index(_LOSS) if is_affine else None
+        self._solved: dict[float, dict[float, Sample]] = {}
 
     def __call__(self, at: FloatArray) -> Sample:
         """F at (u, v). Raises `FpsolveError` where there is none."""
@@ -140,6 +148,16 @@ class Quantity:
             family = self._family.at(values)
         except ValueError as failure:
             raise FpsolveError(f"no such problem: {failure}") from failure
+        if self._bounce is None:
+            return self._sample(at, family)
+        known = self._solved.setdefault(float(at[1 - self._bounce]), {})
+        log_factor = family.problem.system.kicks[0].log_factor
+        if len(known) < 2 and log_factor not in known:
+            known[log_factor] = self._sample(at, family)
+        return known[log_factor] if log_factor in known else self._between(at, family, log_factor, known, self._bounce)
+
+    def _sample(self, at: FloatArray, family: Family) -> Sample:
+        """F from a solve."""
         refuse_infinite(family.problem, self._zero.p)
         solver = ExponentSolver(family.problem, rtol=self._rtol, budget=self._budget, starts=self._starts)
         value, error = solver.ratio_alone(self._zero.p)
@@ -150,7 +168,21 @@ class Quantity:
         scale = solver.scale(self._zero.p) / abs(self._zero.p) if self._zero.p else solver.scales.linear
         return Sample(at, value, gradient, error, scale)
 
-    def _slopes(self, solver: ExponentSolver, along: Sequence[Any]) -> FloatArray:
+    def _between(
+        self, at: FloatArray, family: Family, log_factor: float, known: Mapping[float, Sample], bounce: int
+    ) -> Sample:
+        """λ from two of its values at other r."""
+        (first, one), (second, other) = known.items()
+        share = (log_factor - first) / (second - first)
+        gradient = one.gradient + share * (other.gradient - one.gradient)
+        [rise] = family.directions()[_LOSS].kicks
+        impacts = (other.value - one.value) / (second - first)
+        gradient[bounce] = impacts * rise * self._axes[bounce].slope(float(at[bounce]))
+        value = one.value + share * (other.value - one.value)
+        error = (abs(share) + abs(1 - share)) * max(one.error, other.error)
+        return Sample(at, value, gradient, error, max(one.scale, other.scale))
+
+    def _slopes(self, solver: ExponentSolver, along: Sequence[Direction]) -> FloatArray:
         """∂F/∂θ."""
         p = self._zero.p
         if abs(p) >= SMALL_P:

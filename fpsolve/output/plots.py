@@ -86,7 +86,7 @@ def write_bars(bars: Mapping[str, Sequence[float]], names: Sequence[str], title:
             axes.barh(places, values, 0.9 * height, color=COLOURS[i % len(COLOURS)], label=label)
         axes.set_yticks(middles, names)
         axes.invert_yaxis()
-        axes.legend(frameon=False, fontsize=11)
+        figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=11)
 
 
 def write_response_figure(response: Response, title: str, paths: Sequence[Path]) -> None:
