@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ from fpsolve.arrays import FloatArray
 
 FINE = 16
 """Pieces into which a cell of a scan is divided for a picture."""
-_ORDINALS = {1: "first", 2: "second", 3: "third", 4: "fourth"}
+_ORDINALS = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth"}
 P_BIFURCATIONS = {-1.0: "hump of the amplitude density", -2.0: "crater of the joint density"}
 """What the stationary response of the nonlinear oscillator shows where λ > 0 and δ_p is below a value.
 
@@ -65,21 +66,33 @@ def regions(lines: Sequence[Boundary]) -> Regions:
     for number, k in enumerate(order):
         inside = exists & _equal(signs, kinds[k])
         index[inside] = number
-        name = ", ".join(words(line.zero, sign) for line, sign in zip(lines, kinds[k], strict=True))
+        name = name_of([line.zero for line in lines], kinds[k].tolist())
         by_name = {line.zero.name: int(sign) for line, sign in zip(lines, kinds[k], strict=True)}
         each.append(Region(name, by_name, float(shares[k]), _deepest(inside)))
     return Regions(tuple(each), index)
 
 
-def words(zero: Zero, sign: int) -> str:
-    """What F > 0, or F < 0, means."""
-    if zero.kind == "lyapunov_exponent":
-        return "almost surely " + ("unstable" if sign > 0 else "stable")
-    if zero.kind == "stability_index":
-        return f"δ_p {'<' if sign > 0 else '>'} {zero.p:g}"
-    grows = (sign > 0) == (zero.p > 0)
-    name = f"{_ORDINALS[int(zero.p)]} moment" if zero.p in _ORDINALS else f"moment {zero.p:g}"
-    return f"{name} {'unstable' if grows else 'stable'}"
+def name_of(zeros: Sequence[Zero], signs: Sequence[int]) -> str:
+    """What the signs of F mean: almost surely stable, second moment unstable, -2 < δ_p < -1.
+
+    The bounds of δ_p are left out where λ < 0 says as much.
+    """
+    parts, below, above = [], -math.inf, math.inf
+    for zero, sign in sorted(zip(zeros, signs, strict=True), key=lambda each: (each[0].kind == "moment", each[0].p)):
+        if zero.kind == "lyapunov_exponent":
+            parts.append("almost surely " + ("unstable" if sign > 0 else "stable"))
+            below = below if sign > 0 else 0.0
+        elif zero.kind == "moment":
+            name = f"{_ORDINALS[zero.p]} moment" if zero.p in _ORDINALS else f"moment {zero.p:g}"
+            parts.append(f"{name} {'unstable' if (sign > 0) == (zero.p > 0) else 'stable'}")
+        elif sign > 0:
+            above = min(above, zero.p)
+        else:
+            below = max(below, zero.p)
+    low, high = (f"{below:g} < " if math.isfinite(below) else ""), (f" < {above:g}" if math.isfinite(above) else "")
+    if (low or high) and below != 0:
+        parts.append(f"{low}δ_p{high}" if high else f"δ_p > {below:g}")
+    return ", ".join(parts)
 
 
 def interpolated(scan: Scan) -> FloatArray:

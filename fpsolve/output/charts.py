@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,10 @@ from fpsolve.study.chart import Chart
 
 _TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
 """Of regions, the darker the more of the quantities grow there."""
-_NAMED = 0.03
-"""Regions with less than this share of the frame have their names in chart.json only."""
+_ROOMY, _NAMED = 0.15, 0.01
+"""Shares of the frame from which on a region has room for its name, or for a letter; others are in chart.json only."""
 _CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "color": "black", "linewidth": 1.1, "zorder": 3}
+_LETTER: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0, "color": "0.15"}
 _SPECIAL = {"fold": ("fold", "^"), "crossing": ("crossing", "o"), "at ": ("value asked for", "s")}
 """Beginnings of labels, what the legend calls such points, and their markers."""
 
@@ -39,14 +41,13 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
     """chart.png and chart.pdf: the lines, their closed forms dashed, and the regions with their names."""
     assert case.chart is not None
     x, y = case.chart.x.axis, case.chart.y.axis
-    with canvas([folder / "chart.png", folder / "chart.pdf"]) as figure:
+    with canvas([folder / "chart.png", folder / "chart.pdf"], height=6.5) as figure:
         axes = figure.add_subplot(xlabel=axis_title(PARAMETERS[x.key]), ylabel=axis_title(PARAMETERS[y.key]))
         axes.set(xscale=x.scale, yscale=y.scale, xlim=(x.start, x.stop), ylim=(y.start, y.stop))
         for side, frame in ((axes.xaxis, x), (axes.yaxis, y)):
             _number(side, frame)
         axes.set_title(filled(case.headline, 80), parse_math=False)
-        if chart.regions is not None:
-            _shade(axes, chart.regions, (x, y))
+        small = {} if chart.regions is None else _shade(axes, chart.regions, (x, y))
         entries = {}
         for i, line in enumerate(chart.lines):
             for branch in chart.closed_forms[i]:
@@ -57,7 +58,10 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
         for start, (name, marker) in _SPECIAL.items():
             if any(start in label for label in labels):
                 entries[name] = axes.plot([], [], marker, color="0.35", markersize=7, markerfacecolor="none")[0]
-        figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=2, frameon=False, fontsize=11)
+        entries |= small
+        columns = 1 if small else 2  # names of regions are long
+        style = {"loc": "outside lower center", "frameon": False, "fontsize": 11, "ncols": columns}
+        figure.legend(entries.values(), entries.keys(), **style)
 
 
 def _rows(chart: Chart) -> Iterator[list[Any]]:
@@ -125,21 +129,29 @@ def _number(side: Any, frame: Axis) -> None:
         side.set_minor_formatter(NullFormatter())
 
 
-def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> None:
-    """A tint for each region, and its name where it has room."""
+def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, Any]:
+    """A tint for each region, and its name, or where that has no room a letter; what the legend says of these."""
     from matplotlib.colors import ListedColormap
 
     x, y = frame
     edges = np.linspace(0, 1, regions.index.shape[0] + 1)
-    unstable = [sum("unstable" in part or "<" in part for part in each.name.split(", ")) for each in regions.each]
+    unstable = [sum(sign > 0 for sign in each.signs.values()) for each in regions.each]
     tints = np.array([*unstable, np.nan])[regions.index]
     colours, most = ListedColormap(_TINTS), len(_TINTS) - 1
     axes.pcolormesh(x.value(edges), y.value(edges), tints.T, cmap=colours, vmin=-0.5, vmax=most + 0.5, rasterized=True)
+    letters, small = iter(ascii_lowercase), {}
     for each in regions.each:
-        if each.share > _NAMED:
-            text = "\n".join(each.name.replace("δ_p", r"$\delta_p$").split(", "))
-            place = x.value(each.at[0]), y.value(each.at[1])
-            axes.text(*place, text, ha="center", va="center", fontsize=9.5, color="0.15")
+        name = each.name.replace("δ_p", r"$\delta_p$")
+        place = x.value(each.at[0]), y.value(each.at[1])
+        if each.share > _ROOMY:
+            axes.text(*place, "\n".join(name.split(", ")), ha="center", va="center", fontsize=9.5, color="0.15")
+        elif each.share > _NAMED:
+            letter = next(letters, "z")
+            axes.text(*place, letter, ha="center", va="center", fontsize=12, weight="bold", color="0.15")
+            small[name] = axes.plot(
+                [], [], linestyle="none", marker=f"${letter}$", markersize=8, markeredgewidth=0, color="0.15"
+            )[0]
+    return small
 
 
 def _draw(axes: Any, line: Boundary, colour: str) -> Any:

@@ -131,7 +131,7 @@ def _draw_amplitude(axes: Any, response: Response, seen: float) -> None:
 
 
 @contextmanager
-def canvas(paths: Sequence[Path], width: float = 7.2) -> Iterator[Any]:
+def canvas(paths: Sequence[Path], width: float = 7.2, height: float = 5.0) -> Iterator[Any]:
     """An empty figure in the house style, which is written to the paths in the end."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -139,7 +139,7 @@ def canvas(paths: Sequence[Path], width: float = 7.2) -> Iterator[Any]:
 
     logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
     with rc_context({"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12, "pdf.fonttype": 42}):
-        figure = Figure(figsize=(width, 5.0), dpi=160, layout="constrained")
+        figure = Figure(figsize=(width, height), dpi=160, layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
         figure.draw_without_rendering()  # lays it out, once for all formats
