@@ -150,7 +150,7 @@ def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate
 
 
 def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
-    """Which eigenfunctions, or densities T T*, are not positive: layers of slow or strong noise are thinner than cells."""
+    """Which eigenfunctions or T T* are not positive, as layers of slow or strong noise are thinner than the cells."""
     return [
         f"{name} at p = {pair.p:g} is not resolved, {defect:.0%} of it has the wrong sign; its errors have next to no "
         "effect on Λ, but do not read its picture"
