@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import fpsolve
-from fpsolve.analysis import stationary_density
+from fpsolve.analysis import stationary_density, tilted_density
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import CaseError, NotConverged, OutputError, Remedy
 from fpsolve.exponent.solver import ExponentSolver
@@ -412,6 +412,22 @@ source = "wrong on purpose"
     assert [(item.varied["noise.D0"], item.met) for item in comparisons] == [(1.0, True), (0.1, False), (1.0, False)]
 
 
+def test_tilted_densities_that_python_refuses_are_warned_of(tmp_path):
+    """Each shown p is judged, by the measure of `tilted_density`."""
+    overrides = ["oscillator.epsilon=1.0", "oscillator.restitution=1.0", "noise.r0=1.0", "noise.tau0=1.0"]
+    overrides += ["moments={p=[1.0, 3.0, 4.0], rtol=1e-5}", "output.eigenfunctions=[1.0, 3.0, 4.0]", "vary={}"]
+    [result] = solve_curves(write(tmp_path, TEXT.replace("c1 = 0.1", "c1 = 0.0"), overrides))
+    refused = []
+    for pair in result.eigenpairs:
+        try:
+            tilted_density(pair)
+        except NotConverged:
+            refused.append(pair.p)
+    assert refused == [3.0, 4.0]
+    told = [text for text in result.warnings if text.startswith("tilted_density at p = ")]
+    assert [float(text.split()[4]) for text in told] == refused
+
+
 def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
     sets = [
         "oscillator.epsilon=1.0",
@@ -427,7 +443,7 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
     )
     (result,) = solve_curves(case)
     pair = result.eigenpairs[0]
-    told = [text for text in result.warnings if "do not read its picture" in text]
+    told = [text for text in result.warnings if text.startswith("T") and "do not read its picture" in text]
     assert len(told) == sum(defect > UNRESOLVED for defect in pair.sign_defects) == 1
     assert min(pair.sign_defects) < 1e-4
 

@@ -43,6 +43,11 @@ class Density:
         """∫ρ dξ at `phi`, shape (m,)."""
         return self.values @ self.xi_weights
 
+    def negative_share(self) -> float:
+        """∫|ρ| where ρ < 0 over ∫|ρ|."""
+        sizes = self.phi_weights[:, None] * np.abs(self.values) * self.xi_weights
+        return float(np.sum(sizes[self.values < 0]) / np.sum(sizes))
+
     def xi_marginal(self) -> FloatArray:
         """∫ρ dφ at `xi`, shape (n,)."""
         return self.phi_weights @ self.values
@@ -70,6 +75,11 @@ def tilted_density(pair: PrincipalPair) -> Density:
         NotConverged: too much of it is negative; `partial` is what was found.
     """
     return _judged(pair, _density(pair, "product"), "tilted density")
+
+
+def negative_share(pair: PrincipalPair) -> float:
+    """How much of T T* is negative, by ∫|T T*|."""
+    return _density(pair, "product").negative_share()
 
 
 def furstenberg_khasminskii(pair: PrincipalPair) -> float:
@@ -104,8 +114,7 @@ def _of_zero(pair: PrincipalPair) -> PrincipalPair:
 
 def _judged(pair: PrincipalPair, density: Density, name: str) -> Density:
     """The density, if it is one. Raises `NotConverged`."""
-    sizes = density.phi_weights[:, None] * np.abs(density.values) * density.xi_weights
-    share = float(np.sum(sizes[density.values < 0]) / np.sum(sizes))
+    share = density.negative_share()
     if share > MOST_NEGATIVE:
         raise NotConverged(
             f"the {name} at p = {pair.p:g} is not resolved, {share:.0%} of it is negative",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.analysis.density import stationary_density
+from fpsolve.analysis.density import negative_share, stationary_density
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
@@ -18,7 +18,7 @@ from fpsolve.case.sections import Expectation
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.fields import UNRESOLVED
+from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
 from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
@@ -170,13 +170,17 @@ def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate
 
 
 def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
-    """Which eigenfunctions are not positive, as layers of slow or strong noise are thinner than the cells."""
+    """Which eigenfunctions or T T* are not positive, as layers of slow or strong noise are thinner than the cells."""
     return [
         f"{name} at p = {pair.p:g} is not resolved, {defect:.0%} of it has the wrong sign; its errors have next to no "
         "effect on Λ, but do not read its picture"
         for pair in pairs
-        for name, defect in zip(("T", "T_adjoint"), pair.sign_defects, strict=True)
-        if defect > UNRESOLVED
+        for name, defect, most in (
+            ("T", pair.sign_defects[0], UNRESOLVED),
+            ("T_adjoint", pair.sign_defects[1], UNRESOLVED),
+            ("tilted_density", negative_share(pair), MOST_NEGATIVE),
+        )
+        if defect > most
     ]
 
 
