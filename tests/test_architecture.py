@@ -19,7 +19,7 @@ ROOMS = {
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
     "exponent": [
         *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
-        *("function", "moments", "quantities"),
+        *("impacts", "function", "moments", "quantities"),
     ],
     "analysis": ["density", "sensitivity", "continuation", "special_points", "zero", "stability"],
     "case": ["toml", "messages", "sections", "vary", "curves", "remedies", "refusals", "case"],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,11 +12,9 @@ from typing import TYPE_CHECKING, Any
 from fpsolve import __version__
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import INDICES
+from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import atomic, write_json
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.theory.perturbation import second_order
 
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
@@ -52,11 +51,10 @@ def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
 
 
 def _summary(result: CurveResult) -> dict[str, Any]:
-    theory = second_order(result.curve.problem)
     return {
         **_parameters(result.curve),
         "moments": _rows(result),
-        **{name: _estimate(result.estimates[name], index.theory(theory)) for name, index in INDICES.items()},
+        **{name: _estimate(result, index) for name, index in INDICES.items()},
         "discretisation": result.discretisation,
         "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
         "notes": list(result.notes),
@@ -76,10 +74,14 @@ def _rows(result: CurveResult) -> list[dict[str, float]]:
     return [{name: float(values[i]) for name, values in columns.items()} for i in range(moments.p.size)]
 
 
-def _estimate(estimate: Estimate | None, theory: float) -> dict[str, float] | None:
+def _estimate(result: CurveResult, index: Index) -> dict[str, float | None] | None:
+    """An index beside its perturbation theory, null where that overflows."""
+    estimate = result.estimates[index.name]
     if estimate is None:
         return None
-    return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": theory}
+    theory = index.theory(result.curve.problem)
+    perturbation = theory if math.isfinite(theory) else None
+    return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": perturbation}
 
 
 def _simulation_summary(simulated: SimulatedCurve) -> dict[str, Any]:

@@ -12,11 +12,21 @@ from rich.text import Text
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, VARIANCE_RATE, Quantity
+from fpsolve.exponent.quantities import (
+    CRITICAL_RESTITUTION,
+    IMPACT_RATE,
+    INDICES,
+    LYAPUNOV_EXPONENT,
+    MOMENT,
+    STABILITY_INDEX,
+    VARIANCE_RATE,
+    Quantity,
+)
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.theory.far import grows_far_out
-from fpsolve.theory.perturbation import second_order
+
+WIDTH = 80
+"""Characters in a line of indices."""
 
 
 def print_results(case: Case, results: Sequence[CurveResult]) -> None:
@@ -136,12 +146,17 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
 
 
 def _indices(result: CurveResult) -> str:
-    """λ, δ_p and Λ″(0) in a line."""
-    parts = []
+    """λ, δ_p and Λ″(0) in a line, and what concerns impacts in another, or in more where they are long."""
+    lines = [""]
     for name, estimate in result.estimates.items():
         error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
-        parts.append(f"{INDICES[name].symbol} = {_digits_of(estimate, result, most=9)}{error}")
-    return "   ".join(parts) + "\n"
+        part = f"{INDICES[name].symbol} = {_digits_of(name, result, most=9)}{error}"
+        joined = f"{lines[-1]}   {part}" if lines[-1] else part
+        if name == IMPACT_RATE.name or len(joined) > WIDTH:
+            lines.append(part)
+        else:
+            lines[-1] = joined
+    return "\n".join(lines) + "\n"
 
 
 def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
@@ -152,10 +167,9 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     table = _table(case.title, *names, *headings)
     _explain_star(table, case)
     for result in results:
-        theory = second_order(result.curve.problem)
         row = [f"{value:g}" for value in result.curve.varied.values()]
         for index in indices:
-            row += [_digits_of(result.estimates[index.name], result, most=7), f"{index.theory(theory):.6g}"]
+            row += [_digits_of(index.name, result, most=7), f"{index.theory(result.curve.problem):.6g}"]
         table.add_row(*row)
     return table
 
@@ -200,9 +214,11 @@ def _explain_star(table: Table, case: Case) -> None:
         table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
 
 
-def _digits_of(estimate: Estimate | None, result: CurveResult, most: int) -> str:
+def _digits_of(name: str, result: CurveResult, most: int) -> str:
+    estimate = result.estimates[name]
     if estimate is None:
-        return "none" if grows_far_out(result.curve.problem) else "none found"
+        is_told = name == CRITICAL_RESTITUTION.name or grows_far_out(result.curve.problem)
+        return "none" if is_told else "none found"
     return digits(estimate.value, estimate.error_estimate, most)
 
 

@@ -19,7 +19,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.fields import UNRESOLVED
 from fpsolve.exponent.moments import solve_moments
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.study.results import Comparison, CurveResult
@@ -91,13 +91,14 @@ def _solve_curve(
 ) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
     moments = solve_moments(solver, wanted.p, progress=progress)
-    estimates, missing = _solve_indices(solver, wanted.indices, moments.root)
+    estimates, missing, absent = _solve_indices(solver, wanted.indices, moments.root)
     attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
     stationary = _pair(solver, 0.0) if wanted.density else None
     lost = _lost(stationary)
     warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None)]
     warnings += lost or _unresolved(pairs)
+    notes = _notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name])
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -107,19 +108,20 @@ def _solve_curve(
         stationary=None if lost else stationary,
         discretisation=_discretisation(solver),
         warnings=tuple(map(in_words_of_a_case, warnings)),
-        notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]))),
+        notes=tuple(map(in_words_of_a_case, (*notes, *absent))),
         failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),
     )
 
 
 def _solve_indices(
     solver: ExponentSolver, names: Sequence[str], root: float | None
-) -> tuple[dict[str, Estimate | None], list[str]]:
-    """Indices, δ_p first, None for those not asked for; and why some of those asked for are missing."""
+) -> tuple[dict[str, Estimate | None], list[str], list[str]]:
+    """Indices, δ_p first, None for those not asked for; why some of those asked for are missing, or do not exist."""
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
     failed: dict[str, list[str]] = {}
+    absent: dict[str, list[str]] = {}
     missing = []
-    for index in (STABILITY_INDEX, LYAPUNOV_EXPONENT, VARIANCE_RATE):
+    for index in sorted(INDICES.values(), key=lambda index: index != STABILITY_INDEX):
         if index.name not in names:
             continue
         try:
@@ -129,9 +131,14 @@ def _solve_indices(
             continue
         if isinstance(found, Estimate):
             estimates[index.name] = found
+        elif index != STABILITY_INDEX:
+            absent.setdefault(found.reason, []).append(index.symbol)
         elif found.reason != validity.NO_INDEX:  # of which a note tells
             missing.append(f"no stability index: {found.reason}")
-    return estimates, missing + [f"no {', '.join(symbols)}: {reason}" for reason, symbols in failed.items()]
+    warnings, notes = (
+        [f"no {', '.join(symbols)}: {reason}" for reason, symbols in each.items()] for each in (failed, absent)
+    )
+    return estimates, missing + warnings, notes
 
 
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:
