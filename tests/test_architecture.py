@@ -29,7 +29,7 @@ ROOMS = {
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
     "exponent": [
         *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
-        *("function", "moments", "quantities"),
+        *("impacts", "function", "moments", "quantities"),
     ],
     "analysis": ["density", "sensitivity", "continuation", "special_points", "zero", "stability", "regions"],
     "case": ["toml", "messages", "sections", "vary", "chart", "curves", "remedies", "refusals", "case"],

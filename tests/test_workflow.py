@@ -77,6 +77,10 @@ def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
         assert curve["lyapunov_exponent"]["value"] == result.lyapunov_exponent.value
         assert set(curve["stability_index"]) >= {"value", "perturbation"}
         assert curve["variance_rate"]["value"] > 0
+        for name in ("impact_rate", "critical_impact_factor", "critical_restitution"):
+            assert set(curve[name]) == {"value", "error_estimate", "perturbation"}
+            assert curve[name]["value"] == result.estimates[name].value
+            assert curve[name]["value"] == pytest.approx(curve[name]["perturbation"], rel=5e-3)
         used = curve["discretisation"]
         assert used == result.discretisation
         assert used["xi"] == "polynomials"

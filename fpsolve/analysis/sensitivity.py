@@ -235,8 +235,8 @@ class Gradient:
 
     @cached_property
     def _pairs_at_zero(self) -> tuple[Bordered, Bordered]:
-        pair = self._solver.near.solution(0.0).pair
-        return Bordered(pair), Bordered(self._solver.finer(pair))
+        coarse, fine = self._solver.at_zero
+        return Bordered(coarse), Bordered(fine)
 
 
 def _one_sided(problem: Problem, along: Mapping[str, Direction]) -> tuple[str, ...]:

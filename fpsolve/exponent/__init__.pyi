@@ -6,6 +6,9 @@ from .eigen import spectrum as spectrum
 from .error import Estimate as Estimate
 from .error import Failure as Failure
 from .function import MomentLyapunovFunction as MomentLyapunovFunction
+from .impacts import critical_impact_factor as critical_impact_factor
+from .impacts import critical_restitution as critical_restitution
+from .impacts import impact_rate as impact_rate
 from .moments import moment_lyapunov as moment_lyapunov
 from .moments import solve_moments as solve_moments
 from .quantities import INDICES as INDICES

@@ -222,21 +222,22 @@ class ExponentSolver:
             raise NoSuchExponent(
                 "Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time"
             )
-        pair, scale = self.near.solution(0.0).pair, 2 * self.scales.quadratic
-        finer = self.finer(pair)
-        value, better = second_derivative(pair), second_derivative(finer)
+        scale = 2 * self.scales.quadratic
+        value, better = map(second_derivative, self.at_zero)
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
         beyond = max(1.0, 1 / math.expm1(tail * math.log(WIDER)))  # what is left, over what the wider one has added
         error = beyond * abs(better - value) + rounding
         return checked("Λ″(0)", Estimate(better, error, scale), self.near.remedy)
 
-    def finer(self, pair: PrincipalPair) -> PrincipalPair:
-        """That at p = 0 of a finer and wider discretisation. Raises `NotConverged`."""
+    @cached_property
+    def at_zero(self) -> tuple[PrincipalPair, PrincipalPair]:
+        """The pair at p = 0, and that of a finer and wider discretisation. Raises `NotConverged`."""
+        pair = self.near.solution(0.0).pair
         try:
             generator = Generator(self.problem, widened(pair.generator).enriched())
         except MeshError as failure:
-            raise NotConverged(f"Λ″(0) did not converge: {failure}; {self.near.remedy}") from failure
-        return self.near.remedied(lambda: principal_pair(generator, pair.p, start=pair))
+            raise NotConverged(f"p = 0 did not converge on a finer mesh: {failure}; {self.near.remedy}") from failure
+        return pair, self.near.remedied(lambda: principal_pair(generator, 0.0, start=pair))
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""

@@ -7,6 +7,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Annotated, Self
 
+import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import model_validator
 from pydantic.dataclasses import dataclass
@@ -144,8 +145,13 @@ class VibroImpactOscillator:
 
     def restitution_of(self, log_factor: float) -> float:
         """The r for which this law, with this ε, has a given ln R; it may be no coefficient of restitution."""
-        loss = -log_factor if self.impact == ImpactLaw.DELTA else -math.expm1(log_factor)
+        with np.errstate(over="ignore"):
+            loss = -log_factor if self.impact == ImpactLaw.DELTA else -float(np.expm1(log_factor))
         return 1 - loss / self.epsilon**2
+
+    def restitution_slope(self, log_factor: float) -> float:
+        """dr/d ln R of this law at a given ln R."""
+        return (1.0 if self.impact == ImpactLaw.DELTA else math.exp(log_factor)) / self.epsilon**2
 
     def h2(self, phi: ArrayLike) -> FloatArray:
         """h₂(φ) = c₁ h₁(φ); the impact adds nothing, as sin 2φ vanishes where it acts."""

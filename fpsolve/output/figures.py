@@ -89,7 +89,7 @@ def _index_series(case: Case, index: Index, others: dict[str, float], group: Seq
     y = np.array([np.nan if estimate is None else estimate.value for estimate in found])
     line = np.linspace(x.min(), x.max(), 200)
     curves = [case.curve({**others, case.figure.x: float(value)}) for value in line]
-    line_y = np.array([index.theory(second_order(curve.problem)) for curve in curves])
+    line_y = np.array([index.theory(curve.problem) for curve in curves])
     line_y[(line_y < index.interval[0]) | (line_y > index.interval[1])] = np.nan
     samples = [(each, sample.estimates.get(index.name)) for each, (_, sample) in zip(x, group, strict=True) if sample]
     return Series(others, x, y, line, line_y, _columns([(each, *sample) for each, sample in samples if sample]))

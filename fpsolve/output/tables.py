@@ -13,10 +13,9 @@ from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.exponent.error import MEANINGLESS, Estimate
-from fpsolve.exponent.quantities import INDICES
+from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import write_csv, write_json
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.theory.perturbation import second_order
 
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
@@ -54,11 +53,10 @@ def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
 
 
 def _summary(result: CurveResult) -> dict[str, Any]:
-    theory = second_order(result.curve.problem)
     return {
         **_parameters(result.curve),
         "moments": _rows(result),
-        **{name: _estimate(result.estimates[name], index.theory(theory)) for name, index in INDICES.items()},
+        **{name: _estimate(result, index) for name, index in INDICES.items()},
         "sensitivities": None if result.sensitivities is None else _sensitivities(result.sensitivities),
         "discretisation": result.discretisation,
         "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
@@ -81,10 +79,14 @@ def _rows(result: CurveResult) -> list[dict[str, float | None]]:
     return [dict(zip(known, row, strict=True)) for row in zip(*known.values(), strict=True)]
 
 
-def _estimate(estimate: Estimate | None, theory: float) -> dict[str, float] | None:
+def _estimate(result: CurveResult, index: Index) -> dict[str, float | None] | None:
+    """An index beside its perturbation theory, null where that overflows."""
+    estimate = result.estimates[index.name]
     if estimate is None:
         return None
-    return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": theory}
+    theory = index.theory(result.curve.problem)
+    perturbation = theory if math.isfinite(theory) else None
+    return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": perturbation}
 
 
 def _sensitivities(found: Sensitivities) -> dict[str, Any]:

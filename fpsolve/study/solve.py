@@ -20,7 +20,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
 from fpsolve.exponent.moments import solve_moments
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.direction import directions
@@ -95,7 +95,7 @@ def _solve_curve(
 ) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
     moments = solve_moments(solver, wanted.p, progress=progress)
-    estimates, missing = _solve_indices(solver, wanted.indices, moments)
+    estimates, missing, absent = _solve_indices(solver, wanted.indices, moments)
     attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
     stationary = _pair(solver, 0.0) if wanted.density else None
@@ -103,7 +103,8 @@ def _solve_curve(
     warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None)]
     warnings += lost or _unresolved(pairs)
     slopes = _sensitivities(solver, curve, moments, estimates) if wanted.sensitivities else None
-    notes = [*_notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]), *(slopes.notes if slopes else ())]
+    notes = [*_notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]), *absent]
+    notes += slopes.notes if slopes else ()
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -121,12 +122,13 @@ def _solve_curve(
 
 def _solve_indices(
     solver: ExponentSolver, names: Sequence[str], moments: MomentLyapunov
-) -> tuple[dict[str, Estimate | None], list[str]]:
-    """Indices, δ_p first, None for those not asked for; and why some of those asked for are missing."""
+) -> tuple[dict[str, Estimate | None], list[str], list[str]]:
+    """Indices, δ_p first, None for those not asked for; why some of those asked for are missing, or do not exist."""
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
     failed: dict[str, list[str]] = {}
+    absent: dict[str, list[str]] = {}
     missing = []
-    for index in (STABILITY_INDEX, LYAPUNOV_EXPONENT, VARIANCE_RATE):
+    for index in sorted(INDICES.values(), key=lambda index: index != STABILITY_INDEX):
         if index.name not in names:
             continue
         try:
@@ -136,11 +138,16 @@ def _solve_indices(
             continue
         if isinstance(found, Estimate):
             estimates[index.name] = found
+        elif index != STABILITY_INDEX:
+            absent.setdefault(found.reason, []).append(index.symbol)
         elif found.reason != validity.NO_INDEX:  # of which a note tells
             missing.append(f"no stability index: {found.reason}")
     told = {failure.reason: f"as there is no Λ({failure.p:g})" for failure in moments.failures if failure.p is not None}
-    reasons = {reason: told.get(reason, reason) for reason in failed}
-    return estimates, missing + [f"no {', '.join(failed[each])}: {reason}" for each, reason in reasons.items()]
+    failed = {told.get(reason, reason): symbols for reason, symbols in failed.items()}
+    warnings, notes = (
+        [f"no {', '.join(symbols)}: {reason}" for reason, symbols in each.items()] for each in (failed, absent)
+    )
+    return estimates, missing + warnings, notes
 
 
 def _sensitivities(
