@@ -193,7 +193,7 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     assert sum("the next mesh has" in text for text in curve["warnings"]) == 2
     row = {"p": 0.0, "value": 0.0, "derivative": None, "perturbation": 0.0, "error_estimate": 0.0, "residual": None}
     assert curve["moments"] == ([] if small else [row])
-    assert curve["warnings"][0].startswith("no δ_p, λ, Λ″(0): ")
+    assert curve["warnings"][0].startswith("no δ_p, λ, Λ″(0), N, R_c, r_c: ")
     assert curve["warnings"][0].endswith("as there is no Λ(0.001)") == bool(small)
     with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
         assert [row["derivative"] for row in csv.DictReader(file)] == [""] * (not small)
