@@ -91,7 +91,7 @@ class Boundary:
             return f"{self.zero.symbol} exists nowhere in the frame"
         if np.any(values > 0) and np.any(values < 0):
             return f"no line {self.zero.equation} was found, though {self.zero.symbol} changes its sign in the frame"
-        return f"{self.zero.symbol} {'<' if values[0] < 0 else '>'} 0 everywhere in the frame"
+        return f"{self.zero.side(float(values[0]))} everywhere in the frame"
 
     def refined(self, step: float) -> Boundary:
         """The same with shorter steps, in sides of the frame."""

@@ -99,6 +99,12 @@ class Zero:
         """F, as a sentence has it."""
         return "λ" if self.p == 0 else f"Λ({self.p:g})" if self.kind == "moment" else f"Λ({self.p:g})/({self.p:g})"
 
+    def side(self, value: float) -> str:
+        """What F of this sign means: Λ(2) < 0, δ_p > -1."""
+        if self.kind == "stability_index":  # Λ(p)/p increases from −∞ through 0 at δ_p
+            return f"δ_p {'>' if value < 0 else '<'} {self.p:g}"
+        return f"{self.symbol} {'<' if value * (self.p or 1.0) < 0 else '>'} 0"
+
     @property
     def equation(self) -> str:
         """What holds on the line: λ = 0, Λ(2) = 0, δ_p = -1."""
