@@ -21,7 +21,7 @@ ROOMS = {
         *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
         *("function", "moments", "quantities"),
     ],
-    "analysis": ["density", "sensitivity", "continuation", "special_points", "zero", "stability"],
+    "analysis": ["density", "sensitivity", "curve", "continuation", "special_points", "zero", "stability"],
     "case": ["toml", "messages", "sections", "vary", "curves", "remedies", "refusals", "case"],
     "study": ["results", "solve", "simulate"],
     "output": ["vtk", "tables", "plots", "figures", "terminal"],
