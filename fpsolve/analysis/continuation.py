@@ -2,9 +2,9 @@
 
 From a point on a curve the next one is predicted by the cubic through the last two points and their tangents, and
 corrected by Newton's method on F = 0 and the distance along the tangent (H. B. Keller, 1977). A step follows from the
-angle by which the curve turns, and from what Newton's method needs. Curves are found by a scan: on each edge of a
-grid, and inside each square, F is interpolated from values and gradients, and where that changes its sign a curve
-begins.
+angle by which the curve turns, and from what Newton's method needs; a correction that is not small beside the step is
+refused, as it may lead to another curve. Curves are found by a scan: inside each square of a grid F is interpolated
+from values and gradients, and where that changes its sign a curve begins.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
+from fpsolve.analysis.curve import Field, Point, Sample, Trace, cubic
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 
@@ -24,92 +24,20 @@ LONGEST, SHORTEST = 0.02, 1e-5
 MOST_TURN = 0.15
 """Of the tangent in one step, in radians."""
 MOST_CORRECTIONS = 5
+FARTHEST = 0.1
+"""Way of Newton's method to a first point, in sides of the square."""
+MOST_AWAY = 0.2
+"""Of a point from where it was predicted, in steps."""
 MOST_POINTS = 20_000
-FINE = 7
+FINE = 13
 """Points along a cell of a scan where its interpolation is looked at."""
-SAME = 1e-3
-"""Distance, in sides of the square, in which a curve is taken for one that is known."""
-TOLERANCE = 1e-10
-"""|F| over its scale on a curve; a tenth of what the solves of F leave."""
-
+BESIDE = 1e-8
+"""A point that is outside by less is on the frame."""
 
 FRAME = "leaves the frame"
 """The label of a point where a curve leaves the frame."""
-
-
-class Sample(NamedTuple):
-    """F at a point.
-
-    Attributes:
-        at: (u, v).
-        value: F.
-        gradient: ∂F/∂(u, v), shape (2,).
-        error: estimate of |error of F|.
-        scale: the size of the terms of F before they cancel.
-    """
-
-    at: FloatArray
-    value: float
-    gradient: FloatArray
-    error: float
-    scale: float
-
-    @property
-    def is_zero(self) -> bool:
-        return abs(self.value) <= max(TOLERANCE * self.scale, 0.1 * self.error)
-
-    @property
-    def tangent(self) -> FloatArray:
-        """Along the curve, F > 0 on its left, of length 1."""
-        along = np.array([self.gradient[1], -self.gradient[0]])
-        return np.asarray(along / np.linalg.norm(along))
-
-    @property
-    def width(self) -> float:
-        """|error of F|/|∇F|: how far the curve may be off."""
-        return (self.error + abs(self.value)) / float(np.linalg.norm(self.gradient))
-
-
-Field = Callable[[FloatArray], Sample]
-"""F; raises `FpsolveError` where there is none."""
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """A point of a curve.
-
-    Attributes:
-        sample: F there.
-        label: what is special about it; empty for an ordinary one.
-    """
-
-    sample: Sample
-    label: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Trace:
-    """One branch of a curve.
-
-    Attributes:
-        points: along it.
-        closed: whether the last is followed by the first.
-        obstacles: why it ends inside of the square, if it does.
-    """
-
-    points: tuple[Point, ...]
-    closed: bool = False
-    obstacles: tuple[str, ...] = ()
-
-    @property
-    def at(self) -> FloatArray:
-        """(u, v), shape (n, 2); of a closed one the first again at the end."""
-        places = [point.sample.at for point in self.points]
-        return np.array(places + places[:1] * self.closed)
-
-    def holds(self, at: FloatArray, within: float = SAME) -> bool:
-        """Whether a point lies on it, or near to it."""
-        return bool(_distance(self.at, at) < within)
+UNSETTLED = "Newton's method does not settle on it"
+TOO_SHARP = "it turns too sharply, as where it meets another branch"
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,27 +57,43 @@ class Scan:
     reasons: tuple[str, ...] = ()
 
     def between(self, i: int, j: int, s: FloatArray, t: FloatArray) -> FloatArray:
-        """F in the cell of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation."""
+        """F in the cell of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation.
+
+        The mixed derivatives are those by which it is exact for all cubic F (A. Adini, 1960).
+        """
         size = self.nodes[i + 1] - self.nodes[i], self.nodes[j + 1] - self.nodes[j]
+        values, slopes = self.values[i : i + 2, j : j + 2], self.gradients[i : i + 2, j : j + 2] * size
+        flat = values[1, 1] - values[1, 0] - values[0, 1] + values[0, 0]
         total = np.zeros(np.broadcast_shapes(s.shape, t.shape))
         for a, b in ((0, 0), (0, 1), (1, 0), (1, 1)):
-            slope = self.gradients[i + a, j + b]
             (hold_s, rise_s), (hold_t, rise_t) = _hermite(s, a), _hermite(t, b)
-            total = total + self.values[i + a, j + b] * hold_s * hold_t
-            total = total + size[0] * slope[0] * rise_s * hold_t + size[1] * slope[1] * hold_s * rise_t
+            twist = slopes[a, 1, 0] - slopes[a, 0, 0] + slopes[1, b, 1] - slopes[0, b, 1] - flat
+            total = total + values[a, b] * hold_s * hold_t + twist * rise_s * rise_t
+            total = total + slopes[a, b, 0] * rise_s * hold_t + slopes[a, b, 1] * hold_s * rise_t
         return total
 
+    def __call__(self, at: FloatArray) -> Sample:
+        """Interpolated F."""
+        cell = np.clip(np.searchsorted(self.nodes, at, side="right") - 1, 0, self.nodes.size - 2)
+        size, step = self.nodes[cell + 1] - self.nodes[cell], 1e-5
+        s, t = ((at - self.nodes[cell]) / size)[:, None] + step * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])
+        value, right, left, up, down = self.between(int(cell[0]), int(cell[1]), s, t)
+        gradient = np.array([right - left, up - down]) / (2 * step * size)
+        return Sample(at, float(value), gradient, 0.0, float(np.nanmax(np.abs(self.values))))
+
     def seeds(self) -> Iterator[FloatArray]:
-        """Points near which F changes its sign: on the edges of the cells, or inside."""
+        """Points near which F changes its sign: inside the cells, or beside missing nodes on their edges."""
         fine = np.linspace(0, 1, FINE)
         s, t, half = fine[:, None], fine[None, :], 0.5 * fine[1]
         for i in range(self.nodes.size - 1):
             for j in range(self.nodes.size - 1):
-                inside = self.between(i, j, s, t)
-                places = [(fine[k] + half, fine[m]) for k, m in np.argwhere(inside[1:] * inside[:-1] <= 0)]
-                places += [(fine[k], fine[m] + half) for k, m in np.argwhere(inside[:, 1:] * inside[:, :-1] <= 0)]
                 corner, size = self.nodes[[i, j]], self.nodes[[i + 1, j + 1]] - self.nodes[[i, j]]
-                yield from (corner + size * np.array(place) for place in places)
+                inside = self.between(i, j, s, t)
+                if np.isnan(inside).any():
+                    inside, middle = self.values[i : i + 2, j : j + 2], (np.array([0.0, 1.0]), 0.5)
+                else:
+                    middle = fine, half
+                yield from (corner + size * place for place in _changes(inside, *middle))
 
 
 def scanned(field: Field, count: int, progress: Callable[[], None] = lambda: None) -> Scan:
@@ -170,17 +114,27 @@ def scanned(field: Field, count: int, progress: Callable[[], None] = lambda: Non
 def found(field: Field, scan: Scan, longest: float = LONGEST) -> Iterator[Trace]:
     """Every branch that a scan shows, one after the other."""
     known: list[Trace] = []
+    near = 0.25 / ((scan.nodes.size - 1) * (FINE - 1))
     for seed in scan.seeds():
-        if any(trace.holds(seed, 2 * longest) for trace in known):
+        rough = begun(scan, seed)
+        if rough is not None and any(trace.holds(rough, near) for trace in known):
             continue
-        try:
-            start = corrected(field, seed)
-        except FpsolveError:
-            continue
-        if start is None or not _inside(start.at) or any(trace.holds(start.at) for trace in known):
+        start = begun(field, seed if rough is None else rough.at)
+        if start is None or any(trace.holds(start) for trace in known):
             continue
         known.append(traced(field, start, longest))
         yield known[-1]
+
+
+def begun(field: Field, at: FloatArray) -> Sample | None:
+    """A point F = 0 near a point: on the gradient, or where that leads out of the square, beside it or above it."""
+    for along in (None, np.array([1.0, 0.0]), np.array([0.0, 1.0])):
+        try:
+            if (sample := corrected(field, at, along)) is not None:
+                return sample
+        except FpsolveError:
+            continue
+    return None
 
 
 def corrected(field: Field, at: FloatArray, along: FloatArray | None = None) -> Sample | None:
@@ -191,16 +145,16 @@ def corrected(field: Field, at: FloatArray, along: FloatArray | None = None) -> 
     """
     start = at
     for _ in range(MOST_CORRECTIONS):
-        if not _inside(at) or np.linalg.norm(at - start) > 5 * LONGEST:
+        if not _inside(at) or np.linalg.norm(at - start) > FARTHEST:
             return None
-        sample = field(at)
+        sample = field(np.clip(at, 0, 1))
         if sample.is_zero:
-            return sample
+            return sample if np.any(sample.gradient) else None
         direction = sample.gradient if along is None else np.array([-along[1], along[0]])
         slope = float(sample.gradient @ direction)
         if slope == 0:
             return None
-        at = at - sample.value / slope * direction
+        at = sample.at - sample.value / slope * direction
     return None
 
 
@@ -219,8 +173,9 @@ def traced(field: Field, start: Sample, longest: float = LONGEST) -> Trace:
     if closed:
         return Trace(tuple(forward), closed=True)
     backward, _, other = _half(field, start, -1.0, longest)
+    middle = forward[0] if forward[0].label else backward[0]
     obstacles = tuple(each for each in (other, obstacle) if each)
-    return Trace((*reversed(backward[1:]), *forward), obstacles=obstacles)
+    return Trace((*reversed(backward[1:]), middle, *forward[1:]), obstacles=obstacles)
 
 
 def _half(field: Field, start: Sample, sign: float, longest: float) -> tuple[list[Point], bool, str]:
@@ -228,22 +183,27 @@ def _half(field: Field, start: Sample, sign: float, longest: float) -> tuple[lis
     points, step = [Point(start)], 0.25 * longest
     last, before = start, None
     while len(points) < MOST_POINTS:
-        at, reason = _predicted(last, before, sign * step), "Newton's method does not settle on it"
+        at, reason = _predicted(last, before, sign * step), UNSETTLED
         try:
-            sample = corrected(field, at, last.tangent) if _inside(at) else _landed(field, last, at)
+            sample = _near(field, last, at)
+            is_leaving = sample is None and bool(np.any((at < 0) | (at > 1)))
+            sample = _landed(field, last, at) if is_leaving else sample
         except FpsolveError as failure:
             sample, reason = None, str(failure)
-        turn = math.inf if sample is None else _angle(last.tangent, sample.tangent)
+        turn = 0.0 if sample is None else _angle(last.tangent, sample.tangent)
         if sample is None or turn > 2 * MOST_TURN:
             step /= 3
             if step < SHORTEST:
-                return points, False, reason
+                return points, False, TOO_SHARP if sample is not None else reason
             continue
-        if len(points) > 2 and _passes(last.at, sample.at, start.at):
+        if len(points) > 2 and _passes(last.at, sample, start):
             return points, True, ""
-        points.append(Point(sample, "" if _inside(at) else FRAME))
-        if not _inside(at):
+        if is_leaving:
+            if np.linalg.norm(sample.at - last.at) < BESIDE:
+                points.pop()
+            points.append(Point(sample, FRAME))
             return points, False, ""
+        points.append(Point(sample))
         before, last = last, sample
         step = min(longest, step * min(2.0, MOST_TURN / max(turn, 1e-3)))
     return points, False, f"it has more than {MOST_POINTS} points"
@@ -251,27 +211,41 @@ def _half(field: Field, start: Sample, sign: float, longest: float) -> tuple[lis
 
 def _predicted(last: Sample, before: Sample | None, step: float) -> FloatArray:
     """A step further, on the cubic through the last two points with their tangents."""
+    sign = math.copysign(1.0, step)
     if before is None:
         return last.at + step * last.tangent
-    length = float(np.linalg.norm(last.at - before.at))
-    t, sign = step / length * math.copysign(1, step), math.copysign(1, step)
-    slopes = sign * length * before.tangent, sign * length * last.tangent
-    rise = last.at - before.at
-    quadratic, cubic = 3 * rise - 2 * slopes[0] - slopes[1], slopes[0] + slopes[1] - 2 * rise
-    x = 1 + abs(t)
-    return np.asarray(before.at + slopes[0] * x + quadratic * x**2 + cubic * x**3)
+    share = 1 + abs(step) / float(np.linalg.norm(last.at - before.at))
+    return cubic(before.at, last.at, sign * before.tangent, sign * last.tangent, share)
+
+
+def _near(field: Field, last: Sample, at: FloatArray) -> Sample | None:
+    """The point of the curve beside a predicted one; None where it is not close to that."""
+    sample = corrected(field, at, last.tangent)
+    if sample is None or np.linalg.norm(sample.at - at) > MOST_AWAY * np.linalg.norm(at - last.at):
+        return None
+    return sample
 
 
 def _landed(field: Field, last: Sample, beyond: FloatArray) -> Sample | None:
     """The point where a curve leaves the square on its way to a point beyond; None where that is not clear."""
     way = beyond - last.at
-    sides = [(axis, float(side)) for axis in (0, 1) for side in (0, 1) if (beyond[axis] - side) * (side - 0.5) > 0]
-    share, axis, side = min(((side - last.at[axis]) / way[axis], axis, side) for axis, side in sides)
-    guess = np.clip(last.at + share * way, 0, 1)
-    sample = on_line(field, axis, side, guess)
-    if sample is None or np.linalg.norm(sample.at - last.at) > 2 * np.linalg.norm(way) + 1e-9:
-        return None
-    return sample
+    least = 0.0 if _inside(beyond) else 0.5 * BESIDE
+    sides = [(k, float(side)) for k in (0, 1) for side in (0, 1) if (beyond[k] - side) * (side - 0.5) > least]
+    for share, axis, side in sorted(((side - last.at[axis]) / way[axis], axis, side) for axis, side in sides):
+        guess = np.clip(last.at + share * way, 0, 1)
+        sample = on_line(field, axis, side, guess)
+        if sample is not None and np.linalg.norm(sample.at - guess) <= 0.5 * np.linalg.norm(way):
+            return sample
+    return None
+
+
+def _changes(values: FloatArray, shares: FloatArray, half: float) -> Iterator[FloatArray]:
+    """Half-way between neighbours in a table of F over shares of a cell that differ in sign, or of which one is 0."""
+    signs = np.sign(values)
+    for k, m in np.argwhere(abs(signs[1:] - signs[:-1]) > 0):
+        yield np.array([shares[k] + half, shares[m]])
+    for k, m in np.argwhere(abs(signs[:, 1:] - signs[:, :-1]) > 0):
+        yield np.array([shares[k], shares[m] + half])
 
 
 def _hermite(x: FloatArray, end: int) -> tuple[FloatArray, FloatArray]:
@@ -282,24 +256,17 @@ def _hermite(x: FloatArray, end: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _inside(at: FloatArray) -> bool:
-    return bool(np.all((at >= 0) & (at <= 1)))
+    """Whether a point is in the square, but for rounding."""
+    return bool(np.all((at >= -BESIDE) & (at <= 1 + BESIDE)))
 
 
 def _angle(one: FloatArray, other: FloatArray) -> float:
     return math.acos(float(np.clip(one @ other, -1, 1)))
 
 
-def _passes(start: FloatArray, end: FloatArray, at: FloatArray) -> bool:
-    """Whether the way from start to end passes a point."""
-    way = end - start
-    share = float((at - start) @ way / (way @ way))
-    return 0 <= share <= 1 and bool(np.linalg.norm(start + share * way - at) < 0.2 * np.linalg.norm(way))
-
-
-def _distance(line: FloatArray, at: FloatArray) -> float:
-    """Of a point from a polyline."""
-    if len(line) == 1:
-        return float(np.linalg.norm(line[0] - at))
-    start, way = line[:-1], np.diff(line, axis=0)
-    share = np.clip(np.sum((at - start) * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-300), 0, 1)
-    return float(np.min(np.linalg.norm(start + share[:, None] * way - at, axis=1)))
+def _passes(last: FloatArray, sample: Sample, start: Sample) -> bool:
+    """Whether the way from a point to a sample passes a start in the direction in which the curve left it."""
+    way = sample.at - last
+    along, size = float((start.at - last) @ way), float(way @ way)
+    is_near = np.linalg.norm(size * (start.at - last) - along * way) < 0.1 * size**1.5
+    return 0 <= along <= size and bool(is_near) and _angle(sample.tangent, start.tangent) < 2 * MOST_TURN

@@ -32,6 +32,7 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.direction import Direction, directions
@@ -199,7 +200,8 @@ class Gradient:
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
         pair = self._solver.pair(p)
-        finer = principal_pair(pair.generator.enriched(), p, start=pair)
+        with one_thread():
+            finer = principal_pair(pair.generator.enriched(), p, start=pair)
         return self._each(lambda by: _between(changed_value(pair, by), changed_value(finer, by)))
 
     def lyapunov_exponent(self) -> Slopes:

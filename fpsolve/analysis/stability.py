@@ -12,11 +12,13 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations, product
 
 import numpy as np
+from pydantic import ValidationError
 
-from fpsolve.analysis.continuation import LONGEST, Scan, Trace, corrected, found, scanned, traced
+from fpsolve.analysis.continuation import LONGEST, SHORTEST, Scan, begun, found, scanned, traced
+from fpsolve.analysis.curve import Trace
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.zero import Axis, Quantity, Zero, zero_of
-from fpsolve.arrays import FloatArray
+from fpsolve.analysis.zero import Axis, Quantity, Zero, said, zero_of
+from fpsolve.arrays import FloatArray, real_number
 from fpsolve.exponent.adapt import Budget
 from fpsolve.model.direction import Family
 from fpsolve.model.noise import NonGaussianNoise
@@ -26,6 +28,10 @@ SCAN_RTOL = 1e-5
 """Of F on the grid of a scan."""
 NODES = 13
 """Of a scan, each way."""
+LARGEST = 0.1
+"""Step that may be asked for, in sides of the frame."""
+ON_IT = 1e-4
+"""Distance, in sides of the frame, in which a point of a line is one of a branch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,25 +89,33 @@ class Boundary:
         return Quantity(self.zero, self.family, (self.x, self.y), self.budget)
 
     def remark(self) -> str:
-        """That there is no line, if so; and what the scan could not see."""
+        """That there is no line, if so."""
         if self.traces or self.scan is None:
             return ""
-        values = self.scan.values[np.isfinite(self.scan.values)]
+        exists = np.isfinite(self.scan.values)
+        values = self.scan.values[exists]
         if not values.size:
             return f"{self.zero.symbol} exists nowhere in the frame"
         if np.any(values > 0) and np.any(values < 0):
             return f"no line {self.zero.equation} was found, though {self.zero.symbol} changes its sign in the frame"
-        return f"{self.zero.side(float(values[0]))} everywhere in the frame"
+        where = "everywhere" if exists.all() else "wherever it exists"
+        return f"{self.zero.side(float(values[0]))} {where} in the frame"
 
     def refined(self, step: float) -> Boundary:
-        """The same with shorter steps, in sides of the frame."""
-        return replace(self, step=step, traces=())._from(trace.points[0].sample.at for trace in self.traces)
+        """The same with shorter steps, in sides of the frame. Raises `ValueError`."""
+        middles = (trace.points[len(trace.points) // 2].sample.at for trace in self.traces)
+        return replace(self, step=_checked_step(step), traces=())._from(middles)
 
     def extended(self, x: Axis | None = None, y: Axis | None = None) -> Boundary:
-        """Its branches in another, such as a wider, frame of the same parameters; branches elsewhere are not sought."""
+        """Its branches in another, such as a wider, frame of the same parameters; branches elsewhere are not sought.
+
+        Raises:
+            ValueError: an axis is not of the same parameter, or out of its range.
+        """
         other = replace(self, x=x or self.x, y=y or self.y, traces=(), scan=None)
         if (other.x.key, other.y.key) != (self.x.key, self.y.key):
             raise ValueError(f"a frame of {other.x.key}, {other.y.key}: use `started_from` for other parameters")
+        _check_axes(self.family, other.x, other.y)
         seeds = (
             np.array([other.x.share(x), other.y.share(y)])
             for branch in self.branches
@@ -110,12 +124,20 @@ class Boundary:
         return other._from(seeds)
 
     def started_from(self, branch: int, point: int, x: Axis, y: Axis) -> Boundary:
-        """The branch through one of its points in another pair of parameters; all others are held as they are there."""
+        """The branch through one of its points in another pair of parameters; all others are held as they are there.
+
+        Raises:
+            ValueError: an axis is no parameter of the problem, or the point is not in the frame.
+        """
         here = self.branches[branch]
         values = {self.x.key: float(here.x[point]), self.y.key: float(here.y[point])}
         family = self.family.at(values)
-        directions = family.directions()
-        start = np.array([axis.share(directions[axis.key].theta) for axis in (x, y)])
+        _check_axes(family, x, y)
+        theta = {axis.key: family.directions()[axis.key].theta for axis in (x, y)}
+        start = np.array([axis.share(theta[axis.key]) for axis in (x, y)])
+        if np.any((start < 0) | (start > 1)):
+            point_there = ", ".join(f"{key} = {value:g}" for key, value in theta.items())
+            raise ValueError(f"the point has {point_there}, which is not in the frame; choose a wider one")
         return replace(self, x=x, y=y, family=family, traces=(), scan=None)._from([start])
 
     def grown(self, progress: Callable[[], None] = lambda: None) -> Iterator[Boundary]:
@@ -130,13 +152,13 @@ class Boundary:
             yield now
 
     def _from(self, seeds: Iterable[FloatArray]) -> Boundary:
-        """With the branches through some points, or near to them."""
+        """With the branches through some points of the lines."""
         quantity, traces = self.quantity, list[Trace]()
         for seed in seeds:
-            if np.any((seed < 0) | (seed > 1)) or any(trace.holds(seed, 2 * self.step) for trace in traces):
+            if np.any((seed < 0) | (seed > 1)) or any(trace.passes(seed, ON_IT) for trace in traces):
                 continue
-            start = corrected(quantity, seed)
-            if start is not None:
+            start = begun(quantity, seed)
+            if start is not None and not any(trace.holds(start) for trace in traces):
                 traces.append(self._special(traced(quantity, start, self.step)))
         return replace(self, traces=tuple(traces))
 
@@ -145,7 +167,7 @@ class Boundary:
         quantity = self.quantity
         trace = with_folds(quantity, trace, ("x", "y"))
         for number, axis in enumerate((self.x, self.y)):
-            wanted = [(axis.share(value), f"at {axis.key} = {value:g}") for value in axis.at]
+            wanted = [(axis.share(value), f"at {axis.key} = {value:.12g}") for value in axis.at]
             trace = with_values(quantity, trace, number, wanted)
         return trace
 
@@ -186,20 +208,44 @@ def boundary(
         budget: for a solve.
 
     Raises:
-        ValueError: an axis is no parameter of the problem, both are the same, or `zero` is none of these.
-        NoSuchExponent: Λ(p) is infinite in the frame.
+        ValueError: an axis is no parameter of the problem or out of its range, both are the same, or `zero`, `step` or
+            `nodes` is none of these.
     """
     family = Family(problem, original)
-    known = family.directions()
-    for axis in (x, y):
-        if axis.key not in known:
-            raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known)}")
-    if x.key == y.key:
-        raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
+    _check_axes(family, x, y)
+    if isinstance(nodes, bool) or not isinstance(nodes, int) or nodes < 2:
+        raise ValueError(f"got nodes = {nodes!r}; must be a whole number from 2")
     empty = Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
-    line = Boundary(zero_of(zero), x, y, family, scan=empty, step=step, budget=budget or Budget())
+    line = Boundary(zero_of(zero), x, y, family, scan=empty, step=_checked_step(step), budget=budget or Budget())
     *_, whole = line.grown()
     return whole
+
+
+def _check_axes(family: Family, x: Axis, y: Axis) -> None:
+    """Refuse axes that span no frame. Raises `ValueError`."""
+    known = family.directions()
+    for axis in (x, y):
+        if not isinstance(axis, Axis):
+            raise ValueError(f"got {axis!r} as an axis; must be an Axis")
+        if axis.key not in known:
+            raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known) or 'none'}")
+        for name, value in (("start", axis.start), ("stop", axis.stop)):
+            try:
+                family.at({axis.key: value})
+            except ValidationError as failure:
+                if failure.errors()[0]["loc"]:  # of this parameter alone
+                    raise ValueError(f"got {axis.key} with {name} = {value:g}: {said(failure)}") from failure
+            except ValueError:  # elsewhere in the frame it may be one
+                continue
+    if x.key == y.key:
+        raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
+
+
+def _checked_step(step: float) -> float:
+    """A longest step. Raises `ValueError`."""
+    if not SHORTEST < real_number(step, "step") <= LARGEST:
+        raise ValueError(f"got step = {step:g}; must be above {SHORTEST:g} and up to {LARGEST:g} sides of the frame")
+    return float(step)
 
 
 def crossed(lines: Sequence[Boundary]) -> list[Boundary]:

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from pydantic import ValidationError
 from pydantic.dataclasses import dataclass as checked_dataclass
 
-from fpsolve.analysis.continuation import Sample
+from fpsolve.analysis.curve import Sample
 from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
-from fpsolve.arrays import FloatArray
-from fpsolve.errors import FpsolveError
+from fpsolve.arrays import FloatArray, real_number
+from fpsolve.errors import FpsolveError, NoSuchExponent, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.bordered import Bordered
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.direction import Direction, Family
+from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.parameters import STRICT
 from fpsolve.model.problem import refuse_infinite
 
@@ -67,7 +70,7 @@ class Axis:
     def share(self, value: float) -> float:
         """The inverse of `value`."""
         if self.scale == "log":
-            return math.log(value / self.start) / math.log(self.stop / self.start)
+            return math.log(value / self.start) / math.log(self.stop / self.start) if value > 0 else -math.inf
         return (value - self.start) / (self.stop - self.start)
 
     def slope(self, share: float) -> float:
@@ -117,11 +120,20 @@ def zero_of(value: str | Mapping[str, float]) -> Zero:
         return Zero("lyapunov_exponent")
     if isinstance(value, Mapping) and len(value) == 1:
         [(kind, p)] = value.items()
-        if kind in ("moment", "stability_index") and p:
-            return Zero(kind, float(p))  # type: ignore[arg-type]
+        with suppress(ValueError):
+            if kind in ("moment", "stability_index") and real_number(p, kind) != 0:
+                return Zero(kind, float(p))  # type: ignore[arg-type]
     raise ValueError(
         f'got {value!r}; must be "lyapunov_exponent", {{"moment": p}} or {{"stability_index": v}} with a number != 0'
     )
+
+
+def said(failure: ValueError) -> str:
+    """What is wrong with the parameters of a problem, in one line."""
+    if not isinstance(failure, ValidationError):
+        return str(failure)
+    faults = ((".".join(map(str, fault["loc"])), fault["msg"]) for fault in failure.errors())
+    return "; ".join(f"{key}: {text}" if key else text for key, text in faults)
 
 
 class Quantity:
@@ -153,7 +165,7 @@ class Quantity:
         try:
             family = self._family.at(values)
         except ValueError as failure:
-            raise FpsolveError(f"no such problem: {failure}") from failure
+            raise FpsolveError(f"no such problem: {said(failure)}") from failure
         if self._bounce is None:
             return self._sample(at, family)
         known = self._solved.setdefault(float(at[1 - self._bounce]), {})
@@ -167,6 +179,8 @@ class Quantity:
         refuse_infinite(family.problem, self._zero.p)
         solver = ExponentSolver(family.problem, rtol=self._rtol, budget=self._budget, starts=self._starts)
         value, error = solver.ratio_alone(self._zero.p)
+        if value > 0 > self._zero.p:
+            self._refuse_rare(solver)
         directions = family.directions()
         slopes = self._slopes(solver, [directions[axis.key] for axis in self._axes])
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
@@ -187,6 +201,18 @@ class Quantity:
         value = one.value + share * (other.value - one.value)
         error = (abs(share) + abs(1 - share)) * max(one.error, other.error)
         return Sample(at, value, gradient, error, max(one.scale, other.scale))
+
+    def _refuse_rare(self, solver: ExponentSolver) -> None:
+        """Refuse a Λ(p) < 0 that is not the largest, as rare paths far out in algebraic tails grow. Raises so."""
+        p = self._zero.p
+        if not has_algebraic_tails(solver.problem.noise):
+            return
+        near = solver.near.solution(p).pair
+        if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
+            raise NoSuchExponent(
+                f"Λ({p:g}) is that of rare paths, which hold the noise far out in its tails, and zero nowhere; choose "
+                f"r0 <= 1, {Remedy.REDUCTION}"
+            )
 
     def _slopes(self, solver: ExponentSolver, along: Sequence[Direction]) -> FloatArray:
         """∂F/∂θ."""

@@ -7,7 +7,7 @@ from functools import cached_property
 
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.fem.factors import Factors, factorised
+from fpsolve.fem.factors import Factors, factorised, one_thread
 
 REFINEMENTS = 3
 """Of T′, by each of which its error falls to 1e-6 of a rate over the gap of the spectrum."""
@@ -35,16 +35,16 @@ class Bordered:
     def solve(self, source: FloatArray, *, adjoint: bool = False) -> FloatArray:
         """v from the load f."""
         own, other = self.pair.right, self.pair.left
-        weighed, operator, invert = self._weighed[0], self._operator, self._factor.solve
+        weighed, operator, change = self._weighed[0], self._operator, 0.0 * own
         if adjoint:
-            own, other = other, own
-            weighed, operator, invert = self._weighed[1], self._operator.T, self._factor.solve_transposed
-        change = 0.0 * own
-        for _ in range(REFINEMENTS):
-            rest = source - operator @ change
-            rest -= (other @ rest) / self.norm * weighed
-            change += invert(rest)
-            change -= (other @ self.pair.space.weighed(change)) / self.norm * own
+            own, other, weighed, operator = other, own, self._weighed[1], operator.T
+        with one_thread():
+            invert = self._factor.solve_transposed if adjoint else self._factor.solve
+            for _ in range(REFINEMENTS):
+                rest = source - operator @ change
+                rest -= (other @ rest) / self.norm * weighed
+                change += invert(rest)
+                change -= (other @ self.pair.space.weighed(change)) / self.norm * own
         return change
 
     @cached_property

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
@@ -16,6 +15,7 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import refined
 from fpsolve.exponent.rival import is_far_out, rival
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Discretisation
@@ -71,7 +71,7 @@ class Branch:
         allowed = tolerance or self.tolerance
         if p not in self.known or (self.mesh is None and not self._meets(self.known[p], allowed)):
             try:
-                with _one_thread().limit(limits=1):
+                with one_thread():
                     self.known[p] = self._found(p, allowed)
             except NotConverged as failure:
                 if self.is_far:
@@ -195,9 +195,3 @@ def is_numerical(failure: Exception) -> bool:
     text = str(failure)
     is_singular = isinstance(failure, RuntimeError) and ("singular" in text or "ARPACK" in text)
     return isinstance(failure, ArithmeticError) or is_singular or "infs or NaNs" in text
-
-
-@cache
-def _one_thread() -> ThreadpoolController:
-    """Keeps BLAS from threads, which for the small blocks of a sparse LU cost three times what they save."""
-    return ThreadpoolController()

@@ -23,6 +23,7 @@ from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.refine import WIDER, widened
 from fpsolve.exponent.rival import far_rivals, is_far_out, rival
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import has_algebraic_tails
@@ -237,7 +238,8 @@ class ExponentSolver:
             generator = Generator(self.problem, widened(pair.generator).enriched())
         except MeshError as failure:
             raise NotConverged(f"p = 0 did not converge on a finer mesh: {failure}; {self.near.remedy}") from failure
-        return pair, self.near.remedied(lambda: principal_pair(generator, 0.0, start=pair))
+        with one_thread():
+            return pair, self.near.remedied(lambda: principal_pair(generator, 0.0, start=pair))
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""
