@@ -110,6 +110,8 @@ def _line(line: Boundary) -> dict[str, Any]:
     scan = None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": SCAN_RTOL}
     return {
         "line": line.zero.name,
+        "equation": line.zero.equation,
+        "appears": P_BIFURCATIONS.get(line.zero.p) if line.zero.kind == "stability_index" else None,
         "scan": scan,
         "branches": [
             {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}

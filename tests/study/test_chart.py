@@ -99,6 +99,7 @@ def test_the_summary_says_what_was_done(summary):
     assert summary["x"] == {"key": "oscillator.omega", "start": 0.5, "stop": 3.0, "scale": "log", "at": [1.0]}
     assert [line["line"] for line in summary["lines"]] == ["lyapunov_exponent", "moment 2", "stability_index -1"]
     assert summary["lines"][0]["scan"]["nodes"] == [13, 13]
+    assert [line["appears"] for line in summary["lines"]] == [None, None, "hump of the amplitude density"]
     assert "oscillator.omega" not in summary["parameters"]
     assert summary["parameters"]["oscillator.c1"] == 0.1
 
