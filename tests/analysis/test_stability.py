@@ -6,12 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.analysis.continuation import FRAME
+from fpsolve.analysis.sensitivity import sensitivities
 from fpsolve.analysis.stability import Boundary, boundary, crossed
 from fpsolve.analysis.zero import Axis, Quantity, zero_of
 from fpsolve.errors import FpsolveError, NoSuchExponent
+from fpsolve.exponent import bordered, eigen
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.direction import Family
@@ -160,8 +163,8 @@ def test_two_branches_close_to_each_other_are_both_refined():
     """δ_p = −6 without much damping of impacts bends back, so that the frame cuts it into two arms near its top."""
     found = bent()
     assert len(found.traces) == 2
-    one, other = (trace.at[[0, -1]] for trace in found.traces)
-    assert np.min(np.linalg.norm(one[:, None] - other[None], axis=2)) < 2 * found.step
+    ends = [trace.at[[0, -1]] for trace in found.traces]
+    assert np.min(np.linalg.norm(ends[0][:, None] - ends[1], axis=2)) < found.step
     again = found.refined(0.05)
     assert len(again.traces) == 2
     assert held(again, shares(found))
@@ -170,7 +173,7 @@ def test_two_branches_close_to_each_other_are_both_refined():
 def bent():
     """Arms of the line of `test_a_fold` in a frame whose side passes just beside its fold."""
     fold = folded_by_theory()[1]
-    y = Axis("oscillator.c1", fold + 0.0005, fold + 0.5)
+    y = Axis("oscillator.c1", fold + 0.0004, fold + 0.5)
     return line({"moment": -6.0}, Axis("oscillator.omega", 0.3, 4.0), y, restitution=0.95, nodes=7)
 
 
@@ -203,6 +206,24 @@ def test_a_fold():
     assert abs(off[0][0]) < 0.1 * omega
 
 
+def test_a_fold_of_strong_noise():
+    """Against Eq. (38), where the c₁ of δ_p = −4 falls with τ₀, it first rises for ε = 1."""
+    noise = NonGaussianNoise(D0=0.3, tau0=0.5, r0=0.9)
+    x, y = Axis("noise.tau0", 0.05, 2.0, "log"), Axis("oscillator.c1", 0.6, 0.9)
+    zero, values = {"stability_index": -4.0}, {"noise": noise, "omega": 0.3, "restitution": 0.9}
+    found = line(zero, x, y, epsilon=1.0, **values)
+    [(tau0, c1)] = wanted(found, "fold in y")
+    sample = Quantity(found.zero, found.family, (x, y), Budget(), 1e-11)(np.array([x.share(tau0), y.share(c1)]))
+    assert abs(sample.value) < 1e-9 * sample.scale
+    assert abs(sample.gradient[0]) < 1e-8 * abs(sample.gradient[1])
+    for beside in (0.9 * tau0, 1.1 * tau0):  # where the line is lower, so that Λ(−4) has fallen below 0
+        problem = found.family.at({"noise.tau0": beside, "oscillator.c1": c1}).problem
+        assert ExponentSolver(problem).solution(-4.0).pair.value < -1e-6
+    weak = line(zero, x, y, epsilon=0.1, **values)
+    assert not wanted(weak, "fold in y")
+    assert len(weak.traces) == 1
+
+
 def test_an_extended_line_holds_the_old_points(weak):
     wider = weak.extended(Axis("oscillator.omega", 0.2, 6.0), Axis("oscillator.c1", -2.0, 2.0))
     [new], [old] = wider.branches, weak.branches
@@ -212,10 +233,8 @@ def test_an_extended_line_holds_the_old_points(weak):
     assert wider.scan is None
     narrow = wider.extended(y=Axis("oscillator.c1", 0.0, 0.1))
     assert sorted(narrow.branches[0].y[[0, -1]]) == [0, 0.1]
-    logarithmic = weak.extended(y=Axis("oscillator.c1", 0.01, 0.5, "log"))
-    ends = logarithmic.traces[0].at[[0, -1]]  # each on a side of the frame
-    assert np.min(np.minimum(ends, 1 - ends), axis=1) == pytest.approx(0, abs=1e-9)
-    assert np.min(logarithmic.branches[0].y) == pytest.approx(0.01)
+    logarithmic = weak.extended(y=Axis("oscillator.c1", 0.01, 0.4, "log"))
+    assert sorted(logarithmic.branches[0].y[[0, -1]]) == pytest.approx([0.01, 0.4])
     assert weak.extended(y=Axis("oscillator.c1", 5.0, 6.0)).traces == ()
     with pytest.raises(ValueError, match="use `started_from` for other parameters"):
         weak.extended(Axis("noise.D0", 0.1, 1.0))
@@ -489,3 +508,22 @@ def test_an_axis_is_invertible(scale):
     assert axis.value(np.array([0.0, 1.0])).tolist() == [0.1, 7.0]
     assert axis.value(0.5) == pytest.approx(math.sqrt(0.7) if scale == "log" else 3.55)
     assert axis.share(-1.0) < 0
+
+
+def test_f_is_solved_in_one_thread(monkeypatch):
+    """More only wait for each other: with two λ of strong noise took four times as long."""
+    threads = []
+
+    def factorised(operator):
+        threads.extend(pool["num_threads"] for pool in ThreadpoolController().info())
+        return known(operator)
+
+    known = eigen.factorised
+    for module in (bordered, eigen):
+        monkeypatch.setattr(module, "factorised", factorised)
+    family = Family(Problem(oscillator(0.5), NOISE.ou_reduction()), NOISE)
+    with threadpool_limits(2):
+        Quantity(zero_of(LAMBDA), family, (OMEGA, C1), Budget())(np.array([0.2, 0.6]))
+        sensitivities(family.problem, 2.0)
+    assert threads
+    assert set(threads) == {1}
