@@ -1,7 +1,7 @@
-from .analysis.density import adjoint_density as adjoint_density
-from .analysis.density import furstenberg_khasminskii as furstenberg_khasminskii
 from .analysis.density import stationary_density as stationary_density
 from .analysis.density import tilted_density as tilted_density
+from .analysis.sensitivity import sensitivities as sensitivities
+from .analysis.stability import boundary as boundary
 from .case.case import load_case as load_case
 from .errors import CaseError as CaseError
 from .errors import FpsolveError as FpsolveError

@@ -1,4 +1,4 @@
-"""The command line: fpsolve run | check | simulate | mesh."""
+"""The command line: fpsolve run | check | simulate | chart | mesh."""
 
 from __future__ import annotations
 
@@ -146,6 +146,33 @@ def check(cases: Cases, *, overrides: Overrides = None) -> int:
             code = NOT_CONVERGED
         elif not all(comparison.met for comparison in outcome.comparisons):
             code = max(code, CHECK_FAILED)
+    return code
+
+
+@app.command
+def chart(
+    cases: Cases,
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("results"),
+    overrides: Overrides = None,
+) -> int:
+    """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
+
+    Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
+    """
+    from fpsolve.output.terminal import print_chart
+    from fpsolve.study.chart import refuse_no_chart
+    from fpsolve.workflow import chart_case
+
+    code, loaded = 0, _load_to_write(cases, overrides, {}, monte_carlo=False)
+    for case in loaded:
+        refuse_no_chart(case)
+    for case in loaded:
+        found = chart_case(case, out, watch=_watch())
+        print_chart(case, found)
+        print(f"written: {out / case.name}")
+        if found.failures:
+            code = NOT_CONVERGED
     return code
 
 

@@ -12,9 +12,11 @@ from pathlib import Path
 from fpsolve.case.case import Case
 from fpsolve.errors import NotConverged
 from fpsolve.files import TEMPORARY, alone, writable
-from fpsolve.output.figures import draw, draw_response
+from fpsolve.output.charts import draw_chart, write_chart
+from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_results, write_simulation
 from fpsolve.output.vtk import write_curve, write_response
+from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulate_curves, simulation_work
 from fpsolve.study.solve import compare, expected, solve_curves, solving_work
@@ -22,11 +24,12 @@ from fpsolve.study.solve import compare, expected, solve_curves, solving_work
 Progress = Callable[[], None]
 AGAIN = "run it again to start over"
 SOLVED, SIMULATED = (
-    r"summary\.json|moments\.csv|figure\.(png|pdf)|density\.vtu|show\.py"
+    r"summary\.json|moments\.csv|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu|show\.py"
     r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)",
     r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)",
 )
-"""The names of the files that a run writes, and of those of a simulation."""
+"""The names of the files that a run writes, and of those of a simulation; and of a chart."""
+CHART = r"chart\.(csv|json|png|pdf)"
 _UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
 
 
@@ -144,6 +147,34 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
     return Outcome((), tuple(simulated), interruption)
 
 
+def chart_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Chart:
+    """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
+
+    Tables are written anew after every branch. What an earlier chart wrote there is removed first, and what was solved
+    or simulated with other parameters.
+
+    Raises:
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        FpsolveError: the case has no chart, or several curves; nothing is written.
+        KeyboardInterrupt: its text says what is kept; the figure shows that.
+    """
+    refuse_no_chart(case)
+    chart = Chart((), ())
+    with (
+        _own_folder(case, out, (CHART,)) as folder,
+        _saying_if_interrupted(lambda: _kept_lines(case, chart, folder)),
+        watch.bar(f"{case.name}, chart", chart_work(case)) as progress,
+        writable(folder),
+    ):
+        try:
+            for chart in solve_chart(case, progress=progress):
+                write_chart(case, chart, folder)
+        finally:
+            if chart.lines:
+                draw_chart(case, chart, folder)
+    return chart
+
+
 def check_case(case: Case, *, watch: Watch = NOBODY) -> Outcome:
     """Solve what a case expects, and compare it; nothing is written."""
     with watch.bar(case.name, solving_work(case, expected)) as progress:
@@ -162,6 +193,8 @@ def _solve(case: Case, folder: Path, watch: Watch) -> tuple[CurveResult, ...]:
         write_results(case, results, folder)
         for result in solve_curves(case, progress=progress):
             write_curve(result, folder)
+            if case.output.sensitivities:
+                draw_sensitivities(case, result, folder)
             write_results(case, [*results, result], folder)
             results.append(result.without_pairs())
     return tuple(results)
@@ -188,21 +221,21 @@ def _own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterato
     folder = Path(out) / case.name
     with alone(folder):
         with writable(folder):
-            stale = [names for names in (SOLVED, SIMULATED) if names in replaced or not _agrees(case, folder)]
+            stale = [names for names in (SOLVED, SIMULATED, CHART) if names in replaced or not _agrees(case, folder)]
             _remove(folder, "|".join([*stale, _UNFINISHED]))
         yield folder
 
 
 def _agrees(case: Case, folder: Path) -> bool:
     """Whether the tables in a folder are all of parameters that the case has."""
-    tables = [*folder.glob("summary.json"), *folder.glob("monte_carlo*.json")]
+    tables = [*folder.glob("summary.json"), *folder.glob("monte_carlo*.json"), *folder.glob("chart.json")]
     known = [dict(curve.parameters) for curve in case.curves()] if tables else []
     try:
         contents = [json.loads(table.read_text(encoding="utf-8")) for table in tables]
         found = [curve["parameters"] for content in contents for curve in content.get("curves", [content])]
     except (ValueError, KeyError, TypeError, AttributeError):  # it is no table of ours
         return False
-    return all(each in known for each in found)
+    return all(any(each.items() <= one.items() for one in known) for each in found)
 
 
 @contextmanager
@@ -218,6 +251,13 @@ def _kept(case: Case, done: Sequence[CurveResult] | Sequence[SimulatedCurve], fo
     """How many curves of a case are done, and where these are."""
     count = f" after {len(done)} of {case.planned} curve{'s' if case.planned > 1 else ''}"
     return f"{count}; what was done is kept in {folder}" if done else count
+
+
+def _kept_lines(case: Case, chart: Chart, folder: Path) -> str:
+    """How many branches of a chart are traced, and where these are."""
+    count = sum(len(line.traces) for line in chart.lines)
+    text = f" after {count} branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines"
+    return f"{text}; what was done is kept in {folder}" if count else text
 
 
 def _remove(folder: Path, names: str) -> None:

@@ -10,7 +10,17 @@ import fpsolve
 
 ROOMS = {
     "": ["errors", "arrays", "files", "process"],
-    "model": ["parameters", "words", "faults", "plane", "noise", "markov_chain", "vibro_impact", "problem"],
+    "model": [
+        "parameters",
+        "words",
+        "faults",
+        "plane",
+        "noise",
+        "markov_chain",
+        "vibro_impact",
+        "problem",
+        "direction",
+    ],
     "theory": ["perturbation", "frozen", "far", "validity"],
     "fem": [
         *("reference", "line", "polynomials", "mesh", "mesh_file", "phase_space", "noise_space", "space"),
@@ -18,13 +28,13 @@ ROOMS = {
     ],
     "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
     "exponent": [
-        *("rounding", "eigen", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
-        *("function", "moments", "quantities"),
+        *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
+        *("impacts", "function", "moments", "quantities"),
     ],
-    "analysis": ["density"],
-    "case": ["toml", "messages", "sections", "vary", "curves", "remedies", "refusals", "case"],
-    "study": ["results", "solve", "simulate"],
-    "output": ["vtk", "tables", "plots", "figures", "terminal"],
+    "analysis": ["density", "sensitivity", "curve", "continuation", "special_points", "zero", "stability", "regions"],
+    "case": ["toml", "messages", "sections", "vary", "chart", "curves", "remedies", "refusals", "case"],
+    "study": ["results", "solve", "simulate", "chart"],
+    "output": ["vtk", "tables", "plots", "figures", "charts", "terminal"],
     "workflow": [],
     "cli": [],
 }

@@ -1,6 +1,7 @@
 """The command line: exit codes, messages, and where they go."""
 
 import errno
+import json
 import os
 import re
 import signal
@@ -68,6 +69,46 @@ def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
     assert told.startswith("A test: noise.D0 = 0.1 with oscillator.omega = 2.0, moments.p = [1.0] ┏")
     assert main(["run", case, "--set", "output.eigenfunctions=[]"]) == 0
     assert drawn[1:] == ["A test"]
+
+
+def test_indices_stand_whole_in_short_lines(case, capsys):
+    assert main(["run", case]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if " = " in line and " ± " in line]
+    assert max(map(len, lines)) <= 80
+    for symbols in (("λ", "δ_p"), ("Λ″(0)",), ("N", "R_c", "r_c")):  # the second and the first make no line
+        found = [line for line in lines if line.startswith(f"{symbols[0]} = ")]
+        assert len(found) == 2
+        for line in found:
+            number = r"-?\d+\.\d+(e-\d+)? ± \de-\d+"
+            assert re.fullmatch("   ".join(rf"{re.escape(symbol)} = {number}" for symbol in symbols), line)
+
+
+@pytest.mark.parametrize(("c1", "words"), [("-0.8", "almost surely stable for every r in (0, 1]"), ("0.7", "unstable")])
+def test_why_there_is_no_critical_restitution_is_a_note(case, tmp_path, capsys, c1, words):
+    assert main(["run", case, "--set", f"oscillator.c1={c1}", "--set", "noise.D0=0.1", "--set", "vary={}"]) == 0
+    out, err = capsys.readouterr()
+    assert "r_c = none" in out
+    assert f"note: test: no r_c: {words}" in err
+    assert "warning" not in err
+    (curve,) = json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    assert curve["critical_restitution"] is None
+    assert curve["critical_impact_factor"]["value"] > 0
+    assert any(text.startswith(f"no r_c: {words}") for text in curve["notes"])
+
+
+def test_impacts_can_be_expected(case, tmp_path, capsys):
+    """Values of Eq. (39), and the sentence for one that does not exist."""
+    expected = {"impact_rate": 0.31831, "critical_impact_factor": 0.9964999, "critical_restitution": 0.6494}
+    text = TEXT.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', "")
+    for name, value in expected.items():
+        text += f'[[expect]]\nquantity = "{name}"\nvalue = {value}\nrtol = 5e-3\nsource = "Eq. (39)"\n'
+    (tmp_path / "impacts.toml").write_text(text, encoding="utf-8")
+    assert main(["check", "impacts.toml"]) == 0
+    assert "3 of 3 ok" in capsys.readouterr().out
+    assert main(["check", "impacts.toml", "--set", "oscillator.c1=-0.8"]) == CHECK_FAILED
+    out, err = capsys.readouterr()
+    assert "none" in out
+    assert "no r_c: almost surely stable" in err
 
 
 @pytest.mark.parametrize("word", ["noise.D0=0.2", "mesh.file=a/b.vtu", "vary.noise.D0=[1, 2]", f"title={'x' * 400}"])

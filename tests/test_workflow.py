@@ -77,6 +77,10 @@ def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
         assert curve["lyapunov_exponent"]["value"] == result.lyapunov_exponent.value
         assert set(curve["stability_index"]) >= {"value", "perturbation"}
         assert curve["variance_rate"]["value"] > 0
+        for name in ("impact_rate", "critical_impact_factor", "critical_restitution"):
+            assert set(curve[name]) == {"value", "error_estimate", "perturbation"}
+            assert curve[name]["value"] == result.estimates[name].value
+            assert curve[name]["value"] == pytest.approx(curve[name]["perturbation"], rel=5e-3)
         used = curve["discretisation"]
         assert used == result.discretisation
         assert used["xi"] == "polynomials"
@@ -189,7 +193,7 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     assert sum("the next mesh has" in text for text in curve["warnings"]) == 2
     row = {"p": 0.0, "value": 0.0, "derivative": None, "perturbation": 0.0, "error_estimate": 0.0, "residual": None}
     assert curve["moments"] == ([] if small else [row])
-    assert curve["warnings"][0].startswith("no δ_p, λ, Λ″(0): ")
+    assert curve["warnings"][0].startswith("no δ_p, λ, Λ″(0), N, R_c, r_c: ")
     assert curve["warnings"][0].endswith("as there is no Λ(0.001)") == bool(small)
     with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
         assert [row["derivative"] for row in csv.DictReader(file)] == [""] * (not small)

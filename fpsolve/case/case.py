@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
 from fpsolve.arrays import FloatArray
+from fpsolve.case.chart import ChartSection
 from fpsolve.case.curves import Curve, combinations, make_curve
 from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.refusals import REFUSALS
@@ -65,6 +66,7 @@ class Case(Section):
     )
     figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
     output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
+    chart: Annotated[ChartSection | None, parameter("where stability ends", "[chart]")] = None
     expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
     _path: Path = PrivateAttr(default=Path("case.toml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())

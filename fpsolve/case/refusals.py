@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from fpsolve.arrays import FloatArray
+from fpsolve.case.chart import ChartAxis, ChartSection
 from fpsolve.case.curves import assignments, combinations, make_curve
 from fpsolve.case.messages import Refusal, nearest, shown
 from fpsolve.case.remedies import in_words_of_a_case
@@ -179,6 +181,34 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
             yield (i, "where", key), value, text
 
 
+def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
+    """A frame in which there is no such problem, or where a moment is infinite."""
+    if chart is None or not {"oscillator", "noise"} <= valid.keys():
+        return
+    axes = chart.x, chart.y
+    noise = valid["noise"]
+    highest = max([noise.r0, *(axis.stop for axis in axes if axis.key == "noise.r0")])
+    if noise.treatment == "exact" and highest > 1:
+        axis = next((name for name in ("x", "y") if getattr(chart, name).key == "noise.r0"), None)
+        text = (
+            f"noise.r0 reaches {highest:g} in the frame; for r0 > 1 Λ(p) is infinite or carried by rare paths, and no "
+            'line of stability; let it end at 1, or use treatment = "ou-reduction"'
+        )
+        yield (axis, "stop") if axis else (), highest, text
+        return
+    p = np.array([zero.p for zero in chart.zero])
+    corners = [dict(zip((each.key for each in axes), ends, strict=True)) for ends in product(*map(_ends, axes))]
+    reason = next(
+        filter(None, (_with(corner) + text for corner in corners if (text := _obstacle(valid, corner, p)))), ""
+    )
+    if reason:
+        yield (), None, f"{reason}; choose another frame"
+
+
+def _ends(axis: ChartAxis) -> tuple[float, float]:
+    return axis.start, axis.stop
+
+
 def _without(key: str) -> str:
     """How to go on without what a key lists."""
     return f"or go without by --set '{key}=[]'"
@@ -201,6 +231,7 @@ REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
     "monte_carlo": _of_monte_carlo,
     "figure": _of_figure,
     "output": _of_output,
+    "chart": _of_chart,
     "expect": _of_expect,
 }
 """What is wrong with each section."""

@@ -218,12 +218,13 @@ class FigureSection(Section):
 
 
 class OutputSection(Section):
-    """[output]: the p whose eigenfunctions are written; None is all of them."""
+    """[output]: the p whose eigenfunctions are written, None is all of them; whether sensitivities are drawn."""
 
     eigenfunctions: Annotated[
         Values | None,
         parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False, max_length=MAX_MOMENTS),
     ] = None
+    sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:

@@ -1,10 +1,14 @@
 from .adapt import Budget as Budget
+from .bordered import second_derivative as second_derivative
 from .eigen import PrincipalPair as PrincipalPair
 from .eigen import principal_pair as principal_pair
-from .eigen import second_derivative as second_derivative
 from .eigen import spectrum as spectrum
 from .error import Estimate as Estimate
+from .error import Failure as Failure
 from .function import MomentLyapunovFunction as MomentLyapunovFunction
+from .impacts import critical_impact_factor as critical_impact_factor
+from .impacts import critical_restitution as critical_restitution
+from .impacts import impact_rate as impact_rate
 from .moments import moment_lyapunov as moment_lyapunov
 from .moments import solve_moments as solve_moments
 from .quantities import INDICES as INDICES
@@ -14,5 +18,4 @@ from .quantities import Quantity as Quantity
 from .quantities import lyapunov_exponent as lyapunov_exponent
 from .quantities import stability_index as stability_index
 from .solver import ExponentSolver as ExponentSolver
-from .solver import Failure as Failure
 from .solver import MomentLyapunov as MomentLyapunov

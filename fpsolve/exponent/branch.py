@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from functools import cache, cached_property
+from functools import cached_property, partial
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
@@ -16,8 +15,10 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import refined
 from fpsolve.exponent.rival import is_far_out, rival
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.space import Discretisation
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem
 
@@ -42,16 +43,21 @@ class Branch:
         budget: what the choice of a discretisation may cost.
         tolerance: the usual one.
         is_far: whether it is that of the places far out of algebraic tails.
+        starts: solutions of a problem with parameters close by, by their p.
+
+    Attributes:
+        known: what was solved, by p.
     """
 
     problem: Problem
-    mesh: CylinderMesh | None
     _: KW_ONLY
+    mesh: CylinderMesh | None = None
     rtol: float
     budget: Budget
     tolerance: Tolerance
     is_far: bool = False
-    _known: dict[float, Solution] = field(init=False, default_factory=dict)
+    starts: Mapping[float, Solution] = field(default_factory=dict)
+    known: dict[float, Solution] = field(init=False, default_factory=dict)
     _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
@@ -63,10 +69,10 @@ class Branch:
         if tolerance is None and p in self._failed:
             raise self._failed[p]
         allowed = tolerance or self.tolerance
-        if p not in self._known or (self.mesh is None and not self._meets(self._known[p], allowed)):
+        if p not in self.known or (self.mesh is None and not self._meets(self.known[p], allowed)):
             try:
-                with _one_thread().limit(limits=1):
-                    self._known[p] = self._found(p, allowed)
+                with one_thread():
+                    self.known[p] = self._found(p, allowed)
             except NotConverged as failure:
                 if self.is_far:
                     text = f"{failure}; this moment is carried by rare paths, with noise far out in its tails"
@@ -84,7 +90,7 @@ class Branch:
                 if not is_numerical(failure):
                     raise
                 raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
-        return self._known[p]
+        return self.known[p]
 
     @property
     def remedy(self) -> Remedy:
@@ -103,11 +109,6 @@ class Branch:
         except NotConverged as failure:
             raise NotConverged(failure.reason, failure.partial, self.remedy) from failure
 
-    def largest(self) -> tuple[float, Generator] | None:
-        """The p of the largest size that was solved, and with what; None where none was."""
-        p = max(self._known, key=abs, default=None)
-        return None if p is None else (p, self._known[p].pair.generator)
-
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
         side = p or (-1.0 if has_algebraic_tails(self.problem.noise) else 1.0)  # where Λ is finite
@@ -125,17 +126,13 @@ class Branch:
             return Solution(pair, self.remedied(lambda: principal_pair(fine, p, start=pair)))
         if abs(p) < SMALL_P and not self.is_far:
             return self._tried(self.near_zero(p, tolerance).pair.generator, p)
-        start = self._from_nearest(p, tolerance)
-        if start is not None and self._meets(start, tolerance) and rival(start.pair) is None:
-            return start
-        return (resolve_far if self.is_far else resolve)(
-            self.problem,
-            p,
-            tolerance=lambda value: tolerance(p, value),
-            rtol=self.rtol,
-            budget=self.budget,
-            start=start,
-        )
+        start = None
+        for tried in (self._from_start, self._from_nearest):
+            start = tried(p, tolerance) or start
+            if start is not None and self._meets(start, tolerance) and rival(start.pair) is None:
+                return start
+        search, allowed = resolve_far if self.is_far else resolve, partial(tolerance, p)
+        return search(self.problem, p, tolerance=allowed, rtol=self.rtol, budget=self.budget, start=start)
 
     @cached_property
     def _given(self) -> tuple[Generator, Generator]:
@@ -146,10 +143,12 @@ class Branch:
 
     def _from_nearest(self, p: float, tolerance: Tolerance) -> Solution | None:
         """The solution at p with what was chosen for the nearest p, where that is likely to do."""
-        nearest = min(self._known, key=lambda q: abs(q - p), default=None)
+        nearest = min(self.known, key=lambda q: abs(q - p), default=None)
         if nearest is None:
             return None
-        generator = self._trimmed(self._known[nearest], tolerance)
+        generator = self.known[nearest].pair.generator
+        if (chosen := _trimmed(self.known[nearest], tolerance)) is not generator.chosen:
+            generator = Generator(self.problem, chosen)
         try:
             solution = self._tried(generator, p) if fits(generator, nearest, p) else None
         except NotConverged:
@@ -158,18 +157,19 @@ class Branch:
             return solution
         return None  # its interval reaches a place far out, which at this p is not the nearest to ξ = 0
 
-    def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Generator:
-        """The generator of a solution, or a much smaller one that would do."""
-        pair, size = solution.pair, solution.pair.generator.size
-        if abs(pair.p) < SMALL_P or size <= WORTH_A_TRY:
-            return pair.generator
-        smaller = refined(solution, tolerance(pair.p, pair.value), 0)
-        is_better = smaller.unknowns(self.problem.noise) <= TRIM * size
-        return Generator(self.problem, smaller) if is_better else pair.generator
+    def _from_start(self, p: float, tolerance: Tolerance) -> Solution | None:
+        """The solution at p with what was chosen for it in the problem close by, or None."""
+        if p not in self.starts:
+            return None
+        chosen = _trimmed(self.starts[p], tolerance)
+        try:
+            return Solution(principal_pair(Generator(self.problem, chosen), p, start=self.starts[p].pair))
+        except (NotConverged, MeshError):
+            return None
 
     def _tried(self, generator: Generator, p: float) -> Solution:
         """The solution at p with a generator, from those around p, or from the nearest one."""
-        known = (solution.pair for solution in self._known.values())
+        known = (solution.pair for solution in self.known.values())
         near = sorted(known, key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
         return Solution(self.remedied(lambda: principal_pair(generator, p, start=near)))
 
@@ -180,14 +180,18 @@ class Branch:
         return is_small or solution.error <= tolerance(pair.p, pair.value)
 
 
+def _trimmed(solution: Solution, tolerance: Tolerance) -> Discretisation:
+    """The discretisation of a solution, or a much smaller one that would do."""
+    pair, generator = solution.pair, solution.pair.generator
+    if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
+        return generator.chosen
+    smaller = refined(solution, tolerance(pair.p, pair.value), 0)
+    is_better = smaller.unknowns(generator.problem.noise) <= TRIM * generator.size
+    return smaller if is_better else generator.chosen
+
+
 def is_numerical(failure: Exception) -> bool:
     """Whether numbers became too large, or a matrix singular; all else is a fault of the program."""
     text = str(failure)
     is_singular = isinstance(failure, RuntimeError) and ("singular" in text or "ARPACK" in text)
     return isinstance(failure, ArithmeticError) or is_singular or "infs or NaNs" in text
-
-
-@cache
-def _one_thread() -> ThreadpoolController:
-    """Keeps BLAS from threads, which for the small blocks of a sparse LU cost three times what they save."""
-    return ThreadpoolController()

@@ -37,8 +37,6 @@ SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
 _EPS = float(np.finfo(float).eps)
 MAX_ITERATIONS = 12
-REFINEMENTS = 3
-"""Of T′, by each of which its error falls to 1e-6 of a rate over the gap of the spectrum."""
 STEPS_PER_FACTOR = 5
 SLOW = 1e-2
 """A step that lowers the backward error by less than this factor calls for new LU factors."""
@@ -143,32 +141,6 @@ def _rightmost(pair: PrincipalPair) -> PrincipalPair:
     return pair
 
 
-def slope_rounding(pair: PrincipalPair) -> float:
-    """Bound on the effect of rounding on Λ′."""
-    slope = pair.generator.matrix(pair.p, derivative=1)
-    return float(_EPS * (abs(pair.left) @ (abs(slope) @ abs(pair.right))) * pair.space.turns)
-
-
-def second_derivative(pair: PrincipalPair) -> float:
-    """Λ″(p) = ⟨T*, L″T⟩ + 2⟨T*, (L′ − Λ′)T′⟩, T′ from the bordered system (L − Λ)T′ = −(L′ − Λ′)T, ⟨T*, T′⟩ = 0.
-
-    The system is solved with a shift a little off Λ, and what that leaves of T in T′ is removed.
-    """
-    generator, space, x, y, p = pair.generator, pair.space, pair.right, pair.left, pair.p
-    slope, weighed = generator.matrix(p, derivative=1), space.weighed(x)
-    norm = y @ weighed
-    source = pair.derivative * weighed - slope @ x
-    operator, change = generator.matrix(p, shift=pair.value), np.zeros_like(x)
-    factor = factorised(generator.matrix(p, shift=pair.value + 1e-6 * generator.unit_rate))
-    for _ in range(REFINEMENTS):
-        rest = source - operator @ change
-        rest -= (y @ rest) / norm * weighed
-        change += factor.solve(rest)
-        change -= (y @ space.weighed(change)) / norm * x
-    mixed = y @ (slope @ change) - pair.derivative * (y @ space.weighed(change))
-    return float((y @ (generator.matrix(p, derivative=2) @ x) + 2 * mixed) / norm)
-
-
 def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
     """The k rightmost eigenvalues of L(p), by decreasing real part: complex, shape (k,).
 
@@ -195,6 +167,8 @@ def _carried(pairs: Sequence[PrincipalPair], p: float, generator: Generator) -> 
     kept = [pair for pair in pairs if pair.generator is generator]
     if not kept:
         nearest, space = min(pairs, key=lambda pair: abs(pair.p - p)), generator.space(p)
+        if nearest.generator.chosen is generator.chosen:  # the same functions, of a problem close by
+            return nearest.right, nearest.left
         return space.carry(nearest.right, nearest.space), space.carry(nearest.left, nearest.space)
     nodes = np.array([pair.p for pair in kept])
     weights = np.array([math.prod((p - q) / (node - q) for q in nodes if q != node) for node in nodes])
@@ -214,11 +188,11 @@ def _simplest(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
 
 def _from_the_right(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
     """Right and left vectors near the principal ones, from shifts that start at an upper bound of Λ(p)."""
-    space = generator.space(p)
+    space, operator = generator.space(p), generator.matrix(p)
     shift = generator.upper_bound(p) + 0.25 * generator.unit_rate
     right, left = _simplest(generator, p)
     for _ in range(2):
-        factor = factorised(generator.matrix(p, shift=shift))
+        factor = factorised(operator.shifted(shift))
         right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, p)
         shift -= 0.95 / inverse_distance
     for _ in range(4):

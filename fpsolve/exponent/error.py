@@ -65,6 +65,19 @@ class Absent:
         return f"none: {self.reason}"
 
 
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no Λ(p), or none to be trusted.
+
+    Attributes:
+        p: the moment; None where all of them are doubtful.
+        reason: what happened, and what to do.
+    """
+
+    p: float | None
+    reason: str
+
+
 def checked(name: str, estimate: Estimate, remedy: str) -> Estimate:
     """An estimate whose error leaves it a meaning. Raises `NotConverged`."""
     if not estimate.relative_error <= MEANINGLESS:
@@ -146,7 +159,7 @@ class ModeEffects:
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects, ModeEffects | None]:
     """The effects along φ, and along ξ unless that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
-    operator = pair.generator.matrix(pair.p, shift=pair.value)
+    operator = pair.generator.matrix(pair.p).shifted(pair.value)
     tables = space.table(pair.right), space.table(pair.left)
     found: list[ModeEffects | None] = []
     lines: tuple[PhaseSpace | NoiseSpace, ...] = (space.phi, space.xi)

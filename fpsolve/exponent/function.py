@@ -279,7 +279,8 @@ def nonzero_root(
             raise NotConverged(f"Λ(p)/p does not increase at p = {p:g}, as convexity demands; {solver.near.refinement}")
         low, high = (p, high) if ratio < 0 else (low, p)
         new = p - ratio / slope
-        if abs(new - p) <= max(1e-13 * max(1.0, abs(p)), 0.1 * error / slope):
+        least = 1e-13 * max(1.0, abs(p))
+        if abs(new - p) <= max(least, 0.1 * error / slope) or 0 < high - low <= 10 * least:
             estimate = Estimate(p, error / slope + abs(new - p), scale=1.0)
             return checked("the stability index", estimate, solver.near.remedy)
         if low == high:

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.error import Failure
 from fpsolve.exponent.function import MomentLyapunovFunction, broken_convexity
-from fpsolve.exponent.solver import ExponentSolver, Failure, MomentLyapunov
+from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.problem import Problem, checked_moments, of_problem
 from fpsolve.theory.far import grows_far_out

@@ -10,14 +10,16 @@ from typing import Literal
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.function import SEARCH_INTERVAL, nonzero_root
+from fpsolve.exponent.impacts import critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.theory.perturbation import SecondOrder
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.theory.perturbation import second_order
 
 DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
 """What a figure can show."""
-QuantityName = Literal[DrawnName, "variance_rate"]
+QuantityName = Literal[DrawnName, "variance_rate", "impact_rate", "critical_impact_factor", "critical_restitution"]
 
 
 @dataclass(frozen=True)
@@ -44,12 +46,12 @@ class Index(Quantity):
     Attributes:
         solve: finds it, from a solver and the `root` of its `MomentLyapunov`, or says why there is none in `interval`.
             Raises `NotConverged`.
-        theory: what perturbation theory makes of it.
+        theory: what perturbation theory makes of it; it may be infinite.
         interval: where it is sought.
     """
 
     solve: Callable[[ExponentSolver, float | None], Estimate | Absent]
-    theory: Callable[[SecondOrder], float]
+    theory: Callable[[Problem], float]
     interval: tuple[float, float] = (-math.inf, math.inf)
 
 
@@ -60,7 +62,7 @@ LYAPUNOV_EXPONENT = Index(
     r"largest Lyapunov exponent $\lambda$ (1/time)",
     "(39)",
     solve=lambda solver, _: solver.lyapunov_exponent(),
-    theory=lambda theory: theory.lyapunov_exponent,
+    theory=lambda problem: second_order(problem).lyapunov_exponent,
 )
 STABILITY_INDEX = Index(
     "stability_index",
@@ -68,7 +70,7 @@ STABILITY_INDEX = Index(
     r"stability index $\delta_p$",
     "(38)",
     solve=lambda solver, root: nonzero_root(solver, guess=root),
-    theory=lambda theory: theory.stability_index,
+    theory=lambda problem: second_order(problem).stability_index,
     interval=SEARCH_INTERVAL,
 )
 VARIANCE_RATE = Index(
@@ -77,10 +79,46 @@ VARIANCE_RATE = Index(
     r"growth rate of the variance $\Lambda''(0)$ (1/time)",
     "(37)",
     solve=lambda solver, _: solver.variance_rate(),
-    theory=lambda theory: theory.variance_rate,
+    theory=lambda problem: second_order(problem).variance_rate,
 )
-INDICES: Mapping[str, Index] = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
+IMPACT_RATE = Index(
+    "impact_rate",
+    "N",
+    r"impact rate $N = \partial\lambda/\partial\ln R$ (1/time)",
+    "(39)",
+    solve=lambda solver, _: impact_rate(solver),
+    theory=lambda problem: second_order(problem).impact_rate,
+)
+CRITICAL_IMPACT_FACTOR = Index(
+    "critical_impact_factor",
+    "R_c",
+    "critical impact factor $R_c$",
+    "(39)",
+    solve=lambda solver, _: critical_impact_factor(solver),
+    theory=lambda problem: second_order(problem).critical_impact_factor,
+)
+CRITICAL_RESTITUTION = Index(
+    "critical_restitution",
+    "r_c",
+    "critical coefficient of restitution $r_c$",
+    "(39)",
+    solve=lambda solver, _: critical_restitution(solver),
+    theory=lambda problem: _restitution(problem, second_order(problem).critical_log_factor),
+    interval=(0.0, 1.0),
+)
+_ALL = (
+    *(LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE),
+    *(IMPACT_RATE, CRITICAL_IMPACT_FACTOR, CRITICAL_RESTITUTION),
+)
+INDICES: Mapping[str, Index] = {each.name: each for each in _ALL}
 QUANTITIES: Mapping[str, Quantity] = {MOMENT.name: MOMENT, **INDICES}
+
+
+def _restitution(problem: Problem, log_factor: float) -> float:
+    """The r with a given ln R, by the impact law of the oscillator; NaN for other motions."""
+    if not isinstance(problem.system, VibroImpactOscillator):
+        return math.nan
+    return problem.system.restitution_of(log_factor)
 
 
 @of_problem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from numbers import Real
@@ -16,12 +16,14 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.bordered import second_derivative, slope_rounding
 from fpsolve.exponent.branch import Branch, Tolerance
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair, second_derivative, slope_rounding
-from fpsolve.exponent.error import Estimate, Solution, checked
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.refine import WIDER, widened
 from fpsolve.exponent.rival import far_rivals, is_far_out, rival
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import has_algebraic_tails
@@ -42,19 +44,6 @@ _KINDS: Sequence[tuple[str, Any, str]] = (
     ("budget", Budget, "a Budget"),
     ("rtol", Real, "a number such as 1e-8"),
 )
-
-
-@dataclass(frozen=True)
-class Failure:
-    """Why there is no Λ(p), or none to be trusted.
-
-    Attributes:
-        p: the moment; None where all of them are doubtful.
-        reason: what happened, and what to do.
-    """
-
-    p: float | None
-    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +84,7 @@ class MomentLyapunov:
 
     def forgetful(self) -> MomentLyapunov:
         """The same numbers, without the eigenfunctions that the solver keeps."""
-        return replace(self, solver=replace(self.solver))
+        return replace(self, solver=replace(self.solver, starts={}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +96,7 @@ class ExponentSolver:
         mesh: a mesh for all p; None chooses a discretisation for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a discretisation may cost.
+        starts: solutions of a problem with parameters close by, by their p, see `Branch`.
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
@@ -119,6 +109,7 @@ class ExponentSolver:
     _: KW_ONLY
     rtol: float = 1e-8
     budget: Budget = field(default_factory=Budget)
+    starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind, words in _KINDS:
@@ -143,7 +134,8 @@ class ExponentSolver:
 
     def _branch(self, is_far: bool) -> Branch:
         chosen = {"rtol": self.rtol, "budget": self.budget, "tolerance": self.tolerance}
-        return Branch(self.problem, None if is_far else self.mesh, is_far=is_far, **chosen)  # type: ignore[arg-type]
+        own = {} if is_far else {"mesh": self.mesh, "starts": self.starts}
+        return Branch(self.problem, is_far=is_far, **own, **chosen)  # type: ignore[arg-type]
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
@@ -212,7 +204,7 @@ class ExponentSolver:
 
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
-        value, _, error = self.ratio(0.0)
+        value, error = self.ratio_alone(0.0)
         meaning = ALMOST_EVERY if grows_far_out(self.problem) else ""
         return checked("λ", Estimate(value, error, self.scales.linear, meaning), self.near.remedy)
 
@@ -231,36 +223,44 @@ class ExponentSolver:
             raise NoSuchExponent(
                 "Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time"
             )
-        pair, scale = self.near.solution(0.0).pair, 2 * self.scales.quadratic
-        finer = self._finer(pair)
-        value, better = second_derivative(pair), second_derivative(finer)
+        scale = 2 * self.scales.quadratic
+        value, better = map(second_derivative, self.at_zero)
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
         beyond = max(1.0, 1 / math.expm1(tail * math.log(WIDER)))  # what is left, over what the wider one has added
         error = beyond * abs(better - value) + rounding
         return checked("Λ″(0)", Estimate(better, error, scale), self.near.remedy)
 
-    def _finer(self, pair: PrincipalPair) -> PrincipalPair:
-        """That of a finer and wider discretisation. Raises `NotConverged`."""
+    @cached_property
+    def at_zero(self) -> tuple[PrincipalPair, PrincipalPair]:
+        """The pair at p = 0, and that of a finer and wider discretisation. Raises `NotConverged`."""
+        pair = self.near.solution(0.0).pair
         try:
             generator = Generator(self.problem, widened(pair.generator).enriched())
         except MeshError as failure:
-            raise NotConverged(f"Λ″(0) did not converge: {failure}; {self.near.remedy}") from failure
-        return self.near.remedied(lambda: principal_pair(generator, pair.p, start=pair))
+            raise NotConverged(f"p = 0 did not converge on a finer mesh: {failure}; {self.near.remedy}") from failure
+        with one_thread():
+            return pair, self.near.remedied(lambda: principal_pair(generator, 0.0, start=pair))
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
-        """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0.
+        """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""
+        value, error = self.ratio_alone(p, tolerance)
+        if abs(p) < TINY_P:
+            return value, 0.5 * second_derivative(self.near.solution(p * 0.5, tolerance).pair), error
+        return value, (self.near.solution(p, tolerance).pair.derivative - value) / p, error
+
+    def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
+        """Λ(p)/p and its error.
 
         Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss; its error is that at p = ±`SMALL_P`.
         """
         if abs(p) >= TINY_P:
             solution = self.near.solution(p, tolerance)
-            value = solution.pair.value / p
-            return value, (solution.pair.derivative - value) / p, solution.error / abs(p)
+            return solution.pair.value / p, solution.error / abs(p)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.near.solution(point, tolerance).pair for point in points]
         near = self.near.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
-        return float(np.mean([pair.derivative for pair in pairs])), 0.5 * second_derivative(pairs[0]), error
+        return float(np.mean([pair.derivative for pair in pairs])), error
 
     def _result(self, solutions: Sequence[Solution], failures: Sequence[Failure]) -> MomentLyapunov:
         pairs = tuple(solution.pair for solution in solutions)

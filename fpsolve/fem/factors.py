@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.linalg.blas import dgemm, dtrsm
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import identity
 from scipy.sparse.linalg import splu
+from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray
 from fpsolve.fem.kronecker import KroneckerSum
@@ -16,6 +18,16 @@ from fpsolve.fem.kronecker import KroneckerSum
 MAX_DENSE_UNKNOWNS = 350
 """Below it one dense matrix is the fastest."""
 MAX_BLOCK, MAX_BAND = 400, 6
+
+
+def one_thread() -> Any:
+    """Keeps BLAS in the body from threads, which for the small blocks of an LU cost three times what they save."""
+    return _pools().limit(limits=1)
+
+
+@cache
+def _pools() -> ThreadpoolController:
+    return ThreadpoolController()
 
 
 class Factors(Protocol):

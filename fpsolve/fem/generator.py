@@ -14,7 +14,8 @@ from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.phase_space import PhaseSpace
 from fpsolve.fem.space import CylinderSpace, Discretisation, noise_space
-from fpsolve.fem.terms import Jump, Power, Term, power_of_epsilon, terms_of
+from fpsolve.fem.terms import OfMoment, Term, changed_terms, power_of_epsilon, terms_of
+from fpsolve.model.direction import Direction
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rate, phase_speed
 from fpsolve.model.problem import Problem
@@ -44,6 +45,7 @@ class Generator:
         for kick in problem.system.kicks:
             self.phi.vertices_at(kick.phase)
         self._spaces: dict[float, CylinderSpace] = {}
+        self._changes: dict[Direction, tuple[Term, ...]] = {}
         self.space(0.0)  # refuses a mesh that cannot be used
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -76,16 +78,38 @@ class Generator:
         """L(p) term by term."""
         return tuple(terms_of(self.problem.system, self.space(0.0)))
 
-    def matrix(self, p: float, *, derivative: int = 0, shift: float = 0.0, orders: slice = _ALL) -> KroneckerSum:
-        """The matrix of dᵏL/dpᵏ − shift in the space for p, from the terms of some orders in ε.
+    def matrix(self, p: float, *, derivative: int = 0, orders: slice = _ALL) -> KroneckerSum:
+        """The matrix of dᵏL/dpᵏ in the space for p, from the terms of some orders in ε, the ξ-matrix of 1 first.
 
         Args:
             p: the moment.
             derivative: k; the tilt is held.
-            shift: times the mass matrix.
             orders: slice(1, None) leaves out L₀.
         """
-        phases: dict[Coefficient | None, Any] = {one: -shift * self.phi.identity}
+        space = self.space(p)
+        return KroneckerSum([(phase, space.xi_matrix(g)) for g, phase in self._phases(p, derivative, orders).items()])
+
+    def changed(self, by: Direction, p: float, *, derivative: int = 0) -> KroneckerSum:
+        """The matrix of ∂/∂θ dᵏL/dpᵏ, the functions of φ and ξ held; that of P_s, and so of `mass`, is in it."""
+        space = self.space(p)
+        if by not in self._changes:
+            self._changes[by] = tuple(changed_terms(self.problem.system, self.space(0.0), by))
+        sizes = [(term.of_p(p, derivative), term) for term in self._changes[by]]
+        parts = [(size * term.phase, space.xi_matrix(term.g)) for size, term in sizes if size]
+        if by.noise is not None:
+            phases = self._phases(p, derivative)
+            parts += [(phase, space.xi.changed(by.noise, g)) for g, phase in phases.items()]
+        return KroneckerSum(parts or [(0.0 * self.phi.identity, space.xi_matrix(one))])
+
+    def changed_mass(self, by: Direction, p: float) -> KroneckerSum | None:
+        """∂/∂θ of `mass`; None where the noise does not change."""
+        if by.noise is None:
+            return None
+        return KroneckerSum([(self.phi.identity, self.space(p).xi.changed(by.noise, one))])
+
+    def _phases(self, p: float, derivative: int, orders: slice = _ALL) -> dict[Coefficient | None, Any]:
+        """For each function of ξ the matrix of φ; the first is that of 1."""
+        phases: dict[Coefficient | None, Any] = {one: 0.0 * self.phi.identity}
         last = max(order for parts in self._parts.values() for order, _, _ in parts)
         wanted = range(1 + last)[orders]
         for g, parts in self._parts.items():
@@ -93,21 +117,20 @@ class Generator:
                 size = of_p(p, derivative) if order in wanted else 0.0
                 if size:
                     phases[g] = phases[g] + size * phase if g in phases else size * phase
-        space = self.space(p)
-        return KroneckerSum([(phase, space.xi_matrix(g)) for g, phase in phases.items()])
+        return phases
 
     def mass(self, p: float) -> KroneckerSum:
         """∫ P_s w T."""
         return KroneckerSum([(self.phi.identity, self.space(p).xi_matrix(one))])
 
     @cached_property
-    def _parts(self) -> dict[Coefficient | None, list[tuple[int, Power | Jump, Any]]]:
+    def _parts(self) -> dict[Coefficient | None, list[tuple[int, OfMoment, Any]]]:
         """For each function of ξ the sums of the φ-matrices of all terms with the same order and coefficient."""
-        sums: dict[tuple[Coefficient | None, int, Power | Jump], Any] = {}
+        sums: dict[tuple[Coefficient | None, int, OfMoment], Any] = {}
         for term in self.terms():
             key = term.g, term.order, term.of_p
             sums[key] = sums[key] + term.phase if key in sums else term.phase
-        parts: dict[Coefficient | None, list[tuple[int, Power | Jump, Any]]] = {}
+        parts: dict[Coefficient | None, list[tuple[int, OfMoment, Any]]] = {}
         for (g, order, of_p), phase in sums.items():
             parts.setdefault(g, []).append((order, of_p, phase))
         return parts

@@ -109,9 +109,9 @@ class LineSpace:
     def _mass(self) -> csr_matrix:
         return self._form(self._values, one, self._values)
 
-    def stiffness(self) -> csr_matrix:
-        """∫ w u′v′."""
-        return self._form(self._slopes, one, self._slopes)
+    def stiffness(self, f: Coefficient = one) -> csr_matrix:
+        """∫ w f u′v′."""
+        return self._form(self._slopes, f, self._slopes)
 
     @property
     def measure(self) -> FloatArray:

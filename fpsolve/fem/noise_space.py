@@ -19,12 +19,15 @@ import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
 from fpsolve.fem.phase_space import MAX_DENSE_UNKNOWNS
-from fpsolve.fem.polynomials import Polynomials, gegenbauer, hermite, stieltjes
+from fpsolve.fem.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
+from fpsolve.model.direction import NoiseChange
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import Diffusion
 
 FAR = 50.0
 """Noise units beyond which OU noise does not come."""
+SHARP_ENDS = 50.0
+"""Exponents from which on P_s leaves next to nothing at the ends of its support."""
 EXTRA_POINTS = 16
 """Quadrature points beyond the number of polynomials."""
 
@@ -80,6 +83,10 @@ class NoiseSpace:
 
     def generator(self) -> Any:
         """∫ P_s v L_ξ u, L_ξ the generator of the noise."""
+        raise NotImplementedError
+
+    def changed(self, change: NoiseChange, g: Coefficient | None) -> Any:
+        """∂/∂θ of `mass(g)`, for None of `generator()`, where the noise changes and the functions of ξ do not."""
         raise NotImplementedError
 
     def generator_of_one(self) -> FloatArray:
@@ -160,7 +167,7 @@ class PolynomialSpace(LineNoiseSpace):
 
     def __init__(self, noise: Diffusion, count: int, tilt: float = 0.0) -> None:
         super().__init__(noise, tilt)
-        end = noise.half_width / self.unit
+        end, self._end_exponent = noise.half_width / self.unit, noise.end_exponent
         if math.isinf(end):
             self._polynomials, x, self.values, slopes, self.measure = _hermite_table(count)
             self._shift, self._scale, self._log_weight = 2 * tilt, 1.0, self._log_weight + 2 * tilt**2
@@ -189,6 +196,20 @@ class PolynomialSpace(LineNoiseSpace):
     def generator(self) -> FloatArray:
         """−½σ² ∫ P_s (u′ + s u)(v′ + s v)."""
         return np.asarray(-self.rate * _form(self._slopes, self.measure))
+
+    def changed(self, change: NoiseChange, g: Coefficient | None) -> FloatArray:
+        measure = self.measure * self._log_change(change)
+        if g is not None:
+            return _form(self.values, measure * g(self.unit * self.points))
+        return np.asarray(2 * change.log_diffusion * self.generator() - self.rate * _form(self._slopes, measure))
+
+    def _log_change(self, change: NoiseChange) -> FloatArray:
+        """∂ ln P_s/∂θ at the points, without its mean; no rule of Gauss takes its ln(1 − x²) near ±1 as it stands."""
+        logs, a = change.log_density(self.unit * self.points), self._end_exponent
+        if change.end_exponent and a < SHARP_ENDS:
+            x = self.points / self._scale
+            logs = logs + change.end_exponent * (logarithm(x, a, x.size) - np.log1p(-(x**2)))
+        return np.asarray(logs - self.measure @ logs)
 
     def generator_of_one(self) -> FloatArray:
         return np.asarray(-self.rate * self.tilt * (self.measure @ self._slopes))
@@ -241,6 +262,16 @@ class CellSpace(LineNoiseSpace):
     def generator(self) -> Any:
         """−½σ² ∫ P_s u′v′; at the ends no probability flux is the natural condition."""
         return self._form(-self.rate * self.line.stiffness())
+
+    def changed(self, change: NoiseChange, g: Coefficient | None) -> Any:
+        mean = float(self.measure @ change.log_density(self.unit * self.points) / np.sum(self.measure))
+
+        def log_change(z: FloatArray) -> FloatArray:
+            return change.log_density(self.unit * z) - mean
+
+        if g is not None:
+            return self._form(self.line.mass(lambda z: log_change(z) * g(self.unit * z)))
+        return 2 * change.log_diffusion * self.generator() - self._form(self.rate * self.line.stiffness(log_change))
 
     def constant(self) -> FloatArray:
         """Coefficients of the function 1, shape (size,); where paths are killed it falls to 0 at the ends."""

@@ -54,6 +54,20 @@ def gegenbauer(count: int, exponent: float) -> Polynomials:
     return Polynomials(np.zeros(count), np.append(np.sqrt(0.5 / (1 + c)), b))
 
 
+def logarithm(x: FloatArray, exponent: float, count: int) -> FloatArray:
+    """ln(1 − x²) but for a constant, projected on the polynomials of degree < count in the weight (1 − x²)^exponent.
+
+    ∫ (1 − x²)^b C_2k dx of the Gegenbauer polynomials of λ = exponent + ½ is known for every b. Its derivative at b =
+    exponent gives ∫ ln(1 − x²) C_2k, in the mean −λ/(k(k + λ)).
+    """
+    from scipy.special import gammaln
+
+    polynomials, k, c = gegenbauer(count, exponent), np.arange(1, (count + 1) // 2), exponent + 0.5
+    at_one = np.exp(gammaln(2 * c + 2 * k) - gammaln(2 * c) - gammaln(2 * k + 1))
+    lengths = at_one / polynomials.at(np.ones(1))[0][0, 2 * k]
+    return np.asarray(polynomials.at(x)[0][:, 2 * k] @ (-c / (k * (k + c)) / lengths))
+
+
 def stieltjes(x: FloatArray, weights: FloatArray, count: int) -> Polynomials:
     """Those of a discrete weight on many more points than polynomials (Lanczos' form of the Stieltjes procedure)."""
     a, b = np.empty(count), np.empty(count)

@@ -24,6 +24,7 @@ from scipy.sparse import diags, issparse
 
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.space import CylinderSpace
+from fpsolve.model.direction import Direction
 from fpsolve.model.plane import Drive, Harmonics, Kick, System, phase_speed
 
 
@@ -51,6 +52,22 @@ class Jump:
         return self.log_factor**derivative * math.exp(p * self.log_factor)
 
 
+@dataclass(frozen=True)
+class JumpSlope:
+    """The coefficient ∂R^p/∂ ln R = p R^p."""
+
+    log_factor: float
+
+    def __call__(self, p: float, derivative: int = 0) -> float:
+        """Its k-th derivative."""
+        log = self.log_factor
+        grown = derivative * log ** max(derivative - 1, 0) + p * log**derivative
+        return grown * math.exp(p * log)
+
+
+OfMoment = Power | Jump | JumpSlope
+
+
 @dataclass(frozen=True, eq=False)
 class Term:
     """One term of L(p): a coefficient of p times an operator Φ ⊗ ∫P_s g.
@@ -64,7 +81,7 @@ class Term:
     """
 
     order: int
-    of_p: Power | Jump
+    of_p: OfMoment
     phase: Any
     g: Coefficient | None
     text: str
@@ -72,21 +89,57 @@ class Term:
 
 def terms_of(system: System, space: CylinderSpace) -> Iterator[Term]:
     """L(p) of Eq. (19), term by term; those of φ alone are the same with any tilt."""
-    phi = space.phi
-    yield Term(0, Power(0), phi.identity, None, "L_ξ, the generator of the noise")
-    jump, mean = phi.right_trace - phi.left_trace, 0.5 * (phi.right_trace + phi.left_trace)
+    yield Term(0, Power(0), space.phi.identity, None, "L_ξ, the generator of the noise")
     is_exact, direction = _upwind(system, space)
-    trace = mean - _rows(0.5 * direction, jump)  # nothing is left of the other side: where ξ is large that would count
     for drive in system.drives:
-        size, text = system.epsilon**drive.order, _prefix(drive)
-        if not drive.h.vanishes:
-            along = size * (phi.convection(drive.h) + trace.T @ _rows(drive.h(phi.lines[:-1]), jump))
-            yield Term(drive.order, Power(0), along, drive.g, f"{text}{_written(drive.h)} ∂φ")
-        if not drive.q.vanishes:
-            yield Term(drive.order, Power(1), size * phi.mass(drive.q), drive.g, f"p {text}{_written(drive.q)}")
-    yield from _penalties(system, space, jump, is_exact, direction)
+        yield from _driven(drive, system.epsilon, space, direction)
+    yield from _penalties(system, space, is_exact, direction)
     for kick in system.kicks:
-        yield from _kicked(system, space, kick)
+        text = f"(R^p − 1) |dφ/dt| δ(φ − {kick.phase:.6g} mod π), R = {math.exp(kick.log_factor):.6g}"
+        for load, sign in _loads(system, space, kick):
+            size, flux = _flux_over(system, space, kick, sign)
+            yield Term(2, Jump(kick.log_factor), size * load, flux, text)
+
+
+def changed_terms(system: System, space: CylinderSpace, by: Direction) -> Iterator[Term]:
+    """∂L(p)/∂θ of the same terms where the motion and its kicks change with θ.
+
+    Where θ is the size of the speed for the typical ξ it is held: [T] = 0 there but for the error of the elements.
+    """
+    vertices, jump, text = space.phi.lines[:-1], _jump(space), "∂/∂θ"
+    is_exact, direction = _upwind(system, space)
+    for drive in by.drives:
+        yield from _driven(drive, system.epsilon, space, direction)
+    moved = Moved(system.epsilon, by.drives)
+    for j in np.flatnonzero(is_exact & (direction == 0)):
+        slope = partial(_change_of_size, system=system, moved=moved, phi=float(vertices[j]))
+        yield Term(0, Power(0), -0.5 * jump[[j]].T @ jump[[j]], slope, text)
+    for kick, change in zip(system.kicks, by.kicks or np.zeros(len(system.kicks)), strict=True):
+        for load, sign in _loads(system, space, kick):
+            if change:
+                size, flux = _flux_over(system, space, kick, sign)
+                yield Term(2, JumpSlope(kick.log_factor), change * size * load, flux, text)
+            if by.drives:
+                slope = partial(_change_of_flux, system=system, moved=moved, phi=kick.phase, sign=sign)
+                yield Term(2, Jump(kick.log_factor), load, slope, text)
+
+
+def _driven(drive: Drive, epsilon: float, space: CylinderSpace, direction: FloatArray) -> Iterator[Term]:
+    """h ∂φ with the loads at the φ-vertices, and p q."""
+    phi, jump = space.phi, _jump(space)
+    mean = 0.5 * (phi.right_trace + phi.left_trace)
+    trace = mean - _rows(0.5 * direction, jump)  # nothing is left of the other side: where ξ is large that would count
+    size, text = epsilon**drive.order, _prefix(drive)
+    if not drive.h.vanishes:
+        along = size * (phi.convection(drive.h) + trace.T @ _rows(drive.h(phi.lines[:-1]), jump))
+        yield Term(drive.order, Power(0), along, drive.g, f"{text}{_written(drive.h)} ∂φ")
+    if not drive.q.vanishes:
+        yield Term(drive.order, Power(1), size * phi.mass(drive.q), drive.g, f"p {text}{_written(drive.q)}")
+
+
+def _jump(space: CylinderSpace) -> Any:
+    """T(φ⁺) − T(φ⁻) at the φ-vertices."""
+    return space.phi.right_trace - space.phi.left_trace
 
 
 def _upwind(system: System, space: CylinderSpace) -> tuple[Any, FloatArray]:
@@ -99,9 +152,9 @@ def _upwind(system: System, space: CylinderSpace) -> tuple[Any, FloatArray]:
     return is_exact, np.where(is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0), 0.0)
 
 
-def _penalties(system: System, space: CylinderSpace, jump: Any, is_exact: Any, direction: FloatArray) -> Iterator[Term]:
+def _penalties(system: System, space: CylinderSpace, is_exact: Any, direction: FloatArray) -> Iterator[Term]:
     """−½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|."""
-    vertices, text = space.phi.lines[:-1], "upwind loads between cells"
+    vertices, jump, text = space.phi.lines[:-1], _jump(space), "upwind loads between cells"
     if not np.all(is_exact):
         typical = np.where(is_exact, 0.0, _typical_speed(system, space))
         yield Term(0, Power(0), -0.5 * jump.T @ _rows(typical, jump), one, text)
@@ -133,24 +186,46 @@ def _size_of_speed(xi: Any, system: System, phi: float) -> Any:
     return np.abs(phase_speed(system, xi)(phi))
 
 
-def _kicked(system: System, space: CylinderSpace, kick: Kick) -> Iterator[Term]:
-    """A kick's point load beyond continuity: |v| w(φ⁻) T(φ⁺) where the phase runs forward, else |v| w(φ⁺) T(φ⁻)."""
+def _change_of_size(xi: Any, system: System, moved: Moved, phi: float) -> Any:
+    """∂|dφ/dt|/∂θ at φ."""
+    return np.sign(phase_speed(system, xi)(phi)) * phase_speed(moved, xi)(phi)
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """∂/∂θ of a motion, as a motion."""
+
+    epsilon: float
+    drives: tuple[Drive, ...]
+    kicks: tuple[Kick, ...] = ()
+
+
+def _loads(system: System, space: CylinderSpace, kick: Kick) -> Iterator[tuple[Any, int]]:
+    """A kick's point loads beyond continuity: w(φ⁻) T(φ⁺) where the phase runs forward, 1, else w(φ⁺) T(φ⁻), −1."""
     at = space.phi.vertices_at(kick.phase)
     left, right = space.phi.left_trace[at], space.phi.right_trace[at]
-    text = f"(R^p − 1) |dφ/dt| δ(φ − {kick.phase:.6g} mod π), R = {math.exp(kick.log_factor):.6g}"
     speed = phase_speed(system, space.xi.support)(kick.phase)
-    if np.ptp(speed) <= 1e-12 * np.max(np.abs(speed)):
-        load = left.T @ right if speed[0] > 0 else right.T @ left
-        yield Term(2, Jump(kick.log_factor), abs(float(speed[0])) * load, one, text)
-        return
     for load, sign in ((left.T @ right, 1), (right.T @ left, -1)):
         if np.any(sign * speed > 0):
-            yield Term(2, Jump(kick.log_factor), load, partial(_flux, system=system, phi=kick.phase, sign=sign), text)
+            yield load, sign
+
+
+def _flux_over(system: System, space: CylinderSpace, kick: Kick, sign: int) -> tuple[float, Coefficient]:
+    """max(± dφ/dt, 0) at a kick: a number, times a function of ξ."""
+    speed = phase_speed(system, space.xi.support)(kick.phase)
+    if np.ptp(speed) <= 1e-12 * np.max(np.abs(speed)):
+        return abs(float(speed[0])), one
+    return 1.0, partial(_flux, system=system, phi=kick.phase, sign=sign)
 
 
 def _flux(xi: Any, system: System, phi: float, sign: int) -> Any:
     """max(± dφ/dt, 0) at φ."""
     return np.maximum(sign * phase_speed(system, xi)(phi), 0)
+
+
+def _change_of_flux(xi: Any, system: System, moved: Moved, phi: float, sign: int) -> Any:
+    """∂/∂θ of `_flux`."""
+    return np.where(sign * phase_speed(system, xi)(phi) > 0, sign * phase_speed(moved, xi)(phi), 0.0)
 
 
 def _rows(factors: FloatArray, matrix: Any) -> Any:

@@ -139,6 +139,17 @@ class System(Protocol):
         """The rays at which the state is stretched."""
 
 
+class Differentiable(System, Protocol):
+    """A motion that knows how it changes with its parameters."""
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The names of those it can be differentiated by."""
+
+    def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
+        """∂/∂θ of the sum of the drives, as drives, and ∂ ln R/∂θ of every kick, nothing where none changes."""
+
+
 @dataclass(frozen=True)
 class PlaneSystem:
     """A linear motion in the plane from its parts, see `System`.
@@ -171,6 +182,24 @@ class PlaneSystem:
             raise ValueError(
                 f"got {len(self.drives)} drives and epsilon = {self.epsilon}; needs one at least, and a positive number"
             )
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """ε."""
+        return ("epsilon",)
+
+    def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
+        """∂/∂ε."""
+        return by_epsilon(self), ()
+
+
+def by_epsilon(system: System) -> tuple[Drive, ...]:
+    """∂/∂ε of Σ ε^n g(ξ) A x, as drives."""
+    return tuple(
+        Drive(drive.order - 1, (drive.order * np.array(drive.matrix)).tolist(), drive.g)
+        for drive in system.drives
+        if drive.order
+    )
 
 
 def matrix_at(system: System, xi: ArrayLike, orders: slice = slice(None)) -> FloatArray:

@@ -7,6 +7,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Annotated, Self
 
+import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import model_validator
 from pydantic.dataclasses import dataclass
@@ -14,7 +15,7 @@ from pydantic.dataclasses import dataclass
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
-from fpsolve.model.plane import Drive, Kick
+from fpsolve.model.plane import Drive, Kick, by_epsilon
 
 IMPACT_PHASES = (math.pi / 2, 3 * math.pi / 2)
 """φ in [0, 2π] where cos φ = 0: the mass is at the wall."""
@@ -123,6 +124,34 @@ class VibroImpactOscillator:
     def kicks(self) -> tuple[Kick, ...]:
         """The impacts, where cos φ = 0; to the order ε² both laws lose 1 − r."""
         return (Kick(math.pi / 2, self.log_impact_factor, -self._loss),)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """ω, r, c₁ and ε; c₂ and c₃ are not in the linear motion."""
+        return "omega", "restitution", "c1", "epsilon"
+
+    def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
+        """∂/∂θ of the drives and of ln R for one of the `parameters`."""
+        bounce = 1.0 if self.impact == ImpactLaw.DELTA else 1 / (1 - self._loss)
+        match name:
+            case "omega":
+                return (Drive(0, ((0.0, 1.0), (-1.0, 0.0))),), ()
+            case "c1":
+                return (Drive(2, DAMPING),), ()
+            case "restitution":
+                return (), (self.epsilon**2 * bounce,)
+            case _:
+                return by_epsilon(self), (-2 * self.epsilon * (1 - self.restitution) * bounce,)
+
+    def restitution_of(self, log_factor: float) -> float:
+        """The r for which this law, with this ε, has a given ln R; it may be no coefficient of restitution."""
+        with np.errstate(over="ignore"):
+            loss = -log_factor if self.impact == ImpactLaw.DELTA else -float(np.expm1(log_factor))
+        return 1 - loss / self.epsilon**2
+
+    def restitution_slope(self, log_factor: float) -> float:
+        """dr/d ln R of this law at a given ln R."""
+        return (1.0 if self.impact == ImpactLaw.DELTA else math.exp(log_factor)) / self.epsilon**2
 
     def h2(self, phi: ArrayLike) -> FloatArray:
         """h₂(φ) = c₁ h₁(φ); the impact adds nothing, as sin 2φ vanishes where it acts."""

@@ -64,4 +64,4 @@ def _noun(annotation: Any, plural: str = "") -> str:
         return f"list{plural} of {_noun(arguments[0], 's')}"
     if origin is dict:
         return f"table{plural} of {_noun(arguments[1], 's')}"
-    return _NOUNS[annotation] + plural
+    return _NOUNS.get(annotation, "value") + plural

@@ -9,12 +9,16 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
+from fpsolve.case.vary import PARAMETERS
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import INDICES, QUANTITIES, Index
-from fpsolve.output.plots import Series, write_figure, write_response_figure
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, QUANTITIES, Index
+from fpsolve.model.parameters import symbol_of
+from fpsolve.output.plots import Series, write_bars, write_figure, write_response_figure
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.theory.perturbation import second_order
+from fpsolve.theory.perturbation import scale_of, second_order
 
+MOST_BARS = 4
+"""Of so many p sensitivities are drawn."""
 Pair = tuple[CurveResult, SimulatedCurve | None]
 
 
@@ -26,6 +30,23 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     pictures = [folder / "figure.png", folder / "figure.pdf"]
     quantity = QUANTITIES[case.figure.y]
     write_figure(series, case.figure.x, quantity, case.headline, pictures, is_reduced=case.is_exact)
+
+
+def draw_sensitivities(case: Case, result: CurveResult, folder: Path) -> None:
+    """Draw sensitivities.png and .pdf of a curve: θ ∂Λ(p)/∂θ of some p, and that of λ, over the scale of each."""
+    found = result.sensitivities
+    if found is None:
+        return
+    scale, bars = scale_of(result.curve.problem), dict[str, list[float]]()
+    rows = [(float(p), slopes) for p, slopes in zip(found.p, found.moments, strict=True) if p and slopes]
+    chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_BARS)).round().astype(int))
+    if exponent := found.indices.get(LYAPUNOV_EXPONENT.name):
+        bars[r"$\lambda$"] = [found.theta[key] * exponent[key].value / scale.linear for key in exponent]
+    for p, slopes in (rows[i] for i in chosen):
+        label = rf"$\Lambda({p:g})$"
+        bars[label] = [found.theta[key] * slopes[key].value / float(scale.moment(p)) for key in slopes]
+    pictures = [folder / f"sensitivities{result.curve.suffix}.{ending}" for ending in ("png", "pdf")]
+    write_bars(bars, [symbol_of(PARAMETERS[key]) for key in found.theta], case.heading(result.curve), pictures)
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
@@ -68,7 +89,7 @@ def _index_series(case: Case, index: Index, others: dict[str, float], group: Seq
     y = np.array([np.nan if estimate is None else estimate.value for estimate in found])
     line = np.linspace(x.min(), x.max(), 200)
     curves = [case.curve({**others, case.figure.x: float(value)}) for value in line]
-    line_y = np.array([index.theory(second_order(curve.problem)) for curve in curves])
+    line_y = np.array([index.theory(curve.problem) for curve in curves])
     line_y[(line_y < index.interval[0]) | (line_y > index.interval[1])] = np.nan
     samples = [(each, sample.estimates.get(index.name)) for each, (_, sample) in zip(x, group, strict=True) if sample]
     return Series(others, x, y, line, line_y, _columns([(each, *sample) for each, sample in samples if sample]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +21,7 @@ from fpsolve.model.parameters import axis_title, symbol_of
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
 
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
 _ROOT: dict[str, Any] = {"marker": "|", "linestyle": "none", "markersize": 16, "markeredgewidth": 2.2, "zorder": 4}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
@@ -63,9 +63,9 @@ def write_figure(
         paths: .png, .pdf or what else matplotlib writes.
         is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
-    with _canvas(paths) as figure:
+    with canvas(paths) as figure:
         axes = figure.add_subplot(xlabel=axis_title(ABSCISSAE[x]), ylabel=y.title)
-        axes.set_title(_filled(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
+        axes.set_title(filled(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         for i, item in enumerate(series):
             _draw(axes, item, i)
@@ -74,12 +74,27 @@ def write_figure(
         axes.margins(x=0.03)
 
 
+def write_bars(bars: Mapping[str, Sequence[float]], names: Sequence[str], title: str, paths: Sequence[Path]) -> None:
+    """Draw groups of bars, one group for each name, and in it one bar for each label."""
+    with canvas(paths) as figure:
+        axes = figure.add_subplot(xlabel=r"$\theta\,\partial/\partial\theta$ over the scale")
+        axes.set_title(filled(title, 80), parse_math=False)
+        axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
+        height, middles = 0.8 / max(len(bars), 1), np.arange(len(names))
+        for i, (label, values) in enumerate(bars.items()):
+            places = middles + (i - 0.5 * (len(bars) - 1)) * height
+            axes.barh(places, values, 0.9 * height, color=COLOURS[i % len(COLOURS)], label=label)
+        axes.set_yticks(middles, names)
+        axes.invert_yaxis()
+        figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=11)
+
+
 def write_response_figure(response: Response, title: str, paths: Sequence[Path]) -> None:
     """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors."""
     share = np.cumsum(response.amplitude_density * np.diff(response.amplitude_edges))
     seen = float(response.amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
-    with _canvas(paths, width=10.5) as figure:
-        figure.suptitle(_filled(title, 100), fontsize=12, parse_math=False)
+    with canvas(paths, width=10.5) as figure:
+        figure.suptitle(filled(title, 100), fontsize=12, parse_math=False)
         plane, radial = figure.subplots(1, 2)
         picture = _draw_plane(plane, response, seen)
         figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$ (time/length²)")
@@ -87,7 +102,7 @@ def write_response_figure(response: Response, title: str, paths: Sequence[Path])
         _draw_amplitude(radial, response, seen)
 
 
-def _filled(text: str, width: int) -> str:
+def filled(text: str, width: int) -> str:
     """A text in lines that fit, each of its own lines for itself."""
     return "\n".join(fill(line, width) for line in text.splitlines())
 
@@ -108,15 +123,15 @@ def _draw_amplitude(axes: Any, response: Response, seen: float) -> None:
     """The density of the amplitude as a line in a band."""
     edges, density, error = response.amplitude_edges, response.amplitude_density, response.amplitude_error
     middle, low, high = (edges[1:] + edges[:-1]) / 2, density - 2 * error, density + 2 * error
-    axes.fill_between(middle, low, high, color=_COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")
-    axes.plot(middle, density, color=_COLOURS[0], linewidth=1.6, label="simulation")
+    axes.fill_between(middle, low, high, color=COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")
+    axes.plot(middle, density, color=COLOURS[0], linewidth=1.6, label="simulation")
     axes.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$ (length)", ylabel="density of $A$ (1/length)")
     axes.set(xlim=(0, seen), ylim=(0, 1.25 * high.max()))
     axes.legend(frameon=False, fontsize=11, loc="upper right")
 
 
 @contextmanager
-def _canvas(paths: Sequence[Path], width: float = 7.2) -> Iterator[Any]:
+def canvas(paths: Sequence[Path], width: float = 7.2, height: float = 5.0) -> Iterator[Any]:
     """An empty figure in the house style, which is written to the paths in the end."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -124,7 +139,7 @@ def _canvas(paths: Sequence[Path], width: float = 7.2) -> Iterator[Any]:
 
     logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
     with rc_context({"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12, "pdf.fonttype": 42}):
-        figure = Figure(figsize=(width, 5.0), dpi=160, layout="constrained")
+        figure = Figure(figsize=(width, height), dpi=160, layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
         figure.draw_without_rendering()  # lays it out, once for all formats
@@ -135,7 +150,7 @@ def _canvas(paths: Sequence[Path], width: float = 7.2) -> Iterator[Any]:
 
 
 def _draw(axes: Any, item: Series, i: int) -> None:
-    colour, marker = _COLOURS[i % len(_COLOURS)], _MARKERS[i % len(_MARKERS)]
+    colour, marker = COLOURS[i % len(COLOURS)], _MARKERS[i % len(_MARKERS)]
     label = ", ".join(f"{symbol_of(ABSCISSAE[key])} = {value:g}" for key, value in item.varied.items())
     axes.plot(item.line_x, item.line_y, color=colour, linewidth=1.6)
     axes.plot(

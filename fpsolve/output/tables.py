@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fpsolve import __version__
+from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import INDICES
-from fpsolve.files import atomic, write_json
+from fpsolve.exponent.error import MEANINGLESS, Estimate
+from fpsolve.exponent.quantities import INDICES, Index
+from fpsolve.files import write_csv, write_json
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.theory.perturbation import second_order
 
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
@@ -25,26 +24,27 @@ if TYPE_CHECKING:
 def write_results(case: Case, results: Sequence[CurveResult], folder: Path) -> None:
     """summary.json, which says whether all curves of the case are there, and moments.csv."""
     state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
-    write_json(folder / "summary.json", {**_head(case), **state, "curves": [_summary(result) for result in results]})
+    write_json(folder / "summary.json", {**head(case), **state, "curves": [_summary(result) for result in results]})
     columns = ["p", "value", "derivative", "perturbation", "error_estimate", "residual"]
     rows = ([*result.curve.varied.values(), *row.values()] for result in results for row in _rows(result))
-    _write_csv(folder / "moments.csv", [*case.vary, *columns], rows)
+    write_csv(folder / "moments.csv", [*case.vary, *columns], rows)
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
     """monte_carlo.json of a curve, and response.csv where there is a response."""
     suffix, response = simulated.curve.suffix, simulated.response
-    write_json(folder / f"monte_carlo{suffix}.json", {**_head(case), **_simulation_summary(simulated)})
+    write_json(folder / f"monte_carlo{suffix}.json", {**head(case), **_simulation_summary(simulated)})
     if response is None:
         return
     edges = response.amplitude_edges
     columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
     rows = (map(float, row) for row in zip(*columns, strict=True))
     header = ["amplitude_from", "amplitude_to", "density", "standard_error"]
-    _write_csv(folder / f"response{suffix}.csv", header, rows)
+    write_csv(folder / f"response{suffix}.csv", header, rows)
 
 
-def _head(case: Case) -> dict[str, str]:
+def head(case: Case) -> dict[str, str]:
+    """What every table begins with."""
     return {"case": case.name, "title": case.title, "fpsolve_version": __version__}
 
 
@@ -53,11 +53,11 @@ def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
 
 
 def _summary(result: CurveResult) -> dict[str, Any]:
-    theory = second_order(result.curve.problem)
     return {
         **_parameters(result.curve),
         "moments": _rows(result),
-        **{name: _estimate(result.estimates[name], index.theory(theory)) for name, index in INDICES.items()},
+        **{name: _estimate(result, index) for name, index in INDICES.items()},
+        "sensitivities": None if result.sensitivities is None else _sensitivities(result.sensitivities),
         "discretisation": result.discretisation,
         "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
         "notes": list(result.notes),
@@ -79,10 +79,29 @@ def _rows(result: CurveResult) -> list[dict[str, float | None]]:
     return [dict(zip(known, row, strict=True)) for row in zip(*known.values(), strict=True)]
 
 
-def _estimate(estimate: Estimate | None, theory: float) -> dict[str, float] | None:
+def _estimate(result: CurveResult, index: Index) -> dict[str, float | None] | None:
+    """An index beside its perturbation theory, null where that overflows."""
+    estimate = result.estimates[index.name]
     if estimate is None:
         return None
-    return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": theory}
+    theory = index.theory(result.curve.problem)
+    perturbation = theory if math.isfinite(theory) else None
+    return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": perturbation}
+
+
+def _sensitivities(found: Sensitivities) -> dict[str, Any]:
+    """∂/∂θ by the key of θ, null where its error leaves it no meaning, and the estimates of these errors alike."""
+
+    def numbers(of: Callable[[Estimate], float]) -> dict[str, Any]:
+        def row(slopes: Slopes) -> dict[str, float | None]:
+            return {key: of(each) if each.relative_error <= MEANINGLESS else None for key, each in slopes.items()}
+
+        moments = zip(found.p.tolist(), found.moments, strict=True)
+        indices = {name: row(found.indices[name]) if name in found.indices else None for name in DIFFERENTIATED}
+        return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
+
+    errors = numbers(lambda each: each.error_estimate)
+    return {**numbers(lambda each: each.value), "error_estimates": errors}
 
 
 def _simulation_summary(simulated: SimulatedCurve) -> dict[str, Any]:
@@ -112,10 +131,3 @@ def _response_summary(response: Response) -> dict[str, Any]:
 
 def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
     return {name: {"value": value, "standard_error": error} for name, (value, error) in numbers.items()}
-
-
-def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
-    with atomic(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(columns)
-        table.writerows(rows)

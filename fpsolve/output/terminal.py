@@ -13,11 +13,19 @@ from rich.text import Text
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, VARIANCE_RATE, Quantity
+from fpsolve.exponent.quantities import (
+    CRITICAL_RESTITUTION,
+    IMPACT_RATE,
+    INDICES,
+    LYAPUNOV_EXPONENT,
+    MOMENT,
+    STABILITY_INDEX,
+    VARIANCE_RATE,
+    Quantity,
+)
+from fpsolve.study.chart import Chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.theory.far import grows_far_out
-from fpsolve.theory.perturbation import second_order
 
 
 def print_results(case: Case, results: Sequence[CurveResult]) -> None:
@@ -28,7 +36,8 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
             if result.moments.p.size:
                 console.print(_moment_table(case, result))
             if any(result.estimates.values()):
-                _print_lines(console, [*_packed(_indices(result), console.width), ""])
+                lines = [line for group in _indices(result) for line in _packed(group, console.width)]
+                _print_lines(console, [*lines, ""])
     else:
         console.print(_curve_table(case, results))
     print_warnings(case, results)
@@ -162,13 +171,15 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
     return table
 
 
-def _indices(result: CurveResult) -> list[str]:
-    """λ, δ_p and Λ″(0), each with its error."""
-    parts = []
+def _indices(result: CurveResult) -> list[list[str]]:
+    """λ, δ_p and Λ″(0), each with its error, and apart from them what concerns impacts."""
+    groups: list[list[str]] = [[]]
     for name, estimate in result.estimates.items():
         error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
-        parts.append(f"{INDICES[name].symbol} = {_digits_of(estimate, result, most=9)}{error}")
-    return parts
+        if name == IMPACT_RATE.name:
+            groups.append([])
+        groups[-1].append(f"{INDICES[name].symbol} = {_digits_of(name, result, most=9)}{error}")
+    return groups
 
 
 def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
@@ -179,10 +190,9 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     table = _table(case.headline, *names, *headings)
     _explain_star(table, case)
     for result in results:
-        theory = second_order(result.curve.problem)
         row = [f"{value:g}" for value in result.curve.varied.values()]
         for index in indices:
-            row += [_digits_of(result.estimates[index.name], result, most=7), f"{index.theory(theory):.6g}"]
+            row += [_digits_of(index.name, result, most=7), f"{index.theory(result.curve.problem):.6g}"]
         table.add_row(*row)
     return table
 
@@ -190,6 +200,28 @@ def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
 def _theory(case: Case, quantity: Quantity) -> str:
     """Heading of a column of perturbation theory, starred where it has another noise than the solution."""
     return f"Eq. {quantity.equation}{'*' if case.is_exact else ''}"
+
+
+def print_chart(case: Case, chart: Chart) -> None:
+    """The special points of every line, and what the regions are."""
+    assert case.chart is not None
+    names = (axis.key.partition(".")[2] for axis in (case.chart.x, case.chart.y))
+    table = _table(case.headline, Column("line"), "branch", "points", *names, Column("special point"))
+    for line in chart.lines:
+        for number, branch in enumerate(line.branches, start=1):
+            special = [i for i, label in enumerate(branch.labels) if label]
+            count = f"{branch.x.size}{', closed' if branch.closed else ''}"
+            table.add_row(line.zero.equation, str(number), count, "", "", "", end_section=not special)
+            for i in special:
+                place = f"{branch.x[i]:.7g}", f"{branch.y[i]:.7g}"
+                label = branch.labels[i].replace("oscillator.", "").replace("noise.", "")
+                table.add_row("", "", "", *place, label, end_section=i == special[-1])
+    console = Console()
+    console.print(table)
+    for region in () if chart.regions is None else chart.regions.each:
+        console.print(f"{region.share:5.1%}  {region.name}", highlight=False)
+    for text in chart.remarks:
+        print_remark(f"note: {case.name}: {text}", "cyan")
 
 
 def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
@@ -227,9 +259,11 @@ def _explain_star(table: Table, case: Case) -> None:
         table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
 
 
-def _digits_of(estimate: Estimate | None, result: CurveResult, most: int) -> str:
+def _digits_of(name: str, result: CurveResult, most: int) -> str:
+    estimate = result.estimates[name]
     if estimate is None:
-        return "none" if grows_far_out(result.curve.problem) else "none found"
+        is_told = name == CRITICAL_RESTITUTION.name or grows_far_out(result.curve.problem)
+        return "none" if is_told else "none found"
     return digits(estimate.value, estimate.error_estimate, most)
 
 

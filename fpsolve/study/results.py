@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.curves import Curve
 from fpsolve.case.sections import Expectation
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
-from fpsolve.exponent.solver import Failure, MomentLyapunov
+from fpsolve.exponent.solver import MomentLyapunov
 
 if TYPE_CHECKING:  # numba takes half a second to import
     from fpsolve.simulation.estimators import MonteCarlo
@@ -34,6 +35,7 @@ class CurveResult:
         warnings: what limits these numbers.
         notes: where the theories compared with are not valid.
         failures: why some p are missing.
+        sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
     """
 
     curve: Curve
@@ -46,6 +48,7 @@ class CurveResult:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     failures: tuple[Failure, ...] = ()
+    sensitivities: Sensitivities | None = None
 
     @property
     def lyapunov_exponent(self) -> Estimate | None:

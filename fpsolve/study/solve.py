@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.analysis.density import negative_share, stationary_density
+from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
@@ -19,10 +20,10 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
 from fpsolve.exponent.moments import solve_moments
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
-from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model.direction import directions
 from fpsolve.study.results import Comparison, CurveResult
 from fpsolve.theory import validity
 from fpsolve.theory.perturbation import second_order
@@ -37,17 +38,19 @@ class Wanted:
         indices: names of `INDICES`.
         shown: the p whose eigenfunctions are kept.
         density: whether the stationary density is.
+        sensitivities: whether derivatives by the parameters are wanted, too.
     """
 
     p: FloatArray
     indices: tuple[str, ...]
     shown: tuple[float, ...] = ()
     density: bool = False
+    sensitivities: bool = False
 
 
 def everything(case: Case, curve: Curve) -> Wanted:
-    """All moments and indices, and the eigenfunctions to be drawn."""
-    return Wanted(case.p, tuple(INDICES), tuple(case.shown), density=True)
+    """All moments and indices, their sensitivities, and the eigenfunctions to be drawn."""
+    return Wanted(case.p, tuple(INDICES), tuple(case.shown), density=True, sensitivities=True)
 
 
 def expected(case: Case, curve: Curve) -> Wanted:
@@ -92,13 +95,16 @@ def _solve_curve(
 ) -> CurveResult:
     solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
     moments = solve_moments(solver, wanted.p, progress=progress)
-    estimates, missing = _solve_indices(solver, wanted.indices, moments)
+    estimates, missing, absent = _solve_indices(solver, wanted.indices, moments)
     attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
     pairs = tuple(pair for pair in attempts if pair is not None)
     stationary = _pair(solver, 0.0) if wanted.density else None
     lost = _lost(stationary, solver.near.refinement)
     warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None)]
     warnings += lost or _unresolved(pairs)
+    slopes = _sensitivities(solver, curve, moments, estimates) if wanted.sensitivities else None
+    notes = [*_notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]), *absent]
+    notes += slopes.notes if slopes else ()
     return CurveResult(
         curve=curve,
         moments=moments,
@@ -106,21 +112,23 @@ def _solve_curve(
         estimates=estimates,
         eigenpairs=pairs,
         stationary=None if lost else stationary,
-        discretisation=None if (used := solver.near.largest()) is None else _discretisation(*used),
+        discretisation=_discretisation(solver),
         warnings=tuple(map(in_words_of_a_case, warnings)),
-        notes=tuple(map(in_words_of_a_case, _notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]))),
+        sensitivities=slopes,
+        notes=tuple(map(in_words_of_a_case, notes)),
         failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),
     )
 
 
 def _solve_indices(
     solver: ExponentSolver, names: Sequence[str], moments: MomentLyapunov
-) -> tuple[dict[str, Estimate | None], list[str]]:
-    """Indices, δ_p first, None for those not asked for; and why some of those asked for are missing."""
+) -> tuple[dict[str, Estimate | None], list[str], list[str]]:
+    """Indices, δ_p first, None for those not asked for; why some of those asked for are missing, or do not exist."""
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
     failed: dict[str, list[str]] = {}
+    absent: dict[str, list[str]] = {}
     missing = []
-    for index in (STABILITY_INDEX, LYAPUNOV_EXPONENT, VARIANCE_RATE):
+    for index in sorted(INDICES.values(), key=lambda index: index != STABILITY_INDEX):
         if index.name not in names:
             continue
         try:
@@ -130,11 +138,30 @@ def _solve_indices(
             continue
         if isinstance(found, Estimate):
             estimates[index.name] = found
+        elif index != STABILITY_INDEX:
+            absent.setdefault(found.reason, []).append(index.symbol)
         elif found.reason != validity.NO_INDEX:  # of which a note tells
             missing.append(f"no stability index: {found.reason}")
     told = {failure.reason: f"as there is no Λ({failure.p:g})" for failure in moments.failures if failure.p is not None}
-    reasons = {reason: told.get(reason, reason) for reason in failed}
-    return estimates, missing + [f"no {', '.join(failed[each])}: {reason}" for each, reason in reasons.items()]
+    failed = {told.get(reason, reason): symbols for reason, symbols in failed.items()}
+    warnings, notes = (
+        [f"no {', '.join(symbols)}: {reason}" for reason, symbols in each.items()] for each in (failed, absent)
+    )
+    return estimates, missing + warnings, notes
+
+
+def _sensitivities(
+    solver: ExponentSolver, curve: Curve, moments: MomentLyapunov, estimates: Mapping[str, Estimate | None]
+) -> Sensitivities:
+    """The derivatives of what was found by all parameters of the case."""
+    index = estimates[STABILITY_INDEX.name]
+    return solve_sensitivities(
+        solver,
+        moments.p,
+        directions(curve.problem, curve.original_noise),
+        indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
+        root=None if index is None else index.value,
+    )
 
 
 def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:
@@ -203,8 +230,13 @@ def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
     return Comparison(expectation, dict(result.curve.varied), value, tolerance, met)
 
 
-def _discretisation(p: float, generator: Generator) -> dict[str, Any]:
-    """That of one p, z in noise units."""
+def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
+    """That of the p of the largest size that was solved, z in noise units; None where none was."""
+    known = solver.near.known
+    p = max(known, key=abs, default=None)
+    if p is None:
+        return None
+    generator = known[p].pair.generator
     chosen, noise = generator.chosen, generator.problem.noise
     interval = {"xi_min": float(chosen.z_lines[0]), "xi_max": float(chosen.z_lines[-1])} if chosen.z_lines.size else {}
     return {

@@ -49,10 +49,14 @@ class SecondOrder:
     Attributes:
         linear_terms: what is linear in p: damping of each order, impacts, noise.
         quadratic: the coefficient of p².
+        half_turns: how often per unit time the phase passes a ray, ω/π.
+        log_factor: the sum of all ln R.
     """
 
     linear_terms: tuple[float, ...]
     quadratic: float
+    half_turns: float
+    log_factor: float
 
     def moment_exponent(self, p: ArrayLike) -> Any:
         """ε²Λ₂(p), Eq. (37); an array for an array of p."""
@@ -73,6 +77,22 @@ class SecondOrder:
     def variance_rate(self) -> float:
         """ε²Λ₂″(0), from Eq. (37): the growth rate of the variance of ln ‖x‖."""
         return 2 * self.quadratic
+
+    @property
+    def impact_rate(self) -> float:
+        """N = ∂λ/∂ ln R of Eq. (39), where there is one ray of impacts."""
+        return self.half_turns
+
+    @property
+    def critical_log_factor(self) -> float:
+        """ln R with which λ of Eq. (39) is 0."""
+        return self.log_factor - self.lyapunov_exponent / self.half_turns
+
+    @property
+    def critical_impact_factor(self) -> float:
+        """R with which λ of Eq. (39) is 0; ∞ where it is beyond floating-point numbers."""
+        with np.errstate(over="ignore"):
+            return float(np.exp(self.critical_log_factor))
 
     @property
     def scale(self) -> Scale:
@@ -103,10 +123,12 @@ def second_order(problem: Problem) -> SecondOrder:
     if abs(noise.mean) > 1e-12 * noise.standard_deviation:
         raise NoPerturbationTheory(f"perturbation theory is for noise of mean 0, but it has {noise.mean:g}")
     q, strength = _growth(driven, frame), system.epsilon**2 * noise.spectral_density(2 * omega)
-    terms += [omega / math.pi * kick.second_order for kick in system.kicks]
+    half_turns, log_factors = omega / math.pi, [kick.second_order for kick in system.kicks]
+    terms += [half_turns * log_factor for log_factor in log_factors]
     terms.append(strength / 2 * q.amplitude**2)
     at_rest = system.epsilon**2 * noise.spectral_density(0.0)
-    return SecondOrder(tuple(map(float, terms)), float(at_rest / 2 * q.mean**2 + strength / 4 * q.amplitude**2))
+    quadratic = float(at_rest / 2 * q.mean**2 + strength / 4 * q.amplitude**2)
+    return SecondOrder(tuple(map(float, terms)), quadratic, half_turns, float(sum(log_factors)))
 
 
 def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: ArrayLike) -> FloatArray:

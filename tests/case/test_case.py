@@ -116,6 +116,9 @@ THEORY: dict[str, Callable[..., Any]] = {
     "stability_index": perturbation.stability_index,
     "lyapunov_exponent": perturbation.lyapunov_exponent,
     "variance_rate": perturbation.variance_rate,
+    "impact_rate": perturbation.impact_rate,
+    "critical_impact_factor": perturbation.critical_impact_factor,
+    "critical_restitution": perturbation.critical_restitution,
 }
 
 

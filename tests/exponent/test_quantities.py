@@ -9,7 +9,6 @@ from fpsolve.exponent.quantities import INDICES, QUANTITIES, DrawnName, Quantity
 from fpsolve.model.noise import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.theory.perturbation import second_order
 from tests.conftest import FIG1, FIG1_NOISE
 from tests.oracles import perturbation
 
@@ -27,7 +26,7 @@ def test_every_name_of_a_case_has_a_record():
 
 @pytest.mark.parametrize("name", INDICES)
 def test_every_index_is_solved_and_approximated(name, fig1_solver):
-    theory = INDICES[name].theory(second_order(fig1_solver.problem))
+    theory = INDICES[name].theory(fig1_solver.problem)
     assert theory == pytest.approx(getattr(perturbation, name)(FIG1, WEAK_NOISE), rel=1e-12)
     for root in (None, -0.36):
         assert INDICES[name].solve(fig1_solver, root).value == pytest.approx(theory, rel=5e-3)

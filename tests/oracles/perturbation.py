@@ -79,6 +79,28 @@ def lyapunov_scale(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> f
     return oscillator.epsilon**2 / 8 * (s2 + 4 * (abs(oscillator.c1) + _mean_loss(oscillator)))
 
 
+def impact_rate(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+    """N of Eq. (36): two impacts in a turn, 2π/ω."""
+    return oscillator.omega / math.pi
+
+
+def _noise_and_damping(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+    """λ of Eq. (39) without impacts."""
+    return oscillator.epsilon**2 / 8 * (_spectral_densities(oscillator, noise)[1] + 4 * oscillator.c1)
+
+
+def critical_impact_factor(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+    """The R that makes up for noise and damping within half a turn."""
+    return math.exp(-_noise_and_damping(oscillator, noise) * math.pi / oscillator.omega)
+
+
+def critical_restitution(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+    """The r with this R, by either law."""
+    factor = critical_impact_factor(oscillator, noise)
+    loss = -math.log(factor) if oscillator.impact == "delta" else 1 - factor
+    return 1 - loss / oscillator.epsilon**2
+
+
 def variance_rate(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
     """ε²Λ₂″(0) = ε²(S(2ω) + 2S(0))/8, from Eq. (37): the growth rate of the variance of ln ‖x‖."""
     s0, s2 = _spectral_densities(oscillator, noise)

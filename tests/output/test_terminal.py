@@ -27,7 +27,7 @@ def test_quantities_are_whole(case, width, capsys, monkeypatch):
     results, simulated = tuple(solve_curves(case)), tuple(simulate_curves(case))
     capsys.readouterr()
     for show, names in (
-        (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)"}),
+        (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)", "N", "R_c"}),
         (lambda: print_simulation(case, simulated), {"λ", "Λ″(0)", *simulated[0].response.means}),
     ):
         show()

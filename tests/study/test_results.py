@@ -90,14 +90,14 @@ def test_results_are_frozen(result):
 
 
 def test_what_did_not_converge_is_printed_once(case, tmp_path, capsys):
-    """No empty table, and one sentence for λ and Λ″(0), which fail for one reason."""
+    """No empty table, and one sentence for all indices, which fail for one reason."""
     tight = ["--set", "budget.unknowns=100", "--set", "oscillator.epsilon=2.0", "--set", "moments.p=[9.0]"]
     assert main(["run", str(case.path), "--out", str(tmp_path), *tight]) == 3
     printed = capsys.readouterr()
     assert "┃" not in printed.out
     said = " ".join(printed.err.split())
     assert said.count("p near 0 goes with p = 0.01") == 1
-    assert "no δ_p, λ, Λ″(0): p near 0 goes with p = 0.01: Λ(0.01) did not converge" in said
+    assert "no δ_p, λ, Λ″(0), N, R_c, r_c: p near 0 goes with p = 0.01: Λ(0.01) did not converge" in said
     assert "[mesh]" not in said  # there is none
 
 

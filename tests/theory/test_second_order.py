@@ -32,6 +32,8 @@ def test_the_papers_equations_are_an_instance(noise, law):
         (theory.lyapunov_exponent, perturbation.lyapunov_exponent(oscillator, noise)),
         (theory.scale.linear, perturbation.lyapunov_scale(oscillator, noise)),
         (theory.variance_rate, perturbation.variance_rate(oscillator, noise)),
+        (theory.impact_rate, perturbation.impact_rate(oscillator, noise)),
+        (theory.critical_impact_factor, perturbation.critical_impact_factor(oscillator, noise)),
     ):
         np.testing.assert_allclose(ours, paper, rtol=1e-13, atol=1e-16)
     phi, xi = np.linspace(0, 6, 7)[:, None], np.linspace(-2, 2, 5)

@@ -1,0 +1,115 @@
+"""The regions into which lines of stability divide a frame, with their names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fpsolve.analysis.continuation import Scan
+from fpsolve.analysis.stability import Boundary
+from fpsolve.analysis.zero import Zero
+from fpsolve.arrays import FloatArray
+
+FINE = 16
+"""Pieces into which a cell of a scan is divided for a picture."""
+_ORDINALS = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth"}
+P_BIFURCATIONS = {-1.0: "hump of the amplitude density", -2.0: "crater of the joint density"}
+"""What the stationary response of the nonlinear oscillator shows where λ > 0 and δ_p is below a value.
+
+Near a = 0 its amplitude density is a^(−δ_p − 1) and its joint density of (x, ẋ) is a^(−δ_p − 2).
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Part of a frame, in one piece or in several.
+
+    Attributes:
+        name: "almost surely stable, second moment unstable".
+        signs: that of F for each line, by the name of its `Zero`.
+        share: of the frame.
+        at: a point well inside, in shares of the sides of the frame.
+    """
+
+    name: str
+    signs: dict[str, int]
+    share: float
+    at: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """All of them.
+
+    Attributes:
+        each: from the largest to the smallest.
+        index: which of them is where, on a fine grid of the frame, u first, shape (n, n); −1 where F does not exist.
+    """
+
+    each: tuple[Region, ...]
+    index: FloatArray
+
+
+def regions(lines: Sequence[Boundary]) -> Regions:
+    """The regions of lines that were all sought in one scan of the frame."""
+    scans = [line.scan for line in lines if line.scan is not None]
+    values = np.stack([interpolated(scan) for scan in scans])
+    signs = np.where(values > 0, 1, -1)
+    exists = np.all(np.isfinite(values), axis=0)
+    kinds = np.unique(signs[:, exists].T, axis=0)
+    shares = [np.mean(exists & _equal(signs, kind)) for kind in kinds]
+    order = np.argsort(shares)[::-1]
+    index, each = np.full(exists.shape, -1), []
+    for number, k in enumerate(order):
+        inside = exists & _equal(signs, kinds[k])
+        index[inside] = number
+        name = name_of([line.zero for line in lines], kinds[k].tolist())
+        by_name = {line.zero.name: int(sign) for line, sign in zip(lines, kinds[k], strict=True)}
+        each.append(Region(name, by_name, float(shares[k]), _deepest(inside)))
+    return Regions(tuple(each), index)
+
+
+def name_of(zeros: Sequence[Zero], signs: Sequence[int]) -> str:
+    """What the signs of F mean: almost surely stable, second moment unstable, -2 < δ_p < -1.
+
+    The bounds of δ_p are left out where λ < 0 says as much.
+    """
+    parts, below, above = [], -math.inf, math.inf
+    for zero, sign in sorted(zip(zeros, signs, strict=True), key=lambda each: (each[0].kind == "moment", each[0].p)):
+        if zero.kind == "lyapunov_exponent":
+            parts.append("almost surely " + ("unstable" if sign > 0 else "stable"))
+            below = below if sign > 0 else 0.0
+        elif zero.kind == "moment":
+            name = f"{_ORDINALS[zero.p]} moment" if zero.p in _ORDINALS else f"moment {zero.p:g}"
+            parts.append(f"{name} {'unstable' if (sign > 0) == (zero.p > 0) else 'stable'}")
+        elif sign > 0:
+            above = min(above, zero.p)
+        else:
+            below = max(below, zero.p)
+    low, high = (f"{below:g} < " if math.isfinite(below) else ""), (f" < {above:g}" if math.isfinite(above) else "")
+    if (low or high) and below != 0:
+        parts.append(f"{low}δ_p{high}" if high else f"δ_p > {below:g}")
+    return ", ".join(parts)
+
+
+def interpolated(scan: Scan) -> FloatArray:
+    """F on a grid `FINE` times as fine as that of the scan, by bicubic interpolation."""
+    cells, s = scan.nodes.size - 1, (np.arange(FINE) + 0.5) / FINE
+    rows = [[scan.between(i, j, s[:, None], s[None]) for j in range(cells)] for i in range(cells)]
+    return np.block(rows)
+
+
+def _equal(signs: FloatArray, kind: FloatArray) -> FloatArray:
+    return np.asarray(np.all(signs == kind[:, None, None], axis=0))
+
+
+def _deepest(inside: FloatArray) -> tuple[float, float]:
+    """The point of a region that is farthest from its edges."""
+    from scipy.ndimage import distance_transform_edt
+
+    depth = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
+    i, j = np.unravel_index(int(np.argmax(depth)), depth.shape)
+    return (float(i) + 0.5) / inside.shape[0], (float(j) + 0.5) / inside.shape[1]

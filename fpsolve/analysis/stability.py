@@ -1,0 +1,263 @@
+"""Where stability ends: the lines λ = 0, Λ(p) = 0 and δ_p = v in a frame of two parameters.
+
+F is λ, or Λ(p)/p; δ_p = v is the line Λ(v) = 0. Its gradient is exact, see `analysis.sensitivity`, and every solve
+starts from that at the point before.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations, product
+
+import numpy as np
+from pydantic import ValidationError
+
+from fpsolve.analysis.continuation import LONGEST, SHORTEST, Scan, begun, found, scanned, traced
+from fpsolve.analysis.curve import Trace
+from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
+from fpsolve.analysis.zero import Axis, Quantity, Zero, said, zero_of
+from fpsolve.arrays import FloatArray, real_number
+from fpsolve.exponent.adapt import Budget
+from fpsolve.model.direction import Family
+from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.problem import Problem, of_problem
+
+SCAN_RTOL = 1e-5
+"""Of F on the grid of a scan."""
+NODES = 13
+"""Of a scan, each way."""
+LARGEST = 0.1
+"""Step that may be asked for, in sides of the frame."""
+ON_IT = 1e-4
+"""Distance, in sides of the frame, in which a point of a line is one of a branch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """One branch of a line.
+
+    Attributes:
+        x, y: the values of the two parameters, shape (n,).
+        width: how far the line may be off, |error of F|/|∇F|, as a share of the sides of the frame, shape (n,).
+        labels: what is special about a point: "leaves the frame", "fold in x", "fold in y", "crossing with moment 2",
+            "at noise.D0 = 1"; empty for ordinary ones.
+        closed: whether the last point is followed by the first.
+        obstacles: why it ends inside of the frame, if it does.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    width: FloatArray
+    labels: tuple[str, ...]
+    closed: bool = False
+    obstacles: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """A line F = 0 in a frame of two parameters; it pickles.
+
+    Attributes:
+        zero: what F is.
+        x, y: the frame.
+        family: the problems, one of which has the values of the other parameters.
+        traces: its branches, in shares of the sides of the frame.
+        scan: F on the grid in which they were looked for; None where they were started from points.
+        step: the longest step between two points, in sides of the frame.
+        budget: for a solve.
+    """
+
+    zero: Zero
+    x: Axis
+    y: Axis
+    family: Family
+    traces: tuple[Trace, ...] = ()
+    scan: Scan | None = None
+    step: float = LONGEST
+    budget: Budget = field(default_factory=Budget)
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """The branches in the parameters themselves."""
+        return tuple(self._branch(trace) for trace in self.traces)
+
+    @property
+    def quantity(self) -> Quantity:
+        """F over the unit square."""
+        return Quantity(self.zero, self.family, (self.x, self.y), self.budget)
+
+    def remark(self) -> str:
+        """That there is no line, if so."""
+        if self.traces or self.scan is None:
+            return ""
+        exists = np.isfinite(self.scan.values)
+        values = self.scan.values[exists]
+        if not values.size:
+            return f"{self.zero.symbol} exists nowhere in the frame"
+        if np.any(values > 0) and np.any(values < 0):
+            return f"no line {self.zero.equation} was found, though {self.zero.symbol} changes its sign in the frame"
+        where = "everywhere" if exists.all() else "wherever it exists"
+        return f"{self.zero.side(float(values[0]))} {where} in the frame"
+
+    def refined(self, step: float) -> Boundary:
+        """The same with shorter steps, in sides of the frame. Raises `ValueError`."""
+        middles = (trace.points[len(trace.points) // 2].sample.at for trace in self.traces)
+        return replace(self, step=_checked_step(step), traces=())._from(middles)
+
+    def extended(self, x: Axis | None = None, y: Axis | None = None) -> Boundary:
+        """Its branches in another, such as a wider, frame of the same parameters; branches elsewhere are not sought.
+
+        Raises:
+            ValueError: an axis is not of the same parameter, or out of its range.
+        """
+        other = replace(self, x=x or self.x, y=y or self.y, traces=(), scan=None)
+        if (other.x.key, other.y.key) != (self.x.key, self.y.key):
+            raise ValueError(f"a frame of {other.x.key}, {other.y.key}: use `started_from` for other parameters")
+        _check_axes(self.family, other.x, other.y)
+        seeds = (
+            np.array([other.x.share(x), other.y.share(y)])
+            for branch in self.branches
+            for x, y in zip(branch.x, branch.y, strict=True)
+        )
+        return other._from(seeds)
+
+    def started_from(self, branch: int, point: int, x: Axis, y: Axis) -> Boundary:
+        """The branch through one of its points in another pair of parameters; all others are held as they are there.
+
+        Raises:
+            ValueError: an axis is no parameter of the problem, or the point is not in the frame.
+        """
+        here = self.branches[branch]
+        values = {self.x.key: float(here.x[point]), self.y.key: float(here.y[point])}
+        family = self.family.at(values)
+        _check_axes(family, x, y)
+        theta = {axis.key: family.directions()[axis.key].theta for axis in (x, y)}
+        start = np.array([axis.share(theta[axis.key]) for axis in (x, y)])
+        if np.any((start < 0) | (start > 1)):
+            point_there = ", ".join(f"{key} = {value:g}" for key, value in theta.items())
+            raise ValueError(f"the point has {point_there}, which is not in the frame; choose a wider one")
+        return replace(self, x=x, y=y, family=family, traces=(), scan=None)._from([start])
+
+    def grown(self, progress: Callable[[], None] = lambda: None) -> Iterator[Boundary]:
+        """The scan, then one branch after the other: what there is so far, each time."""
+        rough = Quantity(self.zero, self.family, (self.x, self.y), self.budget, SCAN_RTOL)
+        nodes = NODES if self.scan is None else self.scan.nodes.size
+        scan = scanned(rough, nodes, progress)
+        now = replace(self, scan=scan, traces=())
+        yield now
+        for trace in found(self.quantity, scan, self.step):
+            now = replace(now, traces=(*now.traces, self._special(trace)))
+            yield now
+
+    def _from(self, seeds: Iterable[FloatArray]) -> Boundary:
+        """With the branches through some points of the lines."""
+        quantity, traces = self.quantity, list[Trace]()
+        for seed in seeds:
+            if np.any((seed < 0) | (seed > 1)) or any(trace.passes(seed, ON_IT) for trace in traces):
+                continue
+            start = begun(quantity, seed)
+            if start is not None and not any(trace.holds(start) for trace in traces):
+                traces.append(self._special(traced(quantity, start, self.step)))
+        return replace(self, traces=tuple(traces))
+
+    def _special(self, trace: Trace) -> Trace:
+        """A branch with its folds, and the points that the axes ask for."""
+        quantity = self.quantity
+        trace = with_folds(quantity, trace, ("x", "y"))
+        for number, axis in enumerate((self.x, self.y)):
+            wanted = [(axis.share(value), f"at {axis.key} = {value:.12g}") for value in axis.at]
+            trace = with_values(quantity, trace, number, wanted)
+        return trace
+
+    def _branch(self, trace: Trace) -> Branch:
+        at = np.array([point.sample.at for point in trace.points])
+        return Branch(
+            x=np.asarray(self.x.value(at[:, 0])),
+            y=np.asarray(self.y.value(at[:, 1])),
+            width=np.array([point.sample.width for point in trace.points]),
+            labels=tuple(point.label for point in trace.points),
+            closed=trace.closed,
+            obstacles=trace.obstacles,
+        )
+
+
+@of_problem
+def boundary(
+    problem: Problem,
+    zero: str | Mapping[str, float],
+    x: Axis,
+    y: Axis,
+    *,
+    original: NonGaussianNoise | None = None,
+    step: float = LONGEST,
+    nodes: int = NODES,
+    budget: Budget | None = None,
+) -> Boundary:
+    """The line λ = 0, Λ(p) = 0 or δ_p = v in a frame of two parameters.
+
+    Args:
+        problem: a motion and its noise, in one argument or two; its other parameters are held.
+        zero: "lyapunov_exponent", {"moment": p} or {"stability_index": v}.
+        x, y: the frame.
+        original: the noise of Eq. (7) that an Ornstein-Uhlenbeck noise is the reduction (12)-(14) of; then its
+            parameters are those of the frame.
+        step: the longest step between two points, in sides of the frame.
+        nodes: of the grid in which branches are looked for, each way.
+        budget: for a solve.
+
+    Raises:
+        ValueError: an axis is no parameter of the problem or out of its range, both are the same, or `zero`, `step` or
+            `nodes` is none of these.
+    """
+    family = Family(problem, original)
+    _check_axes(family, x, y)
+    if isinstance(nodes, bool) or not isinstance(nodes, int) or nodes < 2:
+        raise ValueError(f"got nodes = {nodes!r}; must be a whole number from 2")
+    empty = Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
+    line = Boundary(zero_of(zero), x, y, family, scan=empty, step=_checked_step(step), budget=budget or Budget())
+    *_, whole = line.grown()
+    return whole
+
+
+def _check_axes(family: Family, x: Axis, y: Axis) -> None:
+    """Refuse axes that span no frame. Raises `ValueError`."""
+    known = family.directions()
+    for axis in (x, y):
+        if not isinstance(axis, Axis):
+            raise ValueError(f"got {axis!r} as an axis; must be an Axis")
+        if axis.key not in known:
+            raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known) or 'none'}")
+        for name, value in (("start", axis.start), ("stop", axis.stop)):
+            try:
+                family.at({axis.key: value})
+            except ValidationError as failure:
+                if failure.errors()[0]["loc"]:  # of this parameter alone
+                    raise ValueError(f"got {axis.key} with {name} = {value:g}: {said(failure)}") from failure
+            except ValueError:  # elsewhere in the frame it may be one
+                continue
+    if x.key == y.key:
+        raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
+
+
+def _checked_step(step: float) -> float:
+    """A longest step. Raises `ValueError`."""
+    if not SHORTEST < real_number(step, "step") <= LARGEST:
+        raise ValueError(f"got step = {step:g}; must be above {SHORTEST:g} and up to {LARGEST:g} sides of the frame")
+    return float(step)
+
+
+def crossed(lines: Sequence[Boundary]) -> list[Boundary]:
+    """Lines in one frame, each with the points that it has in common with the others."""
+    new = defaultdict[tuple[int, int], list[Placed]](list)
+    for (i, one), (j, other) in combinations(enumerate(lines), 2):
+        fields = one.quantity, other.quantity
+        for (a, trace), (b, crossing) in product(enumerate(one.traces), enumerate(other.traces)):
+            for (place, point), (other_place, other_point) in crossings(trace, crossing, fields):
+                new[i, a].append((place, replace(point, label=f"crossing with {other.zero.name}")))
+                new[j, b].append((other_place, replace(other_point, label=f"crossing with {one.zero.name}")))
+    return [
+        replace(line, traces=tuple(with_points(trace, new[i, a]) for a, trace in enumerate(line.traces)))
+        for i, line in enumerate(lines)
+    ]

@@ -1,0 +1,225 @@
+"""What is zero on a line of stability: λ, or Λ(p)/p, over a frame of two parameters, with its exact gradient."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import ValidationError
+from pydantic.dataclasses import dataclass as checked_dataclass
+
+from fpsolve.analysis.curve import Sample
+from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
+from fpsolve.arrays import FloatArray, real_number
+from fpsolve.errors import FpsolveError, NoSuchExponent, Remedy
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.bordered import Bordered
+from fpsolve.exponent.error import Solution
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.direction import Direction, Family
+from fpsolve.model.noise import has_algebraic_tails
+from fpsolve.model.parameters import STRICT
+from fpsolve.model.problem import refuse_infinite
+
+_LOSS = "oscillator.restitution"
+RTOL = 1e-10
+"""Of F, relative to its scale."""
+
+
+@checked_dataclass(frozen=True, config=STRICT)
+class Axis:
+    """One side of a chart.
+
+    Args:
+        key: of a parameter, such as "oscillator.omega".
+        start, stop: its smallest and its largest value.
+        scale: "linear" or "log".
+        at: values at which the points of a line are wanted exactly.
+
+    Raises:
+        pydantic.ValidationError: start ≥ stop, or not positive on a log scale, or an `at` is not between them.
+    """
+
+    key: str
+    start: float
+    stop: float
+    scale: Literal["linear", "log"] = "linear"
+    at: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.start < self.stop:
+            raise ValueError(f"got start = {self.start}, stop = {self.stop}; must be start < stop; exchange the two")
+        if self.scale == "log" and self.start <= 0:
+            raise ValueError(f'got start = {self.start}; must be > 0 where scale = "log"; use scale = "linear"')
+        for value in self.at:
+            if not self.start <= value <= self.stop:
+                raise ValueError(f"got at = {value}; must be from start = {self.start} to stop = {self.stop}")
+
+    def value(self, share: Any) -> Any:
+        """The parameter at a share of the way from start to stop."""
+        if self.scale == "log":
+            value = self.start * (self.stop / self.start) ** np.asarray(share)
+        else:
+            value = self.start + (self.stop - self.start) * np.asarray(share)
+        return np.clip(value, self.start, self.stop)[()]
+
+    def share(self, value: float) -> float:
+        """The inverse of `value`."""
+        if self.scale == "log":
+            return math.log(value / self.start) / math.log(self.stop / self.start) if value > 0 else -math.inf
+        return (value - self.start) / (self.stop - self.start)
+
+    def slope(self, share: float) -> float:
+        """d value/d share."""
+        if self.scale == "log":
+            return float(self.value(share)) * math.log(self.stop / self.start)
+        return self.stop - self.start
+
+
+@dataclass(frozen=True)
+class Zero:
+    """What is zero on a line.
+
+    Attributes:
+        kind: of the quantity.
+        p: the order of the moment, or the value of δ_p; 0 for λ.
+    """
+
+    kind: Literal["lyapunov_exponent", "moment", "stability_index"]
+    p: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """ "lyapunov_exponent", "moment 2", "stability_index -1"."""
+        return self.kind if self.kind == "lyapunov_exponent" else f"{self.kind} {self.p:g}"
+
+    @property
+    def symbol(self) -> str:
+        """F, as a sentence has it."""
+        return "λ" if self.p == 0 else f"Λ({self.p:g})" if self.kind == "moment" else f"Λ({self.p:g})/({self.p:g})"
+
+    def side(self, value: float) -> str:
+        """What F of this sign means: Λ(2) < 0, δ_p > -1."""
+        if self.kind == "stability_index":  # Λ(p)/p increases from −∞ through 0 at δ_p
+            return f"δ_p {'>' if value < 0 else '<'} {self.p:g}"
+        return f"{self.symbol} {'<' if value * (self.p or 1.0) < 0 else '>'} 0"
+
+    @property
+    def equation(self) -> str:
+        """What holds on the line: λ = 0, Λ(2) = 0, δ_p = -1."""
+        return f"δ_p = {self.p:g}" if self.kind == "stability_index" else f"{self.symbol} = 0"
+
+
+def zero_of(value: str | Mapping[str, float]) -> Zero:
+    """What "lyapunov_exponent", {"moment": 2.0} or {"stability_index": -1.0} says. Raises `ValueError`."""
+    if value == "lyapunov_exponent":
+        return Zero("lyapunov_exponent")
+    if isinstance(value, Mapping) and len(value) == 1:
+        [(kind, p)] = value.items()
+        with suppress(ValueError):
+            if kind in ("moment", "stability_index") and real_number(p, kind) != 0:
+                return Zero(kind, float(p))  # type: ignore[arg-type]
+    raise ValueError(
+        f'got {value!r}; must be "lyapunov_exponent", {{"moment": p}} or {{"stability_index": v}} with a number != 0'
+    )
+
+
+def said(failure: ValueError) -> str:
+    """What is wrong with the parameters of a problem, in one line."""
+    if not isinstance(failure, ValidationError):
+        return str(failure)
+    faults = ((".".join(map(str, fault["loc"])), fault["msg"]) for fault in failure.errors())
+    return "; ".join(f"{key}: {text}" if key else text for key, text in faults)
+
+
+class Quantity:
+    """F over the unit square: λ or Λ(p)/p, with its gradient.
+
+    λ and its slopes are affine in ln R where nothing else changes: a bounce multiplies the whole state and leaves the
+    phase alone. So two of its values at different r give all others.
+
+    Args:
+        zero: which of them.
+        family: the problems.
+        axes: the parameters.
+        budget: for a solve.
+        rtol: of F, relative to its scale.
+    """
+
+    def __init__(self, zero: Zero, family: Family, axes: tuple[Axis, Axis], budget: Budget, rtol: float = RTOL) -> None:
+        self._zero, self._family, self._axes = zero, family, axes
+        self._rtol, self._budget = rtol, budget
+        self._starts: Mapping[float, Solution] = {}
+        keys = [axis.key for axis in axes]
+        is_affine = zero.p == 0 and _LOSS in keys and "oscillator.epsilon" not in keys  # ln R changes with both
+        self._bounce = keys.index(_LOSS) if is_affine else None
+        self._solved: dict[float, dict[float, Sample]] = {}
+
+    def __call__(self, at: FloatArray) -> Sample:
+        """F at (u, v). Raises `FpsolveError` where there is none."""
+        values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}
+        try:
+            family = self._family.at(values)
+        except ValueError as failure:
+            raise FpsolveError(f"no such problem: {said(failure)}") from failure
+        if self._bounce is None:
+            return self._sample(at, family)
+        known = self._solved.setdefault(float(at[1 - self._bounce]), {})
+        log_factor = family.problem.system.kicks[0].log_factor
+        if len(known) < 2 and log_factor not in known:
+            known[log_factor] = self._sample(at, family)
+        return known[log_factor] if log_factor in known else self._between(at, family, log_factor, known, self._bounce)
+
+    def _sample(self, at: FloatArray, family: Family) -> Sample:
+        """F from a solve."""
+        refuse_infinite(family.problem, self._zero.p)
+        solver = ExponentSolver(family.problem, rtol=self._rtol, budget=self._budget, starts=self._starts)
+        value, error = solver.ratio_alone(self._zero.p)
+        if value > 0 > self._zero.p:
+            self._refuse_rare(solver)
+        directions = family.directions()
+        slopes = self._slopes(solver, [directions[axis.key] for axis in self._axes])
+        gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
+        self._starts = solver.near.known
+        scale = solver.scale(self._zero.p) / abs(self._zero.p) if self._zero.p else solver.scales.linear
+        return Sample(at, value, gradient, error, scale)
+
+    def _between(
+        self, at: FloatArray, family: Family, log_factor: float, known: Mapping[float, Sample], bounce: int
+    ) -> Sample:
+        """λ from two of its values at other r."""
+        (first, one), (second, other) = known.items()
+        share = (log_factor - first) / (second - first)
+        gradient = one.gradient + share * (other.gradient - one.gradient)
+        [rise] = family.directions()[_LOSS].kicks
+        impacts = (other.value - one.value) / (second - first)
+        gradient[bounce] = impacts * rise * self._axes[bounce].slope(float(at[bounce]))
+        value = one.value + share * (other.value - one.value)
+        error = (abs(share) + abs(1 - share)) * max(one.error, other.error)
+        return Sample(at, value, gradient, error, max(one.scale, other.scale))
+
+    def _refuse_rare(self, solver: ExponentSolver) -> None:
+        """Refuse a Λ(p) < 0 that is not the largest, as rare paths far out in algebraic tails grow. Raises so."""
+        p = self._zero.p
+        if not has_algebraic_tails(solver.problem.noise):
+            return
+        near = solver.near.solution(p).pair
+        if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
+            raise NoSuchExponent(
+                f"Λ({p:g}) is that of rare paths, which hold the noise far out in its tails, and zero nowhere; choose "
+                f"r0 <= 1, {Remedy.REDUCTION}"
+            )
+
+    def _slopes(self, solver: ExponentSolver, along: Sequence[Direction]) -> FloatArray:
+        """∂F/∂θ."""
+        p = self._zero.p
+        if abs(p) >= SMALL_P:
+            pair = solver.near.solution(p).pair
+            return np.array([changed_value(pair, by).value / p for by in along])
+        around = Bordered(solver.near.solution(0.0).pair)
+        more = [0.5 * p * changed_curvature(around, by).value if p else 0.0 for by in along]
+        return np.array([changed_slope(around, by).value for by in along]) + more

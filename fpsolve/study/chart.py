@@ -1,0 +1,110 @@
+"""Charts: the lines of stability of a case, their crossings, regions, and the closed forms beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fpsolve.analysis.regions import Regions, regions
+from fpsolve.analysis.stability import NODES, Boundary, crossed
+from fpsolve.analysis.zero import Axis, Zero
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case
+from fpsolve.case.remedies import in_words_of_a_case
+from fpsolve.errors import FpsolveError
+from fpsolve.model.direction import Family
+from fpsolve.theory.perturbation import second_order
+
+CLOSED_FORM_NODES = 81
+"""Of the grid, each way, on which the closed forms are evaluated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """What a case says of stability in a plane of two parameters.
+
+    Attributes:
+        lines: one for each entry of `zero` that is begun, in their order.
+        closed_forms: for each entry of `zero` the branches of its closed form, Eqs. (38)-(39), each of shape (n, 2), in
+            the parameters themselves.
+        regions: once all lines are traced.
+        complete: whether they are.
+    """
+
+    lines: tuple[Boundary, ...]
+    closed_forms: tuple[tuple[FloatArray, ...], ...]
+    regions: Regions | None = None
+    complete: bool = False
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Why lines end inside of the frame."""
+        return tuple(text for line in self.lines for trace in line.traces for text in trace.obstacles)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What has no line, which lines end inside of the frame, and where no F exists, with the reasons."""
+        found = [line.remark() for line in self.lines]
+        for line in self.lines:
+            ends = dict.fromkeys(text for trace in line.traces for text in trace.obstacles)
+            holes = line.scan.reasons if line.scan is not None else ()
+            found += [f"the line {line.zero.equation} ends inside of the frame: {text}" for text in ends]
+            found += [f"{line.zero.symbol} is missing in part of the frame: {text}" for text in holes]
+        return tuple(in_words_of_a_case(text) for text in found if text)
+
+
+def refuse_no_chart(case: Case) -> None:
+    """Refuse a case without a chart, or with several curves. Raises `FpsolveError`."""
+    if case.chart is None:
+        raise FpsolveError(
+            f'{case.path}: chart: missing; add [chart] with x = {{ key = "oscillator.omega", start = 0.3, '
+            'stop = 5.0 }, y like it, and zero = ["lyapunov_exponent", { moment = 2.0 }]'
+        )
+    if case.vary:
+        raise FpsolveError(
+            f"{case.path}: vary: a chart has one set of the other parameters; remove [vary], or write --set vary={{}}"
+        )
+
+
+def chart_work(case: Case) -> int:
+    """How often `solve_chart` reports progress: once for each node of each scan."""
+    return NODES**2 * (len(case.chart.zero) if case.chart else 0)
+
+
+def solve_chart(case: Case, *, progress: Callable[[], None] = lambda: None) -> Iterator[Chart]:
+    """What there is so far, after each scan and each branch, and in the end the whole chart."""
+    assert case.chart is not None
+    x, y = case.chart.x.axis, case.chart.y.axis
+    [curve] = case.curves()
+    family = Family(curve.problem, curve.original_noise)
+    chart = Chart((), _closed_forms(family, case.chart.zero, (x, y)))
+    for zero in case.chart.zero:
+        done = chart.lines
+        for line in Boundary(zero, x, y, family, budget=case.budget).grown(progress):
+            chart = replace(chart, lines=(*done, line))
+            yield chart
+    yield Chart(tuple(crossed(chart.lines)), chart.closed_forms, regions(chart.lines), complete=True)
+
+
+def _closed_forms(family: Family, zeros: Sequence[Zero], axes: tuple[Axis, Axis]) -> tuple[tuple[FloatArray, ...], ...]:
+    """The lines ε²Λ₂(p)/p = 0 in the parameters themselves, for noise that is reduced as in the paper."""
+    from contourpy import contour_generator
+
+    shares = np.linspace(0, 1, CLOSED_FORM_NODES)
+    x, y = axes
+    linear, quadratic = np.full((2, shares.size, shares.size), np.nan)
+    for i, u in enumerate(shares):
+        for j, v in enumerate(shares):
+            try:
+                theory = second_order(family.at({x.key: float(x.value(u)), y.key: float(y.value(v))}).problem)
+            except ValueError:  # no such problem
+                continue
+            linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic
+    found = []
+    for zero in zeros:
+        values = np.ma.masked_invalid(linear + zero.p * quadratic)
+        lines: list[FloatArray] = contour_generator(shares, shares, values, line_type="Separate").lines(0.0)  # type: ignore[assignment]
+        found.append(tuple(np.stack([x.value(line[:, 0]), y.value(line[:, 1])], axis=1) for line in lines))
+    return tuple(found)

@@ -1,0 +1,226 @@
+"""∂/∂θ of Λ(p), λ, δ_p and Λ″(0) against central differences, closed forms and scaling laws."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
+from fpsolve.analysis.sensitivity import SMALL_P, sensitivities
+from fpsolve.arrays import identity
+from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.direction import directions
+from fpsolve.model.plane import Drive
+from fpsolve.model.vibro_impact import DAMPING
+from tests.oracles import moment_hierarchy, phase_fraction
+
+RTOL = 1e-11
+STEP = 1e-4
+"""Of differences, in shares of a parameter."""
+
+
+def problem_of(theta, law, is_exact):
+    """A problem and the noise of Eq. (7), from parameters by their keys."""
+    own = {key.partition(".")[2]: value for key, value in theta.items()}
+    noise = NonGaussianNoise(**{name: own.pop(name) for name in ("D0", "tau0", "r0")})
+    return Problem(VibroImpactOscillator(**own, impact=law), noise if is_exact else noise.ou_reduction()), noise
+
+
+def drawn(seed):
+    """A random problem and a p: weak or strong, reduced or exact noise, both laws of impact."""
+    rng = np.random.default_rng(seed)
+
+    def between(low, high):
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    epsilon, restitution = between(0.05, 1.5), rng.uniform(0.6, 0.95)
+    theta = {
+        "oscillator.omega": between(0.3, 5),
+        "oscillator.restitution": restitution,
+        "oscillator.c1": rng.uniform(-0.4, 0.4),
+        "oscillator.epsilon": epsilon,
+        "noise.D0": between(0.05, 2),
+        "noise.tau0": between(0.05, 5),
+        "noise.r0": rng.uniform(-1, 1.4),
+    }
+    is_exact = theta["noise.r0"] < 0.98 and rng.random() < 0.7
+    law = "restitution" if epsilon**2 * (1 - restitution) < 0.8 and rng.random() < 0.5 else "delta"
+    return theta, law, bool(is_exact), float(rng.choice([-1, 1]) * rng.uniform(0.3, 5))
+
+
+def central(theta, key, value_at, step=STEP):
+    """A central difference of fourth order."""
+    h = step * max(abs(theta[key]), 0.1)
+    values = [value_at(theta | {key: theta[key] + k * h}) for k in (-2, -1, 1, 2)]
+    return (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h)
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_of_a_moment_are_central_differences(seed):
+    theta, law, is_exact, p = drawn(seed)
+    problem, noise = problem_of(theta, law, is_exact)
+    [found] = sensitivities(problem, p, original=noise, rtol=RTOL).moments
+    assert found.keys() == theta.keys()
+    value, scale = ExponentSolver(problem, rtol=RTOL).pair(p).value, ExponentSolver(problem).scale(p)
+    for key, estimate in found.items():
+        expected = central(
+            theta, key, lambda at: ExponentSolver(problem_of(at, law, is_exact)[0], rtol=RTOL).pair(p).value
+        )
+        size = max(abs(value), scale) / max(abs(theta[key]), 0.1)
+        assert estimate.value == pytest.approx(expected, rel=1e-6, abs=1e-7 * size), key
+        assert estimate.error_estimate < 1e-6 * max(size, estimate.scale), key
+
+
+@pytest.mark.parametrize("seed", [52, 53, 54, 56, 57, 58])
+def test_of_the_indices_are_central_differences(seed):
+    theta, law, is_exact, _ = drawn(seed)
+    problem, noise = problem_of(theta, law, is_exact)
+    found = sensitivities(problem, original=noise, rtol=RTOL).indices
+
+    def indices(at):
+        solver = ExponentSolver(problem_of(at, law, is_exact)[0], rtol=RTOL)
+        root = nonzero_root(solver)
+        return np.array(
+            [solver.lyapunov_exponent().value, root.value if root else np.nan, solver.variance_rate().value]
+        )
+
+    whole = indices(theta)
+    for key in theta:
+        expected = central(theta, key, indices)
+        for i, name in enumerate(("lyapunov_exponent", "stability_index", "variance_rate")):
+            if np.isfinite(whole[i]):
+                size = max(abs(whole[i]), 1e-3 if i != 1 else 1.0) / max(abs(theta[key]), 0.1)
+                assert found[name][key].value == pytest.approx(expected[i], rel=1e-6, abs=1e-6 * size), (key, name)
+
+
+def test_noise_of_its_own_parameters():
+    """Λ(p) of Ornstein-Uhlenbeck noise by α₀ and σ₀; ε σ₀ is one parameter where c₁ = 0 and r = 1."""
+    oscillator = VibroImpactOscillator(omega=1.3, restitution=1.0, c1=0.0, epsilon=0.8)
+    noise = OrnsteinUhlenbeck(alpha=0.9, sigma=1.1)
+    [found] = sensitivities(oscillator, noise, 2.0, rtol=RTOL).moments
+    assert found.keys() >= {"noise.alpha", "noise.sigma"}
+    by_epsilon = found["oscillator.epsilon"].value * oscillator.epsilon
+    assert found["noise.sigma"].value * noise.sigma == pytest.approx(by_epsilon, rel=1e-8)
+
+
+@pytest.mark.parametrize("is_exact", [False, True])
+def test_time_has_no_unit(is_exact):
+    """Λ(p; ω, c₁, D₀, τ₀) is homogeneous of degree 1 in rates: ω, c₁, D₀ are rates, and τ₀ is a time (Euler)."""
+    theta, p = {"omega": 1.1, "c1": 0.2, "D0": 0.8, "tau0": 0.6}, 1.7
+    oscillator = VibroImpactOscillator(omega=theta["omega"], restitution=0.7, c1=theta["c1"], epsilon=0.9)
+    noise = NonGaussianNoise(D0=theta["D0"], tau0=theta["tau0"], r0=0.4)
+    problem = Problem(oscillator, noise if is_exact else noise.ou_reduction())
+    [found] = sensitivities(problem, p, original=noise, rtol=RTOL).moments
+    by = {key.partition(".")[2]: estimate.value for key, estimate in found.items()}
+    total = theta["omega"] * by["omega"] + theta["c1"] * by["c1"] + theta["D0"] * by["D0"] - theta["tau0"] * by["tau0"]
+    assert total == pytest.approx(ExponentSolver(problem, rtol=RTOL).pair(p).value, rel=1e-8)
+
+
+def test_damping_of_the_exact_moment():
+    """Without walls Λ(−2) = −ε²c₁ + ε²S(0)/2, exactly."""
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.3, epsilon=0.7)
+    noise = OrnsteinUhlenbeck(alpha=0.8, sigma=0.9)
+    [found] = sensitivities(oscillator, noise, -2.0, rtol=RTOL).moments
+    at_rest = noise.spectral_density(0.0)
+    expected = {
+        "oscillator.omega": 0.0,
+        "oscillator.c1": -(0.7**2),
+        "oscillator.epsilon": 2 * 0.7 * (at_rest / 2 - 0.3),
+        "noise.alpha": -(0.7**2) * at_rest / 0.8,
+        "noise.sigma": 0.7**2 * at_rest / 0.9,
+    }
+    for key, value in expected.items():
+        assert found[key].value == pytest.approx(value, abs=1e-9), key
+
+
+def test_against_the_moment_hierarchy():
+    """Λ(2) without walls from equations without a phase, differentiated by differences of them."""
+    theta = {"omega": 1.0, "c1": 0.1, "epsilon": 1.0, "D0": 1.0, "tau0": 0.5, "r0": 0.8}
+
+    def parts(at):
+        own = dict(at)
+        noise = NonGaussianNoise(**{name: own.pop(name) for name in ("D0", "tau0", "r0")})
+        return VibroImpactOscillator(restitution=1.0, **own), noise
+
+    def known(at):
+        oscillator, noise = parts(at)
+        relaxation, force = phase_fraction._noise(oscillator, noise, 40, 0.0)
+        free = moment_hierarchy.rates_of_monomials(oscillator.drives[0].matrix, 2)
+        total = np.kron(relaxation, np.eye(3)) + np.kron(np.eye(40), free)
+        total += np.kron(force, moment_hierarchy.rates_of_monomials(DAMPING, 2))
+        return float(np.max(np.linalg.eigvals(total).real))
+
+    [found] = sensitivities(*parts(theta), 2.0, rtol=RTOL).moments
+    for key, estimate in found.items():
+        name = key.partition(".")[2]
+        if name in theta:  # the restitution is not in these equations
+            assert estimate.value == pytest.approx(central(theta, name, known, 1e-3), rel=1e-8), key
+
+
+def test_heavy_tails_too():
+    theta = dict(zip(drawn(0)[0], (1.2, 0.8, 0.1, 0.7, 0.6, 0.8, 1.1), strict=True))
+    [found] = sensitivities(problem_of(theta, "delta", True)[0], -0.5).moments
+    for key in ("oscillator.omega", "noise.r0"):
+        expected = central(theta, key, lambda at: ExponentSolver(problem_of(at, "delta", True)[0]).pair(-0.5).value)
+        assert found[key].value == pytest.approx(expected, rel=1e-5), key
+
+
+def test_gaussian_noise_is_met_from_below():
+    """∂/∂r₀ at r₀ = 1 is that from r₀ < 1, and a note says so."""
+    theta = dict(zip(drawn(0)[0], (1.2, 0.8, 0.1, 0.7, 0.6, 0.8, 1.0), strict=True))
+    problem, _ = problem_of(theta, "delta", True)
+    found = sensitivities(problem, 1.0, rtol=RTOL)
+    h = 1e-4
+    values = [
+        ExponentSolver(problem_of(theta | {"noise.r0": 1.0 - k * h}, "delta", True)[0], rtol=1e-12).pair(1.0).value
+        for k in range(4)
+    ]
+    backward = (11 * values[0] - 18 * values[1] + 9 * values[2] - 2 * values[3]) / (6 * h)
+    assert found.moments[0]["noise.r0"].value == pytest.approx(backward, rel=1e-5)
+    assert any("from below" in note for note in found.notes)
+
+
+def test_moments_of_order_zero_do_not_change():
+    theta, law, is_exact, _ = drawn(3)
+    problem, noise = problem_of(theta, law, is_exact)
+    [found] = sensitivities(problem, 0.0, original=noise).moments
+    assert {estimate.value for estimate in found.values()} == {0.0}
+
+
+def test_a_small_stability_index():
+    """δ_p near 0 takes ∂Λ/∂θ / p from its derivatives at p = 0."""
+    noise = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
+    c1 = -0.25 * noise.spectral_density(2.0)  # where the λ of Eq. (39) is 0
+    theta = {"omega": 1.0, "c1": c1, "epsilon": 0.01, "restitution": 1.0}
+
+    def index(at):
+        return nonzero_root(ExponentSolver(Problem(VibroImpactOscillator(**at), noise), rtol=1e-10)).value
+
+    found = sensitivities(VibroImpactOscillator(**theta), noise, rtol=1e-10).indices["stability_index"]
+    assert abs(index(theta)) < SMALL_P
+    h = 1e-4 * abs(c1)
+    expected = (index(theta | {"c1": c1 + h}) - index(theta | {"c1": c1 - h})) / (2 * h)
+    assert found["oscillator.c1"].value == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_motion_of_ones_own():
+    rotation, stiffness = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))
+    noise = OrnsteinUhlenbeck(alpha=1.0, sigma=0.8)
+
+    def value(epsilon):
+        system = PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity)], epsilon=epsilon)
+        return ExponentSolver(Problem(system, noise), rtol=RTOL).pair(2.0).value
+
+    system = PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity)], epsilon=0.6)
+    [found] = sensitivities(system, noise, 2.0, rtol=RTOL).moments
+    expected = (value(0.6 + 1e-4) - value(0.6 - 1e-4)) / 2e-4
+    assert found["oscillator.epsilon"].value == pytest.approx(expected, rel=1e-6)
+
+
+def test_only_the_original_of_a_noise_may_be_named():
+    theta, law, _, _ = drawn(0)
+    problem, noise = problem_of(theta, law, False)
+    with pytest.raises(ValueError, match="not its reduction"):
+        directions(problem, NonGaussianNoise(D0=2 * noise.D0, tau0=noise.tau0, r0=noise.r0))
+    assert math.isclose(directions(problem, noise)["noise.r0"].theta, noise.r0)

@@ -1,0 +1,208 @@
+"""Charts of stability from a case file: what is written, and what its regions say."""
+
+import csv
+import json
+from contextlib import nullcontext
+
+import numpy as np
+import pytest
+
+from fpsolve import ExponentSolver, load_case
+from fpsolve.cli import main
+from fpsolve.model.direction import Family
+from fpsolve.study.chart import solve_chart
+from fpsolve.workflow import Watch, chart_case
+
+CASE = """
+title = "Stability"
+[oscillator]
+epsilon = 0.1
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 0.1
+tau0 = 0.5
+r0 = 0.95
+[moments]
+p = [2.0]
+[chart]
+x = { key = "oscillator.omega", start = 0.5, stop = 3.0, scale = "log", at = [1.0] }
+y = { key = "noise.D0", start = 0.01, stop = 1.0 }
+zero = ["lyapunov_exponent", { moment = 2.0 }, { stability_index = -1.0 }]
+"""
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("charts") / "plane.toml"
+    path.write_text(CASE, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(path):
+    out = path.parent / "results"
+    assert main(["chart", str(path), "--out", str(out)]) == 0
+    return out / "plane"
+
+
+@pytest.fixture(scope="module")
+def rows(folder):
+    with (folder / "chart.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def summary(folder):
+    return json.loads((folder / "chart.json").read_text(encoding="utf-8"))
+
+
+def solver_at(path, x, y):
+    """Of the case with the two parameters of its chart."""
+    case = load_case(path)
+    [curve] = case.curves()
+    family = Family(curve.problem, curve.original_noise).at({"oscillator.omega": float(x), "noise.D0": float(y)})
+    return ExponentSolver(family.problem, rtol=1e-11)
+
+
+def test_all_files_are_written(folder):
+    assert {path.name for path in folder.iterdir()} == {"chart.csv", "chart.json", "chart.png", "chart.pdf"}
+    assert (folder / "chart.png").read_bytes()[1:4] == b"PNG"
+
+
+def test_the_table_has_the_columns_and_the_names_of_the_lines(rows):
+    assert list(rows[0]) == ["line", "branch", "x", "y", "width", "label"]
+    assert list(dict.fromkeys(row["line"] for row in rows)) == ["lyapunov_exponent", "moment 2", "stability_index -1"]
+    assert {row["branch"] for row in rows} == {"1"}
+    assert {row["label"] for row in rows} == {"", "leaves the frame", "at oscillator.omega = 1"}
+    assert all(0 <= float(row["width"]) < 1e-8 for row in rows)
+
+
+def test_every_line_is_where_its_quantity_is_zero(path, rows):
+    for name, p in (("lyapunov_exponent", 0.0), ("moment 2", 2.0), ("stability_index -1", -1.0)):
+        for row in [each for each in rows if each["line"] == name][::10]:
+            solver = solver_at(path, row["x"], row["y"])
+            value, _ = solver.ratio_alone(p)
+            scale = solver.scale(p) / abs(p) if p else solver.scales.linear
+            assert abs(value) < 1e-9 * scale, row
+
+
+def test_the_values_asked_for_are_points(rows):
+    asked = [row for row in rows if row["label"].startswith("at ")]
+    assert [row["line"] for row in asked] == ["lyapunov_exponent", "moment 2"]
+    assert all(float(row["x"]) == pytest.approx(1.0, rel=1e-12) for row in asked)
+
+
+def test_the_summary_says_what_was_done(summary):
+    assert (summary["complete"], summary["planned"], summary["done"]) == (True, 3, 3)
+    assert summary["x"] == {"key": "oscillator.omega", "start": 0.5, "stop": 3.0, "scale": "log", "at": [1.0]}
+    assert [line["line"] for line in summary["lines"]] == ["lyapunov_exponent", "moment 2", "stability_index -1"]
+    assert summary["lines"][0]["scan"]["nodes"] == [13, 13]
+    assert [line["appears"] for line in summary["lines"]] == [None, None, "hump of the amplitude density"]
+    assert "oscillator.omega" not in summary["parameters"]
+    assert summary["parameters"]["oscillator.c1"] == 0.1
+
+
+def test_the_closed_forms_are_near_in_weak_noise(rows, summary):
+    """Eqs. (38)-(39) are off by O(ε²): ε = 0.1."""
+    for form in summary["closed_forms"]:
+        points = np.array(form["branches"][0])
+        line = np.array([[float(row["x"]), float(row["y"])] for row in rows if row["line"] == form["line"]])
+        distances = [np.min(np.hypot(np.log(points[:, 0] / x) / np.log(6), points[:, 1] - y)) for x, y in line]
+        assert max(distances) < 0.02
+
+
+def test_the_regions_say_what_is_stable_in_them(path, summary):
+    assert sum(region["share"] for region in summary["regions"]) == pytest.approx(1)
+    for region in summary["regions"]:
+        solver = solver_at(path, region["x"], region["y"])
+        stable = "almost surely stable" if solver.lyapunov_exponent().value < 0 else "almost surely unstable"
+        second = "second moment stable" if solver.pair(2.0).value < 0 else "second moment unstable"
+        assert region["name"].startswith(f"{stable}, {second}")
+        assert ("δ_p < -1" in region["name"]) == (solver.pair(-1.0).value < 0)
+
+
+def test_a_line_that_does_not_cross_the_frame_is_said_so(path, tmp_path, capsys):
+    overrides = ["chart.x.start=2.5", "chart.x.at=[]", "chart.y.stop=0.05", "chart.zero=[{moment=2.0}]"]
+    words = [word for text in overrides for word in ("--set", text)]
+    assert main(["chart", str(path), "--out", str(tmp_path), *words]) == 0
+    assert "Λ(2) < 0 everywhere in the frame" in capsys.readouterr().err
+    summary = json.loads((tmp_path / "plane" / "chart.json").read_text(encoding="utf-8"))
+    assert summary["complete"]
+    assert summary["warnings"] == ["Λ(2) < 0 everywhere in the frame"]
+    assert [region["name"] for region in summary["regions"]] == ["second moment stable"]
+
+
+def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
+    calls = iter(range(200))
+
+    def progress():
+        if next(calls) == 180:  # in the scan for the second line
+            raise KeyboardInterrupt
+
+    watch = Watch(bar=lambda *_: nullcontext(progress))
+    with pytest.raises(KeyboardInterrupt, match="after 1 branch of 3 lines; what was done is kept in"):
+        chart_case(load_case(path), tmp_path, watch=watch)
+    summary = json.loads((tmp_path / "plane" / "chart.json").read_text(encoding="utf-8"))
+    assert not summary["complete"]
+    assert [line["line"] for line in summary["lines"]] == ["lyapunov_exponent"]
+    assert (tmp_path / "plane" / "chart.png").exists()
+
+
+def test_each_step_has_all_that_was_before(path):
+    case = load_case(path, ["chart.zero=['lyapunov_exponent']", "chart.x.at=[]"])
+    *partial, whole = solve_chart(case)
+    assert [chart.complete for chart in partial] == [False] * len(partial)
+    assert whole.complete
+    np.testing.assert_array_equal(whole.lines[0].branches[0].x, partial[-1].lines[0].branches[0].x)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["chart={}"], "chart.x: missing"),
+        (["vary.noise.tau0=[0.5, 1.0]"], "a chart has one set of the other parameters"),
+    ],
+)
+def test_without_a_chart_nothing_is_written(path, tmp_path, capsys, overrides, message):
+    words = [word for text in overrides for word in ("--set", text)]
+    assert main(["chart", str(path), "--out", str(tmp_path / "out"), *words]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_case_without_a_chart_is_refused(tmp_path, capsys):
+    (tmp_path / "bare.toml").write_text(CASE.partition("[chart]")[0], encoding="utf-8")
+    assert main(["chart", str(tmp_path / "bare.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert "chart: missing; add [chart] with x = {" in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (['chart.x.key="oscillator.omeg"'], 'chart.x.key: got "oscillator.omeg"; did you mean "oscillator.omega"?'),
+        (['chart.x.key="oscillator.c2"'], "c2 and c3 are not in the linear theory"),
+        (["chart.x.start=7.0"], "chart.x: got start = 7.0, stop = 3.0; must be start < stop"),
+        (['chart.y.key="oscillator.omega"'], 'chart.y.key: got "oscillator.omega" for both axes'),
+        (["chart.x.start=-1.0"], "chart.x.start: got -1.0; oscillator.omega must be greater than or equal to"),
+        (["chart.y={key='oscillator.c1', start=-1.0, stop=1.0, scale='log'}"], 'must be > 0 where scale = "log"'),
+        (["chart.x.at=[9.0]"], "chart.x.at[0]: got 9.0; must be from start = 0.5 to stop = 3.0"),
+        (["chart.zero=[]"], "chart.zero: got []; must be a list with one entry at least"),
+        (["chart.zero=['lambda']"], 'chart.zero[0]: got "lambda"; must be "lyapunov_exponent"'),
+        (["chart.zero=[{moment=0.0}]"], "chart.zero[0]: got {moment = 0.0}; must be"),
+        (["chart.zero=[{moment=2.0}, {moment=2.0}]"], "chart.zero[1]: got {moment = 2.0} twice"),
+        (['noise.treatment="exact"', "chart.y={key='noise.r0', start=0.5, stop=1.2}"], "noise.r0 reaches 1.2"),
+        (
+            ["chart.x={key='oscillator.epsilon', start=0.1, stop=9.0}", "oscillator.impact='restitution'"],
+            "restitution law",
+        ),
+        (["chart.z=1"], "chart.z: unknown key; known keys: x, y, zero"),
+    ],
+)
+def test_faults_of_a_chart(path, tmp_path, capsys, overrides, message):
+    words = [word for text in overrides for word in ("--set", text)]
+    assert main(["chart", str(path), "--out", str(tmp_path / "out"), *words]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()
