@@ -472,3 +472,26 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     assert in_words_of_a_case(told) in result.warnings
     assert "do not read its picture" not in " ".join(result.warnings)
     assert not list((tmp_path / "out").rglob("*.vtu"))
+
+
+def test_sensitivities_are_written(tmp_path):
+    """At nine p or all, and of the indices, each with its error; those of the Python function."""
+    sets = ["moments.p={start=-2.0, stop=6.0, num=17}", "vary={}", "output={eigenfunctions=[2.0], sensitivities=true}"]
+    case = write(tmp_path, TEXT, sets)
+    fpsolve.run(case, tmp_path)
+    [curve] = json.loads((tmp_path / "test/summary.json").read_text(encoding="utf-8"))["curves"]
+    found, errors = curve["sensitivities"], curve["sensitivities"]["error_estimates"]
+    assert [row["p"] for row in found["moments"]] == [-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    [solved] = case.curves()
+    known = fpsolve.sensitivities(solved.problem, 2.0, original=solved.original_noise)
+    keys = {"oscillator.omega", "oscillator.restitution", "oscillator.c1", "oscillator.epsilon"}
+    keys |= {"noise.D0", "noise.tau0", "noise.r0"}
+    pairs = [(known.moments[0], found["moments"][4], errors["moments"][4])]
+    pairs += [(known.indices[name], found[name], errors[name]) for name in known.indices]
+    assert len(pairs) == 4
+    for expected, row, error in pairs:
+        assert keys == set(row) - {"p"} == set(error) - {"p"} == set(expected)
+        for key in keys:
+            assert row[key] == pytest.approx(expected[key].value, rel=1e-6)
+            assert 0 <= error[key] < 1e-6 * max(abs(row[key]), expected[key].scale)
+    assert {"test/sensitivities.png", "test/sensitivities.pdf"} <= files(tmp_path)

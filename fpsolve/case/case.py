@@ -98,6 +98,11 @@ class Case(Section):
         return _spread(self.p)
 
     @property
+    def differentiated(self) -> FloatArray:
+        """The p at which Λ is differentiated by the parameters: at most nine, evenly spread."""
+        return _spread(self.p)
+
+    @property
     def simulated(self) -> FloatArray:
         """The p that are simulated: those of [monte_carlo], or else all, or of populations at most nine."""
         if self.monte_carlo.p is not None:

@@ -38,19 +38,19 @@ class Wanted:
         indices: names of `INDICES`.
         shown: the p whose eigenfunctions are kept.
         density: whether the stationary density is.
-        sensitivities: whether derivatives by the parameters are wanted, too.
+        differentiated: the p at which Λ is differentiated by the parameters; None where no sensitivities are wanted.
     """
 
     p: FloatArray
     indices: tuple[str, ...]
     shown: tuple[float, ...] = ()
     density: bool = False
-    sensitivities: bool = False
+    differentiated: tuple[float, ...] | None = None
 
 
 def everything(case: Case, curve: Curve) -> Wanted:
     """All moments and indices, their sensitivities, and the eigenfunctions to be drawn."""
-    return Wanted(case.p, tuple(INDICES), tuple(case.shown), density=True, sensitivities=True)
+    return Wanted(case.p, tuple(INDICES), tuple(case.shown), density=True, differentiated=tuple(case.differentiated))
 
 
 def expected(case: Case, curve: Curve) -> Wanted:
@@ -102,7 +102,7 @@ def _solve_curve(
     lost = _lost(stationary, solver.near.refinement)
     warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None)]
     warnings += lost or _unresolved(pairs)
-    slopes = _sensitivities(solver, curve, moments, estimates) if wanted.sensitivities else None
+    slopes = _sensitivities(solver, curve, wanted, moments, estimates)
     notes = [*_notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]), *absent]
     notes += slopes.notes if slopes else ()
     return CurveResult(
@@ -151,13 +151,19 @@ def _solve_indices(
 
 
 def _sensitivities(
-    solver: ExponentSolver, curve: Curve, moments: MomentLyapunov, estimates: Mapping[str, Estimate | None]
-) -> Sensitivities:
-    """The derivatives of what was found by all parameters of the case."""
+    solver: ExponentSolver,
+    curve: Curve,
+    wanted: Wanted,
+    moments: MomentLyapunov,
+    estimates: Mapping[str, Estimate | None],
+) -> Sensitivities | None:
+    """The derivatives of what was found by all parameters of the case, if they are wanted."""
+    if wanted.differentiated is None:
+        return None
     index = estimates[STABILITY_INDEX.name]
     return solve_sensitivities(
         solver,
-        moments.p,
+        np.array([p for p in wanted.differentiated if np.any(moments.p == p)]),
         directions(curve.problem, curve.original_noise),
         indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
         root=None if index is None else index.value,
