@@ -221,7 +221,7 @@ def _own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterato
     folder = Path(out) / case.name
     with alone(folder):
         with writable(folder):
-            stale = [names for names in (SOLVED, SIMULATED, CHART) if names in replaced or not _agrees(case, folder)]
+            stale = replaced if _agrees(case, folder) else (SOLVED, SIMULATED, CHART)
             _remove(folder, "|".join([*stale, _UNFINISHED]))
         yield folder
 

@@ -161,7 +161,7 @@ class Family:
             if new:
                 halves[half] = replace(old, **new)  # type: ignore[type-var]
         if self.original is None:
-            return Family(Problem(**dict(zip(("system", "noise"), halves.values(), strict=True))))  # type: ignore[arg-type]
+            return Family(Problem(halves["oscillator"], halves["noise"]))  # type: ignore[arg-type]
         original: NonGaussianNoise = halves["noise"]  # type: ignore[assignment]
         is_reduced = isinstance(self.problem.noise, OrnsteinUhlenbeck)
         noise = original.ou_reduction() if is_reduced else original
