@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import os
-import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, CycloptsError, Parameter, Token
+from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
 
 from fpsolve import __version__
+from fpsolve.arguments import Cases, Count, Fresh, Jobs, Overrides, Scheduler, load, load_to_write, pool_of
 from fpsolve.case.remedies import in_words_of_a_case
-from fpsolve.errors import CaseError, FpsolveError, NotConverged
+from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.process import drop_blocked_output, ended_by_signals, flush_output
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case
     from fpsolve.workflow import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
-
-UNITS = "Units: omega in rad/time, c1 in 1/time, D0 in 1/time, tau0 in time"
 
 app = App(
     name="fpsolve",
@@ -39,21 +34,6 @@ app = App(
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
 )
-Cases = Annotated[list[Path], Parameter(help="Case files.", consume_multiple=True, negative="")]
-Overrides = Annotated[
-    list[str] | None,
-    Parameter(
-        name="--set", help=f"Another value for a key of the case, e.g. oscillator.omega=2.0. {UNITS}.", negative=""
-    ),
-]
-
-
-def _whole(_: type, tokens: Sequence[Token]) -> int:
-    """A whole number; cyclopts alone would take 2.5 for 2."""
-    return int(tokens[0].value)
-
-
-Count = Annotated[int, Parameter(converter=_whole)]
 
 
 @app.command
@@ -64,9 +44,17 @@ def run(
     monte_carlo: Annotated[
         bool, Parameter(help="Simulate too, as [monte_carlo] of the case says, and draw both.", negative="")
     ] = False,
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    fresh: Fresh = False,
+    json: Annotated[
+        bool, Parameter(help="Print the summaries, one line of JSON for each case, instead of tables.", negative="")
+    ] = False,
     overrides: Overrides = None,
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
+
+    What an earlier run has finished, also one that was killed, is not solved again.
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
@@ -74,15 +62,17 @@ def run(
     from fpsolve.output.terminal import print_remark
     from fpsolve.workflow import run_case
 
-    code = 0
-    for case in _load_to_write(cases, overrides, {}, monte_carlo=monte_carlo):
-        outcome = run_case(case, out, monte_carlo=monte_carlo, watch=_watch())
+    code, loaded = 0, load_to_write(cases, overrides, {}, monte_carlo=monte_carlo)
+    pool = pool_of(jobs, scheduler)
+    for case in loaded:
+        watch = _watch(is_silent=json)
+        outcome = run_case(case, out, monte_carlo=monte_carlo, pool=pool, is_fresh=fresh, watch=watch)
         if outcome.interruption:
             _print_error(outcome.interruption)
         if monte_carlo and case.figure.y == STABILITY_INDEX.name:
             note = "note: a simulation gives no stability index, so that the figure has no dots"
             print_remark(note, "cyan")
-        print(f"written: {out / case.name}")
+        print(_in_one_line(out / case.name / "summary.json") if json else f"written: {out / case.name}")
         if outcome.interruption:
             return INTERRUPTED
         if outcome.failures:
@@ -118,7 +108,7 @@ def simulate(
         for name, value in stated.items()
         if value is not None
     }
-    for case in _load_to_write(cases, overrides, options, monte_carlo=True):
+    for case in load_to_write(cases, overrides, options, monte_carlo=True):
         outcome = simulate_case(case, out, watch=_watch())
         if outcome.interruption:
             _print_error(outcome.interruption)
@@ -129,7 +119,7 @@ def simulate(
 
 
 @app.command
-def check(cases: Cases, *, overrides: Overrides = None) -> int:
+def check(cases: Cases, *, jobs: Jobs = None, scheduler: Scheduler = "", overrides: Overrides = None) -> int:
     """Solve case files and compare with the values that they expect; write nothing.
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
@@ -137,9 +127,10 @@ def check(cases: Cases, *, overrides: Overrides = None) -> int:
     from fpsolve.output.terminal import print_comparisons, print_warnings
     from fpsolve.workflow import check_case
 
-    code = 0
-    for case in _load(cases, overrides, {}):
-        outcome = check_case(case, watch=_watch())
+    code, loaded = 0, load(cases, overrides, {})
+    pool = pool_of(jobs, scheduler)
+    for case in loaded:
+        outcome = check_case(case, pool=pool, watch=_watch())
         print_comparisons(case, outcome.comparisons)
         print_warnings(case, outcome.results)
         if outcome.failures:
@@ -164,7 +155,7 @@ def chart(
     from fpsolve.study.chart import refuse_no_chart
     from fpsolve.workflow import chart_case
 
-    code, loaded = 0, _load_to_write(cases, overrides, {}, monte_carlo=False)
+    code, loaded = 0, load_to_write(cases, overrides, {}, monte_carlo=False)
     for case in loaded:
         refuse_no_chart(case)
     for case in loaded:
@@ -273,52 +264,17 @@ def _print_error(text: str) -> None:
         drop_blocked_output()
 
 
-def _load(paths: Sequence[Path], overrides: Sequence[str] | None, options: Mapping[str, str]) -> list[Case]:
-    """All cases, or one error that lists the faults of all of them."""
-    from fpsolve.case.case import load_case
-
-    cases, errors = [], []
-    for path in paths:
-        try:
-            cases.append(load_case(path, overrides or (), options))
-        except CaseError as error:
-            errors.append(_stray_assignment(path, overrides) or str(error))
-    if errors:
-        raise FpsolveError("\n".join(errors))
-    return cases
+def _in_one_line(summary: Path) -> str:
+    """A file of JSON, which may be long, as one line."""
+    return "".join(line.strip() + " " for line in summary.read_text(encoding="utf-8").splitlines()).rstrip()
 
 
-def _stray_assignment(path: Path, overrides: Sequence[str] | None) -> str:
-    """What to write where a case that cannot be is an assignment that lacks its --set, or nothing."""
-    is_there = os.path.exists(path)  # noqa: PTH110  (Path.exists raises where a name is too long)
-    if is_there or not re.match(r'[\w."-]+ *=', str(path)):
-        return ""
-    words = " ".join(f"--set {quote(text)}" for text in [*(overrides or ()), str(path)])
-    return f"{path}: no such file; each --set takes one assignment: write {words}"
-
-
-def _load_to_write(
-    paths: Sequence[Path], overrides: Sequence[str] | None, options: Mapping[str, str], *, monte_carlo: bool
-) -> list[Case]:
-    """All cases, or an error where two would write into one folder, or one that shall be simulated cannot be."""
-    from fpsolve.study.simulate import refuse_obstacles
-
-    cases = _load(paths, overrides, options)
-    names = [case.name for case in cases]
-    for name in names:
-        if names.count(name) > 1:
-            raise FpsolveError(f'several cases are called "{name}" and would overwrite each other; run them apart')
-    for case in cases if monte_carlo else ():
-        refuse_obstacles(case)
-    return cases
-
-
-def _watch() -> Watch:
-    """Shows bars, and prints what is found."""
-    from fpsolve.output.terminal import print_results, print_simulation
+def _watch(*, is_silent: bool = False) -> Watch:
+    """Shows bars, and prints what is found, or only what limits it."""
+    from fpsolve.output.terminal import print_results, print_simulation, print_warnings
     from fpsolve.workflow import Watch
 
-    return Watch(_bar, print_results, print_simulation)
+    return Watch(_bar, print_warnings) if is_silent else Watch(_bar, print_results, print_simulation)
 
 
 @contextmanager

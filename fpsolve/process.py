@@ -11,6 +11,23 @@ from contextlib import contextmanager
 from typing import Any
 
 ENDING = ("SIGHUP", "SIGTERM")
+PROCESSORS = "FPSOLVE_PROCESSORS"
+"""The environment variable that limits them."""
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    try:
+        count = len(os.sched_getaffinity(0))
+    except AttributeError:  # not on Linux
+        count = os.cpu_count() or 1
+    limit = os.environ.get(PROCESSORS, "")
+    return min(count, max(int(limit), 1)) if limit.isdecimal() else count
+
+
+def limit_processors(count: int) -> None:
+    """Use no more of them, in this process and those that it starts."""
+    os.environ[PROCESSORS] = str(count)
 
 
 @contextmanager

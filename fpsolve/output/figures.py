@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,8 +32,14 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     write_figure(series, case.figure.x, quantity, case.headline, pictures, is_reduced=case.is_exact)
 
 
-def draw_sensitivities(case: Case, result: CurveResult, folder: Path) -> None:
-    """Draw sensitivities.png and .pdf of a curve: θ ∂Λ(p)/∂θ of some p, and that of λ, over the scale of each."""
+def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path) -> None:
+    """Draw sensitivities.png and .pdf of every curve, if the case says so."""
+    for result in results if case.output.sensitivities else ():
+        _draw_sensitivities(case, result, folder)
+
+
+def _draw_sensitivities(case: Case, result: CurveResult, folder: Path) -> None:
+    """θ ∂Λ(p)/∂θ of some p, and that of λ, over the scale of each."""
     found = result.sensitivities
     if found is None:
         return

@@ -1,33 +1,64 @@
-"""Results as tables: summary.json and moments.csv; of simulated curves monte_carlo.json and response.csv."""
+"""Results as tables: summary.json, moments.csv and curves.csv; of simulated curves monte_carlo.json and response.csv."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from fpsolve import __version__
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
+from fpsolve.case.sections import SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate
-from fpsolve.exponent.quantities import INDICES, Index
-from fpsolve.files import write_csv, write_json
+from fpsolve.exponent.quantities import INDICES, MOMENT, Index
+from fpsolve.files import atomic, write_csv, write_json
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
 
+MOMENT_COLUMNS = ("p", "value", "derivative", "perturbation", "error_estimate", "residual")
+MOST_INDENTED = 100
+"""Curves of a summary that is made for eyes, too."""
 
-def write_results(case: Case, results: Sequence[CurveResult], folder: Path) -> None:
-    """summary.json, which says whether all curves of the case are there, and moments.csv."""
+
+def write_results(case: Case, results: Sequence[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
+    """summary.json, which says whether all curves of the case are there, moments.csv and curves.csv.
+
+    Args:
+        facts: on the run, see `Run.facts`.
+    """
+    with atomic(folder / "summary.json") as draft, draft.open("w", encoding="utf-8") as file:
+        write_summary(case, results, facts, file)
+    names = list(case.vary.keys)
+    if MOMENT.name in case.output.quantities:
+        rows = ([*result.curve.varied.values(), *row.values()] for result in results for row in _rows(result))
+        write_csv(folder / "moments.csv", [*names, *MOMENT_COLUMNS], rows)
+    columns = [f"{name}{ending}" for name in asked(case) for ending in ("", "_error")]
+    curves = ([*result.curve.varied.values(), *_curve_row(case, result)] for result in results)
+    write_csv(folder / "curves.csv", [*names, *columns, "p_solved", "p_failed", "status", "seconds"], curves)
+
+
+def write_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str, Any], file: TextIO) -> None:
+    """The summary, curve by curve; beyond `MOST_INDENTED` each is one line."""
     state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
-    write_json(folder / "summary.json", {**head(case), **state, "curves": [_summary(result) for result in results]})
-    columns = ["p", "value", "derivative", "perturbation", "error_estimate", "residual"]
-    rows = ([*result.curve.varied.values(), *row.values()] for result in results for row in _rows(result))
-    write_csv(folder / "moments.csv", [*case.vary, *columns], rows)
+    begin = _json({**head(case), **state, **facts}, is_indented=True).removesuffix("\n}")
+    file.write(f'{begin},\n "curves": [')
+    is_indented = case.planned <= MOST_INDENTED
+    for number, result in enumerate(results):
+        text = _json(_summary(case, result), is_indented=is_indented).replace("\n", "\n  ")
+        file.write(f"{',' if number else ''}\n  {text}")
+    file.write("\n ]\n}\n")
+
+
+def asked(case: Case) -> list[str]:
+    """The indices that a case asks for."""
+    return [name for name in INDICES if name in case.output.quantities]
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
@@ -52,29 +83,41 @@ def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
     return {"parameters": dict(curve.parameters), "varied": dict(curve.varied)}
 
 
-def _summary(result: CurveResult) -> dict[str, Any]:
+def _json(data: Any, *, is_indented: bool) -> str:
+    return json.dumps(data, indent=1 if is_indented else None, allow_nan=False, ensure_ascii=False)
+
+
+def _summary(case: Case, result: CurveResult) -> dict[str, Any]:
+    """What a case asks for of a curve."""
+    found: dict[str, Any] = {name: _estimate(result, INDICES[name]) for name in asked(case)}
+    if MOMENT.name in case.output.quantities:
+        found = {"moments": _rows(result), **found}
+    if SENSITIVITIES in case.output.quantities:
+        found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
     return {
         **_parameters(result.curve),
-        "moments": _rows(result),
-        **{name: _estimate(result, index) for name, index in INDICES.items()},
-        "sensitivities": None if result.sensitivities is None else _sensitivities(result.sensitivities),
+        "status": result.status.name.lower(),
+        **found,
         "discretisation": result.discretisation,
         "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
         "notes": list(result.notes),
+        "seconds": round(result.seconds, 6),
     }
+
+
+def _curve_row(case: Case, result: CurveResult) -> list[Any]:
+    """Each index and its error, empty where there is none, and what became of the curve."""
+    estimates = [result.estimates[name] for name in asked(case)]
+    pairs = [(each.value, each.error_estimate) if each else ("", "") for each in estimates]
+    solved, wanted = result.moments.p.size, case.p.size if MOMENT.name in case.output.quantities else 0
+    numbers = [number for pair in pairs for number in pair]
+    return [*numbers, solved, wanted - solved, result.status.name.lower(), round(result.seconds, 6)]
 
 
 def _rows(result: CurveResult) -> list[dict[str, float | None]]:
     """One row for each p; what is not known is None."""
     moments = result.moments
-    columns = {
-        "p": moments.p,
-        "value": moments.value,
-        "derivative": moments.derivative,
-        "perturbation": result.moments_perturbation,
-        "error_estimate": moments.error_estimate,
-        "residual": moments.residual,
-    }
+    columns = {name: getattr(moments, name) for name in MOMENT_COLUMNS}
     known = {name: [None if math.isnan(x) else x for x in values.tolist()] for name, values in columns.items()}
     return [dict(zip(known, row, strict=True)) for row in zip(*known.values(), strict=True)]
 

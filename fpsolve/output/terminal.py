@@ -164,7 +164,7 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
     _explain_star(table, case)
     moments = result.moments
     for p, value, error, theory in zip(
-        moments.p, moments.value, moments.error_estimate, result.moments_perturbation, strict=True
+        moments.p, moments.value, moments.error_estimate, moments.perturbation, strict=True
     ):
         shown = f"{error:.0e}" if error else "0"
         table.add_row(f"{p + 0.0:g}", digits(value, error), shown, f"{theory + 0.0:.6g}", f"{value - theory + 0.0:.2e}")

@@ -19,6 +19,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.case.curves import Curve
 from fpsolve.errors import OutputError
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import Fields, fields, xi_marginal
@@ -28,7 +29,7 @@ from fpsolve.files import write_text
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.process import signals_held
-from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.study.results import SimulatedCurve, Solved
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals written; elements of a higher degree are cut into several of them."""
@@ -96,15 +97,15 @@ def write_density(path: Path, stationary: PrincipalPair, parameters: Facts = Map
     return path
 
 
-def write_curve(result: CurveResult, folder: Path) -> None:
+def write_functions(solved: Solved, curve: Curve, folder: Path) -> None:
     """Write the eigenfunctions of a curve; with the first curve the stationary density too."""
-    stationary, curve = result.stationary, result.curve
+    stationary = solved.stationary
     if stationary is not None and curve.number == 1:
         write_density(folder / "density.vtu", stationary, curve.parameters)
-    if stationary is not None and result.eigenpairs:
+    if stationary is not None and solved.eigenpairs:
         copy_show_script(folder)
         stem = f"eigenfunctions{curve.suffix}"
-        write_eigenfunctions(folder, result.eigenpairs, stationary, stem, curve.parameters)
+        write_eigenfunctions(folder, solved.eigenpairs, stationary, stem, curve.parameters)
 
 
 def write_response(simulated: SimulatedCurve, folder: Path) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 from fpsolve.analysis.sensitivity import Sensitivities
@@ -13,7 +14,6 @@ from fpsolve.case.sections import Expectation
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
-from fpsolve.exponent.solver import MomentLyapunov
 
 if TYPE_CHECKING:  # numba takes half a second to import
     from fpsolve.simulation.estimators import MonteCarlo
@@ -21,34 +21,60 @@ if TYPE_CHECKING:  # numba takes half a second to import
 
 
 @dataclass(frozen=True, eq=False)
+class Moments:
+    """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
+
+    Attributes:
+        p: the moments.
+        value, derivative, error_estimate, residual: as in `MomentLyapunov`.
+        perturbation: Eq. (37) at the same p.
+        rare: the p at which rare paths carry the moment, shape (k,).
+    """
+
+    p: FloatArray
+    value: FloatArray
+    derivative: FloatArray
+    error_estimate: FloatArray
+    residual: FloatArray
+    perturbation: FloatArray
+    rare: FloatArray
+
+
+class Status(IntEnum):
+    """What became of a parameter set."""
+
+    CONVERGED = 0
+    PARTLY = 1
+    FAILED = 2
+    MISSING = 3
+
+
+@dataclass(frozen=True, eq=False)
 class CurveResult:
-    """What was computed for one parameter set.
+    """What was computed for one parameter set: numbers and sentences, which a record can hold.
 
     Attributes:
         curve: the parameters, the oscillator and the noise.
         moments: Λ(p); where some p failed, of the others.
-        moments_perturbation: Eq. (37) at the same p.
-        estimates: of each of the `INDICES`, by its name; None where there is none, or it did not converge.
-        eigenpairs: those whose eigenfunctions are written; none once they are no longer needed.
-        stationary: the eigenpair at p = 0; None once it is no longer needed.
+        estimates: of each of the `INDICES`, by its name; None where there is none, it was not asked for, or it did not
+            converge.
         discretisation: what was used for the p of the largest size; None where no p was solved.
         warnings: what limits these numbers.
         notes: where the theories compared with are not valid.
         failures: why some p are missing.
         sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
+        seconds: how long the processor took.
     """
 
     curve: Curve
-    moments: MomentLyapunov
-    moments_perturbation: FloatArray
+    moments: Moments
     estimates: Mapping[str, Estimate | None]
-    eigenpairs: tuple[PrincipalPair, ...]
-    stationary: PrincipalPair | None
-    discretisation: dict[str, Any] | None
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]
+    discretisation: dict[str, Any] | None = None
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     failures: tuple[Failure, ...] = ()
     sensitivities: Sensitivities | None = None
+    seconds: float = 0.0
 
     @property
     def lyapunov_exponent(self) -> Estimate | None:
@@ -65,9 +91,29 @@ class CurveResult:
         """Λ″(0)."""
         return self.estimates[VARIANCE_RATE.name]
 
-    def without_pairs(self) -> CurveResult:
-        """The numbers without the eigenpairs; those of `moments` are solved again when they are asked for."""
-        return replace(self, moments=self.moments.forgetful(), eigenpairs=(), stationary=None)
+    @property
+    def status(self) -> Status:
+        """Whether all p that were asked for are there."""
+        if not self.failures:
+            return Status.CONVERGED
+        return Status.PARTLY if self.moments.p.size else Status.FAILED
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A parameter set once it is solved, with the eigenfunctions that are to be drawn.
+
+    Attributes:
+        result: the numbers; None where they were known before.
+        eigenpairs: those whose eigenfunctions are wanted.
+        stationary: the eigenpair at p = 0; None where no density is wanted, or it is not to be trusted.
+        is_passing: whether it failed for a reason that may be gone when it is tried again.
+    """
+
+    result: CurveResult | None
+    eigenpairs: tuple[PrincipalPair, ...]
+    stationary: PrincipalPair | None
+    is_passing: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,10 @@
-"""Solving the curves of a case, and comparing them with what it expects."""
+"""Solving a curve of a case, and comparing curves with what the case expects."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from time import thread_time
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,18 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.case.remedies import in_words_of_a_case
-from fpsolve.case.sections import Expectation
-from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
+from fpsolve.case.sections import EIGENFUNCTIONS, SENSITIVITIES, Expectation
+from fpsolve.errors import NoSuchExponent, NotConverged, Remedy
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
 from fpsolve.exponent.moments import solve_moments
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.direction import directions
-from fpsolve.study.results import Comparison, CurveResult
+from fpsolve.study.results import Comparison, CurveResult, Moments, Solved
 from fpsolve.theory import validity
 from fpsolve.theory.perturbation import second_order
 
@@ -47,10 +49,41 @@ class Wanted:
     density: bool = False
     differentiated: tuple[float, ...] | None = None
 
+    @property
+    def draws(self) -> bool:
+        """Whether functions are wanted, and not numbers only."""
+        return self.density or bool(self.shown)
 
-def everything(case: Case, curve: Curve) -> Wanted:
-    """All moments and indices, their sensitivities, and the eigenfunctions to be drawn."""
-    return Wanted(case.p, tuple(INDICES), tuple(case.shown), density=True, differentiated=tuple(case.differentiated))
+
+@dataclass(frozen=True, eq=False)
+class Numerics:
+    """How all curves of a case are solved.
+
+    Attributes:
+        rtol, mesh, budget: as for `moment_lyapunov`.
+    """
+
+    rtol: float
+    budget: Budget
+    mesh: CylinderMesh | None
+
+    @classmethod
+    def of(cls, case: Case) -> Numerics:
+        return cls(case.rtol, case.budget, case.cylinder_mesh())
+
+
+def everything(case: Case) -> Wanted:
+    """What [output] names as `quantities`, the eigenfunctions to be drawn among them."""
+    names = set(case.output.quantities)
+    draws, has_moments = EIGENFUNCTIONS in names, MOMENT.name in names
+    slopes = tuple(case.differentiated) if has_moments else ()
+    return Wanted(
+        case.p if has_moments else np.zeros(0),
+        tuple(name for name in INDICES if name in names),
+        shown=tuple(case.shown) if draws else (),
+        density=draws,
+        differentiated=slopes if SENSITIVITIES in names else None,
+    )
 
 
 def expected(case: Case, curve: Curve) -> Wanted:
@@ -58,26 +91,6 @@ def expected(case: Case, curve: Curve) -> Wanted:
     chosen = [each for each in case.expect if each.selects(curve.varied)]
     p = np.unique([each.p for each in chosen if each.p is not None])
     return Wanted(p, tuple(name for name in INDICES if any(each.quantity == name for each in chosen)))
-
-
-def solving_work(case: Case, of_curve: Callable[[Case, Curve], Wanted] = everything) -> int:
-    """How often `solve_curves` reports progress: once for each moment of each curve."""
-    return sum(of_curve(case, curve).p.size for curve in case.curves())
-
-
-def solve_curves(
-    case: Case,
-    of_curve: Callable[[Case, Curve], Wanted] = everything,
-    *,
-    progress: Callable[[], None] = lambda: None,
-) -> Iterator[CurveResult]:
-    """Solve the curves of a case one after the other; what did not converge is in their `failures`."""
-    mesh = case.cylinder_mesh()
-    for curve in case.curves():
-        try:
-            yield _solve_curve(case, curve, of_curve(case, curve), mesh, progress)
-        except MeshError as failure:
-            raise MeshError(f"{case.path}: mesh: {failure}") from failure
 
 
 def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
@@ -90,34 +103,67 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
     ]
 
 
-def _solve_curve(
-    case: Case, curve: Curve, wanted: Wanted, mesh: CylinderMesh | None, progress: Callable[[], None]
-) -> CurveResult:
-    solver = ExponentSolver(curve.problem, mesh, rtol=case.rtol, budget=case.budget)
-    moments = solve_moments(solver, wanted.p, progress=progress)
-    estimates, missing, absent = _solve_indices(solver, wanted.indices, moments)
-    attempts = (_pair(solver, float(p)) for p in wanted.shown if np.any(moments.p == p))
-    pairs = tuple(pair for pair in attempts if pair is not None)
-    stationary = _pair(solver, 0.0) if wanted.density else None
+def solve_curve(
+    curve: Curve, wanted: Wanted, numerics: Numerics, progress: Callable[[], None] = lambda: None
+) -> Solved:
+    """Solve one parameter set; what did not converge is in its `failures`.
+
+    Args:
+        curve: the parameter set.
+        wanted: what is asked of it.
+        numerics: how it is solved.
+        progress: called after each moment.
+    """
+    started = thread_time()
+    solver = ExponentSolver(curve.problem, numerics.mesh, rtol=numerics.rtol, budget=numerics.budget)
+    found = solve_moments(solver, wanted.p, progress=progress)
+    estimates, missing, absent = _solve_indices(solver, wanted.indices, found)
+    pairs, stationary = _functions(solver, without_failed(wanted, found.failures))
     lost = _lost(stationary, solver.near.refinement)
-    warnings = [*moments.warnings, *missing, *_imprecise(estimates, case.rtol, mesh is None)]
+    warnings = [*found.warnings, *missing, *_imprecise(estimates, numerics)]
     warnings += lost or _unresolved(pairs)
-    slopes = _sensitivities(solver, curve, wanted, moments, estimates)
-    notes = [*_notes(case, curve, moments, estimates[LYAPUNOV_EXPONENT.name]), *absent]
-    notes += slopes.notes if slopes else ()
-    return CurveResult(
+    slopes = _sensitivities(solver, curve, wanted, found, estimates)
+    notes = [*_notes(curve, found, estimates[LYAPUNOV_EXPONENT.name]), *absent, *(slopes.notes if slopes else ())]
+    result = CurveResult(
         curve=curve,
-        moments=moments,
-        moments_perturbation=second_order(curve.problem).moment_exponent(moments.p),
+        moments=_moments(found),
         estimates=estimates,
-        eigenpairs=pairs,
-        stationary=None if lost else stationary,
         discretisation=_discretisation(solver),
         warnings=tuple(map(in_words_of_a_case, warnings)),
         sensitivities=slopes,
         notes=tuple(map(in_words_of_a_case, notes)),
-        failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in moments.failures),
+        failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in found.failures),
+        seconds=thread_time() - started,
     )
+    return Solved(result, pairs, None if lost else stationary)
+
+
+def solve_functions(
+    curve: Curve, wanted: Wanted, numerics: Numerics
+) -> tuple[tuple[PrincipalPair, ...], PrincipalPair | None]:
+    """The eigenpairs of a parameter set whose numbers are known: those to be drawn, and that at p = 0."""
+    solver = ExponentSolver(curve.problem, numerics.mesh, rtol=numerics.rtol, budget=numerics.budget)
+    pairs, stationary = _functions(solver, wanted)
+    return pairs, None if _lost(stationary, "") else stationary
+
+
+def without_failed(wanted: Wanted, failures: Sequence[Failure]) -> Wanted:
+    """The same without the eigenfunctions at the p that failed."""
+    failed = {failure.p for failure in failures}
+    return replace(wanted, shown=tuple(p for p in wanted.shown if p not in failed))
+
+
+def _functions(solver: ExponentSolver, wanted: Wanted) -> tuple[tuple[PrincipalPair, ...], PrincipalPair | None]:
+    """The eigenpairs to be drawn that converge, and that at p = 0."""
+    attempts = (_pair(solver, p) for p in wanted.shown)
+    pairs = tuple(pair for pair in attempts if pair is not None)
+    return pairs, _pair(solver, 0.0) if wanted.density else None
+
+
+def _moments(found: MomentLyapunov) -> Moments:
+    """The numbers, with Eq. (37) beside them."""
+    theory = second_order(found.solver.problem).moment_exponent(found.p)
+    return Moments(found.p, found.value, found.derivative, found.error_estimate, found.residual, theory, found.rare)
 
 
 def _solve_indices(
@@ -170,12 +216,12 @@ def _sensitivities(
     )
 
 
-def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:
+def _notes(curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:
     """What heavy tails make of the numbers, and where the reduction of the noise, the impact law or Eq. (37) fails."""
     notes = [
         validity.heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
         *moments.notes,
-        None if case.is_exact else validity.reduction_note(curve.original_noise),
+        None if curve.is_exact else validity.reduction_note(curve.original_noise),
         validity.impact_note(curve.oscillator),
         validity.weak_noise_note(curve.problem, moments.p, moments.value),
     ]
@@ -207,13 +253,13 @@ def _lost(stationary: PrincipalPair | None, remedy: str) -> list[str]:
     return []
 
 
-def _imprecise(estimates: Mapping[str, Estimate | None], rtol: float, is_adaptive: bool) -> list[str]:
+def _imprecise(estimates: Mapping[str, Estimate | None], numerics: Numerics) -> list[str]:
     """Which indices miss rtol."""
     return [
-        f"rtol = {rtol:g} is not met by {INDICES[name].symbol}: {estimate.value:.6g} has an estimated error of "
-        f"{estimate.error_estimate:.1e}; {'' if is_adaptive else Remedy.MESH + ', or '}use a larger rtol"
+        f"rtol = {numerics.rtol:g} is not met by {INDICES[name].symbol}: {estimate.value:.6g} has an estimated error of "
+        f"{estimate.error_estimate:.1e}; {'' if numerics.mesh is None else Remedy.MESH + ', or '}use a larger rtol"
         for name, estimate in estimates.items()
-        if estimate and estimate.relative_error > rtol
+        if estimate and estimate.relative_error > numerics.rtol
     ]
 
 

@@ -1,36 +1,38 @@
-"""Running a case: its curves are solved, simulated or checked, written one after the other, and drawn in the end."""
+"""What can be done with a case: run, simulate, chart and check it; each writes as it goes, and draws in the end."""
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.errors import NotConverged
-from fpsolve.files import TEMPORARY, alone, writable
+from fpsolve.files import writable
 from fpsolve.output.charts import draw_chart, write_chart
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
-from fpsolve.output.tables import write_results, write_simulation
-from fpsolve.output.vtk import write_curve, write_response
+from fpsolve.output.tables import write_simulation
+from fpsolve.output.vtk import write_response
+from fpsolve.pool import Pool, cluster, here, several
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulate_curves, simulation_work
-from fpsolve.study.solve import compare, expected, solve_curves, solving_work
+from fpsolve.study.solve import Numerics, compare, expected
+from fpsolve.study.sweep import Order, SolveBatch, batches, lost, result_alone
+from fpsolve.workflow.folders import (
+    AGAIN,
+    AGAIN_FROM_THERE,
+    CHART,
+    SIMULATED,
+    SOLVED,
+    kept,
+    own_folder,
+    saying_if_interrupted,
+)
+from fpsolve.workflow.sets import Sweep
 
 Progress = Callable[[], None]
-AGAIN = "run it again to start over"
-SOLVED, SIMULATED = (
-    r"summary\.json|moments\.csv|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu|show\.py"
-    r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)",
-    r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)",
-)
-"""The names of the files that a run writes, and of those of a simulation; and of a chart."""
-CHART = r"chart\.(csv|json|png|pdf)"
-_UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
 
 
 @dataclass(frozen=True)
@@ -60,12 +62,14 @@ class Outcome:
         simulated: its curves, simulated.
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty where none came.
         comparisons: what it expects beside what was computed.
+        sweep: what solved it, if that was done.
     """
 
-    results: tuple[CurveResult, ...] = ()
+    results: Sequence[CurveResult] = ()
     simulated: tuple[SimulatedCurve, ...] = ()
     interruption: str = ""
     comparisons: tuple[Comparison, ...] = ()
+    sweep: Sweep | None = None
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -73,32 +77,57 @@ class Outcome:
         return tuple(failure.reason for result in self.results for failure in result.failures)
 
 
-def run(case: Case, out: str | Path = "results", *, progress: Progress = lambda: None) -> tuple[CurveResult, ...]:
+def run(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    jobs: int | None = 1,
+    scheduler: str = "",
+    fresh: bool = False,
+    progress: Progress = lambda: None,
+) -> tuple[CurveResult, ...]:
     """Solve a case and write `out`/<name of the case>/.
 
-    What an earlier run wrote there is removed first, and a simulation of other parameters. Tables are written anew
-    after every curve, each file whole or not at all, so that what is finished stays; summary.json says whether all
-    curves are.
+    Sets that an earlier run finished there, also one that was killed, are not solved again; all other files are made
+    anew, and what a simulation of other parameters wrote is removed. summary.json says whether all curves are there.
 
     Args:
         case: from `load_case`.
         out: folder for the results.
+        jobs: how many processes solve; None for one on each processor. A script that asks for several needs
+            `if __name__ == "__main__":` around what it does.
+        scheduler: the address of a Dask scheduler whose workers solve instead, such as "tcp://host:8786".
+        fresh: whether to solve all sets anew.
         progress: called after each moment of each curve.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it; nothing is solved.
         NotConverged: some p failed; everything else is written, and `partial` holds it.
     """
-    outcome = run_case(case, out, watch=Watch(bar=lambda *_: nullcontext(progress)))
+    pool = cluster(scheduler) if scheduler else several(jobs)
+    outcome = run_case(case, out, pool=pool, is_fresh=fresh, watch=Watch(bar=lambda *_: nullcontext(progress)))
+    results = tuple(outcome.results)
     if outcome.failures:
-        raise NotConverged("\n".join(outcome.failures), outcome.results)
-    return outcome.results
+        raise NotConverged("\n".join(outcome.failures), results)
+    return results
 
 
-def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = False, watch: Watch = NOBODY) -> Outcome:
+def run_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    monte_carlo: bool = False,
+    pool: Pool | None = None,
+    is_fresh: bool = False,
+    watch: Watch = NOBODY,
+) -> Outcome:
     """Solve a case, simulate it too if `monte_carlo` says so, and draw both in one figure.
 
     When the simulation is interrupted or fails, the figure shows what was done.
+
+    Args:
+        pool: who solves; this process if none is given.
+        is_fresh: whether to solve all sets anew.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -110,18 +139,19 @@ def run_case(case: Case, out: str | Path = "results", *, monte_carlo: bool = Fal
     simulated: list[SimulatedCurve] = []
     interruption = ""
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
-    with _own_folder(case, out, replaced) as folder:
-        results = _solve(case, folder, watch)
-        with _saying_if_interrupted(lambda: f"; what was solved is kept in {folder}"):
+    with own_folder(case, out, replaced) as folder:
+        sweep = _solve(case, folder, pool or here(), watch, is_fresh=is_fresh)
+        with saying_if_interrupted(lambda: f"; what was solved is kept in {folder}"):
             try:
-                watch.solved(case, results)
+                watch.solved(case, sweep.results)
                 if monte_carlo:
                     interruption = _simulate(case, folder, watch, simulated)
-                    watch.simulated(case, simulated, results)
+                    watch.simulated(case, simulated, sweep.results)
             finally:
                 with writable(folder):
-                    draw(case, results, simulated, folder)
-    return Outcome(results, tuple(simulated), interruption)
+                    draw(case, sweep.results, simulated, folder)
+                    draw_sensitivities(case, sweep.results, folder)
+    return Outcome(sweep.results, tuple(simulated), interruption, sweep=sweep)
 
 
 def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Outcome:
@@ -139,8 +169,8 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
     refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
     with (
-        _own_folder(case, out, (SIMULATED,)) as folder,
-        _saying_if_interrupted(lambda: _kept(case, simulated, folder)),
+        own_folder(case, out, (SIMULATED,)) as folder,
+        saying_if_interrupted(lambda: kept(case, len(simulated), folder)),
     ):
         interruption = _simulate(case, folder, watch, simulated)
         watch.simulated(case, simulated, ())
@@ -161,8 +191,8 @@ def chart_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY
     refuse_no_chart(case)
     chart = Chart((), ())
     with (
-        _own_folder(case, out, (CHART,)) as folder,
-        _saying_if_interrupted(lambda: _kept_lines(case, chart, folder)),
+        own_folder(case, out, (CHART,)) as folder,
+        saying_if_interrupted(lambda: _kept_lines(case, chart, folder)),
         watch.bar(f"{case.name}, chart", chart_work(case)) as progress,
         writable(folder),
     ):
@@ -175,29 +205,37 @@ def chart_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY
     return chart
 
 
-def check_case(case: Case, *, watch: Watch = NOBODY) -> Outcome:
+def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = NOBODY) -> Outcome:
     """Solve what a case expects, and compare it; nothing is written."""
-    with watch.bar(case.name, solving_work(case, expected)) as progress:
-        results = tuple(result.without_pairs() for result in solve_curves(case, expected, progress=progress))
-    return Outcome(results, comparisons=tuple(compare(case, results)))
+    numerics = Numerics.of(case)
+    found: list[CurveResult] = []
+    with watch.bar(case.name, case.planned) as progress, pool or here() as workers:
+        tasks = batches(case, lambda curve: Order(curve, expected(case, curve), ""), numerics)
+        for done in workers.run(SolveBatch(result_alone), tasks):
+            results = done.result or [lost(order.curve) for order in done.item.orders]
+            for result in filter(None, results):
+                found.append(result)
+                progress()
+    found.sort(key=lambda result: result.curve.number)
+    return Outcome(found, comparisons=tuple(compare(case, found)))
 
 
-def _solve(case: Case, folder: Path, watch: Watch) -> tuple[CurveResult, ...]:
-    """Solve the curves of a case, and write after each."""
-    results: list[CurveResult] = []
+def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Sweep:
+    """Solve the sets of a case that are not known, and write all tables."""
+    with writable(folder):
+        sweep = Sweep(case, folder, is_fresh=is_fresh)
     with (
-        _saying_if_interrupted(lambda: _kept(case, results, folder)),
-        watch.bar(case.name, solving_work(case)) as progress,
+        saying_if_interrupted(lambda: kept(case, len(sweep.results), folder), AGAIN_FROM_THERE),
+        watch.bar(case.name, sweep.steps) as progress,
         writable(folder),
     ):
-        write_results(case, results, folder)
-        for result in solve_curves(case, progress=progress):
-            write_curve(result, folder)
-            if case.output.sensitivities:
-                draw_sensitivities(case, result, folder)
-            write_results(case, [*results, result], folder)
-            results.append(result.without_pairs())
-    return tuple(results)
+        try:
+            sweep.solve(pool, progress)
+        except KeyboardInterrupt:
+            sweep.write_all()
+            raise
+        sweep.write_all()
+    return sweep
 
 
 def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedCurve]) -> str:
@@ -215,55 +253,8 @@ def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedC
     return f"interrupted {place}; what was done is kept in {folder}; {AGAIN}"
 
 
-@contextmanager
-def _own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator[Path]:
-    """The folder of a case, which other runs keep out of; nothing is in it that is replaced, or of other parameters."""
-    folder = Path(out) / case.name
-    with alone(folder):
-        with writable(folder):
-            stale = replaced if _agrees(case, folder) else (SOLVED, SIMULATED, CHART)
-            _remove(folder, "|".join([*stale, _UNFINISHED]))
-        yield folder
-
-
-def _agrees(case: Case, folder: Path) -> bool:
-    """Whether the tables in a folder are all of parameters that the case has."""
-    tables = [*folder.glob("summary.json"), *folder.glob("monte_carlo*.json"), *folder.glob("chart.json")]
-    known = [dict(curve.parameters) for curve in case.curves()] if tables else []
-    try:
-        contents = [json.loads(table.read_text(encoding="utf-8")) for table in tables]
-        found = [curve["parameters"] for content in contents for curve in content.get("curves", [content])]
-    except (ValueError, KeyError, TypeError, AttributeError):  # it is no table of ours
-        return False
-    return all(any(each.items() <= one.items() for one in known) for each in found)
-
-
-@contextmanager
-def _saying_if_interrupted(what_is_kept: Callable[[], str]) -> Iterator[None]:
-    """An interrupt of the body says what is kept, and how to go on."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted{what_is_kept()}; {AGAIN}") from None
-
-
-def _kept(case: Case, done: Sequence[CurveResult] | Sequence[SimulatedCurve], folder: Path) -> str:
-    """How many curves of a case are done, and where these are."""
-    count = f" after {len(done)} of {case.planned} curve{'s' if case.planned > 1 else ''}"
-    return f"{count}; what was done is kept in {folder}" if done else count
-
-
 def _kept_lines(case: Case, chart: Chart, folder: Path) -> str:
     """How many branches of a chart are traced, and where these are."""
     count = sum(len(line.traces) for line in chart.lines)
     text = f" after {count} branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines"
     return f"{text}; what was done is kept in {folder}" if count else text
-
-
-def _remove(folder: Path, names: str) -> None:
-    """Remove files with names that match, in a folder and one below."""
-    for path in {*folder.glob("*"), *folder.glob("*/*")}:
-        if re.fullmatch(names, path.relative_to(folder).as_posix()) and not path.is_dir():
-            path.unlink()
-            if path.parent != folder and not any(path.parent.iterdir()):
-                path.parent.rmdir()

@@ -1,0 +1,189 @@
+"""Results as one labelled dataset, results.nc: over the varied keys, or the sets, and p; and many of these as one."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from glob import glob
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.case.case import Case
+from fpsolve.case.vary import PARAMETERS
+from fpsolve.errors import FpsolveError
+from fpsolve.exponent.quantities import INDICES, MOMENT
+from fpsolve.files import atomic
+from fpsolve.model.parameters import unit_of
+from fpsolve.output.tables import asked
+from fpsolve.study.results import CurveResult, Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SET = "set"
+"""The dimension of parameter sets that are no product."""
+RESULTS = "results.nc"
+_DERIVATIVE = {"long_name": "derivative of the moment Lyapunov exponent", "units": "1/time", "equation": "(2)"}
+_STATUS = {
+    "long_name": "what became of the parameter set",
+    "flag_values": np.array([int(each) for each in Status], dtype=np.int8),
+    "flag_meanings": " ".join(each.name.lower() for each in Status),
+    "units": "1",
+}
+
+
+def write_dataset(case: Case, results: Iterable[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
+    """results.nc, for xarray and whatever reads netCDF-4; what is missing or failed is NaN."""
+    with atomic(folder / RESULTS) as draft:
+        dataset_of(case, results, facts).to_netcdf(draft, engine="h5netcdf")
+
+
+def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, Any]) -> xr.Dataset:
+    """The results of a case: a dimension for each varied key, or `set` for those of a list, and p.
+
+    Args:
+        facts: on the run, see `Run.facts`; they become attributes, tables as JSON.
+    """
+    import xarray as xr
+
+    columns = _Columns(case)
+    for result in results:
+        columns.add(result)
+    variables = {name: (dimensions, values, attributes) for name, dimensions, values, attributes in columns.variables()}
+    found = xr.Dataset(variables, _coordinates(case), _attributes(case, facts))
+    return found.assign_attrs(complete=int(not np.any(columns.status == Status.MISSING)))
+
+
+class _Columns:
+    """Arrays over the sets of a case, filled curve by curve."""
+
+    def __init__(self, case: Case) -> None:
+        self.case, self.names = case, asked(case)
+        self.places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.output.quantities else {}
+        size = case.planned, len(self.places)
+        self.moments = {
+            name: np.full(size, math.nan) for name in ("value", "error_estimate", "derivative", "perturbation")
+        }
+        self.estimates = {name: np.full((3, case.planned), math.nan) for name in self.names}
+        self.status = np.full(case.planned, Status.MISSING, dtype=np.int8)
+        self.seconds = np.full(case.planned, math.nan)
+
+    def add(self, result: CurveResult) -> None:
+        row, found = result.curve.number - 1, result.moments
+        if self.places:
+            at = [self.places[p] for p in found.p.tolist()]
+            for name, values in self.moments.items():
+                values[row, at] = getattr(found, name)
+        for name, values in self.estimates.items():
+            if estimate := result.estimates[name]:
+                theory = INDICES[name].theory(result.curve.problem)
+                values[:, row] = estimate.value, estimate.error_estimate, theory
+        self.status[row], self.seconds[row] = result.status, result.seconds
+
+    def variables(self) -> Iterable[tuple[str, tuple[str, ...], Any, dict[str, Any]]]:
+        """The name, the dimensions, the values and the attributes of each."""
+        over = _dimensions(self.case)
+        shape = tuple(len(self.case.vary.values(key)) for key in over) if over != (SET,) else (self.case.planned,)
+        if self.places:
+            columns = zip(("", "_error", "_derivative", "_perturbation"), self.moments.values(), strict=True)
+            for ending, values in columns:
+                attributes = _DERIVATIVE if ending == "_derivative" else _described(MOMENT.attributes, ending)
+                yield f"moment{ending}", (*over, "p"), values.reshape(*shape, -1), attributes
+        for name, values in self.estimates.items():
+            for ending, column in zip(("", "_error", "_perturbation"), values, strict=True):
+                yield f"{name}{ending}", over, column.reshape(shape), _described(INDICES[name].attributes, ending)
+        yield "status", over, self.status.reshape(shape), _STATUS
+        seconds = {"long_name": "time of the processor", "units": "s"}
+        yield "seconds", over, self.seconds.reshape(shape), seconds
+
+
+def _dimensions(case: Case) -> tuple[str, ...]:
+    if not case.vary:
+        return ()
+    return case.vary.keys if case.vary.mode == "product" else (SET,)
+
+
+def _described(attributes: Mapping[str, str], ending: str) -> dict[str, Any]:
+    """The attributes of a quantity for its error, or for what perturbation theory makes of it."""
+    words = {"": "{}", "_error": "estimated error of the {}", "_perturbation": "{} by perturbation theory"}[ending]
+    return {**attributes, "long_name": words.format(attributes["long_name"])}
+
+
+def _coordinates(case: Case) -> dict[str, Any]:
+    over = _dimensions(case)
+    found: dict[str, Any] = {}
+    for key in case.vary.keys:
+        values = case.vary.values(key) if over != (SET,) else case.vary.columns[key]
+        found[key] = ((key,) if over != (SET,) else over, list(values), _parameter(key))
+    if MOMENT.name in case.output.quantities:
+        found["p"] = (("p",), case.p, {"long_name": "order of the moment", "units": "1"})
+    return found
+
+
+def _parameter(key: str) -> dict[str, Any]:
+    """What a varied key is; a text has no unit."""
+    field = PARAMETERS.get(key)
+    return {} if field is None else {"long_name": field.title or "", "units": unit_of(field) or "1"}
+
+
+def _attributes(case: Case, facts: Mapping[str, Any]) -> dict[str, Any]:
+    """The title, the parameters that are held, and where it all comes from; tables as JSON."""
+    [first] = case.curves(0, 1)
+    held = {key: value for key, value in first.parameters.items() if key not in case.vary.keys}
+    origin = {
+        name: value if isinstance(value, str | float | int) else json.dumps(value) for name, value in facts.items()
+    }
+    return {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **held, **origin}
+
+
+def open_results(*places: str | Path) -> xr.Dataset:
+    """The results of several runs as one dataset over `set` and p.
+
+    `run` and every parameter, varied or held, are coordinates of `set`; p are those of any run, and what a run has not
+    is NaN.
+
+    Args:
+        places: folders of cases, their results.nc, or patterns of these such as "results/*".
+
+    Raises:
+        FpsolveError: there is none, or one cannot be read.
+    """
+    import xarray as xr
+
+    paths = [path for place in places for path in _found(str(place))]
+    if not paths:
+        raise FpsolveError(f"no results.nc in {', '.join(map(str, places)) or 'nothing'}; run a case first")
+    return xr.concat(
+        [_long(path) for path in paths], SET, data_vars="all", join="outer", combine_attrs="drop_conflicts"
+    )
+
+
+def _found(place: str) -> Sequence[Path]:
+    """The files that a folder, a file or a pattern means."""
+    paths = [Path(place)] if Path(place).exists() else sorted(map(Path, glob(place)))
+    files = [path / RESULTS if path.is_dir() else path for path in paths]
+    return [path for path in files if path.is_file() and path.suffix == ".nc"]
+
+
+def _long(path: Path) -> xr.Dataset:
+    """A file as a dataset over `set` and p, with all parameters as coordinates of `set`."""
+    import xarray as xr
+
+    try:
+        found = xr.load_dataset(path, engine="h5netcdf")
+    except (OSError, ValueError) as failure:
+        raise FpsolveError(f"{path} cannot be read: {failure}; run its case again") from failure
+    over = [name for name in found.dims if name not in ("p", SET)]
+    if SET not in found.dims:
+        found = found.stack({SET: over}).reset_index(SET) if over else found.expand_dims(SET)
+    held = {key: value for key, value in found.attrs.items() if str(key).partition(".")[0] in ("oscillator", "noise")}
+    size = found.sizes[SET]
+    labels = {"run": path.parent.name, **held}
+    coordinates = {key: (SET, np.full(size, value)) for key, value in labels.items()}
+    rest = {key: value for key, value in found.attrs.items() if key not in held}
+    found = found.assign_coords(coordinates)
+    found.attrs = rest
+    return found

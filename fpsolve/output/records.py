@@ -1,0 +1,180 @@
+"""Records of what is finished, kept in files that only grow: what a run that ended early had done is not lost.
+
+A record is a line of JSON. Each process that writes has a file of its own, and a record is with the system before the
+next one is begun; a line that is torn, or damaged, is none.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import zlib
+from bisect import insort
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from errno import ENOSPC
+from pathlib import Path
+from secrets import token_hex
+from typing import Any, overload
+
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
+from fpsolve.study.records import result_of
+from fpsolve.study.results import CurveResult
+
+FOLDER = "records"
+_NAMES: dict[int, str] = {}
+"""The file of this process."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a record is: its file, where it begins in it, and how long it is, in bytes."""
+
+    file: str
+    start: int
+    size: int
+
+
+class Records:
+    """The records in a folder by their keys, of which the last one counts.
+
+    Args:
+        folder: of the case; the records are in `records` inside of it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder / FOLDER
+        self._places: dict[str, Place] = {}
+
+    def look(self) -> Records:
+        """Find what has been written by now."""
+        for path in sorted(self.folder.glob("*.jsonl")):
+            self._places |= dict(_lines(path))
+        return self
+
+    @property
+    def are_there(self) -> bool:
+        """Whether there is one at least."""
+        return bool(self._places)
+
+    def place(self, key: str) -> Place | None:
+        """Where the record of a key is, if there is one."""
+        return self._places.get(key)
+
+    def read(self, place: Place) -> dict[str, Any]:
+        """A record. Raises OSError or ValueError where there is none."""
+        with (self.folder / place.file).open("rb") as file:
+            file.seek(place.start)
+            found = _parsed(file.read(place.size))
+        if found is None:
+            raise ValueError(f"{self.folder / place.file} has changed")
+        return found[1]
+
+    def remove(self) -> None:
+        """Start over."""
+        self._places.clear()
+        for path in self.folder.glob("*.jsonl"):
+            path.unlink()
+
+
+class Results(Sequence[CurveResult]):
+    """What is known of the curves of a case, in their order; each is read from its record when it is looked at.
+
+    Args:
+        case: whose curves these are.
+        records: those of its folder.
+    """
+
+    def __init__(self, case: Case, records: Records) -> None:
+        self._case, self._records = case, records
+        self._found: dict[int, Place | CurveResult] = {}
+        self._order: list[int] = []
+
+    def add(self, number: int, found: Place | CurveResult) -> None:
+        """Curve `number`, from 1 on."""
+        if number not in self._found:
+            insort(self._order, number)
+        self._found[number] = found
+
+    def of(self, curve: Curve) -> CurveResult | None:
+        """The result of a curve, if there is one."""
+        return self._result(curve) if curve.number in self._found else None
+
+    def __len__(self) -> int:
+        return len(self._order)
+
+    @overload
+    def __getitem__(self, index: int) -> CurveResult: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[CurveResult]: ...
+    def __getitem__(self, index: int | slice) -> CurveResult | Sequence[CurveResult]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        number = self._order[index]
+        [curve] = self._case.curves(number - 1, number)
+        return self._result(curve)
+
+    def __iter__(self) -> Iterator[CurveResult]:
+        return (self._result(curve) for curve in self._case.curves() if curve.number in self._found)
+
+    def _result(self, curve: Curve) -> CurveResult:
+        found = self._found[curve.number]
+        return result_of(self._records.read(found), curve) if isinstance(found, Place) else found
+
+
+def append(folder: Path, key: str, record: dict[str, Any]) -> Place:
+    """Add a record to the file of this process in `folder`/records.
+
+    Raises:
+        OSError: it cannot be written; nothing is left of it.
+    """
+    content = json.dumps(record, ensure_ascii=False).encode()
+    line = b'{"key": "%s", "crc32": %d, "record": %s}\n' % (key.encode(), zlib.crc32(content), content)
+    path = folder / FOLDER / _own_name()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    try:
+        start = os.fstat(handle).st_size
+        try:
+            written = os.write(handle, line)
+            if written < len(line):
+                raise OSError(ENOSPC, os.strerror(ENOSPC), str(path))
+        except OSError:
+            os.ftruncate(handle, start)
+            raise
+    finally:
+        os.close(handle)
+    return Place(path.name, start, len(line))
+
+
+def _own_name() -> str:
+    """A name that no other process has, nor had."""
+    number = os.getpid()
+    if number not in _NAMES:
+        _NAMES[number] = f"{socket.gethostname()}-{number}-{token_hex(4)}.jsonl"
+    return _NAMES[number]
+
+
+def _lines(path: Path) -> Iterator[tuple[str, Place]]:
+    """The keys and places of the whole records of a file."""
+    start = 0
+    with path.open("rb") as file:
+        for line in file:
+            found = _parsed(line)
+            if found is not None:
+                yield found[0], Place(path.name, start, len(line))
+            start += len(line)
+
+
+def _parsed(line: bytes) -> tuple[str, dict[str, Any]] | None:
+    """A key and its record; None where the line is torn or damaged."""
+    _, mark, content = line.removesuffix(b"}\n").partition(b', "record": ')
+    try:
+        head = json.loads(line)
+        if not mark or zlib.crc32(content) != head["crc32"]:
+            return None
+        return str(head["key"]), head["record"]
+    except (ValueError, KeyError, TypeError):
+        return None

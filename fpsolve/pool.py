@@ -1,0 +1,284 @@
+"""Tasks in this process, in several of this machine, or on a cluster: one way to run them, whoever works.
+
+A task is a function of one item, both of which pickle. What it finds must not depend on who runs it.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import islice
+from typing import Any, Generic, TypeVar
+
+from fpsolve.errors import FpsolveError
+from fpsolve.process import limit_processors, processors
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+AHEAD = 2
+"""Tasks that wait for each worker, so that none waits for the next."""
+START_SECONDS = 1.5
+"""Of work that this process does itself before it starts others, as that takes as long."""
+CONNECT_SECONDS = 20
+_TURN = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Done(Generic[Item, Result]):
+    """An item and what became of it.
+
+    Attributes:
+        item: what the task was given.
+        result: what it returned; None where its worker died.
+        is_lost: whether its worker died on it, with no other task under way that may have been the reason.
+    """
+
+    item: Item
+    result: Result | None
+    is_lost: bool = False
+
+
+@dataclass
+class Pool:
+    """Runs tasks on an executor of `concurrent.futures`; use it as a context, which ends the workers.
+
+    Attributes:
+        start: makes an executor; again after one has broken, because a worker died.
+        stop: ends an executor, and what it is at.
+        ahead: how many tasks it is given at once.
+        own_seconds: of work that this process does before the executor is made.
+    """
+
+    start: Callable[[], Executor]
+    stop: Callable[[Executor], None] = lambda executor: executor.shutdown(cancel_futures=True)
+    ahead: int = 1
+    own_seconds: float = 0.0
+    _executor: Executor | None = field(default=None, init=False, repr=False)
+
+    def __enter__(self) -> Pool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end()
+
+    def run(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
+        """The results as they come; an exception of a task is raised here, and ends it all.
+
+        Items are taken when they can be given to a worker, so that they may be many, and may follow from results.
+        """
+        source = iter(items)
+        yield from self._own(task, source)
+        suspects: list[Item] = []
+        while True:
+            waiting: dict[Future[Result], Item] = {}
+            for item in islice(source, self.ahead):
+                waiting[self._submit(task, item)] = item
+            if not waiting:
+                return
+            while waiting:
+                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                    item = waiting.pop(future)
+                    try:
+                        yield Done(item, future.result())
+                    except BrokenProcessPool:
+                        suspects.append(item)
+                        continue
+                    except CancelledError:
+                        raise FpsolveError("the scheduler is gone; the same command goes on where it was") from None
+                    except Exception as failure:
+                        if not _is_killed_worker(failure):
+                            raise
+                        yield Done(item, None, is_lost=True)
+                    if not suspects:
+                        waiting |= {self._submit(task, each): each for each in islice(source, 1)}
+            yield from self._one_by_one(task, suspects)
+            suspects.clear()
+
+    def map(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """The results in the order of the items. Raises `FpsolveError` where a worker dies."""
+        numbered = ((number, item) for number, item in enumerate(items))
+        early: dict[int, Result] = {}
+        due = 0
+        for done in self.run(partial(_numbered, task), numbered):
+            if done.result is None:
+                raise FpsolveError("a worker died, perhaps for lack of memory; use fewer workers, or a smaller budget")
+            number, result = done.result
+            early[number] = result
+            while due in early:
+                yield early.pop(due)
+                due += 1
+
+    def _own(self, task: Callable[[Item], Result], source: Iterator[Item]) -> Iterator[Done[Item, Result]]:
+        """What this process does itself, as long as others need to start."""
+        begun = time.monotonic()
+        while self._executor is None and time.monotonic() - begun < self.own_seconds:
+            for item in islice(source, 1):
+                yield Done(item, task(item))
+                break
+            else:
+                return
+
+    def _submit(self, task: Callable[[Item], Result], item: Item) -> Future[Result]:
+        if self._executor is None:
+            self._executor = self.start()
+        try:
+            with _signals_blocked():
+                return self._executor.submit(_alone, task, item)
+        except BrokenProcessPool as failure:
+            broken: Future[Result] = Future()
+            broken.set_exception(failure)
+            return broken
+
+    def _one_by_one(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
+        """The items that were under way as a worker died, again, so that it shows which one was the reason."""
+        self._end()
+        for item in items:
+            try:
+                yield Done(item, self._submit(task, item).result())
+            except BrokenProcessPool:
+                yield Done(item, None, is_lost=True)
+                self._end()
+
+    def _end(self) -> None:
+        if self._executor is not None:
+            executor, self._executor = self._executor, None
+            self.stop(executor)
+
+
+class _Here(Executor):
+    """Runs every task in this process, as it is submitted."""
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*args, **kwargs))
+        except Exception as failure:
+            future.set_exception(failure)
+        return future
+
+
+def here() -> Pool:
+    """This process alone."""
+    return Pool(_Here)
+
+
+def several(count: int | None = None) -> Pool:
+    """Processes of this machine; without a number as many as there are processors, once this one has begun."""
+    if count == 1 or (count is None and processors() == 1):
+        return here()
+    size = count or processors()
+    return Pool(lambda: _processes(size), _kill, AHEAD * size, START_SECONDS if count is None else 0.0)
+
+
+def cluster(address: str) -> Pool:
+    """The workers of a Dask scheduler, such as "tcp://host:8786"; they need this version of fpsolve.
+
+    Raises:
+        FpsolveError: Dask is not installed, nothing answers, or the workers cannot do it.
+    """
+    client = _client(address)
+    threads = sum(client.nthreads().values())
+
+    def stop(executor: Executor) -> None:
+        executor.shutdown(wait=False)  # what is not done is cancelled
+        client.close()
+
+    return Pool(partial(client.get_executor, pure=False), stop, max(AHEAD * threads, 32))
+
+
+def _client(address: str) -> Any:
+    """A client of a scheduler whose workers have this version of fpsolve."""
+    from fpsolve import __version__
+
+    try:
+        from distributed import Client
+    except ImportError:
+        raise FpsolveError("Dask is not installed; install it with: pip install 'fpsolve[cluster]'") from None
+    try:
+        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+    except (OSError, ValueError) as failure:
+        raise FpsolveError(
+            f"no scheduler answers at {address} ({failure}); start one with: dask scheduler"
+        ) from failure
+    try:
+        versions = client.run(_version)
+    except Exception as failure:
+        client.close()
+        raise FpsolveError(f"the workers of {address} cannot run fpsolve: {failure}; install it there") from failure
+    others = {version for version in versions.values() if version != __version__}
+    if others or not versions:
+        client.close()
+        remedy = f"dask worker {address} --nworkers -1 --nthreads 1"
+        state = f"have fpsolve {', '.join(others)}, not {__version__}" if others else "are not there"
+        raise FpsolveError(f"workers of {address} {state}; start them with: {remedy}")
+    return client
+
+
+def _version() -> str:
+    from fpsolve import __version__
+
+    return __version__
+
+
+def _is_killed_worker(failure: Exception) -> bool:
+    """Whether Dask gave a task up, as several workers in turn died on it."""
+    return type(failure).__name__ == "KilledWorker"
+
+
+def _alone(task: Callable[[Item], Result], item: Item) -> Result:
+    """One task at a time in a process: a worker of a cluster may have several threads."""
+    with _TURN:
+        return task(item)
+
+
+def _numbered(task: Callable[[Item], Result], numbered: tuple[int, Item]) -> tuple[int, Result]:
+    number, item = numbered
+    return number, task(item)
+
+
+def _processes(count: int) -> Executor:
+    """New processes, in which nothing of this one is copied, so that neither its locks nor its threads are."""
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker)
+
+
+def _begin_worker() -> None:
+    """A worker has one processor, and ends when the process that started it does, however that ends."""
+    limit_processors(1)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: Any) -> None:
+    parent.join()
+    os._exit(1)
+
+
+def _kill(executor: Executor) -> None:
+    """End the workers at once; what they had finished is kept."""
+    for process in list((getattr(executor, "_processes", None) or {}).values()):
+        process.kill()
+    executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _signals_blocked() -> Iterator[None]:
+    """What is started in the body never gets the signals of a terminal, which are for the process that started it."""
+    if not hasattr(signal, "pthread_sigmask"):  # on Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

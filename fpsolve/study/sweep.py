@@ -1,0 +1,124 @@
+"""The parameter sets of a case as tasks: batches of neighbours, each solved by itself, by whoever has time.
+
+Each set begins anew, so that its numbers follow from its parameters alone. (To start from a neighbour's mesh saves half
+of the time of one p in strong noise, and nothing of several p, or in weak noise.)
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
+from fpsolve.case.remedies import in_words_of_a_case
+from fpsolve.errors import FpsolveError
+from fpsolve.exponent.error import Failure
+from fpsolve.exponent.quantities import INDICES
+from fpsolve.study.results import CurveResult, Moments, Solved
+from fpsolve.study.solve import Numerics, Wanted, solve_curve, solve_functions
+
+Kept = TypeVar("Kept")
+BATCHES, MOST_SETS = 256, 64
+"""About so many batches has a case, unless these are larger than that."""
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """A parameter set to be solved.
+
+    Attributes:
+        curve, wanted: which, and what of it.
+        key: of its record.
+        is_known: whether there is a record, so that only its eigenfunctions are to be drawn.
+    """
+
+    curve: Curve
+    wanted: Wanted
+    key: str
+    is_known: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Some parameter sets, and how they are solved."""
+
+    orders: tuple[Order, ...]
+    numerics: Numerics
+
+
+@dataclass(frozen=True, eq=False)
+class SolveBatch(Generic[Kept]):
+    """The task: solves a batch, and hands each set to `keep` before the next is begun.
+
+    Attributes:
+        keep: takes an order and what was found, and returns what the caller needs to know; it pickles.
+        progress: called after each moment; only where the task stays in this process.
+    """
+
+    keep: Callable[[Order, Solved], Kept]
+    progress: Callable[[], None] | None = None
+
+    def __call__(self, batch: Batch) -> list[Kept]:
+        progress = self.progress or (lambda: None)
+        return [self.keep(order, solved(order, batch.numerics, progress)) for order in batch.orders]
+
+
+def batch_size(planned: int) -> int:
+    """Sets of a batch, from the case alone."""
+    return min(max(planned // BATCHES, 1), MOST_SETS)
+
+
+def batches(case: Case, order: Callable[[Curve], Order | None], numerics: Numerics) -> Iterator[Batch]:
+    """All batches of a case, without the sets of which nothing is wanted."""
+    size = batch_size(case.planned)
+    for start in range(0, case.planned, size):
+        found = tuple(filter(None, map(order, case.curves(start, min(start + size, case.planned)))))
+        if found:
+            yield Batch(found, numerics)
+
+
+def solved(order: Order, numerics: Numerics, progress: Callable[[], None] = lambda: None) -> Solved:
+    """What is wanted of a set; where that cannot be found, a result that says why."""
+    curve, wanted = order.curve, order.wanted
+    try:
+        if order.is_known:
+            return Solved(None, *solve_functions(curve, wanted, numerics))
+        return solve_curve(curve, wanted, numerics, progress)
+    except FpsolveError as failure:
+        return Solved(failed(curve, str(failure)), (), None)
+    except MemoryError:
+        return Solved(failed(curve, "not enough memory; use a smaller [budget], or fewer --jobs"), (), None, True)
+    except OSError:
+        raise
+    except Exception as failure:
+        last = traceback.extract_tb(failure.__traceback__)[-1]
+        text = f"{type(failure).__name__}: {failure} (a fault of fpsolve, in {Path(last.filename).name}:{last.lineno})"
+        return Solved(failed(curve, text), (), None, True)
+
+
+def failed(curve: Curve, reason: str) -> CurveResult:
+    """A result without numbers."""
+    nothing = np.zeros(0)
+    return CurveResult(
+        curve,
+        Moments(*[nothing] * 7),
+        dict.fromkeys(INDICES),
+        failures=(Failure(None, in_words_of_a_case(reason)),),
+    )
+
+
+def lost(curve: Curve) -> CurveResult:
+    """The result of a set on which its worker died."""
+    reason = "its worker died, perhaps for lack of memory; use a smaller [budget], or fewer --jobs, and run it again"
+    return failed(curve, reason)
+
+
+def result_alone(order: Order, solved: Solved) -> CurveResult | None:
+    """For a `SolveBatch` that keeps nothing but the numbers."""
+    return solved.result

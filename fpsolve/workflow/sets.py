@@ -1,0 +1,130 @@
+"""The sets of a case, solved by whoever works, kept as they are finished, and told of in tables as they grow."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fpsolve.case.case import Case
+from fpsolve.case.curves import Curve
+from fpsolve.output.datasets import write_dataset
+from fpsolve.output.provenance import Run
+from fpsolve.output.records import Place, Records, Results, append
+from fpsolve.output.tables import write_results
+from fpsolve.output.vtk import write_functions
+from fpsolve.pool import Pool
+from fpsolve.study.records import key_of, record_of
+from fpsolve.study.results import CurveResult, Solved
+from fpsolve.study.solve import Numerics, everything, without_failed
+from fpsolve.study.sweep import Batch, Order, SolveBatch, batches, lost
+
+Found = tuple[int, Place | CurveResult | None]
+"""The number of a curve, and its numbers where they are new."""
+GROWTH = 1.5
+"""Tables are written anew when they have grown by that factor, so that all of it costs as little as the last ones."""
+
+
+@dataclass(frozen=True)
+class Keep:
+    """Writes what was found of a set into the folder of its case, and says where the numbers are."""
+
+    folder: Path
+
+    def __call__(self, order: Order, solved: Solved) -> Found:
+        curve, result = order.curve, solved.result
+        write_functions(solved, curve, self.folder)
+        if result is None or solved.is_passing:
+            return curve.number, result
+        return curve.number, append(self.folder, order.key, record_of(result))
+
+
+class Sweep:
+    """All sets of a case on the way to being solved.
+
+    Args:
+        case: whose sets these are.
+        folder: where they are kept.
+    """
+
+    def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
+        self.case, self.folder, self.run = case, folder.resolve(), Run(case)
+        self.numerics, self.wanted = Numerics.of(case), everything(case)
+        self.records = Records(self.folder)
+        self.results = Results(case, self.records)
+        if is_fresh:
+            self.records.remove()
+        elif self.records.look().are_there:
+            for curve in case.curves():
+                if place := self.records.place(self._key(curve)):
+                    self.results.add(curve.number, place)
+        self._tabled = 0
+
+    @property
+    def steps(self) -> int:
+        """How often `solve` reports progress."""
+        return self.case.planned * self._steps_each
+
+    def solve(self, pool: Pool, progress: Callable[[], None]) -> None:
+        """Solve what is not known yet; tables are written at the beginning, and as they grow."""
+        self.write_tables()
+        is_alone = self.case.planned == 1
+        for _ in range(0 if self.wanted.draws else len(self.results) * self._steps_each):
+            progress()
+        queue = _Queue(batches(self.case, self._order, self.numerics))
+        with pool:
+            for done in pool.run(SolveBatch(Keep(self.folder), progress if is_alone else None), queue):
+                for number, found in self._lost(done.item, queue) if done.result is None else done.result:
+                    if found is not None:
+                        self.results.add(number, found)
+                    for _ in range(0 if is_alone else self._steps_each):
+                        progress()
+                if len(self.results) >= GROWTH * self._tabled + 1:
+                    self.write_tables()
+
+    def write_tables(self) -> None:
+        """summary.json and the tables beside it, of what is known."""
+        self._tabled = len(self.results)
+        write_results(self.case, self.results, self.folder, self.run.facts())
+
+    def write_all(self) -> None:
+        """The tables, and results.nc."""
+        self.write_tables()
+        write_dataset(self.case, self.results, self.folder, self.run.facts())
+
+    @property
+    def _steps_each(self) -> int:
+        return max(self.wanted.p.size, 1)
+
+    def _key(self, curve: Curve) -> str:
+        return key_of(curve, self.wanted, self.numerics)
+
+    def _order(self, curve: Curve) -> Order | None:
+        """What is to be done for a curve, or None."""
+        order, known = Order(curve, self.wanted, self._key(curve)), self.results.of(curve)
+        if known is None:
+            return order
+        if not self.wanted.draws:
+            return None
+        return replace(order, wanted=without_failed(order.wanted, known.failures), is_known=True)
+
+    def _lost(self, batch: Batch, queue: _Queue) -> list[Found]:
+        """What is known of a batch whose worker died: the rest is tried again, each by itself, which shows the reason."""
+        self.records.look()
+        places = {order: self.records.place(order.key) for order in batch.orders}
+        left = [order for order, place in places.items() if place is None or order.is_known]
+        if len(batch.orders) > 1:
+            queue.again += [Batch((order,), batch.numerics) for order in left]
+            return [(order.curve.number, place) for order, place in places.items() if order not in left]
+        return [(order.curve.number, None if order.is_known else lost(order.curve)) for order in left]
+
+
+class _Queue(Iterator[Batch]):
+    """Batches, among which some may come again."""
+
+    def __init__(self, source: Iterator[Batch]) -> None:
+        self.source, self.again = source, deque[Batch]()
+
+    def __next__(self) -> Batch:
+        return self.again.popleft() if self.again else next(self.source)
