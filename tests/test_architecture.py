@@ -9,7 +9,7 @@ import pytest
 import fpsolve
 
 ROOMS = {
-    "": ["errors", "arrays", "files", "process"],
+    "": ["errors", "arrays", "files", "process", "pictures", "data"],
     "model": [
         "parameters",
         "words",
@@ -19,6 +19,7 @@ ROOMS = {
         "markov_chain",
         "vibro_impact",
         "problem",
+        "quantity",
         "direction",
     ],
     "theory": ["perturbation", "frozen", "far", "validity"],

@@ -1,10 +1,10 @@
-"""The quantities: what each is called, how it is written and drawn, what solves it, and its perturbation theory."""
+"""The quantities that are one number: what solves each, and its perturbation theory."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from fpsolve.exponent.adapt import Budget
@@ -13,30 +13,16 @@ from fpsolve.exponent.function import SEARCH_INTERVAL, nonzero_root
 from fpsolve.exponent.impacts import critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model import quantity
 from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.quantity import MOMENT as MOMENT
+from fpsolve.model.quantity import Quantity as Quantity
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.theory.perturbation import second_order
 
 DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
 """What a figure can show."""
 QuantityName = Literal[DrawnName, "variance_rate", "impact_rate", "critical_impact_factor", "critical_restitution"]
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Something that is computed of a problem.
-
-    Attributes:
-        name: in case files and results.
-        symbol: in sentences and tables.
-        title: of an axis, in LaTeX, with the unit.
-        equation: the number of its perturbation theory.
-    """
-
-    name: QuantityName
-    symbol: str
-    title: str
-    equation: str
 
 
 @dataclass(frozen=True)
@@ -50,58 +36,49 @@ class Index(Quantity):
         interval: where it is sought.
     """
 
-    solve: Callable[[ExponentSolver, float | None], Estimate | Absent]
-    theory: Callable[[Problem], float]
-    interval: tuple[float, float] = (-math.inf, math.inf)
+    solve: Callable[[ExponentSolver, float | None], Estimate | Absent] = field(kw_only=True)
+    theory: Callable[[Problem], float] = field(kw_only=True)
+    interval: tuple[float, float] = field(kw_only=True)
 
 
-MOMENT = Quantity("moment", "Λ(p)", r"moment Lyapunov exponent $\Lambda(p)$ (1/time)", "(37)")
-LYAPUNOV_EXPONENT = Index(
-    "lyapunov_exponent",
-    "λ",
-    r"largest Lyapunov exponent $\lambda$ (1/time)",
-    "(39)",
+def _index(
+    record: Quantity,
+    solve: Callable[[ExponentSolver, float | None], Estimate | Absent],
+    theory: Callable[[Problem], float],
+    interval: tuple[float, float] = (-math.inf, math.inf),
+) -> Index:
+    """A record with what solves it."""
+    return Index(**vars(record), solve=solve, theory=theory, interval=interval)
+
+
+LYAPUNOV_EXPONENT = _index(
+    quantity.LYAPUNOV_EXPONENT,
     solve=lambda solver, _: solver.lyapunov_exponent(),
     theory=lambda problem: second_order(problem).lyapunov_exponent,
 )
-STABILITY_INDEX = Index(
-    "stability_index",
-    "δ_p",
-    r"stability index $\delta_p$",
-    "(38)",
+STABILITY_INDEX = _index(
+    quantity.STABILITY_INDEX,
     solve=lambda solver, root: nonzero_root(solver, guess=root),
     theory=lambda problem: second_order(problem).stability_index,
     interval=SEARCH_INTERVAL,
 )
-VARIANCE_RATE = Index(
-    "variance_rate",
-    "Λ″(0)",
-    r"growth rate of the variance $\Lambda''(0)$ (1/time)",
-    "(37)",
+VARIANCE_RATE = _index(
+    quantity.VARIANCE_RATE,
     solve=lambda solver, _: solver.variance_rate(),
     theory=lambda problem: second_order(problem).variance_rate,
 )
-IMPACT_RATE = Index(
-    "impact_rate",
-    "N",
-    r"impact rate $N = \partial\lambda/\partial\ln R$ (1/time)",
-    "(39)",
+IMPACT_RATE = _index(
+    quantity.IMPACT_RATE,
     solve=lambda solver, _: impact_rate(solver),
     theory=lambda problem: second_order(problem).impact_rate,
 )
-CRITICAL_IMPACT_FACTOR = Index(
-    "critical_impact_factor",
-    "R_c",
-    "critical impact factor $R_c$",
-    "(39)",
+CRITICAL_IMPACT_FACTOR = _index(
+    quantity.CRITICAL_IMPACT_FACTOR,
     solve=lambda solver, _: critical_impact_factor(solver),
     theory=lambda problem: second_order(problem).critical_impact_factor,
 )
-CRITICAL_RESTITUTION = Index(
-    "critical_restitution",
-    "r_c",
-    "critical coefficient of restitution $r_c$",
-    "(39)",
+CRITICAL_RESTITUTION = _index(
+    quantity.CRITICAL_RESTITUTION,
     solve=lambda solver, _: critical_restitution(solver),
     theory=lambda problem: _restitution(problem, second_order(problem).critical_log_factor),
     interval=(0.0, 1.0),

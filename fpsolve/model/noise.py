@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, Remedy
 from fpsolve.model.faults import told_in_words
-from fpsolve.model.parameters import SIZE, STRICT, Derived, parameter
+from fpsolve.model.parameters import DERIVED, SIZE, STRICT, parameter
 
 Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
 CorrelationTime = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
@@ -87,8 +87,8 @@ class OrnsteinUhlenbeck:
         ParameterError: a parameter is not a finite number in its range.
     """
 
-    alpha: Derived
-    sigma: Derived
+    alpha: Annotated[float, parameter("relaxation rate", "", r"$\alpha_0$", "1/time", **DERIVED)]
+    sigma: Annotated[float, parameter("intensity of its white noise", "", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)]
 
     mean, half_width, end_exponent, moments = 0.0, math.inf, 0.0, (-math.inf, math.inf)
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 SIZE = {"ge": 1e-15, "le": 1e15}
 """The range of a positive parameter: whatever the others are, no formula overflows or divides by nothing."""
-Derived = Annotated[float, Field(ge=1e-32, le=1e32)]
-"""What is made of such parameters."""
+DERIVED = {"ge": 1e-32, "le": 1e32}
+"""That of what is made of such parameters."""
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 

@@ -17,8 +17,9 @@ from fpsolve.case.case import Case
 from fpsolve.case.vary import PARAMETERS
 from fpsolve.files import write_csv, write_json
 from fpsolve.model.parameters import axis_title
-from fpsolve.output.plots import COLOURS, canvas, filled
+from fpsolve.output.plots import canvas, filled
 from fpsolve.output.tables import head
+from fpsolve.pictures import COLOURS
 from fpsolve.study.chart import Chart
 
 _TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")

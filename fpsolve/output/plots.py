@@ -17,11 +17,11 @@ from fpsolve.case.vary import ABSCISSAE
 from fpsolve.exponent.quantities import Quantity
 from fpsolve.files import atomic
 from fpsolve.model.parameters import axis_title, symbol_of
+from fpsolve.pictures import COLOURS, SIZE, STYLE, draw_bars
 
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
 _ROOT: dict[str, Any] = {"marker": "|", "linestyle": "none", "markersize": 16, "markeredgewidth": 2.2, "zorder": 4}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
@@ -79,13 +79,7 @@ def write_bars(bars: Mapping[str, Sequence[float]], names: Sequence[str], title:
     with canvas(paths) as figure:
         axes = figure.add_subplot(xlabel=r"$\theta\,\partial/\partial\theta$ over the scale")
         axes.set_title(filled(title, 80), parse_math=False)
-        axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
-        height, middles = 0.8 / max(len(bars), 1), np.arange(len(names))
-        for i, (label, values) in enumerate(bars.items()):
-            places = middles + (i - 0.5 * (len(bars) - 1)) * height
-            axes.barh(places, values, 0.9 * height, color=COLOURS[i % len(COLOURS)], label=label)
-        axes.set_yticks(middles, names)
-        axes.invert_yaxis()
+        draw_bars(axes, bars, names)
         figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=11)
 
 
@@ -131,14 +125,14 @@ def _draw_amplitude(axes: Any, response: Response, seen: float) -> None:
 
 
 @contextmanager
-def canvas(paths: Sequence[Path], width: float = 7.2, height: float = 5.0) -> Iterator[Any]:
+def canvas(paths: Sequence[Path], width: float = SIZE[0], height: float = SIZE[1]) -> Iterator[Any]:
     """An empty figure in the house style, which is written to the paths in the end."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
-    with rc_context({"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12, "pdf.fonttype": 42}):
+    with rc_context({**STYLE, "pdf.fonttype": 42}):
         figure = Figure(figsize=(width, height), dpi=160, layout="constrained")
         FigureCanvasAgg(figure)
         yield figure

@@ -1,0 +1,98 @@
+"""Results as data: labelled arrays of xarray, tables of pandas, pictures, and what notebooks show."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from fpsolve import __version__
+from fpsolve.errors import FpsolveError
+from fpsolve.pictures import canvas_of, draw
+
+if TYPE_CHECKING:  # each takes some tenths of a second to import
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
+
+LONGEST = 100
+"""Characters of a `repr`."""
+Variable = tuple[str | Sequence[str], Any, Mapping[str, str]]
+"""The dimensions of a variable of xarray, its values and its attributes."""
+Parameters = Mapping[str, float | str]
+"""Parameters of a problem by their keys, such as "noise.D0"."""
+
+
+def described(long_name: str, symbol: str = "", units: str = "1", **more: str) -> dict[str, str]:
+    """The attributes of a variable of xarray: what it is, its symbol in LaTeX, its units, and more; no empty ones."""
+    known = {"long_name": long_name, "symbol": symbol, "units": units, **more}
+    return {name: text for name, text in known.items() if text}
+
+
+def dataset(
+    title: str,
+    variables: Mapping[str, Variable],
+    coordinates: Mapping[str, Variable],
+    parameters: Parameters,
+    **more: float | str | Sequence[str],
+) -> xarray.Dataset:
+    """Labelled arrays, the main variable first, that can be written as netCDF.
+
+    Args:
+        title: what the numbers are.
+        variables, coordinates: each with its dimensions and its attributes.
+        parameters: of the problem, as far as they are known.
+        more: what else is known; of sentences that are none nothing is kept.
+    """
+    import xarray
+
+    joined = {name: value if isinstance(value, int | float | str) else "\n".join(value) for name, value in more.items()}
+    known = {name: value for name, value in joined.items() if value != ""}
+    about = {"title": title, **parameters, **known, "fpsolve_version": __version__}
+    return xarray.Dataset(dict(variables), dict(coordinates), about)
+
+
+class Result(ABC):
+    """Something that was computed, as data and as a picture; a mixin of frozen dataclasses with `repr=False`."""
+
+    @abstractmethod
+    def to_xarray(self) -> xarray.Dataset:
+        """The numbers as labelled arrays, with errors by `<name>_error`, units, equations, and the parameters."""
+
+    @abstractmethod
+    def _said(self) -> str:
+        """What `repr` says, in short."""
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The numbers as a table, one row for each place of the main variable. Raises `FpsolveError` without pandas."""
+        try:
+            import pandas
+        except ImportError as missing:
+            raise FpsolveError("tables need pandas; install it: pip install 'fpsolve[pandas]'") from missing
+        whole = self.to_xarray()
+        full = whole.drop_dims([name for name, size in whole.sizes.items() if not size])
+        main = next(iter((full if full.data_vars else whole).data_vars.values()))
+        names = [name for name, each in whole.data_vars.items() if set(each.dims) <= set(main.dims)]
+        if not main.dims:
+            return pandas.DataFrame({name: [whole[name].item()] for name in names})
+        return whole[names].to_dataframe(dim_order=main.dims)
+
+    def plot(self, ax: Axes | None = None, **line_kwargs: Any) -> Axes:
+        """Draw the main variable with its error, into `ax` or a new figure.
+
+        Args:
+            ax: where; None for a figure of its own.
+            line_kwargs: for matplotlib, such as color or label.
+        """
+        with canvas_of(ax) as axes:
+            draw(self.to_xarray(), axes, **line_kwargs)
+        return axes
+
+    def __repr__(self) -> str:
+        text = f"{type(self).__name__}({' '.join(self._said().split())})"
+        return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...)"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the numbers, with their units, and the parameters."""
+        return f"<p>{escape(repr(self))}</p>{self.to_xarray()._repr_html_()}"

@@ -1,0 +1,126 @@
+"""What is computed of a problem: what each quantity is called, how it is written and drawn, its unit, its equation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from fpsolve.data import Variable, described
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.parameters import symbol_of, unit_of
+from fpsolve.model.problem import Problem
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.pictures import title_of
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something that is computed of a problem, or that this depends on.
+
+    Attributes:
+        name: in case files and results.
+        symbol: in sentences and tables.
+        words: what it is, in small letters.
+        latex: its symbol on an axis, with dollars.
+        unit: "1" for none.
+        equation: the number of its perturbation theory; empty where there is none.
+    """
+
+    name: str
+    symbol: str
+    words: str
+    latex: str
+    unit: str = "1"
+    equation: str = ""
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Those of a variable of xarray: long_name, symbol, units and equation."""
+        return described(self.words, self.latex, self.unit, equation=self.equation)
+
+    @property
+    def title(self) -> str:
+        """Of an axis, in LaTeX, with the unit."""
+        return title_of(self.attributes)
+
+    def variable(self, values: Any, *dims: str) -> Mapping[str, Variable]:
+        """A variable of xarray, by its name."""
+        return {self.name: (dims, values, self.attributes)}
+
+    def with_error(self, values: Any, errors: Any, *dims: str, kind: str = "error estimate") -> Mapping[str, Variable]:
+        """Two variables of xarray: the values by its name, and their errors, of a kind, by `<name>_error`."""
+        about = described(f"{kind} of the {self.words}", units=self.unit)
+        return {**self.variable(values, *dims), f"{self.name}_error": (dims, errors, about)}
+
+    def by(self, other: Quantity) -> Quantity:
+        """Its partial derivative by another one."""
+        return Quantity(
+            name=f"{self.name}_by_{other.name}",
+            symbol=f"∂{self.symbol}/∂{other.symbol}",
+            words=f"derivative of the {self.words} by {other.name}",
+            latex=rf"$\partial {self.latex.strip('$')}/\partial {other.latex.strip('$')}$" if other.latex else "",
+            unit=_over(self.unit, other.unit),
+        )
+
+
+def _over(unit: str, other: str) -> str:
+    """The unit of a ratio."""
+    if "unknown" in (unit, other):
+        return "unknown"
+    return "1" if unit == other else unit if other == "1" else f"{unit}/({other})"
+
+
+UNNAMED = Quantity("value", "value", "number", "", "unknown")
+"""Of a number of which nothing more is known."""
+P = Quantity("p", "p", "order of the moment", "$p$")
+PHASE = Quantity("phi", "φ", "phase", r"$\varphi$", "rad")
+NOISE = Quantity("xi", "ξ", "noise", r"$\xi$", "1/time")
+MOMENT = Quantity("moment", "Λ(p)", "moment Lyapunov exponent", r"$\Lambda(p)$", "1/time", "(37)")
+DERIVATIVE = Quantity(
+    "derivative", "Λ′(p)", "slope of the moment Lyapunov exponent", r"$\Lambda'(p)$", "1/time", "(37)"
+)
+SECOND_DERIVATIVE = Quantity(
+    "second_derivative", "Λ″(p)", "curvature of the moment Lyapunov exponent", r"$\Lambda''(p)$", "1/time", "(37)"
+)
+RESIDUAL = Quantity("residual", "residual", "backward error of the eigenpair", "")
+LYAPUNOV_EXPONENT = Quantity("lyapunov_exponent", "λ", "largest Lyapunov exponent", r"$\lambda$", "1/time", "(39)")
+STABILITY_INDEX = Quantity("stability_index", "δ_p", "stability index", r"$\delta_p$", equation="(38)")
+VARIANCE_RATE = Quantity("variance_rate", "Λ″(0)", "growth rate of the variance", r"$\Lambda''(0)$", "1/time", "(37)")
+IMPACT_RATE = Quantity("impact_rate", "N", "impact rate", r"$N = \partial\lambda/\partial\ln R$", "1/time", "(39)")
+CRITICAL_IMPACT_FACTOR = Quantity("critical_impact_factor", "R_c", "critical impact factor", "$R_c$", equation="(39)")
+CRITICAL_RESTITUTION = Quantity(
+    "critical_restitution", "r_c", "critical coefficient of restitution", "$r_c$", equation="(39)"
+)
+_FIELDS: Mapping[str, FieldInfo] = {
+    f"{half}.{name}": field
+    for half, kinds in (("oscillator", [VibroImpactOscillator]), ("noise", [NonGaussianNoise, OrnsteinUhlenbeck]))
+    for kind in kinds
+    for name, field in kind.__pydantic_fields__.items()  # type: ignore[attr-defined]
+}
+
+
+def parameter_of(key: str) -> Quantity:
+    """A parameter of a problem, by its key, such as "noise.D0"."""
+    field = _FIELDS.get(key)
+    if field is None:
+        return Quantity(key, key, key, "", "unknown")
+    return Quantity(key, key, field.title or key, symbol_of(field), unit_of(field) or "1")
+
+
+def parameter_values(problem: Problem) -> Mapping[str, float | str]:
+    """The parameters of a problem by their keys, as far as they are numbers or words."""
+    found: dict[str, float | str] = {}
+    for half, part in (("oscillator", problem.system), ("noise", problem.noise)):
+        for name, value in vars(part).items():
+            if isinstance(value, Enum | int | float):
+                found[f"{half}.{name}"] = str(value.value) if isinstance(value, Enum) else float(value)
+    return found
+
+
+def noise_of(problem: Problem) -> Quantity:
+    """ξ, whose unit the motion decides."""
+    return NOISE if isinstance(problem.system, VibroImpactOscillator) else replace(NOISE, unit="unknown")

@@ -1,0 +1,130 @@
+"""Pictures of labelled arrays in the house style: lines with their errors, colours over a plane, bars."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
+STYLE: dict[Any, Any] = {"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12}
+SIZE = (7.2, 5.0)
+"""Of a figure, in inches."""
+MARKED = 40
+"""Up to so many points of a line have markers."""
+
+
+def title_of(attributes: Mapping[str, Any]) -> str:
+    r"""A variable on an axis, from its attributes: "largest Lyapunov exponent $\lambda$ (1/time)"."""
+    unit = "" if attributes["units"] == "1" else f"({attributes['units']})"
+    return " ".join(part for part in (attributes["long_name"], attributes.get("symbol", ""), unit) if part)
+
+
+@contextmanager
+def canvas_of(ax: Axes | None) -> Iterator[Axes]:
+    """The axes themselves, or those of a new figure in the house style."""
+    if ax is not None:
+        yield ax
+        return
+    from matplotlib import pyplot, rc_context
+
+    with rc_context(STYLE):
+        _, new = pyplot.subplots(figsize=SIZE, layout="constrained")
+        new.tick_params(labelsize=STYLE["font.size"])  # which later ticks would take from another style
+        yield new
+
+
+def draw(found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    """Draw the first variable of a dataset with its error: a point, a line or colours, by its dimensions."""
+    main = next(iter(found.data_vars.values()))
+    error = found.get(f"{main.name}_error")
+    if main.ndim == 2:
+        draw_plane(axes, main, **kwargs)
+    elif main.ndim == 1:
+        draw_line(axes, main, error, **kwargs)
+    else:
+        draw_point(axes, main, error, **kwargs)
+    axes.set_title(found.attrs["title"], parse_math=False)
+
+
+def draw_line(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
+    """A variable over its coordinate, in a band of ± its error."""
+    x = main[main.dims[0]]
+    order = np.argsort(x.values, kind="stable")
+    places, values = x.values[order], main.values[order]
+    marker = {"marker": "o", "markersize": 4} if places.size <= MARKED else {}
+    [line] = axes.plot(places, values, **{"linewidth": 1.6, **marker, **coloured(axes, kwargs)})
+    if error is not None:
+        low, high = values - error.values[order], values + error.values[order]
+        axes.fill_between(places, low, high, color=line.get_color(), alpha=0.3, linewidth=0)
+    axes.set(xlabel=title_of(x.attrs), ylabel=title_of(main.attrs))
+    _finish(axes)
+
+
+def draw_dots(axes: Axes, main: xarray.DataArray, error: xarray.DataArray, **kwargs: Any) -> None:
+    """A variable over its coordinate, as dots with bars of ± two standard errors."""
+    x = main[main.dims[0]]
+    style = {"linestyle": "none", "marker": "o", "markersize": 5, "elinewidth": 1.3, "capsize": 4}
+    axes.errorbar(x.values, main.values, 2 * error.values, **{**style, **coloured(axes, kwargs)})
+    axes.set(xlabel=title_of(x.attrs), ylabel=title_of(main.attrs))
+    _finish(axes)
+
+
+def draw_point(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
+    """One number with a bar of ± its error, above its symbol; several stand side by side."""
+    name = str(main.attrs.get("symbol", main.name))
+    size = None if error is None else [error.item()]
+    style = {"linestyle": "none", "marker": "o", "markersize": 6, "elinewidth": 1.3, "capsize": 5}
+    axes.errorbar([name], [main.item()], size, **{**style, **coloured(axes, kwargs)})
+    axes.set_ylabel(title_of(main.attrs))
+    axes.margins(x=0.3)
+    _finish(axes)
+
+
+def draw_plane(axes: Axes, main: xarray.DataArray, **kwargs: Any) -> Any:
+    """A variable over two coordinates, the first to the right, in colours, with a colour bar."""
+    x, y = (main[name] for name in main.dims)
+    style = {"cmap": "viridis", "rasterized": True, "shading": "nearest", **kwargs}
+    picture = axes.pcolormesh(x.values, y.values, main.values.T, **style)
+    axes.set(xlabel=title_of(x.attrs), ylabel=title_of(y.attrs))
+    axes.figure.colorbar(picture, ax=axes, label=title_of(main.attrs))
+    return picture
+
+
+def draw_bars(axes: Axes, bars: Mapping[str, Sequence[float] | FloatArray], names: Sequence[str]) -> None:
+    """Groups of horizontal bars, one group for each name, and in it one bar for each label."""
+    axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
+    height, middles = 0.8 / max(len(bars), 1), np.arange(len(names))
+    for i, (label, values) in enumerate(bars.items()):
+        places = middles + (i - 0.5 * (len(bars) - 1)) * height
+        axes.barh(places, values, 0.9 * height, color=COLOURS[i % len(COLOURS)], label=label)
+    axes.set_yticks(middles, names)
+    axes.invert_yaxis()
+
+
+def coloured(axes: Axes, kwargs: Mapping[str, Any]) -> dict[str, Any]:
+    """What matplotlib is told of a line, with a colour that no other line has unless it has one."""
+    from matplotlib.cbook import normalize_kwargs
+    from matplotlib.colors import to_hex
+    from matplotlib.lines import Line2D
+
+    taken = {to_hex(line.get_color()).upper() for line in axes.lines}
+    free = next((colour for colour in COLOURS if colour not in taken), COLOURS[0])
+    return {"color": free, **normalize_kwargs(dict(kwargs), Line2D)}
+
+
+def _finish(axes: Axes) -> None:
+    """The zero line, where it is seen, and a legend, where there is something to tell."""
+    low, high = axes.get_ylim()
+    if low < 0 < high and not any(line.get_gid() == "zero" for line in axes.lines):
+        axes.axhline(0, color="0.6", linewidth=0.8, zorder=0, gid="zero")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False)
