@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 SET = "set"
 """The dimension of parameter sets that are no product."""
 RESULTS = "results.nc"
+_COLUMNS = {"value": "", "error_estimate": "_error", "derivative": "_derivative", "perturbation": "_perturbation"}
+"""Of Λ(p), and the endings of the names of their variables."""
 _DERIVATIVE = {"long_name": "derivative of the moment Lyapunov exponent", "units": "1/time", "equation": "(2)"}
 _STATUS = {
     "long_name": "what became of the parameter set",
@@ -64,9 +66,7 @@ class _Columns:
         self.case, self.names = case, asked(case)
         self.places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.output.quantities else {}
         size = case.planned, len(self.places)
-        self.moments = {
-            name: np.full(size, math.nan) for name in ("value", "error_estimate", "derivative", "perturbation")
-        }
+        self.moments = {name: np.full(size, math.nan) for name in _COLUMNS}
         self.estimates = {name: np.full((3, case.planned), math.nan) for name in self.names}
         self.status = np.full(case.planned, Status.MISSING, dtype=np.int8)
         self.seconds = np.full(case.planned, math.nan)
@@ -88,8 +88,7 @@ class _Columns:
         over = _dimensions(self.case)
         shape = tuple(len(self.case.vary.values(key)) for key in over) if over != (SET,) else (self.case.planned,)
         if self.places:
-            columns = zip(("", "_error", "_derivative", "_perturbation"), self.moments.values(), strict=True)
-            for ending, values in columns:
+            for ending, values in zip(_COLUMNS.values(), self.moments.values(), strict=True):
                 attributes = _DERIVATIVE if ending == "_derivative" else _described(MOMENT.attributes, ending)
                 yield f"moment{ending}", (*over, "p"), values.reshape(*shape, -1), attributes
         for name, values in self.estimates.items():
@@ -163,7 +162,7 @@ def open_results(*places: str | Path) -> xr.Dataset:
 
 def _found(place: str) -> Sequence[Path]:
     """The files that a folder, a file or a pattern means."""
-    paths = [Path(place)] if Path(place).exists() else sorted(map(Path, glob(place)))
+    paths = [Path(place)] if Path(place).exists() else sorted(map(Path, glob(place)))  # noqa: PTH207  (it may be absolute)
     files = [path / RESULTS if path.is_dir() else path for path in paths]
     return [path for path in files if path.is_file() and path.suffix == ".nc"]
 

@@ -1,4 +1,4 @@
-"""Results as tables: summary.json, moments.csv and curves.csv; of simulated curves monte_carlo.json and response.csv."""
+"""Results as tables: summary.json, moments.csv, curves.csv; of simulated curves monte_carlo.json and response.csv."""
 
 from __future__ import annotations
 

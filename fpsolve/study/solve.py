@@ -256,8 +256,8 @@ def _lost(stationary: PrincipalPair | None, remedy: str) -> list[str]:
 def _imprecise(estimates: Mapping[str, Estimate | None], numerics: Numerics) -> list[str]:
     """Which indices miss rtol."""
     return [
-        f"rtol = {numerics.rtol:g} is not met by {INDICES[name].symbol}: {estimate.value:.6g} has an estimated error of "
-        f"{estimate.error_estimate:.1e}; {'' if numerics.mesh is None else Remedy.MESH + ', or '}use a larger rtol"
+        f"rtol = {numerics.rtol:g} is not met by {INDICES[name].symbol}: {estimate.value:.6g} has an estimated error "
+        f"of {estimate.error_estimate:.1e}; {'' if numerics.mesh is None else Remedy.MESH + ', or '}use a larger rtol"
         for name, estimate in estimates.items()
         if estimate and estimate.relative_error > numerics.rtol
     ]

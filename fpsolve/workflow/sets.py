@@ -110,7 +110,7 @@ class Sweep:
         return replace(order, wanted=without_failed(order.wanted, known.failures), is_known=True)
 
     def _lost(self, batch: Batch, queue: _Queue) -> list[Found]:
-        """What is known of a batch whose worker died: the rest is tried again, each by itself, which shows the reason."""
+        """What is known of a batch whose worker died; the rest is tried again, set by set, which shows the reason."""
         self.records.look()
         places = {order: self.records.place(order.key) for order in batch.orders}
         left = [order for order, place in places.items() if place is None or order.is_known]
