@@ -5,6 +5,7 @@ A task is a function of one item, both of which pickle. What it finds must not d
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
@@ -100,8 +101,9 @@ class Pool:
                         yield Done(item, None, is_lost=True)
                     if not suspects:
                         waiting |= {self._submit(task, each): each for each in islice(source, 1)}
-            yield from self._one_by_one(task, suspects)
-            suspects.clear()
+            if suspects:
+                yield from self._one_by_one(task, suspects)
+                suspects.clear()
 
     def map(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """The results in the order of the items. Raises `FpsolveError` where a worker dies."""
@@ -203,6 +205,7 @@ def _client(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise FpsolveError("Dask is not installed; install it with: pip install 'fpsolve[cluster]'") from None
+    logging.getLogger("distributed").setLevel(logging.ERROR)  # it tells of workers that come and go
     try:
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as failure:
