@@ -278,7 +278,7 @@ def _watch(*, is_silent: bool = False) -> Watch:
 
 
 @contextmanager
-def _bar(name: str, total: int) -> Iterator[Callable[[], None]]:
+def _bar(name: str, total: int | None) -> Iterator[Callable[[], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())

@@ -1,4 +1,4 @@
-"""What surrounds work: the signals that end it or have to wait, and outputs that cannot be written."""
+"""What surrounds work: its processors, the signals that end it or have to wait, and outputs that cannot be written."""
 
 from __future__ import annotations
 
@@ -10,24 +10,43 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-ENDING = ("SIGHUP", "SIGTERM")
+from fpsolve.errors import FpsolveError
+
 PROCESSORS = "FPSOLVE_PROCESSORS"
-"""The environment variable that limits them."""
+"""The variable of the environment that limits how many processors a process and its children use."""
+ENDING = ("SIGHUP", "SIGTERM")
+_limits: list[int] = []
 
 
 def processors() -> int:
-    """How many processors this process may use."""
-    try:
-        count = len(os.sched_getaffinity(0))
-    except AttributeError:  # not on Linux
-        count = os.cpu_count() or 1
-    limit = os.environ.get(PROCESSORS, "")
-    return min(count, max(int(limit), 1)) if limit.isdecimal() else count
+    """How many processors this process may use: those that the system gives it, or fewer if there is a limit.
+
+    Raises:
+        FpsolveError: the limit of the environment is no whole number from 1 on.
+    """
+    given = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min([given, *_limits, *_limit_of_environment()])
 
 
 def limit_processors(count: int) -> None:
-    """Use no more of them, in this process and those that it starts."""
-    os.environ[PROCESSORS] = str(count)
+    """From now on this process uses at most so many processors. Raises `ValueError` if `count` is not ≥ 1."""
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise ValueError(f"got count = {count!r}; must be a whole number >= 1")
+    _limits[:] = [count]
+
+
+def _limit_of_environment() -> list[int]:
+    text = os.environ.get(PROCESSORS, "").strip()
+    if not text:
+        return []
+    try:
+        limit = int(text)
+    except ValueError:
+        limit = 0
+    if limit < 1:
+        known = "must be a whole number >= 1; set it to one, or unset it"
+        raise FpsolveError(f'{PROCESSORS}, in the environment: got "{text}"; {known}')
+    return [limit]
 
 
 @contextmanager

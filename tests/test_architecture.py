@@ -32,7 +32,9 @@ ROOMS = {
         *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
         *("impacts", "function", "moments", "quantities"),
     ],
-    "analysis": ["density", "sensitivity", "curve", "continuation", "special_points", "zero", "stability", "regions"],
+    "analysis": [
+        *("density", "sensitivity", "curve", "scan", "continuation", "special_points", "zero", "stability", "regions"),
+    ],
     "case": ["toml", "messages", "sections", "vary", "chart", "curves", "remedies", "refusals", "case"],
     "study": ["results", "solve", "simulate", "chart"],
     "output": ["vtk", "tables", "plots", "figures", "charts", "terminal"],

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fpsolve.analysis.continuation import Scan
+from fpsolve.analysis.scan import Scan
 from fpsolve.analysis.stability import Boundary
 from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray

@@ -1,7 +1,7 @@
 """Where stability ends: the lines λ = 0, Λ(p) = 0 and δ_p = v in a frame of two parameters.
 
 F is λ, or Λ(p)/p; δ_p = v is the line Λ(v) = 0. Its gradient is exact, see `analysis.sensitivity`, and every solve
-starts from that at the point before.
+starts from that at the point before; the rows of a scan begin anew, so that other processes may compute them.
 """
 
 from __future__ import annotations
@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import combinations, product
 
 import numpy as np
 from pydantic import ValidationError
 
-from fpsolve.analysis.continuation import LONGEST, SHORTEST, Scan, begun, found, scanned, traced
+from fpsolve.analysis.continuation import LONGEST, SHORTEST, begun, found, traced
 from fpsolve.analysis.curve import Trace
+from fpsolve.analysis.scan import Row, Scan, ScannedRow, rows_of, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
 from fpsolve.analysis.zero import Axis, Quantity, Zero, said, zero_of
 from fpsolve.arrays import FloatArray, real_number
@@ -32,6 +34,9 @@ LARGEST = 0.1
 """Step that may be asked for, in sides of the frame."""
 ON_IT = 1e-4
 """Distance, in sides of the frame, in which a point of a line is one of a branch."""
+
+Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow]]
+"""The builtin `map`, or that of an executor: results in the order of the tasks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,14 +145,34 @@ class Boundary:
             raise ValueError(f"the point has {point_there}, which is not in the frame; choose a wider one")
         return replace(self, x=x, y=y, family=family, traces=(), scan=None)._from([start])
 
-    def grown(self, progress: Callable[[], None] = lambda: None) -> Iterator[Boundary]:
-        """The scan, then one branch after the other: what there is so far, each time."""
-        rough = Quantity(self.zero, self.family, (self.x, self.y), self.budget, SCAN_RTOL)
-        nodes = NODES if self.scan is None else self.scan.nodes.size
-        scan = scanned(rough, nodes, progress)
+    def rows(self) -> list[Row]:
+        """The rows of its scan, tasks for `scan_row`, each of which begins anew; they pickle small."""
+        rough = partial(Quantity, self.zero, self.family, (self.x, self.y), self.budget, SCAN_RTOL)
+        return rows_of(rough, NODES if self.scan is None else self.scan.nodes.size, rough().easy_axis)
+
+    def grown(
+        self,
+        progress: Callable[[], None] = lambda: None,
+        stepped: Callable[[], None] = lambda: None,
+        map: Map = map,
+    ) -> Iterator[Boundary]:
+        """The scan, then one branch after the other: what there is so far, each time.
+
+        Args:
+            progress: called once for each node of the scan, a row at a time.
+            stepped: called once for each point of a branch.
+            map: computes the rows, as the builtin does or in other processes; they come back in order.
+        """
+        return self.grown_from(iter(map(scan_row, self.rows())), progress, stepped)
+
+    def grown_from(
+        self, rows: Iterator[ScannedRow], progress: Callable[[], None], stepped: Callable[[], None]
+    ) -> Iterator[Boundary]:
+        """The same from rows that others scan, of which it takes its own."""
+        scan = scanned(self.rows(), rows, progress)
         now = replace(self, scan=scan, traces=())
         yield now
-        for trace in found(self.quantity, scan, self.step):
+        for trace in found(self.quantity, scan, self.step, stepped):
             now = replace(now, traces=(*now.traces, self._special(trace)))
             yield now
 

@@ -159,6 +159,11 @@ class Quantity:
         self._bounce = keys.index(_LOSS) if is_affine else None
         self._solved: dict[float, dict[float, Sample]] = {}
 
+    @property
+    def easy_axis(self) -> int:
+        """Along which F of one point says most of the next, 0 for u and 1 for v: along r λ is affine."""
+        return 1 if self._bounce is None else self._bounce
+
     def __call__(self, at: FloatArray) -> Sample:
         """F at (u, v). Raises `FpsolveError` where there is none."""
         values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from numpy.random import SeedSequence, default_rng
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import ColouredNoise, has_algebraic_tails, relaxation_time
+from fpsolve.process import processors
 from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
 from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator
 from fpsolve.simulation.step import Motion, NoiseStep, noise_step, starting_state
@@ -184,20 +184,16 @@ class Population(_Paths):
             self.bias = float(np.average(self.xi, weights=weights)) / (2 * self.plan.noise.standard_deviation**2)
 
 
-def _pool() -> ThreadPoolExecutor:
-    """One thread for each processor that this process may use; compiled code runs in them side by side."""
-    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return ThreadPoolExecutor(count)
-
-
 def advance_all(advances: Sequence[Advance], wanted: int, seconds: float, progress: Callable[[], None]) -> bool:
-    """Advance batches side by side by the wanted number of units, each of which takes some `seconds`.
+    """Advance batches by the wanted number of units, each of which takes some `seconds`.
+
+    Each processor has a thread, in which compiled code runs beside that in the others.
 
     `progress` is called 100 times in all. An interrupt ends this early; returns whether it did.
     """
     portion = max(1, min(math.ceil(wanted / PROGRESS_STEPS), round(_PORTION_SECONDS / seconds)))
     stop = Event()
-    with _pool() as pool:
+    with ThreadPoolExecutor(processors()) as pool:
         for done in range(0, wanted, portion):
             count = min(portion, wanted - done)
             futures: list[Future[None]] = []

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fpsolve.analysis.regions import Regions, regions
-from fpsolve.analysis.stability import NODES, Boundary, crossed
+from fpsolve.analysis.scan import scan_row
+from fpsolve.analysis.stability import NODES, Boundary, Map, crossed
 from fpsolve.analysis.zero import Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
@@ -46,7 +47,7 @@ class Chart:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What has no line, which lines end inside of the frame, and where no F exists, with the reasons."""
-        found = [line.remark() for line in self.lines]
+        found = [line.remark() for line in (self.lines if self.complete else self.lines[:-1])]
         for line in self.lines:
             ends = dict.fromkeys(text for trace in line.traces for text in trace.obstacles)
             holes = line.scan.reasons if line.scan is not None else ()
@@ -73,16 +74,31 @@ def chart_work(case: Case) -> int:
     return NODES**2 * (len(case.chart.zero) if case.chart else 0)
 
 
-def solve_chart(case: Case, *, progress: Callable[[], None] = lambda: None) -> Iterator[Chart]:
-    """What there is so far, after each scan and each branch, and in the end the whole chart."""
+def solve_chart(
+    case: Case,
+    *,
+    progress: Callable[[], None] = lambda: None,
+    stepped: Callable[[], None] = lambda: None,
+    map: Map = map,
+) -> Iterator[Chart]:
+    """What there is so far, after each scan and each branch, and in the end the whole chart.
+
+    Args:
+        case: with a chart, see `refuse_no_chart`.
+        progress: called once for each node of each scan, see `chart_work`.
+        stepped: called once for each point that is traced.
+        map: computes the rows of all scans, as the builtin does or in other processes, while branches are traced here.
+    """
     assert case.chart is not None
     x, y = case.chart.x.axis, case.chart.y.axis
     [curve] = case.curves()
     family = Family(curve.problem, curve.original_noise)
     chart = Chart((), _closed_forms(family, case.chart.zero, (x, y)))
-    for zero in case.chart.zero:
+    begun = [Boundary(zero, x, y, family, budget=case.budget) for zero in case.chart.zero]
+    rows = iter(map(scan_row, [row for line in begun for row in line.rows()]))
+    for each in begun:
         done = chart.lines
-        for line in Boundary(zero, x, y, family, budget=case.budget).grown(progress):
+        for line in each.grown_from(rows, progress, stepped):
             chart = replace(chart, lines=(*done, line))
             yield chart
     yield Chart(tuple(crossed(chart.lines)), chart.closed_forms, regions(chart.lines), complete=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.errors import FpsolveError
+from fpsolve.process import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.theory.validity import simulated_tail_note
@@ -26,11 +27,12 @@ def simulation_work(case: Case) -> int:
 
 
 def refuse_obstacles(case: Case) -> None:
-    """Refuse a case some curve of which cannot be simulated.
+    """Refuse a case some curve of which cannot be simulated, or a number of processors that is none.
 
     Raises:
         FpsolveError: with the curve and the reason.
     """
+    processors()
     for curve in case.curves():
         found = obstacles(curve.oscillator, curve.noise, time=case.monte_carlo.time, step=case.monte_carlo.step)
         for name, sentence in found.items():

@@ -40,12 +40,13 @@ class Watch:
     """Whom to tell how it goes; by default nobody.
 
     Attributes:
-        bar: gives a stretch of work, from its name and how often it reports progress, what it shall call for that.
+        bar: gives a stretch of work, from its name and how often it reports progress, None where nobody knows, what it
+            shall call for that; a chart has two at a time.
         solved: takes a case and its curves once they are solved.
         simulated: takes a case, its simulated curves, and those that are solved too.
     """
 
-    bar: Callable[[str, int], AbstractContextManager[Progress]] = lambda *_: nullcontext(lambda: None)
+    bar: Callable[[str, int | None], AbstractContextManager[Progress]] = lambda *_: nullcontext(lambda: None)
     solved: Callable[[Case, Sequence[CurveResult]], None] = lambda *_: None
     simulated: Callable[[Case, Sequence[SimulatedCurve], Sequence[CurveResult]], None] = lambda *_: None
 
@@ -193,11 +194,12 @@ def chart_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY
     with (
         own_folder(case, out, (CHART,)) as folder,
         saying_if_interrupted(lambda: _kept_lines(case, chart, folder)),
-        watch.bar(f"{case.name}, chart", chart_work(case)) as progress,
+        watch.bar(f"{case.name}, scan", chart_work(case)) as progress,
+        watch.bar(f"{case.name}, points", None) as stepped,
         writable(folder),
     ):
         try:
-            for chart in solve_chart(case, progress=progress):
+            for chart in solve_chart(case, progress=progress, stepped=stepped):
                 write_chart(case, chart, folder)
         finally:
             if chart.lines:

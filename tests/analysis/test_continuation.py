@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fpsolve.analysis.continuation import FINE, FRAME, LONGEST, SHORTEST, found, scanned
+from fpsolve.analysis.continuation import FRAME, LONGEST, SHORTEST, found
 from fpsolve.analysis.curve import TOLERANCE, Sample
+from fpsolve.analysis.scan import FINE, rows_of, scan_row, scanned
 from fpsolve.analysis.special_points import crossings, with_folds, with_points, with_values
 from fpsolve.errors import NotConverged
 
@@ -38,9 +39,14 @@ def line(a, b, c):
     return field(lambda u, v: (a * u + b * v - c, a, b))
 
 
+def scan_of(of, nodes=NODES, axis=1):
+    rows = rows_of(lambda: of, nodes, axis)
+    return scanned(rows, map(scan_row, rows))
+
+
 def lines(of, nodes=NODES, longest=LONGEST):
     """All branches, each checked for what must always hold."""
-    branches = list(found(of, scanned(of, nodes), longest))
+    branches = list(found(of, scan_of(of, nodes), longest))
     for branch in branches:
         check(branch, of, longest)
     for i, one in enumerate(branches):
@@ -398,7 +404,7 @@ def test_the_interpolation_of_a_scan_is_exact_for_cubics(rng):
     a = rng.normal(size=(4, 4)) * (np.add.outer(np.arange(4), np.arange(4)) <= 3)
     polynomial = np.polynomial.polynomial
     by_u, by_v = polynomial.polyder(a, axis=0), polynomial.polyder(a, axis=1)
-    scan = scanned(field(lambda u, v: [polynomial.polyval2d(u, v, each) for each in (a, by_u, by_v)]), 4)
+    scan = scan_of(field(lambda u, v: [polynomial.polyval2d(u, v, each) for each in (a, by_u, by_v)]), 4)
     for at in rng.uniform(size=(20, 2)):
         sample = scan(at)
         assert sample.value == pytest.approx(polynomial.polyval2d(*at, a), abs=1e-12)
@@ -410,17 +416,54 @@ def test_the_interpolation_converges_with_the_fourth_power(rng):
     at = rng.uniform(size=(100, 2))
     errors = []
     for nodes in (9, 17, 33):
-        scan = scanned(of, nodes)
+        scan = scan_of(of, nodes)
         errors.append(max(abs(scan(each).value - np.sin(3 * each[0] + 2 * each[1])) for each in at))
     assert np.log2(errors[0] / errors[1]) > 3.5
     assert np.log2(errors[1] / errors[2]) > 3.5
 
 
 def test_a_scan_tells_of_holes():
-    scan = scanned(field(lambda u, v: (u - v, 1, -1), hole=(0.5, 0.5, 0.2)), 11)
+    scan = scan_of(field(lambda u, v: (u - v, 1, -1), hole=(0.5, 0.5, 0.2)), 11)
     assert scan.reasons == ("a hole",)
     inside = np.hypot(*np.meshgrid(scan.nodes - 0.5, scan.nodes - 0.5)) < 0.2
     assert np.array_equal(np.isnan(scan.values), inside)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_rows_go_along_an_axis_and_each_begins_anew(axis):
+    """F notes where it is asked for; it exists below the diagonal."""
+    begun = []
+
+    def begin():
+        begun.append([])
+        of = field(lambda u, v: (u - v**2, 1, -2 * v), hole=(0, 1, 0.5))
+        return lambda at: (begun[-1].append(tuple(at)), of(at))[1]
+
+    rows, told = rows_of(begin, 4, axis), []
+    scan = scanned(rows, map(scan_row, rows), lambda: told.append(len(begun)))
+    u, v = np.meshgrid(scan.nodes, scan.nodes, indexing="ij")
+    exists = np.hypot(u, v - 1) >= 0.5
+    assert np.array_equal(scan.values[exists], (u - v**2)[exists])
+    assert np.array_equal(scan.gradients[exists], np.stack([np.ones_like(u), -2 * v], axis=-1)[exists])
+    assert np.all(np.isnan(scan.values[~exists]))
+    expected = [[(s, t) if axis == 1 else (t, s) for t in scan.nodes] for s in scan.nodes]
+    assert begun == expected
+    assert told == [1] * 4 + [2] * 4 + [3] * 4 + [4] * 4  # a row at a time, before the next is begun
+
+
+def test_what_is_no_failure_of_a_solve_ends_a_scan():
+    def broken(at):
+        raise ZeroDivisionError("a mistake")
+
+    with pytest.raises(ZeroDivisionError, match="a mistake"):
+        scan_of(broken)
+
+
+@pytest.mark.parametrize("of", [circle(0.5, 0.5, 0.3), line(1, 1, 0.8)])
+def test_each_point_is_told_as_it_is_found(of):
+    told = []
+    [branch] = found(of, scan_of(of), stepped=lambda: told.append(1))
+    assert len(told) == len(branch.points)
 
 
 def met(one, other):
@@ -481,7 +524,7 @@ def test_random_cubics(coefficients):
     parts = a, 2 * polynomial.polyder(a, axis=0), 2 * polynomial.polyder(a, axis=1)
     of = field(lambda u, v: [polynomial.polyval2d(2 * u - 1, 2 * v - 1, each) for each in parts])
     values, by_u, by_v = (polynomial.polygrid2d(2 * fine - 1, 2 * fine - 1, each) for each in parts)
-    branches = list(found(of, scanned(of, NODES)))
+    branches = list(found(of, scan_of(of, NODES)))
     slope = np.hypot(by_u, by_v)
     is_regular = np.all(np.maximum(abs(values), 0.05 * slope) > 3e-3)
     for branch in branches:

@@ -2,7 +2,9 @@
 
 import math
 import pickle
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.analysis.continuation import FRAME
+from fpsolve.analysis.scan import Scan, scan_row
 from fpsolve.analysis.sensitivity import sensitivities
 from fpsolve.analysis.stability import Boundary, boundary, crossed
 from fpsolve.analysis.zero import Axis, Quantity, zero_of
@@ -508,6 +511,41 @@ def test_an_axis_is_invertible(scale):
     assert axis.value(np.array([0.0, 1.0])).tolist() == [0.1, 7.0]
     assert axis.value(0.5) == pytest.approx(math.sqrt(0.7) if scale == "log" else 3.55)
     assert axis.share(-1.0) < 0
+
+
+def test_rows_are_the_same_in_other_processes():
+    """Bit for bit; tasks and what they bring are small."""
+    problem = Problem(oscillator(0.5), NOISE.ou_reduction())
+    nowhere = Scan(np.linspace(0, 1, 4), np.zeros((0, 0)), np.zeros((0, 0, 2)))
+    c1 = Axis("oscillator.c1", -1.2, 0.8)
+    of = Boundary(zero_of(SECOND), Axis("noise.r0", 0.5, 1.2), c1, Family(problem, NOISE), scan=nowhere)
+    here = next(of.grown()).scan
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        there = next(of.grown(map=pool.map)).scan
+    assert np.array_equal(there.values, here.values)
+    assert np.array_equal(there.gradients, here.gradients)
+    assert all(len(pickle.dumps(row)) < 4000 for row in of.rows())
+    assert all(len(pickle.dumps(scan_row(row))) < 1000 for row in of.rows())
+
+
+def test_a_row_does_not_depend_on_others():
+    of = Boundary(zero_of(SECOND), OMEGA, C1, Family(Problem(oscillator(), NOISE.ou_reduction()), NOISE))
+    rows = of.rows()
+    forth, back = [scan_row(row) for row in rows[:2]], [scan_row(row) for row in rows[1::-1]]
+    for one, other in zip(forth, reversed(back), strict=True):
+        assert np.array_equal(one.values, other.values)
+        assert np.array_equal(one.gradients, other.gradients)
+
+
+@pytest.mark.parametrize("is_first", [True, False])
+def test_the_scan_of_lambda_over_r_solves_two_nodes_of_a_row(is_first, monkeypatch):
+    """λ is affine in ln R: rows run along r, whichever axis it is on."""
+    solved, sample = [], Quantity._sample
+    monkeypatch.setattr(Quantity, "_sample", lambda self, *given: (solved.append(1), sample(self, *given))[1])
+    r = Axis("oscillator.restitution", 0.5, 1.0)
+    of = Boundary(zero_of(LAMBDA), *((r, C1) if is_first else (C1, r)), Family(Problem(oscillator(), NOISE)))
+    scan_row(of.rows()[3])
+    assert len(solved) == 2
 
 
 def test_f_is_solved_in_one_thread(monkeypatch):

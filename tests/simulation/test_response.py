@@ -10,6 +10,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.simulation import batches
 from fpsolve.simulation.response import stationary_response
 from fpsolve.simulation.setup import default_step
 
@@ -78,11 +79,12 @@ def test_energy_is_that_of_x_and_v(weak):
     assert mean["energy"] == pytest.approx(energy, rel=1e-12)
 
 
-def test_seed_decides(weak):
+def test_seed_decides_whatever_the_threads(weak, monkeypatch):
     oscillator, _ = weak
-    arguments = (oscillator, NOISE, 0.05, 0.01)
-    first, again, other = (
-        stationary_response(*arguments, paths=32, time=50.0, step=0.1, seed=seed) for seed in (1, 1, 2)
-    )
+    arguments, found = (oscillator, NOISE, 0.05, 0.01), []
+    for threads, seed in ((1, 1), (2, 1), (2, 2)):
+        monkeypatch.setattr(batches, "processors", lambda threads=threads: threads)
+        found.append(stationary_response(*arguments, paths=32, time=50.0, step=0.1, seed=seed))
+    first, again, other = found
     assert first.means == again.means != other.means
     np.testing.assert_array_equal(first.density, again.density)

@@ -3,14 +3,16 @@
 import csv
 import json
 from contextlib import nullcontext
+from io import StringIO
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from fpsolve import ExponentSolver, load_case
-from fpsolve.cli import main
+from fpsolve.cli import _bar, main
 from fpsolve.model.direction import Family
-from fpsolve.study.chart import solve_chart
+from fpsolve.study.chart import chart_work, solve_chart
 from fpsolve.workflow import Watch, chart_case
 
 CASE = """
@@ -141,7 +143,7 @@ def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
         if next(calls) == 180:  # in the scan for the second line
             raise KeyboardInterrupt
 
-    watch = Watch(bar=lambda *_: nullcontext(progress))
+    watch = Watch(bar=lambda _, total: nullcontext(progress if total else lambda: None))
     with pytest.raises(KeyboardInterrupt, match="after 1 branch of 3 lines; what was done is kept in"):
         chart_case(load_case(path), tmp_path, watch=watch)
     summary = json.loads((tmp_path / "plane" / "chart.json").read_text(encoding="utf-8"))
@@ -150,12 +152,50 @@ def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
     assert (tmp_path / "plane" / "chart.png").exists()
 
 
+def test_a_bar_for_the_scans_and_one_for_the_points(path, tmp_path):
+    bars = {}
+
+    def bar(name, total):
+        bars[name] = [total, 0]
+        return nullcontext(lambda: bars.__setitem__(name, [total, bars[name][1] + 1]))
+
+    override = ["chart.zero=['lyapunov_exponent']", "chart.x.at=[]"]
+    chart = chart_case(load_case(path, override), tmp_path, watch=Watch(bar=bar))
+    assert bars == {"plane, scan": [169, 169], "plane, points": [None, chart.lines[0].branches[0].x.size]}
+
+
+def test_two_bars_show_at_a_time(monkeypatch):
+    screen = StringIO()
+    monkeypatch.setattr("fpsolve.cli.Console", lambda **_: Console(file=screen, force_terminal=True, width=100))
+    with _bar("scan", 4) as progress, _bar("points", None) as stepped:
+        progress()
+        stepped()
+    assert "1/4" in screen.getvalue()
+    assert "1/?" in screen.getvalue()
+
+
 def test_each_step_has_all_that_was_before(path):
     case = load_case(path, ["chart.zero=['lyapunov_exponent']", "chart.x.at=[]"])
     *partial, whole = solve_chart(case)
     assert [chart.complete for chart in partial] == [False] * len(partial)
     assert whole.complete
     np.testing.assert_array_equal(whole.lines[0].branches[0].x, partial[-1].lines[0].branches[0].x)
+
+
+def test_progress_and_rows_are_those_of_the_whole_chart(path):
+    """All rows are given to one `map`, so that workers have them while the first line is traced."""
+    case, nodes, points, given = load_case(path, ["chart.x.at=[]"]), [], [], []
+
+    def noting(function, rows):
+        given.append(len(rows))
+        return map(function, rows)
+
+    *partial, whole = solve_chart(case, progress=lambda: nodes.append(1), stepped=lambda: points.append(1), map=noting)
+    assert given == [3 * 13]
+    assert len(nodes) == chart_work(case) == 3 * 13**2
+    assert len(points) == sum(branch.x.size for line in whole.lines for branch in line.branches)  # none has a fold
+    assert [len(chart.lines) for chart in partial] == [1, 1, 2, 2, 3, 3]
+    assert not any(chart.remarks for chart in partial)  # "no line was found" where none is traced yet
 
 
 @pytest.mark.parametrize(

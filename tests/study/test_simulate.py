@@ -365,6 +365,16 @@ def test_run_with_simulation_refuses_before_it_solves(case, out):
     assert not out.exists()
 
 
+def test_a_number_of_processors_that_is_none_is_refused(case, out, capsys, monkeypatch):
+    monkeypatch.setenv("FPSOLVE_PROCESSORS", "many")
+    assert simulate(case, "--out", out) == 2
+    expected = (
+        'FPSOLVE_PROCESSORS, in the environment: got "many"; must be a whole number >= 1; set it to one, or unset it'
+    )
+    assert capsys.readouterr().err.strip() == expected
+    assert not out.exists()
+
+
 def test_a_folder_that_cannot_be_made(case, tmp_path, capsys):
     blocker = tmp_path / "file"
     blocker.write_text("", encoding="utf-8")
