@@ -145,6 +145,8 @@ def chart(
     cases: Cases,
     *,
     out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("results"),
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
     overrides: Overrides = None,
 ) -> int:
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
@@ -158,8 +160,9 @@ def chart(
     code, loaded = 0, load_to_write(cases, overrides, {}, monte_carlo=False)
     for case in loaded:
         refuse_no_chart(case)
+    pool = pool_of(jobs, scheduler)
     for case in loaded:
-        found = chart_case(case, out, watch=_watch())
+        found = chart_case(case, out, pool=pool, watch=_watch())
         print_chart(case, found)
         print(f"written: {out / case.name}")
         if found.failures:

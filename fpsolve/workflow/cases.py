@@ -178,11 +178,16 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
     return Outcome((), tuple(simulated), interruption)
 
 
-def chart_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Chart:
+def chart_case(
+    case: Case, out: str | Path = "results", *, pool: Pool | None = None, watch: Watch = NOBODY
+) -> Chart:
     """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
 
     Tables are written anew after every branch. What an earlier chart wrote there is removed first, and what was solved
     or simulated with other parameters.
+
+    Args:
+        pool: who scans the plane; this process if none is given.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -197,9 +202,10 @@ def chart_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY
         watch.bar(f"{case.name}, scan", chart_work(case)) as progress,
         watch.bar(f"{case.name}, points", None) as stepped,
         writable(folder),
+        pool or here() as workers,
     ):
         try:
-            for chart in solve_chart(case, progress=progress, stepped=stepped):
+            for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map):
                 write_chart(case, chart, folder)
         finally:
             if chart.lines:
