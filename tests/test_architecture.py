@@ -32,7 +32,10 @@ ROOMS = {
         *("impacts", "function", "moments", "quantities"),
     ],
     "analysis": ["density", "sensitivity", "curve", "continuation", "special_points", "zero", "stability", "regions"],
-    "case": ["toml", "messages", "sections", "vary", "chart", "curves", "remedies", "refusals", "case"],
+    "case": [
+        *("toml", "messages", "sections", "vary", "vary_table", "chart", "curves", "remedies", "refusals"),
+        "case",
+    ],
     "study": ["results", "solve", "simulate", "chart"],
     "output": ["vtk", "tables", "plots", "figures", "charts", "terminal"],
     "workflow": [],

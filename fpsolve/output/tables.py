@@ -27,7 +27,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path) -> N
     write_json(folder / "summary.json", {**head(case), **state, "curves": [_summary(result) for result in results]})
     columns = ["p", "value", "derivative", "perturbation", "error_estimate", "residual"]
     rows = ([*result.curve.varied.values(), *row.values()] for result in results for row in _rows(result))
-    write_csv(folder / "moments.csv", [*case.vary, *columns], rows)
+    write_csv(folder / "moments.csv", [*case.vary.keys, *columns], rows)
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:

@@ -175,7 +175,7 @@ def _notes(case: Case, curve: Curve, moments: MomentLyapunov, exponent: Estimate
     notes = [
         validity.heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
         *moments.notes,
-        None if case.is_exact else validity.reduction_note(curve.original_noise),
+        None if curve.is_exact else validity.reduction_note(curve.original_noise),
         validity.impact_note(curve.oscillator),
         validity.weak_noise_note(curve.problem, moments.p, moments.value),
     ]
