@@ -202,12 +202,13 @@ def _client(address: str) -> Any:
     from fpsolve import __version__
 
     try:
-        from distributed import Client
+        import distributed
     except ImportError:
         raise FpsolveError("Dask is not installed; install it with: pip install 'fpsolve[cluster]'") from None
+    connect: Callable[..., Any] = distributed.Client
     logging.getLogger("distributed").setLevel(logging.ERROR)  # it tells of workers that come and go
     try:
-        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+        client = connect(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as failure:
         raise FpsolveError(
             f"no scheduler answers at {address} ({failure}); start one with: dask scheduler"

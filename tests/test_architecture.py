@@ -35,10 +35,16 @@ ROOMS = {
     "analysis": [
         *("density", "sensitivity", "curve", "scan", "continuation", "special_points", "zero", "stability", "regions"),
     ],
-    "case": ["toml", "messages", "sections", "vary", "chart", "curves", "remedies", "refusals", "case"],
-    "study": ["results", "solve", "simulate", "chart"],
-    "output": ["vtk", "tables", "plots", "figures", "charts", "terminal"],
-    "workflow": [],
+    "case": [
+        *("toml", "messages", "sections", "vary", "vary_table", "chart", "curves", "remedies", "refusals"),
+        "case",
+    ],
+    "study": ["results", "solve", "records", "sweep", "simulate", "chart"],
+    "output": [
+        *("vtk", "provenance", "records", "tables", "datasets", "plots", "figures", "charts", "terminal"),
+    ],
+    "workflow": ["folders", "sets", "cases"],
+    "arguments": [],
     "cli": [],
 }
 """Rooms from the ground up, each with its files from the lowest to the highest."""

@@ -269,7 +269,7 @@ def test_a_run_and_a_simulation_of_the_same_parameters_stay_together(case, tmp_p
     first, second = fpsolve.load_case(case.path), fpsolve.load_case(case.path, ["oscillator.omega=2.0"])
     fpsolve.run(first, tmp_path)
     solved = files(folder)
-    parameters = dict(first.curves()[1].parameters)
+    parameters = dict(next(first.curves(1)).parameters)
     table = json.dumps({"parameters": parameters})
     (folder / "monte_carlo-2.json").write_text(table, encoding="utf-8")
     fpsolve.run(first, tmp_path)
@@ -366,7 +366,8 @@ def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
     result = next(solve_curves(case))
     reduced = next(solve_curves(write(tmp_path, TEXT)))
     np.testing.assert_array_equal(result.moments_perturbation, reduced.moments_perturbation)
-    assert case.is_exact
+    assert result.curve.is_exact
+    assert not reduced.curve.is_exact
 
 
 def test_an_unwritable_folder_is_refused_before_solving(case, tmp_path):

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
+from pydantic import BeforeValidator, InstanceOf, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartSection
-from fpsolve.case.curves import Curve, combinations, make_curve
+from fpsolve.case.curves import Curve, make_curve
 from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
@@ -25,9 +24,11 @@ from fpsolve.case.sections import (
     OutputSection,
     Section,
     Text,
+    Varied,
 )
 from fpsolve.case.toml import Document, read_document
 from fpsolve.case.vary import Vary
+from fpsolve.case.vary_table import EXAMPLE, vary_of
 from fpsolve.errors import CaseError, Fault
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import CylinderMesh
@@ -57,9 +58,9 @@ class Case(Section):
     noise: Annotated[NoiseSection, parameter("Eqs. (7)-(8)", "[noise]")]
     moments: Annotated[Moments, parameter("which p", "[moments]")]
     budget: Annotated[Budget, _from_table(Budget), parameter("what one p may cost", "[budget]")] = Budget()
-    vary: Annotated[Vary, parameter("one curve for each value", '[vary] with "noise.D0" = [0.1, 0.5, 1.0]')] = Field(
-        default_factory=dict
-    )
+    vary: Annotated[
+        InstanceOf[Vary], BeforeValidator(vary_of), parameter("one curve for each parameter set", EXAMPLE)
+    ] = Vary()
     mesh: Annotated[MeshSection, parameter("the finite elements", "[mesh]")] = MeshSection()
     monte_carlo: Annotated[MonteCarloSection, parameter("how the system is simulated", "[monte_carlo]")] = (
         MonteCarloSection()
@@ -70,10 +71,21 @@ class Case(Section):
     expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
     _path: Path = PrivateAttr(default=Path("case.toml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())
+    _text: str = PrivateAttr(default="")
 
     @property
     def path(self) -> Path:
         return self._path
+
+    @property
+    def text(self) -> str:
+        """The file, as it was read."""
+        return self._text
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """What the command line has changed, as it was typed."""
+        return self._overrides
 
     @property
     def name(self) -> str:
@@ -110,23 +122,19 @@ class Case(Section):
         return self.p if self.monte_carlo.estimator == "direct" else _spread(self.p)
 
     @property
-    def is_exact(self) -> bool:
-        """Whether the noise is Eq. (7) as it stands; perturbation theory then has its reduction only."""
-        return self.noise.treatment == "exact"
-
-    @property
     def planned(self) -> int:
         """How many curves there are, without making them."""
-        return math.prod(map(len, self.vary.values()))
+        return len(self.vary)
 
-    def curves(self) -> tuple[Curve, ...]:
-        """One curve for each combination of the varied values, the last key varying fastest."""
-        return tuple(
-            make_curve(self.oscillator, self.noise, varied, number)
-            for number, varied in enumerate(combinations(self.vary), start=1)
+    def curves(self, start: int = 0, stop: int | None = None) -> Iterator[Curve]:
+        """One curve for each set of the varied values, from one place to another; each is made when it is asked for."""
+        places = range(self.planned)[start:stop]
+        return (
+            make_curve(self.oscillator, self.noise, varied, place + 1)
+            for place, varied in zip(places, self.vary.sets(start, stop), strict=True)
         )
 
-    def curve(self, varied: Mapping[str, float]) -> Curve:
+    def curve(self, varied: Varied) -> Curve:
         """The case's parameter set with some parameters replaced, by their dotted keys."""
         return make_curve(self.oscillator, self.noise, varied)
 
@@ -183,13 +191,13 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
     if faults:
         raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
-    case._path, case._overrides = Path(path), tuple(overrides)
+    case._path, case._overrides, case._text = Path(path), tuple(overrides), document.text
     return case
 
 
 def _hidden_overrides(case: Case, document: Document) -> Iterator[Fault]:
     """Values of the command line that [vary] would replace."""
-    for key in case.vary:
+    for key in case.vary.keys:
         if isinstance(document.places.get(key), str):
             remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
             yield document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from itertools import product
 from typing import Any
 
-from fpsolve.case.sections import NoiseSection, Values, flat
+from fpsolve.case.sections import NoiseSection, Value, Varied, flat
+from fpsolve.case.vary import assignments
 from fpsolve.model.noise import ColouredNoise, NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
@@ -26,8 +26,8 @@ class Curve:
 
     oscillator: VibroImpactOscillator
     noise: ColouredNoise
-    parameters: Mapping[str, float | str]
-    varied: Mapping[str, float]
+    parameters: Varied
+    varied: Varied
     number: int = 1
 
     @property
@@ -36,7 +36,7 @@ class Curve:
         return Problem(self.oscillator, self.noise)
 
     @property
-    def key(self) -> tuple[tuple[str, float], ...]:
+    def key(self) -> tuple[tuple[str, Value], ...]:
         """What tells it from the other curves of its case."""
         return tuple(self.varied.items())
 
@@ -51,14 +51,17 @@ class Curve:
         return "" if self.number == 1 else f"-{self.number}"
 
     @property
+    def is_exact(self) -> bool:
+        """Whether the noise is Eq. (7) as it stands; perturbation theory then has its reduction only."""
+        return self.parameters["noise.treatment"] == "exact"
+
+    @property
     def original_noise(self) -> NonGaussianNoise:
         """The noise of Eq. (7), whatever its treatment."""
         return NoiseSection(**_section("noise", self.parameters)).original()
 
 
-def make_curve(
-    oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Mapping[str, float], number: int = 1
-) -> Curve:
+def make_curve(oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Varied, number: int = 1) -> Curve:
     """The curve on which some parameters are replaced, by their dotted keys."""
     system = asdict(oscillator) | {"impact": oscillator.impact.value}
     parameters: dict[str, Any] = flat({"oscillator": system, "noise": noise.model_dump()}) | varied
@@ -69,16 +72,6 @@ def make_curve(
         varied=varied,
         number=number,
     )
-
-
-def combinations(vary: Mapping[str, Values]) -> Iterator[dict[str, float]]:
-    """The varied values of each curve, the last key varying fastest."""
-    return (dict(zip(vary, values, strict=True)) for values in product(*vary.values()))
-
-
-def assignments(varied: Mapping[str, float], style: str = "") -> str:
-    """Keys with their values, these in a format: "noise.D0 = 0.1, noise.r0 = 0.9"."""
-    return ", ".join(f"{key} = {value:{style}}" for key, value in varied.items())
 
 
 def _section(name: str, parameters: Mapping[str, Any]) -> dict[str, Any]:

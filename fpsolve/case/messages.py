@@ -59,6 +59,11 @@ def shown(value: Any) -> str:
     return shortened(text)
 
 
+def shown_with_kind(value: Any) -> str:
+    """The same with what it is: "3 (a number)"."""
+    return f"{shown(value)} ({_KINDS.get(type(value), 'a date or time')})"
+
+
 def shortened(text: str) -> str:
     """A text cut to a readable length."""
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartAxis, ChartSection
-from fpsolve.case.curves import assignments, combinations, make_curve
+from fpsolve.case.curves import make_curve
 from fpsolve.case.messages import Refusal, nearest, shown
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.case.sections import (
@@ -28,9 +28,10 @@ from fpsolve.case.sections import (
     Moments,
     MonteCarloSection,
     OutputSection,
-    Values,
+    Varied,
     same,
 )
+from fpsolve.case.vary import ABSCISSAE, WORDS, Vary, assignments
 from fpsolve.errors import MeshError, NoSuchExponent
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Discretisation, noise_space
@@ -39,42 +40,41 @@ from fpsolve.simulation.setup import obstacles
 from fpsolve.theory.perturbation import second_order
 
 Known = Mapping[str, Any]
-MAX_CURVES = 10_000
+MAX_CURVES = 1_000_000
 _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
 
 
 def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
     is_varied = context.get("varies", False)  # then the curves decide which moments exist
-    return _of_curves({**valid, "moments": moments}, {}, with_existence=not is_varied)
+    return _of_curves({**valid, "moments": moments}, Vary(), with_existence=not is_varied)
 
 
-def _of_vary(vary: Mapping[str, Values], valid: Known, context: Known) -> Iterator[Refusal]:
+def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
     """Too many curves, or one that cannot be solved."""
-    number = math.prod(map(len, vary.values()))
-    if number > MAX_CURVES:
-        yield (), None, f"makes {number} curves; must be at most {MAX_CURVES}; list fewer values"
+    if len(vary) > MAX_CURVES:
+        yield (), None, f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
     else:
         yield from _of_curves(valid, vary)
 
 
-def _of_curves(valid: Known, vary: Mapping[str, Values], *, with_existence: bool = True) -> Iterator[Refusal]:
+def _of_curves(valid: Known, vary: Vary, *, with_existence: bool = True) -> Iterator[Refusal]:
     """The first combination whose parameters contradict each other or overflow, or whose moments are infinite."""
     if not {"oscillator", "noise", "moments"} <= valid.keys():
         return
     p = valid["moments"].values
-    for varied in combinations(vary):
+    for varied in vary.sets():
         reason = _obstacle(valid, varied, p, with_existence=with_existence)
         if reason:
             yield (), varied, _with(varied) + reason
             return
 
 
-def _with(varied: Mapping[str, float]) -> str:
+def _with(varied: Varied) -> str:
     """Beginning of a sentence on one of several curves."""
     return f"with {assignments(varied)}: " if varied else ""
 
 
-def _obstacle(valid: Known, varied: Mapping[str, float], p: FloatArray, *, with_existence: bool = True) -> str:
+def _obstacle(valid: Known, varied: Varied, p: FloatArray, *, with_existence: bool = True) -> str:
     """Why there is no such curve, or why some Λ(p) of it is infinite, or nothing."""
     extremes = [float(p.max()), float(p.min())]
     try:
@@ -113,7 +113,7 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
 
 def _misfit(mesh: CylinderMesh, valid: Known) -> str:
     """Why the mesh does not serve some noise, or nothing; in noise units a noise is told by its r0 and treatment."""
-    for varied in combinations({key: values for key, values in valid["vary"].items() if key == "noise.r0"}):
+    for varied in valid["vary"].among(("noise.r0", "noise.treatment")):
         noise = make_curve(valid["oscillator"], valid["noise"], varied).noise
         chosen = Discretisation.on(mesh, noise)
         size, most = chosen.unknowns(noise), valid["budget"].unknowns
@@ -135,7 +135,7 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     if not {"oscillator", "noise", "vary"} <= valid.keys():
         return
     p = np.array(section.p or (0.0,))
-    for varied in combinations(valid["vary"]):
+    for varied in valid["vary"].sets():
         reason, faults = _obstacle(valid, varied, p), {}
         with suppress(ValidationError):  # that is the reason
             curve = make_curve(valid["oscillator"], valid["noise"], varied)
@@ -150,9 +150,14 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
 
 
 def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """An abscissa that is not varied."""
-    known = ("p", *valid.get("vary", (figure.x,)))
-    if figure.x not in known:
+    """An abscissa that is not varied, or is no number."""
+    if "vary" not in valid:
+        return
+    known = [key for key in ("p", *valid["vary"].keys) if key in ABSCISSAE]
+    if figure.x in valid["vary"].keys and figure.x not in ABSCISSAE:
+        text = f"got {shown(figure.x)}, whose values are texts; must be one of {', '.join(known)}; choose one of them"
+        yield ("x",), figure.x, text
+    elif figure.x not in known:
         guess = nearest(figure.x, known)
         text = f"got {shown(figure.x)};{guess} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
         yield ("x",), figure.x, text
@@ -166,18 +171,19 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
     """Each p that is not among the moments, and each key of a `where` that is not varied, or not with that value."""
     yield from _of_orders(valid, (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None), "expect")
-    vary: Mapping[str, Values] | None = valid.get("vary")
+    vary: Vary | None = valid.get("vary")
     if vary is None:
         return
     stated = ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items())
     for i, key, value in stated:
-        if key not in vary:
-            guess, known = nearest(key, vary), ", ".join(vary) or "none"
+        if key not in vary.keys:
+            guess, known = nearest(key, vary.keys), ", ".join(vary.keys) or "none"
             text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {_without('expect')}"
             yield (i, "where", key), value, text
-        elif not any(same(value, other) for other in vary[key]):
-            known = shown(vary[key])
-            text = f"got {value}; must be one of {known}; add it to [vary], {_without('expect')}"
+        elif not any(same(value, other) for other in vary.columns[key]):
+            is_possible = isinstance(value, str) == (key in WORDS)
+            remedy = f"add it to [vary], {_without('expect')}" if is_possible else "write one of these"
+            text = f"got {shown(value)}; must be one of {shown(vary.values(key))}; {remedy}"
             yield (i, "where", key), value, text
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Container, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -16,9 +16,9 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
+from fpsolve.case.messages import LIST, TABLE, Refusal, nearest, refuse, shown, shown_with_kind
 from fpsolve.errors import MeshError
-from fpsolve.exponent.quantities import DrawnName, QuantityName
+from fpsolve.exponent.quantities import QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, vertices_at
 from fpsolve.fem.mesh_file import read_mesh
 from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
@@ -31,24 +31,38 @@ _SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
 
 Values = tuple[float, ...]
+Value = float | str
+Varied = Mapping[str, Value]
+"""The values of the varied keys on one curve."""
 NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MOMENTS)]
 Text = Annotated[str, Field(min_length=1)]
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
 
 
-def flat(value: Any) -> Any:
-    """Nested tables as one: noise.D0 = 1.0 means the same as "noise.D0" = 1.0."""
+def flat(value: Any, whole: Container[str] = ()) -> Any:
+    """Nested tables as one: noise.D0 = 1.0 means the same as "noise.D0" = 1.0.
+
+    Args:
+        value: a table; anything else is left.
+        whole: the keys whose tables are values, not sections.
+    """
     if not isinstance(value, dict):
         return value
     result: dict[str, Any] = {}
-    for key, item in value.items():
-        is_nested = isinstance(item, dict) and item
-        entries = {f"{key}.{name}": entry for name, entry in flat(item).items()} if is_nested else {key: item}
-        for name in entries.keys() & result.keys():
-            raise ValueError(f"{name} stands twice, once with quotes and once without; remove one of them")
-        result |= entries
+    for key, item in _entries(value, "", whole):
+        if key in result:
+            raise ValueError(f"{key} stands twice, once with quotes and once without; remove one of them")
+        result[key] = item
     return result
+
+
+def _entries(table: Mapping[str, Any], section: str, whole: Container[str]) -> Iterator[tuple[str, Any]]:
+    """The dotted keys of a table and of those in it; a range is a value."""
+    for name, item in table.items():
+        key = section + name
+        is_section = isinstance(item, dict) and item and key not in whole and not item.keys() & RANGE
+        yield from _entries(item, f"{key}.", whole) if is_section else [(key, item)]
 
 
 class Section(BaseModel):
@@ -77,26 +91,39 @@ class NoiseSection(Section):
 
 
 class Sweep(Section):
-    """{ start, stop, num }: equidistant numbers, both ends included."""
+    """{ start, stop, num, scale }: numbers a constant step or a constant factor apart, both ends included."""
 
-    start: Annotated[float, parameter("first p", "start = -2.0")]
-    stop: Annotated[float, parameter("last p", "stop = 6.0")]
-    num: Annotated[int, parameter("how many p", "num = 33", ge=2, le=MAX_MOMENTS)]
+    start: Annotated[float, parameter("the first value", "start = 1.0")]
+    stop: Annotated[float, parameter("the last value", "stop = 6.0")]
+    num: Annotated[int, parameter("how many values", "num = 33", ge=2, le=MAX_MOMENTS)]
+    scale: Annotated[Literal["linear", "log"], parameter("how they are spread", 'scale = "log"')] = "linear"
 
     @model_validator(mode="after")
     def _increases(self) -> Self:
         if not 0 < self.stop - self.start < math.inf:
             raise ValueError(
                 f"got start = {self.start}, stop = {self.stop}; must be start < stop, a finite way apart; "
-                "exchange the two, or list a single p as in p = [2.0]"
+                "exchange the two, or list a single value as in [2.0]"
             )
+        if self.scale == "log" and self.start <= 0:
+            text = f'got {self.start}; must be > 0 where scale = "log"; use a positive start, or scale = "linear"'
+            refuse([(("start",), self.start, text)])
         return self
 
     @property
     def values(self) -> FloatArray:
         """The numbers, those between the ends without the rounding errors of the division, and 0 without a sign."""
-        inner = np.linspace(self.start, self.stop, self.num)[1:-1].tolist()
-        return np.array([self.start, *(round(p, _DIGITS) for p in inner), self.stop]) + 0.0
+        if self.scale == "log":
+            inner = [float(f"{value:.{_DIGITS}g}") for value in np.geomspace(self.start, self.stop, self.num)[1:-1]]
+        else:
+            size = max(abs(self.start), abs(self.stop))
+            decimals = max(_DIGITS, _DIGITS - 1 - math.floor(math.log10(size)))
+            inner = [round(value, decimals) for value in np.linspace(self.start, self.stop, self.num)[1:-1].tolist()]
+        return np.array([self.start, *inner, self.stop]) + 0.0
+
+
+RANGE = frozenset(Sweep.__pydantic_fields__)
+"""The keys that tell a range from a section."""
 
 
 def _list_or_table(value: Any) -> str | None:
@@ -217,9 +244,37 @@ class FigureSection(Section):
         return self
 
 
-class OutputSection(Section):
-    """[output]: the p whose eigenfunctions are written, None is all of them; whether sensitivities are drawn."""
+SENSITIVITIES, EIGENFUNCTIONS = "sensitivities", "eigenfunctions"
+QUANTITY_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS)
+"""What may be asked for; eigenfunctions with the stationary density."""
 
+
+def _quantities(value: Any) -> Any:
+    """A list of names, each known and there once."""
+    known = ", ".join(f'"{name}"' for name in QUANTITY_NAMES)
+    if not isinstance(value, list | tuple) or not value:
+        text = f"got {shown_with_kind(value)}; must be a non-empty list of some of {known}; name one"
+        refuse([((), value, text)])
+    refusals = list[Refusal]()
+    for i, name in enumerate(value):
+        if name not in QUANTITY_NAMES:
+            guess = nearest(name, QUANTITY_NAMES) if isinstance(name, str) else ""
+            text = f"got {shown_with_kind(name)};{guess} known names: {known}; rename or remove it"
+            refusals.append(((i,), name, text))
+        elif name in value[:i]:
+            refusals.append(((i,), name, f"got {shown(name)} twice; names must be distinct; remove one"))
+    refuse(refusals)
+    return tuple(value)
+
+
+class OutputSection(Section):
+    """[output]: what is computed, the p whose eigenfunctions are written, and whether sensitivities are drawn."""
+
+    quantities: Annotated[
+        tuple[str, ...],
+        BeforeValidator(_quantities),
+        parameter("what is computed", 'quantities = ["lyapunov_exponent", "stability_index"]'),
+    ] = QUANTITY_NAMES
     eigenfunctions: Annotated[
         Values | None,
         parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False, max_length=MAX_MOMENTS),
@@ -235,6 +290,18 @@ class OutputSection(Section):
         return self
 
 
+def _where(value: Any) -> Any:
+    """The flat table of a `where`, every entry a finite number or a text."""
+    table = flat(value)
+    if isinstance(table, dict):
+        refuse(((key,), item, "") for key, item in table.items() if not _is_number(item) and not isinstance(item, str))
+    return table
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) < math.inf
+
+
 class Expectation(Section):
     """[[expect]]: a value that the result must have, on the curves that `where` selects."""
 
@@ -245,12 +312,12 @@ class Expectation(Section):
     atol: Annotated[float | None, parameter("absolute tolerance", "atol = 1e-6", gt=0)] = None
     source: Annotated[Text, parameter("where the value comes from", 'source = "Eq. (37), second order"')]
     where: Annotated[
-        dict[str, float],
-        BeforeValidator(flat),
+        dict[str, Value],
+        BeforeValidator(_where),
         parameter("which curves: some of the varied keys", 'where = { "noise.D0" = 1.0 }'),
     ] = Field(default_factory=dict)
 
-    def selects(self, varied: Mapping[str, float]) -> bool:
+    def selects(self, varied: Varied) -> bool:
         """Whether this is about the curve with these varied values; without `where`, about all curves."""
         return all(same(varied[key], value) for key, value in self.where.items())
 
@@ -268,6 +335,8 @@ class Expectation(Section):
         return self
 
 
-def same(value: float, other: float) -> bool:
+def same(value: Value, other: Value) -> bool:
     """Whether two values of a varied key are one."""
+    if isinstance(value, str) or isinstance(other, str):
+        return value == other
     return math.isclose(value, other, rel_tol=_SAME)

@@ -139,12 +139,14 @@ class Document:
         data: what `tomllib` made of it.
         places: the line of each dotted key, or the `--set` or other option that gave it.
         faults: what is wrong with the changes.
+        text: the file as it was read.
     """
 
     file: str
     data: dict[str, Any]
     places: dict[str, int | str]
     faults: list[Fault] = field(default_factory=list)
+    text: str = ""
 
     def fault(self, path: Sequence[str | int], key: str, sentence: str) -> Fault:
         """A fault at the place of this path, or of the nearest table around it that has one."""
@@ -211,7 +213,7 @@ def read_document(
     text = _read(path)
     try:
         data = _loads(text)
-        document = Document(str(path), data, dict(_Scanner(text).scan().lines))
+        document = Document(str(path), data, dict(_Scanner(text).scan().lines), text=text)
     except RecursionError:
         fault = Fault("", None, "lists or tables are nested too deeply; a case needs three levels")
         raise CaseError(str(path), [fault]) from None

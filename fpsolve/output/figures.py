@@ -9,6 +9,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
+from fpsolve.case.sections import Value, Varied
 from fpsolve.case.vary import PARAMETERS
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, QUANTITIES, Index
@@ -29,7 +30,8 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     series = [_moment_series(*pair) for pair in pairs] if case.figure.x == "p" else _over_parameter(case, pairs)
     pictures = [folder / "figure.png", folder / "figure.pdf"]
     quantity = QUANTITIES[case.figure.y]
-    write_figure(series, case.figure.x, quantity, case.headline, pictures, is_reduced=case.is_exact)
+    is_exact = any(result.curve.is_exact for result in results)
+    write_figure(series, case.figure.x, quantity, case.headline, pictures, is_reduced=is_exact)
 
 
 def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path) -> None:
@@ -81,14 +83,14 @@ def _root_in(index: Estimate | None, line: FloatArray) -> float | None:
 
 def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
     """One series for each set of the other parameters that vary."""
-    groups: dict[tuple[tuple[str, float], ...], list[Pair]] = {}
+    groups: dict[tuple[tuple[str, Value], ...], list[Pair]] = {}
     for pair in pairs:
         others = tuple((key, value) for key, value in pair[0].curve.key if key != case.figure.x)
         groups.setdefault(others, []).append(pair)
     return [_index_series(case, INDICES[case.figure.y], dict(others), group) for others, group in groups.items()]
 
 
-def _index_series(case: Case, index: Index, others: dict[str, float], group: Sequence[Pair]) -> Series:
+def _index_series(case: Case, index: Index, others: Varied, group: Sequence[Pair]) -> Series:
     """λ or δ_p over the parameter; its perturbation theory, which has poles, where the index is sought."""
     x = np.array([result.curve.varied[case.figure.x] for result, _ in group])
     found = [result.estimates[index.name] for result, _ in group]

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.vary import ABSCISSAE
+from fpsolve.case.sections import Varied
+from fpsolve.case.vary import ABSCISSAE, legend
 from fpsolve.exponent.quantities import Quantity
 from fpsolve.files import atomic
-from fpsolve.model.parameters import axis_title, symbol_of
+from fpsolve.model.parameters import axis_title
 from fpsolve.pictures import COLOURS, SIZE, STYLE, draw_bars
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class Series:
         root: the stability index, which is marked on the zero line; None where there is none among the x.
     """
 
-    varied: dict[str, float]
+    varied: Varied
     x: FloatArray
     y: FloatArray
     line_x: FloatArray
@@ -145,11 +146,10 @@ def canvas(paths: Sequence[Path], width: float = SIZE[0], height: float = SIZE[1
 
 def _draw(axes: Any, item: Series, i: int) -> None:
     colour, marker = COLOURS[i % len(COLOURS)], _MARKERS[i % len(_MARKERS)]
-    label = ", ".join(f"{symbol_of(ABSCISSAE[key])} = {value:g}" for key, value in item.varied.items())
     axes.plot(item.line_x, item.line_y, color=colour, linewidth=1.6)
     axes.plot(
         item.x, item.y, marker, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6,
-        markevery=item.every, label=label or None,
+        markevery=item.every, label=legend(item.varied) or None,
     )  # fmt: skip
     if _has_rare(item):
         filled = item.rare & (np.arange(item.x.size) % item.every == 0)

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
+from fpsolve.case.vary import WORDS, written
 from fpsolve.exponent.quantities import (
     CRITICAL_RESTITUTION,
     IMPACT_RATE,
@@ -131,13 +132,14 @@ def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult
 
 def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Table:
     """One row for each parameter set: λ by simulation and by finite elements."""
-    names = (key.partition(".")[2] for key in case.vary)
-    table = _table(case.headline, *names, LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away")
+    table = _table(
+        case.headline, *_varied_columns(case), LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away"
+    )
     for each, result in pairs:
         value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
         known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
         exact = ("", "") if known is None else (f"{known:.6g}", _deviation(value, error, known))
-        varied = (f"{number:g}" for number in each.curve.varied.values())
+        varied = map(written, each.curve.varied.values())
         table.add_row(*varied, sampled(value, error), f"{error:.1e}", *exact)
     return table
 
@@ -160,8 +162,9 @@ def _deviation(value: float, error: float, exact: float) -> str:
 
 def _moment_table(case: Case, result: CurveResult) -> Table:
     """p, Λ(p), Eq. (37) and the difference."""
-    table = _table(case.heading(result.curve), "p", MOMENT.symbol, "± error", _theory(case, MOMENT), "difference")
-    _explain_star(table, case)
+    is_exact = result.curve.is_exact
+    table = _table(case.heading(result.curve), "p", MOMENT.symbol, "± error", _theory(MOMENT, is_exact), "difference")
+    _explain_star(table, is_exact)
     moments = result.moments
     for p, value, error, theory in zip(
         moments.p, moments.value, moments.error_estimate, moments.perturbation, strict=True
@@ -185,21 +188,27 @@ def _indices(result: CurveResult) -> list[list[str]]:
 def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     """One row for each parameter set: λ, Eq. (39), δ_p and Eq. (38)."""
     indices = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
-    names = (key.partition(".")[2] for key in case.vary)
-    headings = (text for index in indices for text in (index.symbol, _theory(case, index)))
-    table = _table(case.headline, *names, *headings)
-    _explain_star(table, case)
+    is_exact = any(result.curve.is_exact for result in results)
+    headings = (text for index in indices for text in (index.symbol, _theory(index, is_exact)))
+    table = _table(case.headline, *_varied_columns(case), *headings)
+    _explain_star(table, is_exact)
     for result in results:
-        row = [f"{value:g}" for value in result.curve.varied.values()]
+        row = list(map(written, result.curve.varied.values()))
         for index in indices:
             row += [_digits_of(index.name, result, most=7), f"{index.theory(result.curve.problem):.6g}"]
         table.add_row(*row)
     return table
 
 
-def _theory(case: Case, quantity: Quantity) -> str:
-    """Heading of a column of perturbation theory, starred where it has another noise than the solution."""
-    return f"Eq. {quantity.equation}{'*' if case.is_exact else ''}"
+def _varied_columns(case: Case) -> list[str | Column]:
+    """A column for each varied key; those of texts give way to numbers where the terminal is narrow."""
+    names = {key: key.partition(".")[2] for key in case.vary.keys}
+    return [Column(name, overflow="fold") if key in WORDS else name for key, name in names.items()]
+
+
+def _theory(quantity: Quantity, is_exact: bool) -> str:
+    """Heading of a column of perturbation theory, starred where it has another noise than some solution."""
+    return f"Eq. {quantity.equation}{'*' if is_exact else ''}"
 
 
 def print_chart(case: Case, chart: Chart) -> None:
@@ -236,7 +245,7 @@ def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
     for item in comparisons:
         expectation = item.expectation
         name = expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
-        where = "".join(f"\n{key} = {value:g}" for key, value in item.varied.items())
+        where = "".join(f"\n{key} = {written(value)}" for key, value in item.varied.items())
         table.add_row(
             f"{name}{where}\n[dim]{escape(expectation.source)}[/dim]",
             f"{expectation.value:.12g}\n± {item.tolerance:.0e}",
@@ -254,8 +263,8 @@ def _table(title: str, *columns: str | Column) -> Table:
     return Table(*aligned, title=Text(title), title_justify="left")
 
 
-def _explain_star(table: Table, case: Case) -> None:
-    if case.is_exact:
+def _explain_star(table: Table, is_exact: bool) -> None:
+    if is_exact:
         table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
 
 

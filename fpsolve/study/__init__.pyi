@@ -3,4 +3,4 @@ from .results import CurveResult as CurveResult
 from .results import SimulatedCurve as SimulatedCurve
 from .simulate import simulate_curves as simulate_curves
 from .solve import compare as compare
-from .solve import solve_curves as solve_curves
+from .solve import solve_curve as solve_curve

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.curves import Curve
-from fpsolve.case.sections import Expectation
+from fpsolve.case.sections import Expectation, Varied
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
@@ -149,7 +149,7 @@ class Comparison:
     """One expectation of a case and what was computed; `met` says whether they agree."""
 
     expectation: Expectation
-    varied: dict[str, float]
+    varied: Varied
     value: float | None
     tolerance: float
     met: bool

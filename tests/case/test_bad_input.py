@@ -183,7 +183,9 @@ VALUES = [  # key, its bad line, what the message says
     ("expect[0].rtol", "", "missing, and so is atol|rtol = 1e-3"),
     ("expect[0].source", 'source = ""', 'got ""|non-empty string|source = '),
     ('expect[0].where."noise.D0"', 'where = { "noise.D0" = 9 }', "got 9.0|[0.1, 0.5]"),
-    ('expect[0].where."noise.D0"', 'where = { noise.D0 = "a" }', 'got "a"|finite numbers'),
+    ('expect[0].where."noise.D0"', 'where = { noise.D0 = "a" }', 'got "a"|[0.1, 0.5]|write one of these'),
+    ('expect[0].where."noise.D0"', "where = { noise.D0 = true }", "got true (a boolean)|finite numbers"),
+    ('expect[0].where."noise.D0"', "where = { noise.D0 = inf }", "got inf|finite numbers"),
     ('expect[0].where."noise.r0"', 'where = { "noise.r0" = 1 }', "not varied|[vary]"),
 ]
 LINES = [  # key, a good line, what stands there instead, what the message says
@@ -196,10 +198,10 @@ LINES = [  # key, a good line, what stands there instead, what the message says
         'cannot be varied; did you mean "oscillator.omega"?',
     ),
     (
-        'vary."oscillator.impact"',
+        'vary."oscillator.impact"[0]',
         '"oscillator.omega" = [1.0, 2.0]',
-        '"oscillator.impact" = ["delta"]',
-        "known keys",
+        '"oscillator.impact" = ["dleta"]',
+        'got "dleta" (a string)|one of "delta", "restitution"; did you mean "delta"?',
     ),
     (
         'vary."oscillator.omega"[0]',
@@ -404,9 +406,10 @@ def test_restitution_law_on_one_of_the_curves(tmp_path: Path) -> None:
 
 
 def test_too_many_curves(tmp_path: Path) -> None:
-    text = edited('"oscillator.omega" = [1.0, 2.0]', f'"oscillator.omega" = {list(range(1, 6001))}')
+    text = edited('"oscillator.omega" = [1.0, 2.0]', '"noise.tau0" = { start = 1, stop = 9, num = 50001 }')
+    text = text.replace("[mesh]", '"oscillator.omega" = { start = 1, stop = 9, num = 20 }\n[mesh]')
     message = only_message(write(tmp_path, text))
-    assert "vary: makes 12000 curves; must be at most 10000; list fewer values" in message
+    assert "vary: makes 2000040 curves; must be at most 1000000; list fewer values" in message
 
 
 TOO_MANY = f"[{', '.join(f'0.{i:06}' for i in range(1, 100_002))}]"

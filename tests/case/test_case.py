@@ -17,6 +17,7 @@ from fpsolve.case.case import Case, load_case
 from fpsolve.case.curves import Curve
 from fpsolve.case.sections import Moments, Sweep
 from fpsolve.case.toml import read_document
+from fpsolve.case.vary import Vary
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.mesh_file import write_mesh
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
@@ -55,8 +56,8 @@ def test_shipped_case_loads(path: Path) -> None:
     assert case.name == path.stem
     assert case.path == path
     assert case.expect
-    assert all(curve.varied.keys() == case.vary.keys() for curve in case.curves())
-    assert case.planned == len(case.curves())
+    assert all(tuple(curve.varied) == case.vary.keys for curve in case.curves())
+    assert case.planned == len(list(case.curves()))
 
 
 CAPTIONS: dict[str, dict[str, float]] = {
@@ -93,11 +94,11 @@ def test_every_curve_of_a_figure_has_the_caption_s_parameters(name: str) -> None
     ],
 )
 def test_figure_varies_the_parameter_of_its_caption(name: str, varied: set[str]) -> None:
-    assert set(load_case(CASES / f"{name}.toml").vary) == varied
+    assert set(load_case(CASES / f"{name}.toml").vary.keys) == varied
 
 
 def test_fig2c_has_the_three_correlation_times_of_the_text() -> None:
-    assert {1e-4, 1e-3, 1e-2} <= set(load_case(CASES / "fig2c.toml").vary["noise.tau0"])
+    assert {1e-4, 1e-3, 1e-2} <= set(load_case(CASES / "fig2c.toml").vary.values("noise.tau0"))
 
 
 def test_fig3_draws_the_lyapunov_exponent_against_the_frequency() -> None:
@@ -149,7 +150,7 @@ def test_fig1_of_the_schema() -> None:
 
 
 def test_a_curve_holds_every_parameter() -> None:
-    curve = load_case(CASES / "fig1.toml").curves()[2]
+    curve = next(load_case(CASES / "fig1.toml").curves(2))
     noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95).ou_reduction()
     assert (curve.noise, curve.varied) == (noise, {"noise.D0": 1.0})
     assert curve.parameters == {
@@ -169,13 +170,12 @@ def test_a_curve_holds_every_parameter() -> None:
 
 def test_defaults_and_integers(write: Write) -> None:
     case = load_case(write(SMALL))
-    assert case.curves() == (
-        Curve(case.oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=math.sqrt(2)), case.curves()[0].parameters, {}),
-    )
+    [curve] = case.curves()
+    assert curve == Curve(case.oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=math.sqrt(2)), curve.parameters, {})
     assert isinstance(case.oscillator.omega, float)
     assert case.oscillator.impact is ImpactLaw.DELTA
     assert case.p.tolist() == [2.0, -1.0]
-    assert (case.rtol, case.vary, case.expect) == (1e-8, {}, ())
+    assert (case.rtol, case.vary, case.expect) == (1e-8, Vary(), ())
     assert (case.figure.x, case.figure.y) == ("p", "moment")
     assert case.output.eigenfunctions is None
     assert case.cylinder_mesh() is None
@@ -200,25 +200,26 @@ def test_windows_line_ends(write: Write) -> None:
 
 def test_exact_treatment_keeps_the_non_gaussian_noise(write: Write) -> None:
     case = load_case(write(SMALL.replace("r0 = 1", 'r0 = 0.9, treatment = "exact"')))
-    assert case.curves()[0].noise == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
+    assert next(case.curves()).noise == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
 
 
 def test_restitution_law(write: Write) -> None:
     case = load_case(write(SMALL.replace("epsilon = 1", 'epsilon = 1, impact = "restitution"')))
-    assert case.curves()[0].oscillator.impact is ImpactLaw.RESTITUTION
-    assert case.curves()[0].parameters["oscillator.impact"] == "restitution"
+    [curve] = case.curves()
+    assert curve.oscillator.impact is ImpactLaw.RESTITUTION
+    assert curve.parameters["oscillator.impact"] == "restitution"
 
 
 def test_several_varied_keys_give_their_product(write: Write) -> None:
     text = SMALL + '[vary]\n"noise.D0" = [1, 2]\n"oscillator.omega" = [3, 4, 5]\n'
-    curves = load_case(write(text)).curves()
+    curves = list(load_case(write(text)).curves())
     pairs = [(curve.varied["noise.D0"], curve.oscillator.omega) for curve in curves]
     assert pairs == [(1, 3), (1, 4), (1, 5), (2, 3), (2, 4), (2, 5)]
 
 
 def test_curves_are_numbered_and_named(write: Write) -> None:
     case = load_case(write(SMALL + '[vary]\n"noise.D0" = [1, 2.5]\n"oscillator.omega" = [3, 0.0001]\n'))
-    curves = case.curves()
+    curves = list(case.curves())
     assert [(curve.number, curve.suffix) for curve in curves] == [(1, ""), (2, "-2"), (3, "-3"), (4, "-4")]
     assert curves[3].label == "noise.D0 = 2.5, oscillator.omega = 0.0001"
     assert case.place(curves[3]) == "small, noise.D0 = 2.5, oscillator.omega = 0.0001"
@@ -239,7 +240,7 @@ def test_a_curve_knows_the_noise_before_its_reduction(write: Write) -> None:
 
 
 def test_varied_keys_may_be_dotted_without_quotes(write: Write) -> None:
-    assert load_case(write(SMALL + "[vary]\nnoise.D0 = [1.0, 2.0]\n")).vary == {"noise.D0": (1.0, 2.0)}
+    assert load_case(write(SMALL + "[vary]\nnoise.D0 = [1.0, 2.0]\n")).vary.columns == {"noise.D0": (1.0, 2.0)}
 
 
 def test_where_selects_curves(write: Write) -> None:
@@ -256,7 +257,7 @@ def test_where_selects_curves(write: Write) -> None:
 def test_expectation_without_where_is_about_every_curve(write: Write) -> None:
     text = SMALL + '[[expect]]\nquantity = "moment"\np = 2\nvalue = 1\nrtol = 9\nsource = "none"\n'
     case = load_case(write(text))
-    assert case.expect[0].selects(case.curves()[0].varied)
+    assert case.expect[0].selects(next(case.curves()).varied)
 
 
 def test_mesh_from_numbers(write: Write) -> None:
@@ -285,20 +286,21 @@ def test_mesh_file_is_sought_from_the_case(write: Write, tmp_path: Path) -> None
     ],
 )
 def test_override(write: Write, override: str, key: str, value: float | str) -> None:
-    assert load_case(write(SMALL), [override]).curves()[0].parameters[key] == value
+    assert next(load_case(write(SMALL), [override]).curves()).parameters[key] == value
 
 
 def test_override_of_a_text_needs_no_quotes(write: Write) -> None:
     case = load_case(write(SMALL), ["oscillator.impact=restitution", "noise.treatment=exact", "title=Two words"])
-    assert case.curves()[0].parameters["oscillator.impact"] == "restitution"
-    assert case.is_exact
+    [curve] = case.curves()
+    assert curve.parameters["oscillator.impact"] == "restitution"
+    assert curve.is_exact
     assert case.title == "Two words"
 
 
 @pytest.mark.parametrize("stated", ['"noise.D0" = [1]', "noise.D0 = [1]", ""])
 @pytest.mark.parametrize("override", ['vary."noise.D0"=[2]', "vary.noise.D0=[2]", 'vary={"noise.D0"=[2]}'])
 def test_override_of_a_varied_key(write: Write, stated: str, override: str) -> None:
-    assert load_case(write(f"{SMALL}[vary]\n{stated}"), [override]).vary == {"noise.D0": (2.0,)}
+    assert load_case(write(f"{SMALL}[vary]\n{stated}"), [override]).vary.columns == {"noise.D0": (2.0,)}
 
 
 def test_later_overrides_win_and_tables_replace_tables(write: Write) -> None:

@@ -29,7 +29,7 @@ def index(result):
 def curves(name):
     """Moments, shape (curves, p), in the order of the varied values, which must increase."""
     case, results = solved(name)
-    (values,) = case.vary.values()
+    (values,) = case.vary.columns.values()
     assert list(values) == sorted(values)
     return case.p, np.array([result.moments.value for result in results]), results
 
@@ -105,10 +105,10 @@ def test_fig2c_short_correlation_times_nearly_coincide():
 def fig3():
     """λ by (ω, D0)."""
     case, results = solved("fig3")
-    omegas, intensities = case.vary["oscillator.omega"], case.vary["noise.D0"]
+    omegas, intensities = case.vary.values("oscillator.omega"), case.vary.values("noise.D0")
     table = {tuple(result.curve.varied.values()): result.lyapunov_exponent.value for result in results}
-    assert set(case.vary) == {"oscillator.omega", "noise.D0"}
-    order = list(case.vary)
+    assert set(case.vary.keys) == {"oscillator.omega", "noise.D0"}
+    order = list(case.vary.keys)
     return np.array(
         [
             [table[tuple({"oscillator.omega": w, "noise.D0": d}[key] for key in order)] for d in intensities]
