@@ -117,7 +117,7 @@ class Results(Sequence[CurveResult]):
         return self._result(curve)
 
     def __iter__(self) -> Iterator[CurveResult]:
-        return (self._result(curve) for curve in self._case.curves() if curve.number in self._found)
+        return (self[i] for i in range(len(self)))
 
     def _result(self, curve: Curve) -> CurveResult:
         found = self._found[curve.number]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -28,32 +30,45 @@ MOST_INDENTED = 100
 
 
 def write_results(case: Case, results: Sequence[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
-    """summary.json, which says whether all curves of the case are there, moments.csv and curves.csv.
+    """summary.json, which says whether all curves of the case are there, moments.csv and curves.csv, in one go.
 
     Args:
         facts: on the run, see `Run.facts`.
     """
-    with atomic(folder / "summary.json") as draft, draft.open("w", encoding="utf-8") as file:
-        write_summary(case, results, facts, file)
-    names = list(case.vary.keys)
-    if MOMENT.name in case.output.quantities:
-        rows = ([*result.curve.varied.values(), *row.values()] for result in results for row in _rows(result))
-        write_csv(folder / "moments.csv", [*names, *MOMENT_COLUMNS], rows)
-    columns = [f"{name}{ending}" for name in asked(case) for ending in ("", "_error")]
-    curves = ([*result.curve.varied.values(), *_curve_row(case, result)] for result in results)
-    write_csv(folder / "curves.csv", [*names, *columns, "p_solved", "p_failed", "status", "seconds"], curves)
+    with ExitStack() as stack:
+        summary, moments, curves = (
+            stack.enter_context(_draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
+        )
+        by_moment, by_curve = csv.writer(moments), csv.writer(curves)
+        by_moment.writerow([*case.vary.keys, *MOMENT_COLUMNS])
+        by_curve.writerow([*case.vary.keys, *_curve_columns(case)])
+        summary.write(_begin(case, len(results), facts))
+        for number, result in enumerate(results):
+            varied, rows = result.curve.varied.values(), _rows(result)
+            summary.write((",\n  " if number else "\n  ") + _text(case, _summary(case, result, rows)))
+            by_moment.writerows([*varied, *row.values()] for row in rows)
+            by_curve.writerow([*varied, *_curve_row(case, result)])
+        summary.write("\n ]\n}\n")
 
 
-def write_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str, Any], file: TextIO) -> None:
-    """The summary, curve by curve; beyond `MOST_INDENTED` each is one line."""
-    state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
-    begin = _json({**head(case), **state, **facts}, is_indented=True).removesuffix("\n}")
-    file.write(f'{begin},\n "curves": [')
-    is_indented = case.planned <= MOST_INDENTED
-    for number, result in enumerate(results):
-        text = _json(_summary(case, result), is_indented=is_indented).replace("\n", "\n  ")
-        file.write(f"{',' if number else ''}\n  {text}")
-    file.write("\n ]\n}\n")
+@contextmanager
+def _draft(path: Path) -> Iterator[TextIO]:
+    """A file that is open for writing, and takes its place when it is whole."""
+    with atomic(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        yield file
+
+
+def _begin(case: Case, done: int, facts: Mapping[str, Any]) -> str:
+    """The summary up to its curves."""
+    state = {"complete": done == case.planned, "planned": case.planned, "done": done}
+    head_text = json.dumps({**head(case), **state, **facts}, indent=1, ensure_ascii=False).removesuffix("\n}")
+    return f'{head_text},\n "curves": ['
+
+
+def _text(case: Case, curve: Mapping[str, Any]) -> str:
+    """A curve of the summary; of many each is one line."""
+    indent = 1 if case.planned <= MOST_INDENTED else None
+    return json.dumps(curve, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
 
 
 def asked(case: Case) -> list[str]:
@@ -83,15 +98,11 @@ def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
     return {"parameters": dict(curve.parameters), "varied": dict(curve.varied)}
 
 
-def _json(data: Any, *, is_indented: bool) -> str:
-    return json.dumps(data, indent=1 if is_indented else None, allow_nan=False, ensure_ascii=False)
-
-
-def _summary(case: Case, result: CurveResult) -> dict[str, Any]:
-    """What a case asks for of a curve."""
+def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What a case asks for of a curve; `rows` are those of its moments."""
     found: dict[str, Any] = {name: _estimate(result, INDICES[name]) for name in asked(case)}
     if MOMENT.name in case.output.quantities:
-        found = {"moments": _rows(result), **found}
+        found = {"moments": rows, **found}
     if SENSITIVITIES in case.output.quantities:
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
     return {
@@ -103,6 +114,11 @@ def _summary(case: Case, result: CurveResult) -> dict[str, Any]:
         "notes": list(result.notes),
         "seconds": round(result.seconds, 6),
     }
+
+
+def _curve_columns(case: Case) -> list[str]:
+    estimates = [f"{name}{ending}" for name in asked(case) for ending in ("", "_error")]
+    return [*estimates, "p_solved", "p_failed", "status", "seconds"]
 
 
 def _curve_row(case: Case, result: CurveResult) -> list[Any]:

@@ -22,7 +22,7 @@ from fpsolve.study.sweep import Batch, Order, SolveBatch, batches, lost
 
 Found = tuple[int, Place | CurveResult | None]
 """The number of a curve, and its numbers where they are new."""
-GROWTH = 1.5
+GROWTH = 2
 """Tables are written anew when they have grown by that factor, so that all of it costs as little as the last ones."""
 
 
