@@ -14,7 +14,7 @@ from fpsolve.case.vary import PARAMETERS
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, QUANTITIES, Index
 from fpsolve.model.parameters import symbol_of
-from fpsolve.output.plots import Series, write_bars, write_figure, write_response_figure
+from fpsolve.output.plots import MOST_LABELLED, Series, write_bars, write_figure, write_response_figure
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory.perturbation import scale_of, second_order
 
@@ -27,7 +27,9 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     """Draw figure.png and figure.pdf: finite elements, perturbation theory, and what is simulated as dots."""
     samples = {each.curve.key: each for each in simulated}
     pairs = [(result, samples.get(result.curve.key)) for result in results]
-    series = [_moment_series(*pair) for pair in pairs] if case.figure.x == "p" else _over_parameter(case, pairs)
+    is_many = len(pairs) > MOST_LABELLED
+    of_moments = _plain_series if is_many else _moment_series
+    series = [of_moments(*pair) for pair in pairs] if case.figure.x == "p" else _over_parameter(case, pairs)
     pictures = [folder / "figure.png", folder / "figure.pdf"]
     quantity = QUANTITIES[case.figure.y]
     is_exact = any(result.curve.is_exact for result in results)
@@ -74,6 +76,12 @@ def _moment_series(result: CurveResult, sample: SimulatedCurve | None) -> Series
     rare = np.isin(moments.p, moments.rare)
     root = _root_in(result.stability_index, line)
     return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, _columns(dots), rare, root)
+
+
+def _plain_series(result: CurveResult, _: SimulatedCurve | None) -> Series:
+    """Λ(p) alone, of one of many curves."""
+    nothing = np.zeros(0)
+    return Series(dict(result.curve.varied), result.moments.p, result.moments.value, nothing, nothing)
 
 
 def _root_in(index: Estimate | None, line: FloatArray) -> float | None:

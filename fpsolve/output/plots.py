@@ -23,6 +23,8 @@ from fpsolve.pictures import COLOURS, SIZE, STYLE, draw_bars
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
 
+MOST_LABELLED = 20
+"""Curves that a legend can tell apart."""
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
 _ROOT: dict[str, Any] = {"marker": "|", "linestyle": "none", "markersize": 16, "markeredgewidth": 2.2, "zorder": 4}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
@@ -68,9 +70,12 @@ def write_figure(
         axes = figure.add_subplot(xlabel=axis_title(ABSCISSAE[x]), ylabel=y.title)
         axes.set_title(filled(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
-        for i, item in enumerate(series):
-            _draw(axes, item, i)
-        _add_legend(axes, series, y.equation + (", reduced noise" if is_reduced else ""))
+        if len(series) > MOST_LABELLED:
+            _draw_many(figure, axes, series)
+        else:
+            for i, item in enumerate(series):
+                _draw(axes, item, i)
+            _add_legend(axes, series, y.equation + (", reduced noise" if is_reduced else ""))
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         axes.margins(x=0.03)
 
@@ -159,6 +164,22 @@ def _draw(axes: Any, item: Series, i: int) -> None:
         axes.errorbar(x, y, 2 * error, **_DOT)
     if item.root is not None:
         axes.plot(item.root, 0, color=colour, **_ROOT)
+
+
+def _draw_many(figure: Any, axes: Any, series: Sequence[Series]) -> None:
+    """Many curves as thin lines, or points where they have but one, coloured in their order."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import Normalize
+
+    order = ScalarMappable(Normalize(1, len(series)), "viridis")
+    colours = order.to_rgba(np.arange(1, len(series) + 1))
+    lines = LineCollection([np.stack([item.x, item.y], axis=1) for item in series], colors=colours, linewidths=0.8)
+    axes.add_collection(lines, autolim=True)
+    alone = [i for i, item in enumerate(series) if item.x.size == 1]
+    axes.scatter([series[i].x[0] for i in alone], [series[i].y[0] for i in alone], s=8, color=colours[alone])
+    axes.autoscale_view()
+    figure.colorbar(order, ax=axes, label="number of the curve")
 
 
 def _has_rare(item: Series) -> bool:

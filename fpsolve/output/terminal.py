@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from textwrap import wrap
 
@@ -28,11 +29,16 @@ from fpsolve.study.chart import Chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.theory.far import grows_far_out
 
+MOST_TABLES, MOST_REMARKS = 50, 50
+"""Curves whose tables are printed, and remarks on them."""
+
 
 def print_results(case: Case, results: Sequence[CurveResult]) -> None:
     """Λ(p), or λ and δ_p over a parameter, beside perturbation theory."""
     console = Console()
-    if case.figure.x == "p":
+    if len(results) > MOST_TABLES:
+        _print_lines(console, [case.headline, _count(results), ""])
+    elif case.figure.x == "p":
         for result in results:
             if result.moments.p.size:
                 console.print(_moment_table(case, result))
@@ -46,15 +52,28 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
 
 def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
     """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
+    told, untold = 0, 0
     for result in results:
-        _remark(case, result.curve, "warning", "yellow", result.warnings)
-        _remark(case, result.curve, "not converged", "bold red", [failure.reason for failure in result.failures])
-        _remark(case, result.curve, "note", "cyan", result.notes)
+        failures = [failure.reason for failure in result.failures]
+        remarks = (("warning", "yellow", result.warnings), ("not converged", "bold red", failures))
+        for kind, style, texts in (*remarks, ("note", "cyan", result.notes)):
+            most = texts[: max(MOST_REMARKS - told, 0)]
+            _remark(case, result.curve, kind, style, most)
+            told, untold = told + len(most), untold + len(texts) - len(most)
+    if untold:
+        print_remark(f"note: {case.name}: {untold} more remarks of this kind are in summary.json", "cyan")
 
 
 def _remark(case: Case, curve: Curve, kind: str, style: str, texts: Sequence[str]) -> None:
     for text in texts:
         print_remark(f"{kind}: {case.place(curve)}: {text}", style)
+
+
+def _count(results: Sequence[CurveResult]) -> str:
+    """How many curves have become what."""
+    counts = Counter(result.status for result in results)
+    states = ", ".join(f"{count} {status.name.lower()}" for status, count in sorted(counts.items()))
+    return f"{len(results)} curves: {states}; their numbers are in curves.csv and results.nc"
 
 
 def print_remark(text: str, style: str) -> None:

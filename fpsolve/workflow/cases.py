@@ -178,9 +178,7 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
     return Outcome((), tuple(simulated), interruption)
 
 
-def chart_case(
-    case: Case, out: str | Path = "results", *, pool: Pool | None = None, watch: Watch = NOBODY
-) -> Chart:
+def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = None, watch: Watch = NOBODY) -> Chart:
     """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
 
     Tables are written anew after every branch. What an earlier chart wrote there is removed first, and what was solved
