@@ -35,7 +35,7 @@ ROOMS = {
         *("density", "sensitivity", "curve", "scan", "continuation", "special_points", "zero", "stability", "regions"),
     ],
     "case": ["toml", "messages", "sections", "vary", "chart", "curves", "remedies", "refusals", "case"],
-    "study": ["results", "solve", "simulate", "chart"],
+    "study": ["results", "records", "solve", "simulate", "chart"],
     "output": ["vtk", "tables", "plots", "figures", "charts", "terminal"],
     "workflow": [],
     "cli": [],

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
+from fpsolve.case.sections import MonteCarloSection
 from fpsolve.errors import FpsolveError
 from fpsolve.process import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles
@@ -43,14 +44,13 @@ def refuse_obstacles(case: Case) -> None:
 def simulate_curves(case: Case, *, progress: Callable[[], None] = lambda: None) -> Iterator[SimulatedCurve]:
     """Simulate the curves of a case one after the other; an interrupt (Ctrl-C) ends it with what is done.
 
-    With c₂ or c₃ > 0 the stationary response is simulated too.
-
     Raises:
         KeyboardInterrupt: nothing was done yet.
     """
+    orders = tuple(float(p) for p in case.simulated)
     for curve in case.curves():
         try:
-            simulated = _simulate_curve(case, curve, progress)
+            simulated = simulate_curve(curve, orders, case.monte_carlo, progress)
         except KeyboardInterrupt:
             if curve.number == 1:
                 raise
@@ -60,12 +60,25 @@ def simulate_curves(case: Case, *, progress: Callable[[], None] = lambda: None) 
             return
 
 
-def _simulate_curve(case: Case, curve: Curve, progress: Callable[[], None]) -> SimulatedCurve:
+def simulate_curve(
+    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = lambda: None
+) -> SimulatedCurve:
+    """Simulate one curve, and with c₂ or c₃ > 0 its stationary response; a task that pickles small.
+
+    Args:
+        curve: the parameters.
+        orders: p of the moments.
+        setting: [monte_carlo] of the case, whose p are not used.
+        progress: called as often as `simulation_work` counts; a task for another process has none.
+
+    Raises:
+        KeyboardInterrupt: nothing was done yet.
+        FpsolveError: as `simulate`.
+    """
     from fpsolve.simulation.estimators import simulate
 
-    setting = case.monte_carlo
     result = simulate(
-        curve.problem, [float(p) for p in case.simulated], estimator=setting.estimator,
+        curve.problem, orders, estimator=setting.estimator,
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
     note = simulated_tail_note(curve.problem) if any(each.p for each in result.estimates) else None
