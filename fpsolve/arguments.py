@@ -84,9 +84,12 @@ def load_to_write(
 def pool_of(jobs: int | None, scheduler: str) -> Pool:
     """Who does the work. Raises `FpsolveError`."""
     from fpsolve.pool import cluster, several
+    from fpsolve.process import limit_processors
 
     if jobs is not None and scheduler:
         raise FpsolveError("--jobs is for this machine, and --scheduler for a cluster; name one of them")
     if jobs is not None and jobs < 1:
         raise FpsolveError(f"--jobs: got {jobs}; must be at least 1; leave it out for one process on each processor")
+    if jobs is not None:
+        limit_processors(jobs)
     return cluster(scheduler) if scheduler else several(jobs)

@@ -92,11 +92,14 @@ def simulate(
         str | None,
         Parameter(help="direct (if nothing is stated), or population for strong noise or large |p|."),
     ] = None,
+    jobs: Annotated[Count | None, Parameter(help="How many processors; all if omitted.")] = None,
+    scheduler: Scheduler = "",
+    fresh: Fresh = False,
     overrides: Overrides = None,
 ) -> int:
     """Simulate the system with its impacts and estimate the exponents; write monte_carlo.json into OUT/<case>/.
 
-    Ctrl-C ends it early and keeps what is done.
+    Ctrl-C ends it early and keeps what is done; curves that an earlier simulation has finished are not simulated again.
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
@@ -108,8 +111,10 @@ def simulate(
         for name, value in stated.items()
         if value is not None
     }
-    for case in load_to_write(cases, overrides, options, monte_carlo=True):
-        outcome = simulate_case(case, out, watch=_watch())
+    loaded = load_to_write(cases, overrides, options, monte_carlo=True)
+    pool = pool_of(jobs, scheduler)
+    for case in loaded:
+        outcome = simulate_case(case, out, pool=pool if scheduler else None, is_fresh=fresh, watch=_watch())
         if outcome.interruption:
             _print_error(outcome.interruption)
         print(f"written: {out / case.name}")

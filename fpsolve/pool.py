@@ -57,12 +57,14 @@ class Pool:
         stop: ends an executor, and what it is at.
         ahead: how many tasks it is given at once.
         own_seconds: of work that this process does before the executor is made.
+        is_elsewhere: whether other machines work.
     """
 
     start: Callable[[], Executor]
     stop: Callable[[Executor], None] = lambda executor: executor.shutdown(cancel_futures=True)
     ahead: int = 1
     own_seconds: float = 0.0
+    is_elsewhere: bool = False
     _executor: Executor | None = field(default=None, init=False, repr=False)
 
     def __enter__(self) -> Pool:
@@ -194,7 +196,7 @@ def cluster(address: str) -> Pool:
         executor.shutdown(wait=False)  # what is not done is cancelled
         client.close()
 
-    return Pool(partial(client.get_executor, pure=False), stop, max(AHEAD * threads, 32))
+    return Pool(partial(client.get_executor, pure=False), stop, max(AHEAD * threads, 32), is_elsewhere=True)
 
 
 def _client(address: str) -> Any:

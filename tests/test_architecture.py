@@ -39,11 +39,11 @@ ROOMS = {
         *("toml", "messages", "sections", "vary", "vary_table", "chart", "curves", "remedies", "refusals"),
         "case",
     ],
-    "study": ["results", "solve", "records", "sweep", "simulate", "chart"],
+    "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart"],
     "output": [
         *("vtk", "provenance", "records", "tables", "datasets", "plots", "figures", "charts", "terminal"),
     ],
-    "workflow": ["folders", "sets", "cases"],
+    "workflow": ["folders", "sets", "simulations", "cases"],
     "arguments": [],
     "cli": [],
 }

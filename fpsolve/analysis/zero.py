@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -30,6 +30,22 @@ RTOL = 1e-10
 """Of F, relative to its scale."""
 
 
+def axis_faults(
+    start: float, stop: float, scale: str, at: Sequence[float]
+) -> Iterator[tuple[tuple[str | int, ...], float | None, str]]:
+    """What is wrong with the numbers of an axis: where, which value, and a sentence."""
+    if not start < stop:
+        yield (), None, f"got start = {start}, stop = {stop}; must be start < stop; exchange the two"
+        return
+    if scale == "log" and start <= 0:
+        remedy = 'must be > 0 where scale = "log"; use a positive start, or scale = "linear"'
+        yield ("start",), start, f"got {start}; {remedy}"
+    for i, value in enumerate(at):
+        if not start <= value <= stop:
+            known = f"must be from start = {start} to stop = {stop}; remove it, or widen the frame"
+            yield ("at", i), value, f"got {value}; {known}"
+
+
 @checked_dataclass(frozen=True, config=STRICT)
 class Axis:
     """One side of a chart.
@@ -51,13 +67,8 @@ class Axis:
     at: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        if not self.start < self.stop:
-            raise ValueError(f"got start = {self.start}, stop = {self.stop}; must be start < stop; exchange the two")
-        if self.scale == "log" and self.start <= 0:
-            raise ValueError(f'got start = {self.start}; must be > 0 where scale = "log"; use scale = "linear"')
-        for value in self.at:
-            if not self.start <= value <= self.stop:
-                raise ValueError(f"got at = {value}; must be from start = {self.start} to stop = {self.stop}")
+        for place, _, text in axis_faults(self.start, self.stop, self.scale, self.at):
+            raise ValueError(f"{place[0]}: {text}" if place else text)
 
     def value(self, share: Any) -> Any:
         """The parameter at a share of the way from start to stop."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, ValidationError, model_validator
 
-from fpsolve.analysis.zero import Axis, Zero, zero_of
+from fpsolve.analysis.zero import Axis, Zero, axis_faults, zero_of
 from fpsolve.case.messages import Refusal, nearest, own_faults, refuse, shown
 from fpsolve.case.sections import Section, Text, Values
 from fpsolve.case.vary import VARIABLE
@@ -56,16 +56,7 @@ class ChartAxis(Section):
                     value = getattr(self, name)
                     yield (name,), value, f"got {value}; {self.key} {accepted}; choose another value"
                 return
-        if not self.start < self.stop:
-            yield (), None, f"got start = {self.start}, stop = {self.stop}; must be start < stop; exchange the two"
-            return
-        if self.scale == "log" and self.start <= 0:
-            remedy = 'must be > 0 where scale = "log"; use a positive start, or scale = "linear"'
-            yield ("start",), self.start, f"got {self.start}; {remedy}"
-        for i, value in enumerate(self.at):
-            if not self.start <= value <= self.stop:
-                known = f"must be from start = {self.start} to stop = {self.stop}"
-                yield ("at", i), value, f"got {value}; {known}; remove it, or widen the frame"
+        yield from axis_faults(self.start, self.stop, self.scale, self.at)
 
 
 def _zeros(value: Any) -> Any:

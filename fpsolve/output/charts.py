@@ -20,7 +20,7 @@ from fpsolve.model.parameters import axis_title
 from fpsolve.output.plots import canvas, filled
 from fpsolve.output.tables import head
 from fpsolve.pictures import COLOURS
-from fpsolve.study.chart import Chart
+from fpsolve.study.chart import Chart, charted
 
 _TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
 """Of regions, the darker the more of the quantities grow there."""
@@ -40,8 +40,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
 
 def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
     """chart.png and chart.pdf: the lines, their closed forms dashed, and the regions with their names."""
-    assert case.chart is not None
-    x, y = case.chart.x.axis, case.chart.y.axis
+    x, y = charted(case).x.axis, charted(case).y.axis
     with canvas([folder / "chart.png", folder / "chart.pdf"], height=6.5) as figure:
         axes = figure.add_subplot(xlabel=axis_title(PARAMETERS[x.key]), ylabel=axis_title(PARAMETERS[y.key]))
         axes.set(xscale=x.scale, yscale=y.scale, xlim=(x.start, x.stop), ylim=(y.start, y.stop))
@@ -76,14 +75,13 @@ def _rows(chart: Chart) -> Iterator[list[Any]]:
 
 
 def _summary(case: Case, chart: Chart) -> dict[str, Any]:
-    assert case.chart is not None
-    x, y = case.chart.x.axis, case.chart.y.axis
+    x, y = charted(case).x.axis, charted(case).y.axis
     regions = () if chart.regions is None else chart.regions.each
     [curve] = case.curves()
     held = {key: value for key, value in curve.parameters.items() if key not in (x.key, y.key)}
     return {
         "complete": chart.complete,
-        "planned": len(case.chart.zero),
+        "planned": len(charted(case).zero),
         "done": len(chart.lines) if chart.complete else max(len(chart.lines) - 1, 0),
         "parameters": held,
         "x": _frame(x),
@@ -92,7 +90,7 @@ def _summary(case: Case, chart: Chart) -> dict[str, Any]:
         "lines": [_line(line) for line in chart.lines],
         "closed_forms": [
             {"line": zero.name, "equation": "(38)-(39)", "branches": [branch.tolist() for branch in branches]}
-            for zero, branches in zip(case.chart.zero, chart.closed_forms, strict=True)
+            for zero, branches in zip(charted(case).zero, chart.closed_forms, strict=True)
         ],
         "regions": [
             {"name": each.name, "signs": each.signs, "share": each.share}

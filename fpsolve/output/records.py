@@ -23,7 +23,6 @@ from fpsolve.case.curves import Curve
 from fpsolve.study.records import result_of
 from fpsolve.study.results import CurveResult
 
-FOLDER = "records"
 _NAMES: dict[int, str] = {}
 """The file of this process."""
 
@@ -38,14 +37,10 @@ class Place:
 
 
 class Records:
-    """The records in a folder by their keys, of which the last one counts.
-
-    Args:
-        folder: of the case; the records are in `records` inside of it.
-    """
+    """The records in a folder by their keys, of which the last one counts."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder / FOLDER
+        self.folder = folder
         self._places: dict[str, Place] = {}
 
     def look(self) -> Records:
@@ -125,14 +120,14 @@ class Results(Sequence[CurveResult]):
 
 
 def append(folder: Path, key: str, record: dict[str, Any]) -> Place:
-    """Add a record to the file of this process in `folder`/records.
+    """Add a record to the file of this process in a folder.
 
     Raises:
         OSError: it cannot be written; nothing is left of it.
     """
     content = json.dumps(record, ensure_ascii=False).encode()
     line = b'{"key": "%s", "crc32": %d, "record": %s}\n' % (key.encode(), zlib.crc32(content), content)
-    path = folder / FOLDER / _own_name()
+    path = folder / _own_name()
     path.parent.mkdir(parents=True, exist_ok=True)
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
     try:

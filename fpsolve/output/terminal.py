@@ -25,7 +25,7 @@ from fpsolve.exponent.quantities import (
     VARIANCE_RATE,
     Quantity,
 )
-from fpsolve.study.chart import Chart
+from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.theory.far import grows_far_out
 
@@ -232,8 +232,7 @@ def _theory(quantity: Quantity, is_exact: bool) -> str:
 
 def print_chart(case: Case, chart: Chart) -> None:
     """The special points of every line, and what the regions are."""
-    assert case.chart is not None
-    names = (axis.key.partition(".")[2] for axis in (case.chart.x, case.chart.y))
+    names = (axis.key.partition(".")[2] for axis in (charted(case).x, charted(case).y))
     table = _table(case.headline, Column("line"), "branch", "points", *names, Column("special point"))
     for line in chart.lines:
         for number, branch in enumerate(line.branches, start=1):

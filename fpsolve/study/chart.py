@@ -13,6 +13,7 @@ from fpsolve.analysis.stability import NODES, Boundary, Map, crossed
 from fpsolve.analysis.zero import Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
+from fpsolve.case.chart import ChartSection
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import FpsolveError
 from fpsolve.model.direction import Family
@@ -56,13 +57,19 @@ class Chart:
         return tuple(in_words_of_a_case(text) for text in found if text)
 
 
+def charted(case: Case) -> ChartSection:
+    """The frame of a case and the lines in it. Raises `FpsolveError` where it has none."""
+    if case.chart is not None:
+        return case.chart
+    raise FpsolveError(
+        f'{case.path}: chart: missing; add [chart] with x = {{ key = "oscillator.omega", start = 0.3, '
+        'stop = 5.0 }, y like it, and zero = ["lyapunov_exponent", { moment = 2.0 }]'
+    )
+
+
 def refuse_no_chart(case: Case) -> None:
     """Refuse a case without a chart, or with several curves. Raises `FpsolveError`."""
-    if case.chart is None:
-        raise FpsolveError(
-            f'{case.path}: chart: missing; add [chart] with x = {{ key = "oscillator.omega", start = 0.3, '
-            'stop = 5.0 }, y like it, and zero = ["lyapunov_exponent", { moment = 2.0 }]'
-        )
+    charted(case)
     if case.vary:
         raise FpsolveError(
             f"{case.path}: vary: a chart has one set of the other parameters; remove [vary], or write --set vary={{}}"
@@ -71,7 +78,7 @@ def refuse_no_chart(case: Case) -> None:
 
 def chart_work(case: Case) -> int:
     """How often `solve_chart` reports progress: once for each node of each scan."""
-    return NODES**2 * (len(case.chart.zero) if case.chart else 0)
+    return NODES**2 * len(charted(case).zero)
 
 
 def solve_chart(
@@ -89,12 +96,12 @@ def solve_chart(
         stepped: called once for each point that is traced.
         map: computes the rows of all scans, as the builtin does or in other processes, while branches are traced here.
     """
-    assert case.chart is not None
-    x, y = case.chart.x.axis, case.chart.y.axis
+    frame = charted(case)
+    x, y = frame.x.axis, frame.y.axis
     [curve] = case.curves()
     family = Family(curve.problem, curve.original_noise)
-    chart = Chart((), _closed_forms(family, case.chart.zero, (x, y)))
-    begun = [Boundary(zero, x, y, family, budget=case.budget) for zero in case.chart.zero]
+    chart = Chart((), _closed_forms(family, frame.zero, (x, y)))
+    begun = [Boundary(zero, x, y, family, budget=case.budget) for zero in frame.zero]
     rows = iter(map(scan_row, [row for line in begun for row in line.rows()]))
     for each in begun:
         done = chart.lines

@@ -25,13 +25,18 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
     """What a record is found by: a digest of all that its numbers and sentences follow from."""
     mesh, budget = numerics.mesh, numerics.budget
     content = {
-        "version": RESULT_VERSION,
         "parameters": dict(curve.parameters),
         "p": wanted.p.tolist(),
         "wanted": [wanted.indices, wanted.shown, wanted.density, wanted.differentiated],
         "numerics": [numerics.rtol, budget.unknowns, budget.seconds, None if mesh is None else _plain(mesh)],
     }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return digest(content)
+
+
+def digest(content: Record) -> str:
+    """A key from what results follow from, and from their version."""
+    text = json.dumps({"version": RESULT_VERSION, **content}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def record_of(result: CurveResult) -> Record:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
+from fpsolve.case.sections import MonteCarloSection
 from fpsolve.errors import FpsolveError
 from fpsolve.process import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles
@@ -23,7 +25,12 @@ SIGNIFICANT = 3.0
 
 def simulation_work(case: Case) -> int:
     """How often `simulate_curves` reports progress."""
-    return PROGRESS_STEPS * sum(3 if _is_nonlinear(curve) else 1 for curve in case.curves())
+    return sum(map(simulation_steps, case.curves()))
+
+
+def simulation_steps(curve: Curve) -> int:
+    """How often the simulation of a curve does."""
+    return PROGRESS_STEPS * (3 if _is_nonlinear(curve) else 1)
 
 
 def refuse_obstacles(case: Case) -> None:
@@ -40,17 +47,50 @@ def refuse_obstacles(case: Case) -> None:
             raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
 
 
-def simulate_curves(case: Case, *, progress: Callable[[], None] = lambda: None) -> Iterator[SimulatedCurve]:
+@dataclass(frozen=True)
+class SimulateCurve:
+    """The task: simulates a curve with as many processors as there are.
+
+    Attributes:
+        orders: p of the moments.
+        setting: [monte_carlo] of the case, whose p are not used.
+    """
+
+    orders: tuple[float, ...]
+    setting: MonteCarloSection
+
+    @classmethod
+    def of(cls, case: Case) -> SimulateCurve:
+        return cls(tuple(float(p) for p in case.simulated), case.monte_carlo)
+
+    def __call__(self, curve: Curve, progress: Callable[[], None] = lambda: None) -> SimulatedCurve:
+        return simulate_curve(curve, self.orders, self.setting, progress)
+
+
+def simulate_curves(
+    case: Case,
+    *,
+    progress: Callable[[], None] = lambda: None,
+    known: Callable[[Curve], SimulatedCurve | None] = lambda curve: None,
+) -> Iterator[SimulatedCurve]:
     """Simulate the curves of a case one after the other; an interrupt (Ctrl-C) ends it with what is done.
 
-    With c₂ or c₃ > 0 the stationary response is simulated too.
+    Args:
+        progress: called as often as `simulation_work` counts.
+        known: the simulation of a curve, if that is done already.
 
     Raises:
         KeyboardInterrupt: nothing was done yet.
     """
+    task = SimulateCurve.of(case)
     for curve in case.curves():
+        if found := known(curve):
+            for _ in range(simulation_steps(curve)):
+                progress()
+            yield found
+            continue
         try:
-            simulated = _simulate_curve(case, curve, progress)
+            simulated = task(curve, progress)
         except KeyboardInterrupt:
             if curve.number == 1:
                 raise
@@ -60,12 +100,25 @@ def simulate_curves(case: Case, *, progress: Callable[[], None] = lambda: None) 
             return
 
 
-def _simulate_curve(case: Case, curve: Curve, progress: Callable[[], None]) -> SimulatedCurve:
+def simulate_curve(
+    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = lambda: None
+) -> SimulatedCurve:
+    """Simulate one curve, and with c₂ or c₃ > 0 its stationary response; a task that pickles small.
+
+    Args:
+        curve: the parameters.
+        orders: p of the moments.
+        setting: [monte_carlo] of the case, whose p are not used.
+        progress: called as often as `simulation_work` counts; a task for another process has none.
+
+    Raises:
+        KeyboardInterrupt: nothing was done yet.
+        FpsolveError: as `simulate`.
+    """
     from fpsolve.simulation.estimators import simulate
 
-    setting = case.monte_carlo
     result = simulate(
-        curve.problem, [float(p) for p in case.simulated], estimator=setting.estimator,
+        curve.problem, orders, estimator=setting.estimator,
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
     note = simulated_tail_note(curve.problem) if any(each.p for each in result.estimates) else None

@@ -17,12 +17,12 @@ from fpsolve.output.vtk import write_response
 from fpsolve.pool import Pool, cluster, here, several
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
-from fpsolve.study.simulate import refuse_obstacles, simulate_curves, simulation_work
+from fpsolve.study.simulate import refuse_obstacles, simulation_work
 from fpsolve.study.solve import Numerics, compare, expected
 from fpsolve.study.sweep import Order, SolveBatch, batches, lost, result_alone
 from fpsolve.workflow.folders import (
     AGAIN,
-    AGAIN_FROM_THERE,
+    ANEW,
     CHART,
     SIMULATED,
     SOLVED,
@@ -31,6 +31,7 @@ from fpsolve.workflow.folders import (
     saying_if_interrupted,
 )
 from fpsolve.workflow.sets import Sweep
+from fpsolve.workflow.simulations import simulated_curves
 
 Progress = Callable[[], None]
 
@@ -139,6 +140,7 @@ def run_case(
         refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
     interruption = ""
+    simulators = pool if pool and pool.is_elsewhere else None
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
     with own_folder(case, out, replaced) as folder:
         sweep = _solve(case, folder, pool or here(), watch, is_fresh=is_fresh)
@@ -146,7 +148,7 @@ def run_case(
             try:
                 watch.solved(case, sweep.results)
                 if monte_carlo:
-                    interruption = _simulate(case, folder, watch, simulated)
+                    interruption = _simulate(case, folder, watch, simulated, simulators, is_fresh=is_fresh)
                     watch.simulated(case, simulated, sweep.results)
             finally:
                 with writable(folder):
@@ -155,12 +157,24 @@ def run_case(
     return Outcome(sweep.results, tuple(simulated), interruption, sweep=sweep)
 
 
-def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOBODY) -> Outcome:
+def simulate_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    pool: Pool | None = None,
+    is_fresh: bool = False,
+    watch: Watch = NOBODY,
+) -> Outcome:
     """Simulate a case and write monte_carlo.json into `out`/<name of the case>/; further curves have a number.
 
     What an earlier simulation wrote there is removed first, and a run with other parameters; with c₂ or c₃ > 0 the
     stationary response is written too.
-    An interrupt (Ctrl-C) ends the simulation, and what is done is estimated and written.
+    An interrupt (Ctrl-C) ends the simulation, and what is done is estimated and written; curves that are finished are
+    not simulated again the next time.
+
+    Args:
+        pool: who simulates, such as a `cluster`; None for all processors of this machine.
+        is_fresh: whether to simulate all curves anew.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -173,7 +187,7 @@ def simulate_case(case: Case, out: str | Path = "results", *, watch: Watch = NOB
         own_folder(case, out, (SIMULATED,)) as folder,
         saying_if_interrupted(lambda: kept(case, len(simulated), folder)),
     ):
-        interruption = _simulate(case, folder, watch, simulated)
+        interruption = _simulate(case, folder, watch, simulated, pool, is_fresh=is_fresh)
         watch.simulated(case, simulated, ())
     return Outcome((), tuple(simulated), interruption)
 
@@ -196,7 +210,7 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
     chart = Chart((), ())
     with (
         own_folder(case, out, (CHART,)) as folder,
-        saying_if_interrupted(lambda: _kept_lines(case, chart, folder)),
+        saying_if_interrupted(lambda: _kept_lines(case, chart, folder), ANEW),
         watch.bar(f"{case.name}, scan", chart_work(case)) as progress,
         watch.bar(f"{case.name}, points", None) as stepped,
         writable(folder),
@@ -231,7 +245,7 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
     with writable(folder):
         sweep = Sweep(case, folder, is_fresh=is_fresh)
     with (
-        saying_if_interrupted(lambda: kept(case, len(sweep.results), folder), AGAIN_FROM_THERE),
+        saying_if_interrupted(lambda: kept(case, len(sweep.results), folder)),
         watch.bar(case.name, sweep.steps) as progress,
         writable(folder),
     ):
@@ -244,10 +258,12 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
     return sweep
 
 
-def _simulate(case: Case, folder: Path, watch: Watch, simulated: list[SimulatedCurve]) -> str:
+def _simulate(
+    case: Case, folder: Path, watch: Watch, simulated: list[SimulatedCurve], pool: Pool | None, *, is_fresh: bool
+) -> str:
     """Simulate the curves of a case into a list, and write each; what to say where an interrupt ended it."""
     with watch.bar(f"{case.name}, simulation", simulation_work(case)) as progress, writable(folder):
-        for each in simulate_curves(case, progress=progress):
+        for each in simulated_curves(case, folder, progress, pool=pool, is_fresh=is_fresh):
             simulated.append(each)
             write_simulation(case, each, folder)
             write_response(each, folder)

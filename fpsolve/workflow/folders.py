@@ -12,8 +12,7 @@ from typing import Any
 from fpsolve.case.case import Case
 from fpsolve.files import TEMPORARY, alone, writable
 
-AGAIN = "run it again to start over"
-AGAIN_FROM_THERE = "run it again to go on"
+AGAIN, ANEW = "run it again to go on", "run it again to start over"
 SOLVED, SIMULATED = (
     r"summary\.json|(moments|curves)\.csv|results\.nc|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu|show\.py"
     r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)",

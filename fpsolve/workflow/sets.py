@@ -22,6 +22,7 @@ from fpsolve.study.sweep import Batch, Order, SolveBatch, batches, lost
 
 Found = tuple[int, Place | CurveResult | None]
 """The number of a curve, and its numbers where they are new."""
+SOLVED_RECORDS = "records/solved"
 GROWTH = 2
 """Tables are written anew when they have grown by that factor, so that all of it costs as little as the last ones."""
 
@@ -37,7 +38,7 @@ class Keep:
         write_functions(solved, curve, self.folder)
         if result is None or solved.is_passing:
             return curve.number, result
-        return curve.number, append(self.folder, order.key, record_of(result))
+        return curve.number, append(self.folder / SOLVED_RECORDS, order.key, record_of(result))
 
 
 class Sweep:
@@ -51,7 +52,7 @@ class Sweep:
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
         self.case, self.folder, self.run = case, folder.resolve(), Run(case)
         self.numerics, self.wanted = Numerics.of(case), everything(case)
-        self.records = Records(self.folder)
+        self.records = Records(self.folder / SOLVED_RECORDS)
         self.results = Results(case, self.records)
         if is_fresh:
             self.records.remove()

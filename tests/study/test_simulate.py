@@ -127,7 +127,7 @@ def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out
     earlier = {"monte_carlo.json", "monte_carlo-2.json", "response.png", "summary.json", "figure.png", "density.vtu"}
     for name in (*earlier, "notes.txt"):
         (out / "quick" / name).write_text("{}", encoding="utf-8")
-    monkeypatch.setattr(simulated, "_simulate_curve", raising(KeyboardInterrupt))
+    monkeypatch.setattr(simulated, "simulate_curve", raising(KeyboardInterrupt))
     assert simulate(case, "--out", out) == 130
     assert [path.name for path in (out / "quick").iterdir()] == ["notes.txt"]
     assert capsys.readouterr().err.strip() == "interrupted after 0 of 1 curve; run it again to start over"
@@ -190,7 +190,7 @@ def test_run_adds_markers_over_a_parameter(case, out):
 
 def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, out, capsys, monkeypatch):
     drawn = []
-    monkeypatch.setattr(simulated, "_simulate_curve", raising(KeyboardInterrupt))
+    monkeypatch.setattr(simulated, "simulate_curve", raising(KeyboardInterrupt))
     monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
     assert main(["run", str(case), "--out", str(out), "--monte-carlo"]) == 130
     ((series,),) = drawn
@@ -203,14 +203,14 @@ def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, ou
 
 
 def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, monkeypatch):
-    drawn, original = [], simulated._simulate_curve
+    drawn, original = [], simulated.simulate_curve
 
-    def failing_later(case, curve, progress):
+    def failing_later(curve, *others):
         if curve.number == 2:
             raise NotConverged("the simulation overflowed")
-        return original(case, curve, progress)
+        return original(curve, *others)
 
-    monkeypatch.setattr(simulated, "_simulate_curve", failing_later)
+    monkeypatch.setattr(simulated, "simulate_curve", failing_later)
     monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
     sets = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", "monte_carlo.time=100.0"]
     assert main(["run", str(case), "--out", str(out), "--monte-carlo", *sets]) == 3
@@ -227,14 +227,14 @@ def kept(out, curve, planned):
 
 
 def test_an_interrupted_simulation_of_a_run_says_how_to_go_on(case, out, capsys, monkeypatch):
-    original = simulated._simulate_curve
+    original = simulated.simulate_curve
 
-    def interrupted(case, curve, progress):
+    def interrupted(curve, *others):
         if curve.number == 2:
             raise KeyboardInterrupt
-        return original(case, curve, progress)
+        return original(curve, *others)
 
-    monkeypatch.setattr(simulated, "_simulate_curve", interrupted)
+    monkeypatch.setattr(simulated, "simulate_curve", interrupted)
     sets = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", "monte_carlo.time=100.0"]
     assert main(["run", str(case), "--out", str(out), "--monte-carlo", *sets]) == 130
     assert capsys.readouterr().err.strip() == kept(out, 2, 2)
@@ -253,14 +253,14 @@ def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys,
 
 def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
     """What is finished stays, and the message says so."""
-    original = simulated._simulate_curve
+    original = simulated.simulate_curve
 
-    def interrupted(case, curve, progress):
+    def interrupted(curve, *others):
         if curve.varied["noise.D0"] == 0.2:
             raise KeyboardInterrupt
-        return original(case, curve, progress)
+        return original(curve, *others)
 
-    monkeypatch.setattr(simulated, "_simulate_curve", interrupted)
+    monkeypatch.setattr(simulated, "simulate_curve", interrupted)
     assert simulate(case, "--out", out, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]') == 130
     assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
     printed = capsys.readouterr()
@@ -303,18 +303,18 @@ def test_a_real_interrupt(case, out):
 
 def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
     """An interrupt in the second of three curves: the first is whole, the second is marked, the third is not begun."""
-    original, calls = simulated._simulate_curve, []
+    original, calls = simulated.simulate_curve, []
 
-    def interrupted_later(case, curve, progress):
+    def interrupted_later(curve, orders, setting, progress):
         def counted():
             calls.append(1)
             if len(calls) == 150:
                 raise KeyboardInterrupt
             progress()
 
-        return original(case, curve, counted)
+        return original(curve, orders, setting, counted)
 
-    monkeypatch.setattr(simulated, "_simulate_curve", interrupted_later)
+    monkeypatch.setattr(simulated, "simulate_curve", interrupted_later)
     vary = ["--set", 'vary."noise.D0"=[0.1, 0.2, 0.3]', "--time", "200"]
     (out / "quick").mkdir(parents=True)
     (out / "quick/monte_carlo-3.json").write_text("{}", encoding="utf-8")

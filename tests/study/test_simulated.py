@@ -1,0 +1,181 @@
+"""Simulated curves as plain data: they come back to the last bit, also through JSON, and are small."""
+
+import json
+import math
+import pickle
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from fpsolve import load_case
+from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
+from fpsolve.simulation.response import BINS, MEANS, Response
+from fpsolve.study.results import SimulatedCurve
+from fpsolve.study.simulate import simulate_curve, simulate_curves
+from fpsolve.study.simulated import simulated_of, to_record
+
+CASE = """
+title = "Records"
+[oscillator]
+epsilon = 0.5
+omega = 1.0
+restitution = 0.8
+c1 = 0.8
+c2 = 0.5
+[noise]
+D0 = 0.1
+tau0 = 0.5
+r0 = 0.95
+[moments]
+p = [-1.0, 2.0]
+[monte_carlo]
+paths = 4096
+time = 40.0
+"""
+RESULT = MonteCarlo(
+    estimates=(
+        MomentEstimate(1.0, 0.1, 1 / 3, "direct", 5e-324),
+        MomentEstimate(-0.5, None, None, "population", 0.0),
+        MomentEstimate(2.0, math.nan, math.inf, "population", -0.0),
+    ),
+    lyapunov_exponent=-math.inf,
+    lyapunov_exponent_error=math.nan,
+    variance_rate=1.7976931348623157e308,
+    variance_rate_error=math.pi,
+    paths=64,
+    time=0.1 + 0.2,
+    step=1e-300,
+    seed=2**63,
+    impacts=0,
+    warnings=("Λ(p) at p = 2", 'a "quoted" one\nof two lines'),
+    interrupted=True,
+)
+
+
+def response(rng):
+    """All kinds of numbers in arrays, among them those that JSON has not."""
+    density = rng.normal(size=(3, 6)) * 10.0 ** rng.integers(-300, 300, size=(3, 6))
+    density[0, :4] = math.nan, math.inf, -math.inf, -0.0
+    means = {name: (float(rng.normal()), math.nan) for name in MEANS}
+    return Response(
+        means, np.arange(4.0), np.linspace(-1, 1, 7), density, np.zeros(0), rng.normal(size=3), np.full(3, 5e-324),
+        outside=1e-17, impact_rate=math.inf, time=2.5, interrupted=True,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    path = tmp_path_factory.mktemp("records") / "records.toml"
+    path.write_text(CASE, encoding="utf-8")
+    return load_case(path)
+
+
+@pytest.fixture(scope="module")
+def curve(case):
+    [curve] = case.curves()
+    return curve
+
+
+def through_json(simulated):
+    """Made again from strict JSON, in which nan is no number."""
+    text = json.dumps(to_record(simulated), allow_nan=False)
+    return simulated_of(json.loads(text), simulated.curve)
+
+
+def check_same(one, other):
+    """All attributes, each with its type and its bits."""
+    assert type(one) is type(other)
+    for name, value in vars(one).items():
+        again = vars(other)[name]
+        assert type(again) is type(value), name
+        if isinstance(value, np.ndarray):
+            assert (again.dtype, again.shape, again.tobytes()) == (value.dtype, value.shape, value.tobytes()), name
+            assert again.flags.writeable
+        else:
+            assert repr(again) == repr(value), name  # nan is nan, and -0.0 is not 0.0
+
+
+@pytest.mark.parametrize("has_response", [True, False])
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_a_record_comes_back_to_the_last_bit(curve, has_response, interrupted, rng):
+    found = response(rng) if has_response else None
+    simulated = SimulatedCurve(curve, RESULT, found, ("a warning", *RESULT.warnings), interrupted)
+    again = through_json(simulated)
+    assert again.curve is curve
+    check_same(RESULT, again.result)
+    for one, other in zip(RESULT.estimates, again.result.estimates, strict=True):
+        check_same(one, other)
+    if has_response:
+        check_same(found, again.response)
+        assert list(again.response.means) == list(MEANS)
+    else:
+        assert again.response is None
+    assert again.warnings == simulated.warnings
+    assert again.interrupted is interrupted
+
+
+def test_numbers_of_numpy_are_stored_as_those_of_python(curve):
+    numbers = {"time": np.float64(0.1), "paths": np.int64(64), "variance_rate": np.float64(math.nan)}
+    again = through_json(SimulatedCurve(curve, replace(RESULT, **numbers), None, ()))
+    check_same(replace(RESULT, time=0.1, paths=64, variance_rate=math.nan), again.result)
+
+
+def test_a_simulation_comes_back_and_is_small(case):
+    [simulated] = simulate_curves(case)
+    assert simulated.response.density.shape == (BINS, 2 * BINS)
+    again = through_json(simulated)
+    check_same(simulated.result, again.result)
+    check_same(simulated.response, again.response)
+    assert len(json.dumps(to_record(simulated))) < 50_000
+
+
+def test_a_curve_is_a_small_task(case, curve):
+    orders = tuple(float(p) for p in case.simulated)
+    task = pickle.dumps((simulate_curve, curve, orders, case.monte_carlo))
+    assert len(task) < 4000
+    function, *arguments = pickle.loads(task)
+    [expected], found = simulate_curves(case), function(*arguments)
+    check_same(expected.result, found.result)
+    check_same(expected.response, found.response)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"result": {}},
+        {"result": None},
+        {"result": asdict(RESULT) | {"time": "soon"}},
+        {"result": asdict(RESULT) | {"estimates": [{}]}},
+        {"response": {}},
+        {"response": {"density": {"shape": [2], "data": "AAAA"}}},
+        {"warnings": None},
+    ],
+)
+def test_what_is_no_record_is_refused(curve, change):
+    record = to_record(SimulatedCurve(curve, RESULT, None, ()))
+    with pytest.raises(ValueError, match="this is no record of a simulation: "):
+        simulated_of(record | change, curve)
+    with pytest.raises(ValueError, match="this is no record of a simulation: "):
+        simulated_of({}, curve)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"shape": [2]},
+        {"shape": None},
+        {"data": "AAAA"},
+        {"data": "not base64"},
+        {"data": lambda data: data[:-8]},
+    ],
+)
+def test_a_damaged_array_is_refused(curve, change, rng):
+    record = to_record(SimulatedCurve(curve, RESULT, response(rng), ()))
+    packed = record["response"]["amplitude_density"]
+    assert simulated_of(record, curve).response.amplitude_density.shape == (3,)
+    record["response"]["amplitude_error"] = packed | {
+        key: value(packed["data"]) if callable(value) else value for key, value in change.items()
+    }
+    with pytest.raises(ValueError, match="this is no record of a simulation: "):
+        simulated_of(record, curve)
