@@ -27,6 +27,8 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 AHEAD = 2
 """Tasks that wait for each worker, so that none waits for the next."""
+AHEAD_IN_ORDER = 64
+"""The same where results are wanted in order, so that none waits while the caller is busy with one."""
 START_SECONDS = 1.5
 """Of work that this process does itself before it starts others, as that takes as long."""
 CONNECT_SECONDS = 20
@@ -73,7 +75,9 @@ class Pool:
     def __exit__(self, *_: object) -> None:
         self._end()
 
-    def run(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
+    def run(
+        self, task: Callable[[Item], Result], items: Iterable[Item], ahead: int = 0
+    ) -> Iterator[Done[Item, Result]]:
         """The results as they come; an exception of a task is raised here, and ends it all.
 
         Items are taken when they can be given to a worker, so that they may be many, and may follow from results.
@@ -83,7 +87,7 @@ class Pool:
         suspects: list[Item] = []
         while True:
             waiting: dict[Future[Result], Item] = {}
-            for item in islice(source, self.ahead):
+            for item in islice(source, ahead or self.ahead):
                 waiting[self._submit(task, item)] = item
             if not waiting:
                 return
@@ -112,7 +116,7 @@ class Pool:
         numbered = ((number, item) for number, item in enumerate(items))
         early: dict[int, Result] = {}
         due = 0
-        for done in self.run(partial(_numbered, task), numbered):
+        for done in self.run(partial(_numbered, task), numbered, max(self.ahead, AHEAD_IN_ORDER)):
             if done.result is None:
                 raise FpsolveError("a worker died, perhaps for lack of memory; use fewer workers, or a smaller budget")
             number, result = done.result
