@@ -30,6 +30,12 @@ def described(long_name: str, symbol: str = "", units: str = "1", **more: str) -
     return {name: text for name, text in known.items() if text}
 
 
+def brief(thing: object, text: str) -> str:
+    """The class of a thing with a text about it, as a `repr` of one line."""
+    line = f"{type(thing).__name__}({' '.join(text.split())})"
+    return line if len(line) <= LONGEST else f"{line[: LONGEST - 4]}...)"
+
+
 def dataset(
     title: str,
     variables: Mapping[str, Variable],
@@ -90,8 +96,7 @@ class Result(ABC):
         return axes
 
     def __repr__(self) -> str:
-        text = f"{type(self).__name__}({' '.join(self._said().split())})"
-        return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...)"
+        return brief(self, self._said())
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the numbers, with their units, and the parameters."""

@@ -103,6 +103,11 @@ _FIELDS: Mapping[str, FieldInfo] = {
 }
 
 
+def moment_at(p: float) -> Quantity:
+    """Λ at one p."""
+    return replace(MOMENT, symbol=f"Λ({p:g})", latex=rf"$\Lambda({p:g})$")
+
+
 def parameter_of(key: str) -> Quantity:
     """A parameter of a problem, by its key, such as "noise.D0"."""
     field = _FIELDS.get(key)
