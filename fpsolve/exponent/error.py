@@ -65,7 +65,7 @@ class Estimate(Result):
             **self.quantity.with_error(self.value, self.error_estimate),
             "scale": ((), self.scale, described("size of the terms of the sum", units=self.quantity.unit)),
         }
-        return dataset(f"{self.quantity.words} by finite elements", variables, {}, {}, meaning=self.meaning)
+        return dataset(self.quantity.words, "finite elements", variables, {}, {}, meaning=self.meaning)
 
 
 @dataclass(frozen=True, repr=False)

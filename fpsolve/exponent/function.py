@@ -213,8 +213,10 @@ def _dataset(function: MomentLyapunovFunction, p: FloatArray) -> xarray.Dataset:
         **DERIVATIVE.variable(function.derivative(p), "p"),
         **SECOND_DERIVATIVE.variable(function.second_derivative(p), "p"),
     }
-    solver, title = function.solver, f"{MOMENT.words} by finite elements and interpolation"
-    return dataset(title, variables, P.variable(p, "p"), parameter_values(solver.problem), rtol=solver.rtol)
+    solver, method = function.solver, "finite elements and interpolation"
+    return dataset(
+        MOMENT.words, method, variables, P.variable(p, "p"), parameter_values(solver.problem), rtol=solver.rtol
+    )
 
 
 def _nodes_needed(count: int, last: float, error: float, allowed: float) -> float:

@@ -101,8 +101,8 @@ class MomentLyapunov(Result):
         }
         failures, values = [each.reason for each in self.failures], quantity.parameter_values(self.solver.problem)
         more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
-        title = f"{quantity.MOMENT.words} by finite elements"
-        return dataset(title, variables, quantity.P.variable(self.p, "p"), values, rtol=self.solver.rtol, **more)
+        title, places = quantity.MOMENT.words, quantity.P.variable(self.p, "p")
+        return dataset(title, "finite elements", variables, places, values, rtol=self.solver.rtol, **more)
 
     def _said(self) -> str:
         if not self.p.size:
