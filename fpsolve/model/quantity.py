@@ -71,7 +71,9 @@ def _over(unit: str, other: str) -> str:
     """The unit of a ratio."""
     if "unknown" in (unit, other):
         return "unknown"
-    return "1" if unit == other else unit if other == "1" else f"{unit}/({other})"
+    if other == "1" or unit == other:
+        return unit if other == "1" else "1"
+    return f"{unit}/{other if other.isidentifier() else f'({other})'}"
 
 
 UNNAMED = Quantity("value", "value", "number", "", "unknown")
