@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from html import escape
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from fpsolve import __version__
@@ -30,8 +31,15 @@ def described(long_name: str, symbol: str = "", units: str = "1", **more: str) -
     return {name: text for name, text in known.items() if text}
 
 
+def brief(thing: object, text: str) -> str:
+    """The class of a thing with a text about it, as a `repr` of one line."""
+    line = f"{type(thing).__name__}({' '.join(text.split())})"
+    return line if len(line) <= LONGEST else f"{line[: LONGEST - 4]}...)"
+
+
 def dataset(
     title: str,
+    method: str,
     variables: Mapping[str, Variable],
     coordinates: Mapping[str, Variable],
     parameters: Parameters,
@@ -41,6 +49,7 @@ def dataset(
 
     Args:
         title: what the numbers are.
+        method: what they come from, such as "finite elements".
         variables, coordinates: each with its dimensions and its attributes.
         parameters: of the problem, as far as they are known.
         more: what else is known; of sentences that are none nothing is kept.
@@ -49,7 +58,7 @@ def dataset(
 
     joined = {name: value if isinstance(value, int | float | str) else "\n".join(value) for name, value in more.items()}
     known = {name: value for name, value in joined.items() if value != ""}
-    about = {"title": title, **parameters, **known, "fpsolve_version": __version__}
+    about = {"title": f"{title} by {method}", "method": method, **parameters, **known, "fpsolve_version": __version__}
     return xarray.Dataset(dict(variables), dict(coordinates), about)
 
 
@@ -64,13 +73,17 @@ class Result(ABC):
     def _said(self) -> str:
         """What `repr` says, in short."""
 
+    def _table(self) -> xarray.Dataset:
+        """Of `to_xarray` what a table holds."""
+        return self.to_xarray()
+
     def to_pandas(self) -> pandas.DataFrame:
         """The numbers as a table, one row for each place of the main variable. Raises `FpsolveError` without pandas."""
         try:
             import pandas
         except ImportError as missing:
             raise FpsolveError("tables need pandas; install it: pip install 'fpsolve[pandas]'") from missing
-        whole = self.to_xarray()
+        whole = self._table()
         full = whole.drop_dims([name for name, size in whole.sizes.items() if not size])
         main = next(iter((full if full.data_vars else whole).data_vars.values()))
         names = [name for name, each in whole.data_vars.items() if set(each.dims) <= set(main.dims)]
@@ -85,13 +98,19 @@ class Result(ABC):
             ax: where; None for a figure of its own.
             line_kwargs: for matplotlib, such as color or label.
         """
+        found = self.to_xarray()
         with canvas_of(ax) as axes:
-            draw(self.to_xarray(), axes, **line_kwargs)
+            self._draw(found, axes, **line_kwargs)
+            if ax is None:
+                axes.set_title(fill(found.attrs["title"], 60), parse_math=False)
         return axes
 
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+        """Draw what `to_xarray` gives."""
+        draw(found, axes, **kwargs)
+
     def __repr__(self) -> str:
-        text = f"{type(self).__name__}({' '.join(self._said().split())})"
-        return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...)"
+        return brief(self, self._said())
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the numbers, with their units, and the parameters."""

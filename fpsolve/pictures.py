@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +20,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 STYLE: dict[Any, Any] = {"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12}
 SIZE = (7.2, 5.0)
 """Of a figure, in inches."""
+LONG = 40
+"""With more letters a label has several lines."""
 MARKED = 40
 """Up to so many points of a line have markers."""
 
@@ -26,6 +30,13 @@ def title_of(attributes: Mapping[str, Any]) -> str:
     r"""A variable on an axis, from its attributes: "largest Lyapunov exponent $\lambda$ (1/time)"."""
     unit = "" if attributes["units"] == "1" else f"({attributes['units']})"
     return " ".join(part for part in (attributes["long_name"], attributes.get("symbol", ""), unit) if part)
+
+
+def label_of(variable: xarray.DataArray) -> str:
+    """The same in several lines, where it is long."""
+    words = str(variable.attrs["long_name"])
+    rest = title_of({**variable.attrs, "long_name": ""})
+    return f"{fill(words, LONG)}{' ' if len(words) <= LONG else chr(10)}{rest}".strip()
 
 
 @contextmanager
@@ -46,13 +57,14 @@ def draw(found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
     """Draw the first variable of a dataset with its error: a point, a line or colours, by its dimensions."""
     main = next(iter(found.data_vars.values()))
     error = found.get(f"{main.name}_error")
+    label = {"label": found.attrs["method"]}
     if main.ndim == 2:
         draw_plane(axes, main, **kwargs)
     elif main.ndim == 1:
-        draw_line(axes, main, error, **kwargs)
+        draw_line(axes, main, error, **{**label, **kwargs})
     else:
         draw_point(axes, main, error, **kwargs)
-    axes.set_title(found.attrs["title"], parse_math=False)
+    finish(axes, **kwargs)
 
 
 def draw_line(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
@@ -65,8 +77,7 @@ def draw_line(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None
     if error is not None:
         low, high = values - error.values[order], values + error.values[order]
         axes.fill_between(places, low, high, color=line.get_color(), alpha=0.3, linewidth=0)
-    axes.set(xlabel=title_of(x.attrs), ylabel=title_of(main.attrs))
-    _finish(axes)
+    axes.set(xlabel=label_of(x), ylabel=label_of(main))
 
 
 def draw_dots(axes: Axes, main: xarray.DataArray, error: xarray.DataArray, **kwargs: Any) -> None:
@@ -74,8 +85,7 @@ def draw_dots(axes: Axes, main: xarray.DataArray, error: xarray.DataArray, **kwa
     x = main[main.dims[0]]
     style = {"linestyle": "none", "marker": "o", "markersize": 5, "elinewidth": 1.3, "capsize": 4}
     axes.errorbar(x.values, main.values, 2 * error.values, **{**style, **coloured(axes, kwargs)})
-    axes.set(xlabel=title_of(x.attrs), ylabel=title_of(main.attrs))
-    _finish(axes)
+    axes.set(xlabel=label_of(x), ylabel=label_of(main))
 
 
 def draw_point(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
@@ -84,9 +94,9 @@ def draw_point(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | Non
     size = None if error is None else [error.item()]
     style = {"linestyle": "none", "marker": "o", "markersize": 6, "elinewidth": 1.3, "capsize": 5}
     axes.errorbar([name], [main.item()], size, **{**style, **coloured(axes, kwargs)})
-    axes.set_ylabel(title_of(main.attrs))
+    axes.set_ylabel(label_of(main))
+    mark_zero(axes)
     axes.margins(x=0.3)
-    _finish(axes)
 
 
 def draw_plane(axes: Axes, main: xarray.DataArray, **kwargs: Any) -> Any:
@@ -94,20 +104,34 @@ def draw_plane(axes: Axes, main: xarray.DataArray, **kwargs: Any) -> Any:
     x, y = (main[name] for name in main.dims)
     style = {"cmap": "viridis", "rasterized": True, "shading": "nearest", **kwargs}
     picture = axes.pcolormesh(x.values, y.values, main.values.T, **style)
-    axes.set(xlabel=title_of(x.attrs), ylabel=title_of(y.attrs))
-    axes.figure.colorbar(picture, ax=axes, label=title_of(main.attrs))
+    axes.set(xlabel=label_of(x), ylabel=label_of(y))
+    axes.figure.colorbar(picture, ax=axes, label=label_of(main))
     return picture
 
 
-def draw_bars(axes: Axes, bars: Mapping[str, Sequence[float] | FloatArray], names: Sequence[str]) -> None:
+def draw_bars(
+    axes: Axes, bars: Mapping[str, Sequence[float] | FloatArray], names: Sequence[str], **kwargs: Any
+) -> None:
     """Groups of horizontal bars, one group for each name, and in it one bar for each label."""
     axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
     height, middles = 0.8 / max(len(bars), 1), np.arange(len(names))
     for i, (label, values) in enumerate(bars.items()):
         places = middles + (i - 0.5 * (len(bars) - 1)) * height
-        axes.barh(places, values, 0.9 * height, color=COLOURS[i % len(COLOURS)], label=label)
+        style = {"color": COLOURS[i % len(COLOURS)], "label": label, **kwargs}
+        axes.barh(places, values, 0.9 * height, **style)
     axes.set_yticks(middles, names)
     axes.invert_yaxis()
+
+
+def plain_numbers(side: Any, start: float, stop: float) -> None:
+    """Numbers such as 0.5, 1, 2 on a logarithmic axis of a few decades."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    decades = math.log10(stop / start)
+    if decades < 4:
+        side.set_major_locator(LogLocator(subs=(1, 2, 5) if decades < 2.5 else (1,)))
+        side.set_major_formatter(StrMethodFormatter("{x:g}"))
+        side.set_minor_formatter(NullFormatter())
 
 
 def coloured(axes: Axes, kwargs: Mapping[str, Any]) -> dict[str, Any]:
@@ -121,10 +145,16 @@ def coloured(axes: Axes, kwargs: Mapping[str, Any]) -> dict[str, Any]:
     return {"color": free, **normalize_kwargs(dict(kwargs), Line2D)}
 
 
-def _finish(axes: Axes) -> None:
-    """The zero line, where it is seen, and a legend, where there is something to tell."""
-    low, high = axes.get_ylim()
-    if low < 0 < high and not any(line.get_gid() == "zero" for line in axes.lines):
+def mark_zero(axes: Axes) -> None:
+    """The zero line, once."""
+    if not any(line.get_gid() == "zero" for line in axes.lines):
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0, gid="zero")
-    if axes.get_legend_handles_labels()[0]:
+
+
+def finish(axes: Axes, **kwargs: Any) -> None:
+    """The zero line, where it is seen, and a legend, where it tells things apart or was asked for by a `label`."""
+    low, high = axes.get_ylim()
+    if low < 0 < high:
+        mark_zero(axes)
+    if "label" in kwargs or len(set(axes.get_legend_handles_labels()[1])) > 1:
         axes.legend(frameon=False)

@@ -27,13 +27,14 @@ ROOMS = {
         *("reference", "line", "polynomials", "mesh", "mesh_file", "phase_space", "noise_space", "space"),
         *("kronecker", "factors", "terms", "generator"),
     ],
-    "simulation": ["setup", "kernels", "step", "batches", "estimators", "response"],
+    "simulation": ["setup", "kernels", "step", "batches", "monte_carlo", "estimators", "response"],
     "exponent": [
         *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
         *("impacts", "function", "moments", "quantities"),
     ],
     "analysis": [
-        *("density", "sensitivity", "curve", "scan", "continuation", "special_points", "zero", "stability", "regions"),
+        *("density", "slopes", "sensitivity", "curve", "scan", "continuation", "special_points", "zero", "stability"),
+        "regions",
     ],
     "case": [
         *("toml", "messages", "sections", "vary", "vary_table", "chart", "curves", "remedies", "refusals"),

@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
+from fpsolve.data import Result, dataset, described
 from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
 from fpsolve.model.plane import growth_rate, phase_speed
+from fpsolve.model.quantity import NOISE, PHASE, Quantity, density_unit, noise_of, parameter_values
+from fpsolve.pictures import draw_plane
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+UNSEEN = 1e-5
+"""Where the density of ξ is below this share of its largest value, no picture shows it."""
+_NAMES = {"adjoint": "adjoint density", "product": "tilted density"}
 
 
-@dataclass(frozen=True, eq=False)
-class Density:
+@dataclass(frozen=True, eq=False, repr=False)
+class Density(Result):
     """A probability density on the cylinder, known at the points of a quadrature rule.
 
     Attributes:
@@ -25,6 +36,9 @@ class Density:
         xi: points on the noise axis, shape (n,), increasing.
         phi_weights, xi_weights: weights of the rule, so that ∫f dφ dξ = phi_weights @ f @ xi_weights.
         values: the density, per radian and unit of ξ, shape (m, n).
+        name: what it is a density of, and at which p.
+        noise: what ξ is, with its unit.
+        parameters: of the problem, by keys such as "noise.D0".
     """
 
     phi: FloatArray
@@ -32,6 +46,30 @@ class Density:
     phi_weights: FloatArray
     xi_weights: FloatArray
     values: FloatArray
+    name: str = "density of phase and noise"
+    noise: Quantity = NOISE
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The density over φ and ξ, and the weights for integrals."""
+        unit, weight = density_unit(self.noise), "weight of the rule for integrals"
+        variables = {"density": (("phi", "xi"), self.values, described("density", units=unit))}
+        coordinates = {
+            **PHASE.variable(self.phi, "phi"),
+            **self.noise.variable(self.xi, "xi"),
+            "phi_weights": ("phi", self.phi_weights, described(weight, units=PHASE.unit)),
+            "xi_weights": ("xi", self.xi_weights, described(weight, units=self.noise.unit)),
+        }
+        return dataset(self.name, "finite elements", variables, coordinates, self.parameters)
+
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+        draw_plane(axes, found.density, **{"shading": "gouraud", **kwargs})
+        axes.set_xticks(np.pi * np.arange(5) / 2, ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
+        seen = self.xi[self.xi_marginal() > UNSEEN * self.xi_marginal().max()]
+        axes.set(xlim=(0, 2 * np.pi), ylim=(seen.min(), seen.max()))
+
+    def _said(self) -> str:
+        return f"{self.name}, on {self.phi.size} x {self.xi.size} points"
 
     def mean(self, f: Callable[[FloatArray, FloatArray], ArrayLike]) -> float:
         """∫ f(φ, ξ) ρ dφ dξ; f gets φ as a column and ξ as a row, and may return either, or a number."""
@@ -132,4 +170,7 @@ def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Densit
     phi = np.mod(np.concatenate([space.phi.points + k * space.phi.span for k in range(turns)]), 2 * np.pi)
     order = np.argsort(phi)
     phi, values, phi_weights = phi[order], values[order], np.tile(space.phi.weights, turns)[order]
-    return Density(phi, at.xi, phi_weights, at.measure, values / (phi_weights @ values @ at.measure))
+    total, problem = phi_weights @ values @ at.measure, pair.generator.problem
+    words = _NAMES[name] if pair.p or name == "product" else "stationary density"
+    about = f"{words} at p = {pair.p:g}", noise_of(problem), parameter_values(problem)
+    return Density(phi, at.xi, phi_weights, at.measure, values / total, *about)

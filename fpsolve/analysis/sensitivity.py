@@ -17,13 +17,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fpsolve.analysis.slopes import DIFFERENTIATED as DIFFERENTIATED
+from fpsolve.analysis.slopes import RECORDS
+from fpsolve.analysis.slopes import Sensitivities as Sensitivities
+from fpsolve.analysis.slopes import Slopes as Slopes
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
@@ -38,14 +42,11 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.direction import Direction, directions
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem, checked_moments, of_problem
+from fpsolve.model.quantity import Quantity, moment_at, parameter_of
 
-DIFFERENTIATED = ("lyapunov_exponent", "stability_index", "variance_rate")
-"""The quantities that are no function of p."""
 SMALL_P = 1e-4
 """For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
 Operator = Callable[[FloatArray], FloatArray]
-Slopes = Mapping[str, Estimate]
-"""∂/∂θ by the key of θ."""
 
 
 def changed_value(pair: PrincipalPair, by: Direction) -> Estimate:
@@ -91,25 +92,6 @@ def _less(pair: PrincipalPair, by: Direction, k: int, change: float, own: float 
         return operator @ v - lost - change * pair.space.weighed(v)
 
     return image
-
-
-@dataclass(frozen=True, eq=False)
-class Sensitivities:
-    """∂/∂θ for every parameter θ of a problem; all are `Estimate`s by the key of θ, such as "oscillator.omega".
-
-    Attributes:
-        theta: the values of the parameters.
-        p: the moments, shape (n,).
-        moments: ∂Λ(p)/∂θ, one mapping for each p; empty where Λ(p) did not converge.
-        indices: ∂/∂θ of "lyapunov_exponent", "stability_index" and "variance_rate"; without those that do not exist.
-        notes: what is one-sided, and what is missing, and why.
-    """
-
-    theta: Mapping[str, float]
-    p: FloatArray
-    moments: tuple[Slopes, ...]
-    indices: Mapping[str, Slopes]
-    notes: tuple[str, ...] = ()
 
 
 @of_problem
@@ -161,20 +143,21 @@ def solve_sensitivities(
     """
     found, notes = Gradient(solver, along), list[str]()
 
-    def tried(what: str, solve: Callable[[], Slopes]) -> Slopes:
+    def tried(record: Quantity, solve: Callable[[], Slopes]) -> Slopes:
         try:
-            return solve()
+            slopes = solve()
         except (NotConverged, NoSuchExponent) as failure:
-            notes.append(f"no sensitivities of {what}: {failure}")
+            notes.append(f"no sensitivities of {record.symbol}: {failure}")
             return {}
+        return {key: replace(each, quantity=record.by(parameter_of(key))) for key, each in slopes.items()}
 
     def of_root() -> Slopes:
         index = nonzero_root(solver, guess=root)
         return found.root(index.value) if isinstance(index, Estimate) else {}
 
-    moments = tuple(tried(f"Λ({each:g})", partial(found.moment, float(each))) for each in p)
-    solves = dict(zip(DIFFERENTIATED, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
-    slopes = {name: tried(name, solves[name]) for name in indices}
+    moments = tuple(tried(moment_at(each), partial(found.moment, each)) for each in p.tolist())
+    solves = dict(zip(RECORDS, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
+    slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
     return Sensitivities(
         theta={key: by.theta for key, by in along.items()},
         p=p,

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations, product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -21,10 +22,17 @@ from fpsolve.analysis.scan import Row, Scan, ScannedRow, rows_of, scan_row, scan
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
 from fpsolve.analysis.zero import Axis, Quantity, Zero, said, zero_of
 from fpsolve.arrays import FloatArray, real_number
+from fpsolve.data import Result, brief, dataset, described
 from fpsolve.exponent.adapt import Budget
 from fpsolve.model.direction import Family
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.quantity import parameter_of, parameter_values
+from fpsolve.pictures import coloured, label_of, plain_numbers
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
 
 SCAN_RTOL = 1e-5
 """Of F on the grid of a scan."""
@@ -39,7 +47,7 @@ Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow
 """The builtin `map`, or that of an executor: results in the order of the tasks."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Branch:
     """One branch of a line.
 
@@ -59,9 +67,12 @@ class Branch:
     closed: bool = False
     obstacles: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return brief(self, f"{self.x.size} points{', closed' * self.closed}")
 
-@dataclass(frozen=True, eq=False)
-class Boundary:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Boundary(Result):
     """A line F = 0 in a frame of two parameters; it pickles.
 
     Attributes:
@@ -196,6 +207,18 @@ class Boundary:
             trace = with_values(quantity, trace, number, wanted)
         return trace
 
+    def to_xarray(self) -> xarray.Dataset:
+        """The points of all branches, one after the other, with the line, the branch and the label of each."""
+        return _dataset(self)
+
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+        _draw_lines(self, found, axes, **kwargs)
+
+    def _said(self) -> str:
+        count = len(self.traces)
+        branches = f"{count} branch{'es' * (count != 1)}"
+        return f"{self.zero.equation}: {branches} over {self.x.key} and {self.y.key}"
+
     def _branch(self, trace: Trace) -> Branch:
         at = np.array([point.sample.at for point in trace.points])
         return Branch(
@@ -206,6 +229,49 @@ class Boundary:
             closed=trace.closed,
             obstacles=trace.obstacles,
         )
+
+
+def _dataset(line: Boundary) -> xarray.Dataset:
+    """The points of a line."""
+    branches = line.branches
+    numbers = np.repeat(np.arange(1, len(branches) + 1), [branch.x.size for branch in branches])
+    columns = [np.concatenate([np.zeros(0), *(getattr(each, of) for each in branches)]) for of in ("x", "y", "width")]
+    labels = np.array([label for branch in branches for label in branch.labels], dtype=str)
+    sides = [parameter_of(axis.key) for axis in (line.x, line.y)]
+    far = described("how far the line may be off, as a share of the sides of the frame")
+    variables = {
+        "x": ("point", columns[0], {**sides[0].attributes, "key": line.x.key}),
+        "y": ("point", columns[1], {**sides[1].attributes, "key": line.y.key}),
+        "width": ("point", columns[2], far),
+    }
+    coordinates = {
+        "line": ("point", np.full(numbers.size, line.zero.name), described("what is zero")),
+        "branch": ("point", numbers, described("number of the branch")),
+        "label": ("point", labels, described("what is special about the point")),
+    }
+    original = line.family.original
+    values = dict(parameter_values(line.family.problem, original))
+    held = {key: value for key, value in values.items() if key not in (line.x.key, line.y.key)}
+    closed = [str(number) for number, branch in enumerate(branches, start=1) if branch.closed]
+    more = {"line": line.zero.equation, "closed_branches": ", ".join(closed), "remark": line.remark()}
+    return dataset("line of stability", "finite elements", variables, coordinates, held, **more)
+
+
+def _draw_lines(line: Boundary, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    """The branches of a line in their frame."""
+    style = {"linewidth": 2, "label": line.zero.latex, **coloured(axes, kwargs)}
+    for branch in line.branches:
+        x, y = (np.append(each, each[: branch.closed]) for each in (branch.x, branch.y))
+        axes.plot(x, y, **style)
+        style.pop("label", None)
+    if "label" in style:
+        axes.plot([], [], **style)
+    axes.set(xlabel=label_of(found.x), ylabel=label_of(found.y), xscale=line.x.scale, yscale=line.y.scale)
+    axes.set(xlim=(line.x.start, line.x.stop), ylim=(line.y.start, line.y.stop))
+    for side, axis in ((axes.xaxis, line.x), (axes.yaxis, line.y)):
+        if axis.scale == "log":
+            plain_numbers(side, axis.start, axis.stop)
+    axes.legend(frameon=False)
 
 
 @of_problem

@@ -124,6 +124,13 @@ class Zero:
         """What holds on the line: λ = 0, Λ(2) = 0, δ_p = -1."""
         return f"δ_p = {self.p:g}" if self.kind == "stability_index" else f"{self.symbol} = 0"
 
+    @property
+    def latex(self) -> str:
+        """The same in LaTeX, with dollars."""
+        if self.kind == "stability_index":
+            return rf"$\delta_p = {self.p:g}$"
+        return rf"$\Lambda({self.p:g}) = 0$" if self.p else r"$\lambda = 0$"
+
 
 def zero_of(value: str | Mapping[str, float]) -> Zero:
     """What "lyapunov_exponent", {"moment": 2.0} or {"stability_index": -1.0} says. Raises `ValueError`."""

@@ -6,9 +6,11 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
+from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
@@ -195,3 +197,8 @@ def is_numerical(failure: Exception) -> bool:
     text = str(failure)
     is_singular = isinstance(failure, RuntimeError) and ("singular" in text or "ARPACK" in text)
     return isinstance(failure, ArithmeticError) or is_singular or "infs or NaNs" in text
+
+
+def best_order(p: FloatArray) -> Any:
+    """Indices of p, inwards from the largest and then from the smallest: a mesh for a large |p| serves smaller ones."""
+    return np.lexsort((-np.abs(p), p < 0))

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ import scipy.linalg
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.arrays import FloatArray, dense, one
+from fpsolve.data import brief
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.rounding import rounding_of_entries
 from fpsolve.fem.factors import Factors, factorised
@@ -45,7 +46,7 @@ SURVEYED_UNKNOWNS = 600
 """Up to so many, a chain is checked by all eigenvalues."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PrincipalPair:
     """Λ(p) with its eigenfunctions on a mesh.
 
@@ -63,13 +64,17 @@ class PrincipalPair:
 
     p: float
     value: float
-    right: FloatArray = field(repr=False)
-    left: FloatArray = field(repr=False)
+    right: FloatArray
+    left: FloatArray
     derivative: float
     residual: float
     rounding: float
     sign_defects: tuple[float, float]
-    generator: Generator = field(repr=False)
+    generator: Generator
+
+    def __repr__(self) -> str:
+        of_p = f"({self.p:g}) = "
+        return brief(self, f"Λ{of_p}{self.value:.10g}, Λ′{of_p}{self.derivative:.10g}, {self.right.size} unknowns")
 
     @property
     def space(self) -> CylinderSpace:

@@ -9,35 +9,43 @@ and how it falls tells what is left of it.
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from html import escape
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.data import Result, brief, dataset, described
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_space import CellSpace, NoiseSpace
 from fpsolve.fem.phase_space import PhaseSpace
+from fpsolve.model.quantity import UNNAMED, Quantity
+
+if TYPE_CHECKING:
+    import xarray
 
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
 
 
-@dataclass(frozen=True)
-class Estimate:
+@dataclass(frozen=True, repr=False)
+class Estimate(Result):
     """A number, the estimate of its error, and what both are measured by.
 
     Attributes:
         scale: size of the terms that the number is the sum of, where they may cancel.
         meaning: what the number is, where its name may mislead.
+        quantity: what it is called, and its unit.
     """
 
     value: float
     error_estimate: float
     scale: float
     meaning: str = ""
+    quantity: Quantity = field(default=UNNAMED, compare=False)
 
     @property
     def relative_error(self) -> float:
@@ -47,8 +55,20 @@ class Estimate:
     def __str__(self) -> str:
         return f"{self.value:.10g} ± {self.error_estimate:.0e}"
 
+    def _said(self) -> str:
+        unit = "" if self.quantity.unit in ("1", UNNAMED.unit) else f", in {self.quantity.unit}"
+        return f"{self.quantity.symbol} = {self}{unit}"
 
-@dataclass(frozen=True)
+    def to_xarray(self) -> xarray.Dataset:
+        """The number and its error, without dimensions."""
+        variables = {
+            **self.quantity.with_error(self.value, self.error_estimate),
+            "scale": ((), self.scale, described("size of the terms of the sum", units=self.quantity.unit)),
+        }
+        return dataset(self.quantity.words, "finite elements", variables, {}, {}, meaning=self.meaning)
+
+
+@dataclass(frozen=True, repr=False)
 class Absent:
     """A quantity that does not exist; it is false.
 
@@ -64,6 +84,13 @@ class Absent:
     def __str__(self) -> str:
         return f"none: {self.reason}"
 
+    def __repr__(self) -> str:
+        return brief(self, self.reason)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the whole reason."""
+        return f"<p>{escape(str(self))}</p>"
+
 
 @dataclass(frozen=True)
 class Failure:
@@ -78,8 +105,9 @@ class Failure:
     reason: str
 
 
-def checked(name: str, estimate: Estimate, remedy: str) -> Estimate:
+def checked(estimate: Estimate, remedy: str) -> Estimate:
     """An estimate whose error leaves it a meaning. Raises `NotConverged`."""
+    name = estimate.quantity.symbol
     if not estimate.relative_error <= MEANINGLESS:
         raise NotConverged(
             f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "

@@ -4,40 +4,52 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_array
+from fpsolve.arrays import FloatArray, real_array, real_numbers
+from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.branch import best_order
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
-from fpsolve.exponent.solver import (
-    ExponentSolver,
-    MomentLyapunov,
-    best_order,
-    misplaced,
-    missed,
-)
+from fpsolve.exponent.rival import misplaced
+from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, missed
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.problem import Problem, checked_moments, of_problem_too
+from fpsolve.model.quantity import (
+    DERIVATIVE,
+    MOMENT,
+    SECOND_DERIVATIVE,
+    STABILITY_INDEX,
+    P,
+    moment_at,
+    parameter_values,
+)
 from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.validity import NO_INDEX
 
-SEARCH_INTERVAL = (-20.0, 20.0)
+if TYPE_CHECKING:
+    import xarray
+
+SEARCH_INTERVAL: tuple[float, float] = (-20.0, 20.0)
 SHARE = 0.4
 """Of the tolerance of Λ(p)/p, that is left to the interpolation."""
 FEW_NODES = 5
 """For so many an interpolation is tried, even if few p are asked for."""
+SHOWN = 201
+"""So many p of the interval are drawn."""
 LEVELS = (3, 5, 9, 17, 33, 65)
 """Numbers of nodes tried; each has the nodes of the one before, and new ones between them."""
 
 
-class MomentLyapunovFunction:
+class MomentLyapunovFunction(Result):
     """Λ(p) on an interval of p, callable on arrays.
 
     Λ(p)/p is interpolated at Chebyshev points, value and slope (Hermite), as the eigenvectors give both, with
@@ -119,10 +131,7 @@ class MomentLyapunovFunction:
         """Λ(p) at several p; the residual is the largest of the nodes."""
         points = checked_moments(p, self.solver.problem)
         value, error = self(points), self.error_estimate(points)
-        for point, each, bound in zip(points, value, error, strict=True):
-            if point != 0:
-                estimate = Estimate(float(each), float(bound), self.solver.scale(float(point)))
-                checked(f"Λ({point:g})", estimate, self.solver.near.remedy)
+        _check(self.solver, points, value, error)
         return MomentLyapunov(
             p=points,
             value=value,
@@ -130,7 +139,7 @@ class MomentLyapunovFunction:
             error_estimate=error,
             residual=np.full(points.size, max(pair.residual for pair in self._pairs)),
             solver=self.solver,
-            warnings=(*missed(self.solver, points, value, error), *misplaced(self.solver, self._pairs)),
+            warnings=(*missed(self.solver, points, value, error), *misplaced(self.solver.mesh, self._pairs)),
             root=self.root(),
         )
 
@@ -153,6 +162,13 @@ class MomentLyapunovFunction:
         """δ_p, see `nonzero_root`, from `root` on, or why there is none. Raises `NotConverged`."""
         return nonzero_root(self.solver, search, self.root())
 
+    def to_xarray(self, p: ArrayLike | None = None) -> xarray.Dataset:
+        """Λ(p) with its derivatives and errors at some p, `SHOWN` of the interval if none are given."""
+        return _dataset(self, np.linspace(*self.interval, SHOWN) if p is None else real_numbers(p, "p"))
+
+    def _said(self) -> str:
+        return "p from {:g} to {:g}, {} solved".format(*self.interval, self.nodes.size)
+
     def _inside(self, p: ArrayLike) -> FloatArray:
         points = real_array(p, "p")
         low, high = self.interval
@@ -163,13 +179,8 @@ class MomentLyapunovFunction:
 
     def _interpolate(self, count: int, progress: Callable[[], None]) -> None:
         """Solve at so many Chebyshev points, the outermost first, and interpolate."""
-        x = -np.cos(np.pi * np.arange(count) / (count - 1))
-        self.nodes = _scaled(x, *self.interval)
-        if self._among is not None:
-            self.nodes = np.unique(self._among[np.argmin(np.abs(self._among - self.nodes[:, None]), axis=1)])
-            x = np.interp(self.nodes, self.interval, (-1.0, 1.0))
-            count = x.size
-        ratios = np.empty((count, 3))
+        x, self.nodes = _nodes(count, self.interval, self._among)
+        ratios = np.empty((x.size, 3))
         for i in best_order(self.nodes):
             ratios[i] = self.solver.ratio(float(self.nodes[i]), self._tolerance)
             progress()
@@ -188,12 +199,42 @@ class MomentLyapunovFunction:
         return self.solver.rtol * abs(p) * self.solver.scales.linear
 
 
+def _check(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> None:
+    """Refuse values whose errors leave them no meaning. Raises `NotConverged`."""
+    for point, each, bound in zip(p.tolist(), value.tolist(), error.tolist(), strict=True):
+        if point != 0:
+            checked(Estimate(each, bound, solver.scale(point), quantity=moment_at(point)), solver.near.remedy)
+
+
+def _dataset(function: MomentLyapunovFunction, p: FloatArray) -> xarray.Dataset:
+    """What a function is at some p."""
+    variables = {
+        **MOMENT.with_error(function(p), function.error_estimate(p), "p"),
+        **DERIVATIVE.variable(function.derivative(p), "p"),
+        **SECOND_DERIVATIVE.variable(function.second_derivative(p), "p"),
+    }
+    solver, method = function.solver, "finite elements and interpolation"
+    return dataset(
+        MOMENT.words, method, variables, P.variable(p, "p"), parameter_values(solver.problem), rtol=solver.rtol
+    )
+
+
 def _nodes_needed(count: int, last: float, error: float, allowed: float) -> float:
     """How many nodes convergence may take, if the error falls exponentially, as from half as many to `count`."""
     if not math.isfinite(last):
         return 2 * count - 1
     rate = math.log(max(last / error, 1.1)) / (count // 2)
     return max(2 * count - 1, count + math.log(error / allowed) / rate)
+
+
+def _nodes(count: int, interval: tuple[float, float], among: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+    """So many Chebyshev points of an interval, or of some p those nearest to them, as x in [-1, 1] and as p."""
+    x = -np.cos(np.pi * np.arange(count) / (count - 1))
+    nodes = _scaled(x, *interval)
+    if among is None:
+        return x, nodes
+    nodes = np.unique(among[np.argmin(np.abs(among - nodes[:, None]), axis=1)])
+    return np.interp(nodes, interval, (-1.0, 1.0)), nodes
 
 
 def _scaled(x: FloatArray, low: float, high: float) -> FloatArray:
@@ -281,8 +322,8 @@ def nonzero_root(
         new = p - ratio / slope
         least = 1e-13 * max(1.0, abs(p))
         if abs(new - p) <= max(least, 0.1 * error / slope) or 0 < high - low <= 10 * least:
-            estimate = Estimate(p, error / slope + abs(new - p), scale=1.0)
-            return checked("the stability index", estimate, solver.near.remedy)
+            found = Estimate(p, error / slope + abs(new - p), scale=1.0, quantity=STABILITY_INDEX)
+            return checked(found, solver.near.remedy)
         if low == high:
             return _no_root(solver.problem, interval)
         if not low < new < high:

@@ -30,6 +30,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.direction import Direction
+from fpsolve.model.quantity import CRITICAL_IMPACT_FACTOR, CRITICAL_RESTITUTION, IMPACT_RATE
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 
 _EPS = sys.float_info.epsilon
@@ -56,7 +57,7 @@ def impact_rate(solver: ExponentSolver) -> Estimate | Absent:
     usual = generator.unit_rate / math.pi
     rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.loss * usual
     error = abs(better - value) + (rounding if better > lost else lost)
-    return checked("N", Estimate(better, error, usual), solver.near.remedy)
+    return checked(Estimate(better, error, usual, quantity=IMPACT_RATE), solver.near.remedy)
 
 
 def critical_impact_factor(solver: ExponentSolver) -> Estimate | Absent:
@@ -72,7 +73,8 @@ def critical_impact_factor(solver: ExponentSolver) -> Estimate | Absent:
         return Absent(f"its logarithm is {log.value:.3g}, beyond ±{LARGEST_LOG:g}")
     value = math.exp(log.value)
     error = value * math.expm1(min(log.error_estimate, LARGEST_LOG))
-    return checked("R_c", Estimate(value, error, value * max(1.0, log.scale)), solver.near.remedy)
+    found = Estimate(value, error, value * max(1.0, log.scale), quantity=CRITICAL_IMPACT_FACTOR)
+    return checked(found, solver.near.remedy)
 
 
 def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
@@ -95,8 +97,8 @@ def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
     if value <= 0:
         return Absent(f"unstable for every r in (0, 1]: it would have to be {value:.3g}")
     slope = oscillator.restitution_slope(log.value)
-    found = Estimate(value, slope * log.error_estimate + _EPS, max(1.0, slope * log.scale))
-    return checked("r_c", found, solver.near.remedy)
+    error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
+    return checked(Estimate(value, error, scale, quantity=CRITICAL_RESTITUTION), solver.near.remedy)
 
 
 def _flux(pair: PrincipalPair) -> float:

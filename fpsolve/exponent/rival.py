@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from fpsolve.errors import Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import noise_marginal
+from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.theory.far import Place, far_places
 from fpsolve.theory.frozen import frozen_noise
@@ -31,6 +34,26 @@ def rival(pair: PrincipalPair) -> float | None:
     mean, width = _where(pair)
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
     return float(z[far][np.argmax(rate[far])]) if np.any(far) else None
+
+
+def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
+    """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
+    if mesh is None:  # then both places have been looked at
+        return ()
+    found = ((pair, _elsewhere(pair)) for pair in pairs)
+    pair, z = next(((pair, z) for pair, z in found if z is not None), (None, None))
+    if pair is None:
+        return ()
+    cause = "noise with heavy tails" if has_algebraic_tails(pair.generator.problem.noise) else "slow noise"
+    return (
+        f"Λ({pair.p:g}) may be larger: {cause} may carry the moment near {z:.3g} standard deviations; {Remedy.REACH}",
+    )
+
+
+def _elsewhere(pair: PrincipalPair) -> float | None:
+    """Another z where noise that is held there may carry the moment, or None."""
+    places = far_rivals(pair)
+    return math.sqrt(places[0].lower * places[0].upper) * math.copysign(1, places[0].lower) if places else rival(pair)
 
 
 def far_rivals(pair: PrincipalPair) -> list[Place]:

@@ -8,29 +8,34 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_number
+from fpsolve.data import Result, dataset, described
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.bordered import second_derivative, slope_rounding
-from fpsolve.exponent.branch import Branch, Tolerance
+from fpsolve.exponent.branch import Branch, Tolerance, best_order
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.refine import WIDER, widened
-from fpsolve.exponent.rival import far_rivals, is_far_out, rival
+from fpsolve.exponent.rival import far_rivals, is_far_out, misplaced
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.model import quantity
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
 from fpsolve.theory.far import far_places, grows_far_out, highest_rate, log_tail, refuse_beyond, variance_tail
 from fpsolve.theory.perturbation import Scale, scale_of
 from fpsolve.theory.validity import ALMOST_EVERY
+
+if TYPE_CHECKING:
+    import xarray
 
 LOOSE = 1e-3
 """Share of the rates within which a place is solved before it is compared with others."""
@@ -46,8 +51,8 @@ _KINDS: Sequence[tuple[str, Any, str]] = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class MomentLyapunov:
+@dataclass(frozen=True, eq=False, repr=False)
+class MomentLyapunov(Result):
     """Λ(p) at several p.
 
     Attributes:
@@ -70,7 +75,7 @@ class MomentLyapunov:
     derivative: FloatArray
     error_estimate: FloatArray
     residual: FloatArray
-    solver: ExponentSolver = field(repr=False)
+    solver: ExponentSolver
     warnings: tuple[str, ...] = ()
     root: float | None = None
     failures: tuple[Failure, ...] = ()
@@ -85,6 +90,25 @@ class MomentLyapunov:
     def forgetful(self) -> MomentLyapunov:
         """The same numbers, without the eigenfunctions that the solver keeps."""
         return replace(self, solver=replace(self.solver, starts={}))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Λ(p), Λ′(p), their errors and residuals over p."""
+        variables = {
+            **quantity.MOMENT.with_error(self.value, self.error_estimate, "p"),
+            **quantity.DERIVATIVE.variable(self.derivative, "p"),
+            **quantity.RESIDUAL.variable(self.residual, "p"),
+            "rare": ("p", np.isin(self.p, self.rare), described("whether rare paths carry the moment")),
+        }
+        failures, values = [each.reason for each in self.failures], quantity.parameter_values(self.solver.problem)
+        more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
+        title, places = quantity.MOMENT.words, quantity.P.variable(self.p, "p")
+        return dataset(title, "finite elements", variables, places, values, rtol=self.solver.rtol, **more)
+
+    def _said(self) -> str:
+        if not self.p.size:
+            return "no p"
+        last = f"Λ({self.p[-1]:g}) = {self.value[-1]:.6g} ± {self.error_estimate[-1]:.0e}"
+        return last if self.p.size == 1 else f"{self.p.size} p from {self.p.min():g} to {self.p.max():g}, {last}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +215,7 @@ class ExponentSolver:
             try:
                 solution = self.solution(float(points[i]))
                 if points[i] != 0:  # where Λ = 0 has no scale
-                    checked(f"Λ({points[i]:g})", self.estimate(solution), self.near.remedy)
+                    checked(self.estimate(solution), self.near.remedy)
                 solutions[i] = solution
             except NotConverged as failure:
                 failures.append(Failure(float(points[i]), str(failure)))
@@ -200,13 +224,15 @@ class ExponentSolver:
 
     def estimate(self, solution: Solution) -> Estimate:
         """Λ(p) on the scale of the terms of Eq. (37) before they cancel."""
-        return Estimate(solution.pair.value, solution.error, self.scale(solution.pair.p))
+        p = solution.pair.p
+        return Estimate(solution.pair.value, solution.error, self.scale(p), quantity=quantity.moment_at(p))
 
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
         value, error = self.ratio_alone(0.0)
         meaning = ALMOST_EVERY if grows_far_out(self.problem) else ""
-        return checked("λ", Estimate(value, error, self.scales.linear, meaning), self.near.remedy)
+        found = Estimate(value, error, self.scales.linear, meaning, quantity.LYAPUNOV_EXPONENT)
+        return checked(found, self.near.remedy)
 
     def variance_rate(self) -> Estimate:
         """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
@@ -228,7 +254,7 @@ class ExponentSolver:
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
         beyond = max(1.0, 1 / math.expm1(tail * math.log(WIDER)))  # what is left, over what the wider one has added
         error = beyond * abs(better - value) + rounding
-        return checked("Λ″(0)", Estimate(better, error, scale), self.near.remedy)
+        return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.near.remedy)
 
     @cached_property
     def at_zero(self) -> tuple[PrincipalPair, PrincipalPair]:
@@ -276,7 +302,7 @@ class ExponentSolver:
             error_estimate=errors,
             residual=np.array([pair.residual for pair in pairs]),
             solver=self,
-            warnings=(*missed(self, p, value, errors), *misplaced(self, pairs)),
+            warnings=(*missed(self, p, value, errors), *misplaced(self.mesh, pairs)),
             failures=tuple(failures),
             rare=np.array([pair.p for pair in pairs if is_far_out(pair)]),
             notes=carried_far_out(self, pairs),
@@ -295,26 +321,6 @@ def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: Floa
         f"rtol = {solver.rtol:g} is not met at {np.count_nonzero(shares > solver.rtol)} of {p.size} moments, worst at "
         f"p = {p[worst]:g} with an estimated relative error of {shares[worst]:.1e}; {remedy}, or use a larger rtol",
     )
-
-
-def misplaced(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
-    """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
-    if solver.mesh is None:  # then both places have been looked at
-        return ()
-    found = ((pair, _elsewhere(pair)) for pair in pairs)
-    pair, z = next(((pair, z) for pair, z in found if z is not None), (None, None))
-    if pair is None:
-        return ()
-    cause = "noise with heavy tails" if has_algebraic_tails(solver.problem.noise) else "slow noise"
-    return (
-        f"Λ({pair.p:g}) may be larger: {cause} may carry the moment near {z:.3g} standard deviations; {Remedy.REACH}",
-    )
-
-
-def _elsewhere(pair: PrincipalPair) -> float | None:
-    """Another z where noise that is held there may carry the moment, or None."""
-    places = far_rivals(pair)
-    return math.sqrt(places[0].lower * places[0].upper) * math.copysign(1, places[0].lower) if places else rival(pair)
 
 
 def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
@@ -336,8 +342,3 @@ def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> t
         return (text,)
     wait = rarity / (pair.value - near.value)
     return (f"{text}; for times up to about {wait:.1g} they hardly count, and E‖x‖^p grows at {near.value:.3g}",)
-
-
-def best_order(p: FloatArray) -> Any:
-    """Indices of p, inwards from the largest and then from the smallest: a mesh for a large |p| serves smaller ones."""
-    return np.lexsort((-np.abs(p), p < 0))

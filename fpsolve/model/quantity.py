@@ -71,7 +71,9 @@ def _over(unit: str, other: str) -> str:
     """The unit of a ratio."""
     if "unknown" in (unit, other):
         return "unknown"
-    return "1" if unit == other else unit if other == "1" else f"{unit}/({other})"
+    if other == "1" or unit == other:
+        return unit if other == "1" else "1"
+    return f"{unit}/{other if other.isidentifier() else f'({other})'}"
 
 
 UNNAMED = Quantity("value", "value", "number", "", "unknown")
@@ -95,12 +97,19 @@ CRITICAL_IMPACT_FACTOR = Quantity("critical_impact_factor", "R_c", "critical imp
 CRITICAL_RESTITUTION = Quantity(
     "critical_restitution", "r_c", "critical coefficient of restitution", "$r_c$", equation="(39)"
 )
+THETA = Quantity("theta", "θ", "parameter", r"$\theta$", "theta_unit")
+"""Any parameter; its unit is a variable beside it."""
 _FIELDS: Mapping[str, FieldInfo] = {
     f"{half}.{name}": field
     for half, kinds in (("oscillator", [VibroImpactOscillator]), ("noise", [NonGaussianNoise, OrnsteinUhlenbeck]))
     for kind in kinds
     for name, field in kind.__pydantic_fields__.items()  # type: ignore[attr-defined]
 }
+
+
+def moment_at(p: float) -> Quantity:
+    """Λ at one p."""
+    return replace(MOMENT, symbol=f"Λ({p:g})", latex=rf"$\Lambda({p:g})$")
 
 
 def parameter_of(key: str) -> Quantity:
@@ -111,14 +120,26 @@ def parameter_of(key: str) -> Quantity:
     return Quantity(key, key, field.title or key, symbol_of(field), unit_of(field) or "1")
 
 
-def parameter_values(problem: Problem) -> Mapping[str, float | str]:
-    """The parameters of a problem by their keys, as far as they are numbers or words."""
+def parameter_values(problem: Problem, original: NonGaussianNoise | None = None) -> Mapping[str, float | str]:
+    """The parameters of a problem by their keys, as far as they are numbers or words.
+
+    Args:
+        problem: a motion and its noise.
+        original: the noise of Eq. (7) that the noise is the reduction of; then its parameters are told.
+    """
     found: dict[str, float | str] = {}
-    for half, part in (("oscillator", problem.system), ("noise", problem.noise)):
+    for half, part in (("oscillator", problem.system), ("noise", original or problem.noise)):
         for name, value in vars(part).items():
             if isinstance(value, Enum | int | float):
                 found[f"{half}.{name}"] = str(value.value) if isinstance(value, Enum) else float(value)
+    if original is not None:
+        found["noise.treatment"] = "exact" if problem.noise == original else "ou-reduction"
     return found
+
+
+def density_unit(noise: Quantity) -> str:
+    """Of a density per radian and unit of ξ."""
+    return {"1/time": "time/rad", "1": "1/rad"}.get(noise.unit, "unknown")
 
 
 def noise_of(problem: Problem) -> Quantity:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from string import ascii_lowercase
@@ -19,7 +18,7 @@ from fpsolve.files import write_csv, write_json
 from fpsolve.model.parameters import axis_title
 from fpsolve.output.plots import canvas, filled
 from fpsolve.output.tables import head
-from fpsolve.pictures import COLOURS
+from fpsolve.pictures import COLOURS, plain_numbers
 from fpsolve.study.chart import Chart, charted
 
 _TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
@@ -45,7 +44,8 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
         axes = figure.add_subplot(xlabel=axis_title(PARAMETERS[x.key]), ylabel=axis_title(PARAMETERS[y.key]))
         axes.set(xscale=x.scale, yscale=y.scale, xlim=(x.start, x.stop), ylim=(y.start, y.stop))
         for side, frame in ((axes.xaxis, x), (axes.yaxis, y)):
-            _number(side, frame)
+            if frame.scale == "log":
+                plain_numbers(side, frame.start, frame.stop)
         axes.set_title(filled(case.headline, 80), parse_math=False)
         small = {} if chart.regions is None else _shade(axes, chart.regions, (x, y))
         entries = {}
@@ -119,17 +119,6 @@ def _line(line: Boundary) -> dict[str, Any]:
     }
 
 
-def _number(side: Any, frame: Axis) -> None:
-    """Plain numbers on a logarithmic axis of a few decades: 0.5, 1, 2."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    decades = math.log10(frame.stop / frame.start) if frame.scale == "log" else math.inf
-    if decades < 4:
-        side.set_major_locator(LogLocator(subs=(1, 2, 5) if decades < 2.5 else (1,)))
-        side.set_major_formatter(StrMethodFormatter("{x:g}"))
-        side.set_minor_formatter(NullFormatter())
-
-
 def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, Any]:
     """A tint for each region, and its name, or where that has no room a letter; what the legend says of these."""
     from matplotlib.colors import ListedColormap
@@ -168,9 +157,5 @@ def _draw(axes: Any, line: Boundary, colour: str) -> Any:
 
 def _legend(zero: Zero) -> str:
     """λ = 0, or what appears at a value of δ_p, in LaTeX."""
-    if zero.kind == "lyapunov_exponent":
-        return r"$\lambda = 0$"
-    if zero.kind == "moment":
-        return rf"$\Lambda({zero.p:g}) = 0$"
-    note = f": {P_BIFURCATIONS[zero.p]}" if zero.p in P_BIFURCATIONS else ""
-    return rf"$\delta_p = {zero.p:g}$" + note
+    appears = P_BIFURCATIONS.get(zero.p) if zero.kind == "stability_index" else None
+    return f"{zero.latex}: {appears}" if appears else zero.latex

@@ -12,14 +12,12 @@ from fpsolve.case.case import Case
 from fpsolve.case.sections import Value, Varied
 from fpsolve.case.vary import PARAMETERS
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, QUANTITIES, Index
+from fpsolve.exponent.quantities import INDICES, QUANTITIES, Index
 from fpsolve.model.parameters import symbol_of
 from fpsolve.output.plots import MOST_LABELLED, Series, write_bars, write_figure, write_response_figure
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory.perturbation import scale_of, second_order
 
-MOST_BARS = 4
-"""Of so many p sensitivities are drawn."""
 Pair = tuple[CurveResult, SimulatedCurve | None]
 
 
@@ -48,13 +46,9 @@ def _draw_sensitivities(case: Case, result: CurveResult, folder: Path) -> None:
     if found is None:
         return
     scale, bars = scale_of(result.curve.problem), dict[str, list[float]]()
-    rows = [(float(p), slopes) for p, slopes in zip(found.p, found.moments, strict=True) if p and slopes]
-    chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_BARS)).round().astype(int))
-    if exponent := found.indices.get(LYAPUNOV_EXPONENT.name):
-        bars[r"$\lambda$"] = [found.theta[key] * exponent[key].value / scale.linear for key in exponent]
-    for p, slopes in (rows[i] for i in chosen):
-        label = rf"$\Lambda({p:g})$"
-        bars[label] = [found.theta[key] * slopes[key].value / float(scale.moment(p)) for key in slopes]
+    for label, (p, slopes) in found.shown().items():
+        size = float(scale.moment(p)) if p else scale.linear
+        bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
     pictures = [folder / f"sensitivities{result.curve.suffix}.{ending}" for ending in ("png", "pdf")]
     write_bars(bars, [symbol_of(PARAMETERS[key]) for key in found.theta], case.heading(result.curve), pictures)
 

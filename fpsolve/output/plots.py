@@ -91,43 +91,17 @@ def write_bars(bars: Mapping[str, Sequence[float]], names: Sequence[str], title:
 
 def write_response_figure(response: Response, title: str, paths: Sequence[Path]) -> None:
     """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors."""
-    share = np.cumsum(response.amplitude_density * np.diff(response.amplitude_edges))
-    seen = float(response.amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
     with canvas(paths, width=10.5) as figure:
         figure.suptitle(filled(title, 100), fontsize=12, parse_math=False)
         plane, radial = figure.subplots(1, 2)
-        picture = _draw_plane(plane, response, seen)
-        figure.colorbar(picture, ax=plane, label=r"density of $(x, \dot{x})$ (time/length²)")
+        response.plot(plane)
         figure.get_layout_engine().set(wspace=0.1)
-        _draw_amplitude(radial, response, seen)
+        response.plot_amplitude(radial)
 
 
 def filled(text: str, width: int) -> str:
     """A text in lines that fit, each of its own lines for itself."""
     return "\n".join(fill(line, width) for line in text.splitlines())
-
-
-def _draw_plane(axes: Any, response: Response, seen: float) -> Any:
-    """The density of x and ẋ in colours, which are returned, up to the amplitude `seen`."""
-    from matplotlib.colors import LogNorm
-
-    x, v, density = response.x_edges, response.v_edges, response.density
-    scale = LogNorm(max(density[density > 0].min(), density.max() * 1e-4), density.max())
-    visited = np.ma.masked_equal(density.T, 0)
-    velocity = seen * v[-1] / x[-1]
-    axes.set(xlabel="$x$ (length)", ylabel=r"$\dot{x}$ (length/time)", xlim=(0, seen), ylim=(-velocity, velocity))
-    return axes.pcolormesh(x, v, visited, cmap="viridis", norm=scale, rasterized=True)
-
-
-def _draw_amplitude(axes: Any, response: Response, seen: float) -> None:
-    """The density of the amplitude as a line in a band."""
-    edges, density, error = response.amplitude_edges, response.amplitude_density, response.amplitude_error
-    middle, low, high = (edges[1:] + edges[:-1]) / 2, density - 2 * error, density + 2 * error
-    axes.fill_between(middle, low, high, color=COLOURS[0], alpha=0.35, linewidth=0, label="± 2 standard errors")
-    axes.plot(middle, density, color=COLOURS[0], linewidth=1.6, label="simulation")
-    axes.set(xlabel=r"amplitude $A = \sqrt{x^2 + \dot{x}^2/\omega^2}$ (length)", ylabel="density of $A$ (1/length)")
-    axes.set(xlim=(0, seen), ylim=(0, 1.25 * high.max()))
-    axes.legend(frameon=False, fontsize=11, loc="upper right")
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -24,8 +24,11 @@ from scipy.special import logsumexp
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.errors import NotConverged
 from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.quantity import parameter_values
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.simulation.kernels import TALLIES
+from fpsolve.simulation.monte_carlo import MomentEstimate as MomentEstimate
+from fpsolve.simulation.monte_carlo import MonteCarlo as MonteCarlo
 from fpsolve.simulation.setup import (
     BATCHES,
     PATHS,
@@ -49,53 +52,6 @@ _KEPT = 0.3
 _LEVELS = 12
 _SETTLING = 9
 """Slices in which a population finds its law."""
-
-
-@dataclass(frozen=True)
-class MomentEstimate:
-    """Λ(p) by simulation.
-
-    Attributes:
-        p: order of the moment.
-        value, standard_error: Λ(p) and the standard deviation of this estimate; None where too few paths carry it.
-        estimator: "direct" or "population".
-        effective_paths: how many paths carry the mean. Direct: (Σw)²/Σw² over all windows with the weights w = ‖x‖^p
-            at their ends. Population: the same for the paths of a transient ago with the weights of their descendants.
-    """
-
-    p: float
-    value: float | None
-    standard_error: float | None
-    estimator: Estimator
-    effective_paths: float
-
-
-@dataclass(frozen=True)
-class MonteCarlo:
-    """What a simulation of one parameter set found.
-
-    Attributes:
-        estimates: Λ(p), in the order of p.
-        lyapunov_exponent, lyapunov_exponent_error: λ and its standard error.
-        variance_rate, variance_rate_error: Λ″(0), from the variance of ln‖x‖ over the paths, and its standard error.
-        paths, time, step, seed: how many paths, their length after the transient, the time step, the seed.
-        impacts: how many bounces the paths without weights had.
-        warnings: what limits these numbers, each with its criterion.
-        interrupted: whether the simulation was stopped early.
-    """
-
-    estimates: tuple[MomentEstimate, ...]
-    lyapunov_exponent: float
-    lyapunov_exponent_error: float
-    variance_rate: float
-    variance_rate_error: float
-    paths: int
-    time: float
-    step: float
-    seed: int
-    impacts: int
-    warnings: tuple[str, ...]
-    interrupted: bool = False
 
 
 @of_problem
@@ -140,7 +96,8 @@ def simulate(
     plain, populations = _start(plan, seed)
     advances = [batch.advance for batch in (*plain, *populations)]
     interrupted = advance_all(advances, plan.settling + plan.wanted, plan.slice_seconds, progress)
-    return _result(plan, plain, populations, seed, interrupted)
+    found = _result(plan, plain, populations, seed, interrupted)
+    return replace(found, parameters=parameter_values(problem))
 
 
 def _plan(

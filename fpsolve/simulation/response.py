@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from threading import Event
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.data import Result, Variable, dataset, described
 from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.quantity import IMPACT_RATE, parameter_values
 from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.pictures import canvas_of, draw_line, draw_plane, finish
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.kernels import advance_and_count
 from fpsolve.simulation.setup import BATCHES, simulated_parts
 from fpsolve.simulation.step import Motion, NoiseStep, motion, noise_step, starting_state
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
 
 BINS = 100
 MEANS = ("x", "x_squared", "v_squared", "amplitude", "energy")
@@ -25,8 +33,8 @@ _LOOKS = 8
 """How often in a half-turn π/ω the state is counted."""
 
 
-@dataclass(frozen=True, eq=False)
-class Response:
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(Result):
     """Stationary response to the noise.
 
     Attributes:
@@ -38,6 +46,7 @@ class Response:
         impact_rate: impacts in unit time.
         time: over which the paths were averaged.
         interrupted: whether the simulation was stopped early.
+        parameters: of the problem, by keys such as "noise.D0".
     """
 
     means: dict[str, tuple[float, float]]
@@ -51,6 +60,81 @@ class Response:
     impact_rate: float
     time: float
     interrupted: bool = False
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
+
+    @property
+    def reach(self) -> float:
+        """The amplitude below which nearly all is, up to which pictures go."""
+        share = np.cumsum(self.amplitude_density * np.diff(self.amplitude_edges))
+        return float(self.amplitude_edges[1:][np.searchsorted(share, 0.9995 * share[-1])])
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The densities over the middles of their cells, and the means."""
+        return _dataset(self)
+
+    def _table(self) -> xarray.Dataset:
+        """The density of the amplitude: beside that of (x, v) it would be repeated for every cell."""
+        return self.to_xarray()[["amplitude_density", "amplitude_density_error"]]
+
+    def plot_amplitude(self, ax: Axes | None = None, **line_kwargs: Any) -> Axes:
+        """Draw the density of the amplitude in a band of two standard errors, into `ax` or a new figure."""
+        found = self.to_xarray()
+        style = {"marker": "", "label": f"{found.attrs['method']}\n± 2 standard errors", **line_kwargs}
+        with canvas_of(ax) as axes:
+            draw_line(axes, found.amplitude_density, 2 * found.amplitude_density_error, **style)
+            finish(axes, **style)
+            axes.set(xlim=(0, self.reach), ylim=(0, None))
+            if ax is None:
+                axes.set_title(found.attrs["title"], parse_math=False)
+        return axes
+
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+        from matplotlib.colors import LogNorm
+
+        most = self.density.max()
+        scale = LogNorm(max(self.density[self.density > 0].min(), most * 1e-4), most)
+        draw_plane(axes, found.density.where(found.density > 0), **{"norm": scale, **kwargs})
+        velocity = self.reach * self.v_edges[-1] / self.x_edges[-1]
+        axes.set(xlim=(0, self.reach), ylim=(-velocity, velocity))
+
+    def _said(self) -> str:
+        mean, error = self.means["amplitude"]
+        return f"mean amplitude {mean:.6g} ± {error:.0e}, {self.density.size} cells"
+
+
+_LENGTH, _VELOCITY = "length", "length/time"
+_UNITS = dict(zip(MEANS, (_LENGTH, "length²", "length²/time²", _LENGTH, "length²/time²"), strict=True))
+
+
+def _dataset(found: Response) -> xarray.Dataset:
+    """The densities and the means of a response."""
+    density = described("density", r"of $(x, \dot{x})$", "time/length²")
+    radial, error = described("density of the amplitude", "$A$", "1/length"), "standard error of the"
+    about = described(f"{error} density of the amplitude", units="1/length")
+    variables: dict[str, Variable] = {
+        "density": (("x", "v"), found.density, density),
+        "amplitude_density": ("amplitude", found.amplitude_density, radial),
+        "amplitude_density_error": ("amplitude", found.amplitude_error, about),
+    }
+    for name, (value, deviation) in found.means.items():
+        unit = _UNITS[name]
+        variables[f"mean_{name}"] = ((), value, described(f"stationary mean of {name}", units=unit))
+        variables[f"mean_{name}_error"] = ((), deviation, described(f"{error} mean of {name}", units=unit))
+    variables["impact_rate"] = ((), found.impact_rate, described(IMPACT_RATE.words, units=IMPACT_RATE.unit))
+    variables["outside"] = ((), found.outside, described("share of the counts outside of the cells"))
+    amplitude = described("amplitude", r"$A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", _LENGTH)
+    sides = {
+        "x": (found.x_edges, described("displacement", "$x$", _LENGTH)),
+        "v": (found.v_edges, described("velocity", r"$\dot{x}$", _VELOCITY)),
+        "amplitude": (found.amplitude_edges, amplitude),
+    }
+    coordinates: dict[str, Variable] = {}
+    for name, (edges, words) in sides.items():
+        coordinates[name] = (name, (edges[1:] + edges[:-1]) / 2, words)
+        ends = described(f"edges of the cells of {name}", units=words["units"])
+        coordinates[f"{name}_edges"] = (f"{name}_edges", edges, ends)
+    more = {"time": found.time, "interrupted": int(found.interrupted)}
+    return dataset("stationary response", "Monte Carlo", variables, coordinates, found.parameters, **more)
 
 
 class _Batch:
@@ -119,7 +203,8 @@ def stationary_response(
     for batch in batches:
         batch.impacts, batch.reach = 0, reach
     interrupted = advance_all(advances, looks, seconds, progress)
-    return _collect(oscillator, batches, between, reach, interrupted)
+    found = _collect(oscillator, batches, between, reach, interrupted)
+    return replace(found, parameters=parameter_values(problem))
 
 
 def _collect(

@@ -1,7 +1,6 @@
 """What the figures show, read from the drawn figures themselves."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import matplotlib.figure
 import numpy as np
@@ -11,6 +10,7 @@ from fpsolve.case.case import load_case
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.output.figures import draw
 from fpsolve.output.plots import Series, write_figure, write_response_figure
+from fpsolve.simulation.response import MEANS, Response
 from fpsolve.study.solve import solve_curves
 
 ROOT = Path(__file__).parents[2]
@@ -91,9 +91,10 @@ def test_no_entry_without_a_stability_index(drawn, tmp_path):
 
 def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
     edges, density = np.linspace(0, 3, 31), np.exp(-np.linspace(0, 3, 30))
-    response = SimpleNamespace(
-        x_edges=edges, v_edges=np.linspace(-3, 3, 21), density=np.ones((30, 20)), amplitude_edges=edges,
-        amplitude_density=density, amplitude_error=0.01 * density,
+    response = Response(
+        means=dict.fromkeys(MEANS, (1.0, 0.01)), x_edges=edges, v_edges=np.linspace(-3, 3, 21),
+        density=np.ones((30, 20)), amplitude_edges=edges, amplitude_density=density, amplitude_error=0.01 * density,
+        outside=0.0, impact_rate=1.0, time=1.0,
     )  # fmt: skip
     write_response_figure(response, "Title", [tmp_path / "response.png"])
     plane, radial, bar = drawn[0].axes

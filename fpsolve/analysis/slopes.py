@@ -1,0 +1,112 @@
+"""Derivatives by the parameters θ of a problem, as data and as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.data import Result, Variable, dataset, described
+from fpsolve.exponent.error import Estimate
+from fpsolve.model.quantity import (
+    LYAPUNOV_EXPONENT,
+    MOMENT,
+    STABILITY_INDEX,
+    THETA,
+    VARIANCE_RATE,
+    P,
+    Quantity,
+    moment_at,
+    parameter_of,
+)
+from fpsolve.pictures import draw_bars
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
+DIFFERENTIATED = tuple(RECORDS)
+"""The quantities that are no function of p."""
+MOST_BARS = 4
+"""Of so many p sensitivities are drawn."""
+Slopes = Mapping[str, Estimate]
+"""∂/∂θ by the key of θ."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensitivities(Result):
+    """∂/∂θ for every parameter θ of a problem; all are `Estimate`s by the key of θ, such as "oscillator.omega".
+
+    Attributes:
+        theta: the values of the parameters.
+        p: the moments, shape (n,).
+        moments: ∂Λ(p)/∂θ, one mapping for each p; empty where Λ(p) did not converge.
+        indices: ∂/∂θ of "lyapunov_exponent", "stability_index" and "variance_rate"; without those that do not exist.
+        notes: what is one-sided, and what is missing, and why.
+    """
+
+    theta: Mapping[str, float]
+    p: FloatArray
+    moments: tuple[Slopes, ...]
+    indices: Mapping[str, Slopes]
+    notes: tuple[str, ...] = ()
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The derivatives over p and θ, and their errors; NaN where there is none."""
+        variables = dict(_labelled(MOMENT, [*self.moments], self.theta, "p", "parameter"))
+        for name, record in RECORDS.items():
+            if name in self.indices:
+                variables |= _labelled(record, self.indices[name], self.theta, "parameter")
+        names, units = ([getattr(parameter_of(key), of) for key in self.theta] for of in ("name", "unit"))
+        coordinates = {
+            **P.variable(self.p, "p"),
+            "parameter": (
+                "parameter",
+                np.array(names, dtype=str),
+                described("key of a parameter"),
+            ),
+            **THETA.variable(np.array([*self.theta.values()], dtype=float), "parameter"),
+            "theta_unit": ("parameter", np.array(units, dtype=str), described("unit of theta")),
+        }
+        return dataset("sensitivities", "finite elements", variables, coordinates, self.theta, notes=self.notes)
+
+    def shown(self) -> Mapping[str, tuple[float, Slopes]]:
+        """What pictures show: by their symbols λ, as p = 0, and Λ of some p, each with its derivatives."""
+        rows = [(float(p), slopes) for p, slopes in zip(self.p, self.moments, strict=True) if p and slopes]
+        chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_BARS)).round().astype(int))
+        exponent = self.indices.get(LYAPUNOV_EXPONENT.name)
+        first = {LYAPUNOV_EXPONENT.latex: (0.0, exponent)} if exponent else {}
+        return first | {moment_at(rows[i][0]).latex: rows[i] for i in chosen}
+
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+        bars = {
+            label: np.array([self.theta[key] * each.value for key, each in slopes.items()])
+            for label, (_, slopes) in self.shown().items()
+        }
+        draw_bars(axes, bars, [parameter_of(key).latex or key for key in self.theta], **kwargs)
+        axes.set_xlabel(r"effect of a relative change, $\theta\,\partial/\partial\theta$ (1/time)")
+        if bars:
+            axes.legend(frameon=False)
+
+    def _said(self) -> str:
+        what = [*self.indices, *[f"Λ({p:g})" for p in self.p[:1]], *["..."] * (self.p.size > 1)]
+        return f"of {', '.join(what) or 'nothing'} by {len(self.theta)} parameters"
+
+
+def _labelled(
+    record: Quantity, slopes: Slopes | list[Slopes], theta: Mapping[str, float], *dims: str
+) -> Mapping[str, Variable]:
+    """Derivatives by θ and their errors, as variables of xarray."""
+    rows = slopes if isinstance(slopes, list) else [slopes]
+    shape = (len(rows), len(theta)) if len(dims) == 2 else (len(theta),)
+
+    def array(of: Callable[[Estimate], float]) -> FloatArray:
+        numbers = [of(row[key]) if key in row else np.nan for row in rows for key in theta]
+        return np.array(numbers, dtype=float).reshape(shape)
+
+    values, errors = array(lambda each: each.value), array(lambda each: each.error_estimate)
+    return record.by(THETA).with_error(values, errors, *dims)
