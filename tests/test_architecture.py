@@ -33,8 +33,8 @@ ROOMS = {
     ],
     "analysis": ["density", "sensitivity", "curve", "continuation", "special_points", "zero", "stability", "regions"],
     "case": [
-        *("toml", "messages", "sections", "vary", "vary_table", "chart", "curves", "remedies", "refusals"),
-        "case",
+        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "chart", "curves"),
+        *("remedies", "refusals", "case"),
     ],
     "study": ["results", "solve", "simulate", "chart"],
     "output": ["vtk", "tables", "plots", "figures", "charts", "terminal"],
