@@ -37,8 +37,8 @@ ROOMS = {
         "regions",
     ],
     "case": [
-        *("toml", "messages", "sections", "vary", "vary_table", "chart", "curves", "remedies", "refusals"),
-        "case",
+        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "chart", "curves"),
+        *("remedies", "refusals", "case"),
     ],
     "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart"],
     "output": [

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import product
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from fpsolve.case.sections import (
     Varied,
     same,
 )
+from fpsolve.case.set_file import FileVary
 from fpsolve.case.vary import ABSCISSAE, WORDS, Vary, assignments
 from fpsolve.errors import MeshError, NoSuchExponent
 from fpsolve.fem.mesh import CylinderMesh
@@ -50,23 +52,33 @@ def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refu
 
 
 def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
-    """Too many curves, or one that cannot be solved."""
+    """Too many curves, or one that cannot be solved; of a file every one."""
     if len(vary) > MAX_CURVES:
         yield (), None, f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
+    elif isinstance(vary, FileVary):
+        reasons = ((vary.lines[place], text) for place, text in (_unsolvable(valid, vary) if vary.lines else ()))
+        for line, text in sorted([*vary.faults, *reasons], key=itemgetter(0)):
+            yield ("file",), None, f"{vary.file}:{line}: {text}"
     else:
         yield from _of_curves(valid, vary)
 
 
 def _of_curves(valid: Known, vary: Vary, *, with_existence: bool = True) -> Iterator[Refusal]:
-    """The first combination whose parameters contradict each other or overflow, or whose moments are infinite."""
+    """The first of these."""
+    for _, text in _unsolvable(valid, vary, with_existence=with_existence):
+        yield (), None, text
+        return
+
+
+def _unsolvable(valid: Known, vary: Vary, *, with_existence: bool = True) -> Iterator[tuple[int, str]]:
+    """The places of sets that contradict themselves or overflow, or whose moments are infinite, with the reasons."""
     if not {"oscillator", "noise", "moments"} <= valid.keys():
         return
     p = valid["moments"].values
-    for varied in vary.sets():
+    for place, varied in enumerate(vary.sets()):
         reason = _obstacle(valid, varied, p, with_existence=with_existence)
         if reason:
-            yield (), varied, _with(varied) + reason
-            return
+            yield place, _with(varied) + reason
 
 
 def _with(varied: Varied) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import stat
 import tomllib
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
@@ -12,11 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.errors import CaseError, Fault
 
 _BLANK = re.compile(r"(?:\s|#[^\n]*)*")
 _KEY = re.compile(r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')
 _STRING = re.compile(r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'', re.DOTALL)
+_WORDS = Words("the case", "a case file", "fig1.toml", "TOML", "start from a copy of cases/minimal.toml")
 _SCALAR = re.compile(r"[^,\]}\n#]+")
 
 
@@ -232,33 +233,10 @@ def _loads(text: str) -> dict[str, Any]:
 
 
 def _read(path: str | Path) -> str:
-    def refuse(sentence: str, line: int | None = None) -> CaseError:
-        return CaseError(str(path), [Fault("", line, sentence)])
-
     try:
-        mode = Path(path).stat().st_mode
-        if stat.S_ISDIR(mode):
-            raise refuse("is a directory; name a case file in it, such as fig1.toml")
-        if not stat.S_ISREG(mode):
-            raise refuse("is a pipe or a device, not a file; write the case into a file and name that")
-        content = Path(path).read_bytes()
-    except FileNotFoundError:
-        raise refuse(f"no such file; look in {Path(path).parent.resolve()} or give the full path") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise refuse(f"cannot be read ({reason}); check its name and permissions") from None
-    if content.startswith(b"\xef\xbb\xbf"):
-        raise refuse('starts with a byte order mark; save it as "UTF-8", not "UTF-8 with BOM"', 1)
-    if b"\0" in content:
-        raise refuse("is binary or UTF-16, not UTF-8 text; name a TOML file, or save it as UTF-8")
-    try:
-        text = content.decode()
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise refuse(f"is not UTF-8 text: byte 0x{content[error.start]:02x}; save it as UTF-8", line) from None
-    if not text.strip():
-        raise refuse("is empty; start from a copy of cases/minimal.toml")
-    return text
+        return read_text(Path(path), _WORDS)
+    except Unreadable as error:
+        raise CaseError(str(path), [Fault("", error.line, error.sentence)]) from None
 
 
 def _syntax_fault(text: str, message: str) -> Fault:

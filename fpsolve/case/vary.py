@@ -32,17 +32,19 @@ ABSCISSAE: Mapping[str, FieldInfo] = {"p": Moments.__pydantic_fields__["p"], **P
 """What a figure may have along its x-axis, each with its record."""
 
 
-def _list_of(record: FieldInfo) -> TypeAdapter[Values]:
-    """A list of what a key accepts."""
+def _list_of(record: FieldInfo, most: int | None = None) -> TypeAdapter[Values]:
+    """A list of what a key accepts, with at most so many entries."""
     kind = Annotated[
         tuple[Annotated[float, Field(), *record.metadata], ...],
-        Field(strict=False, min_length=1, max_length=MAX_MOMENTS),
+        Field(strict=False, min_length=1, max_length=most),
     ]
     return TypeAdapter(kind, config=STRICT)
 
 
-VARIABLE: Mapping[str, TypeAdapter[Values]] = {key: _list_of(record) for key, record in PARAMETERS.items()}
+VARIABLE: Mapping[str, TypeAdapter[Values]] = {key: _list_of(record, MAX_MOMENTS) for key, record in PARAMETERS.items()}
 """What the lists of numbers of [vary] may hold."""
+COLUMN: Mapping[str, TypeAdapter[Values]] = {key: _list_of(record) for key, record in PARAMETERS.items()}
+"""What a column of a file may hold."""
 
 
 @dataclass(frozen=True)

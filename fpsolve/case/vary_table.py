@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import ValidationError, ValidationInfo
 
-from fpsolve.case.messages import Refusal, explain, nearest, own_faults, refuse, shown_with_kind, too_long
+from fpsolve.case.messages import Refusal, explain, nearest, own_faults, refuse, shown, shown_with_kind, too_long
+from fpsolve.case.reading import Unreadable
 from fpsolve.case.sections import Sweep, Value, flat
+from fpsolve.case.set_file import FileVary, read_sets
 from fpsolve.case.vary import RECORDS, VARIABLE, WORDS, Vary, assignments, groups, repeats
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
 Columns = dict[str, tuple[Value, ...]]
 
 
-def vary_of(value: Any) -> Vary:
-    """What [vary] means; a `Vary` is left. Raises ValidationError with all that is wrong with it."""
+def vary_of(value: Any, info: ValidationInfo) -> Vary:
+    """What [vary] means; a `Vary` is left. Raises ValidationError with all that is wrong with it.
+
+    Of a file the rows that are wrong by themselves are not raised, but among the faults of its `FileVary`.
+    """
     if isinstance(value, Vary):
         return value
     if not isinstance(value, dict):
         text = f"got {shown_with_kind(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
         refuse([((), value, text)])
     table = flat(value, RECORDS)
+    if "file" in table:
+        return _of_file(table, (info.context or {}).get("folder", Path()))
     mode = table.pop("mode", "product")
     columns, refusals = Columns(), list(_of_mode(mode))
     for key, item in table.items():
@@ -30,6 +38,27 @@ def vary_of(value: Any) -> Vary:
     refuse(refusals)
     refuse(_uneven(columns) if mode == "zip" else _repeated(columns))
     return Vary(columns, mode)
+
+
+def _of_file(table: Mapping[str, Any], folder: Path) -> FileVary:
+    """The sets of a file, beside which nothing else may stand."""
+    file, mode = table["file"], table.get("mode", "zip")
+    others = [key for key in table if key not in ("file", "mode")]
+    if not isinstance(file, str) or not file:
+        text = f'got {shown_with_kind(file)}; must be the path of a file of sets; write, for example, file = "sets.csv"'
+        refuse([(("file",), file, text)])
+    if others:
+        text = f"gives every value, so nothing may stand beside it, but {', '.join(others)} does; remove that, or file"
+        refuse([(("file",), file, f"{text}, as by --set 'vary={{ file = {shown(file)} }}'")])
+    if mode != "zip":
+        text = f"got {shown(mode)}; the rows of a file are sets side by side; remove it"
+        refuse([(("mode",), mode, text)])
+    try:
+        return read_sets(file, folder)
+    except Unreadable as error:
+        place = file if error.line is None else f"{file}:{error.line}"
+        refuse([(("file",), file, f"{place}: {error.sentence}")])
+        raise
 
 
 def _of_mode(mode: Any) -> Iterator[Refusal]:
@@ -42,8 +71,9 @@ def _of_mode(mode: Any) -> Iterator[Refusal]:
 def _column(key: str, values: Any, columns: Columns) -> Iterator[Refusal]:
     """What is wrong with the values of a key; without faults these join the columns."""
     if key not in RECORDS:
-        guess = nearest(key, (*RECORDS, "mode"))
-        yield (key,), values, f"cannot be varied;{guess} known keys: {', '.join(RECORDS)}; rename or remove it"
+        known = (*RECORDS, "mode", "file")
+        text = f"cannot be varied;{nearest(key, known)} known keys: {', '.join(known)}; rename or remove it"
+        yield (key,), values, text
         return
     if key in WORDS:
         yield from _texts(key, values, columns)
@@ -85,8 +115,12 @@ def _range(key: str, table: Mapping[str, Any], columns: Columns) -> Iterator[Ref
         except ValidationError:
             wrong = True
             yield (key, end), getattr(sweep, end), ""
-    if not wrong:
-        columns[key] = tuple(sweep.values.tolist())
+    values = tuple(sweep.values.tolist())
+    if len(set(groups(values))) < len(values):
+        text = f"got num = {sweep.num}, which makes values equal to 12 digits; use a smaller num, or ends further apart"
+        yield (key, "num"), sweep.num, text
+    elif not wrong:
+        columns[key] = values
 
 
 def _repeated(columns: Columns) -> Iterator[Refusal]:

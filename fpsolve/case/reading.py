@@ -1,0 +1,77 @@
+"""The text of a file that somebody wrote, or one sentence on why it is none."""
+
+from __future__ import annotations
+
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+_MARK = b"\xef\xbb\xbf"
+
+
+class Unreadable(Exception):
+    """A file that is no text.
+
+    Attributes:
+        sentence: why, and what to do.
+        line: where; None where that is not in the file.
+    """
+
+    def __init__(self, sentence: str, line: int | None = None) -> None:
+        super().__init__(sentence)
+        self.sentence, self.line = sentence, line
+
+
+@dataclass(frozen=True)
+class Words:
+    """What messages on a file speak of.
+
+    Attributes:
+        content: what is in it, such as "the case".
+        kind: what it is, such as "a case file".
+        example: its name, such as "fig1.toml".
+        format: such as "TOML".
+        start: what to do where it is empty.
+        may_have_mark: whether it may start with a byte order mark.
+    """
+
+    content: str
+    kind: str
+    example: str
+    format: str
+    start: str
+    may_have_mark: bool = False
+
+
+def read_text(path: Path, words: Words) -> str:
+    """The text of a file in UTF-8. Raises Unreadable."""
+    content = _content(path, words)
+    if content.startswith(_MARK):
+        if not words.may_have_mark:
+            raise Unreadable('starts with a byte order mark; save it as "UTF-8", not "UTF-8 with BOM"', 1)
+        content = content.removeprefix(_MARK)
+    if b"\0" in content:
+        raise Unreadable(f"is binary or UTF-16, not UTF-8 text; name a {words.format} file, or save it as UTF-8")
+    try:
+        text = content.decode()
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise Unreadable(f"is not UTF-8 text: byte 0x{content[error.start]:02x}; save it as UTF-8", line) from None
+    if not text.strip():
+        raise Unreadable(f"is empty; {words.start}")
+    return text
+
+
+def _content(path: Path, words: Words) -> bytes:
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise Unreadable(f"is a directory; name {words.kind} in it, such as {words.example}")
+        if not stat.S_ISREG(mode):
+            raise Unreadable(f"is a pipe or a device, not a file; write {words.content} into a file and name that")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise Unreadable(f"no such file; look in {path.parent.resolve()} or give the full path") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise Unreadable(f"cannot be read ({reason}); check its name and permissions") from None
