@@ -33,7 +33,7 @@ ROOMS = {
     ],
     "analysis": ["density", "sensitivity", "curve", "continuation", "special_points", "zero", "stability", "regions"],
     "case": [
-        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "chart", "curves"),
+        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "chart", "output", "curves"),
         *("remedies", "refusals", "case"),
     ],
     "study": ["results", "solve", "simulate", "chart"],

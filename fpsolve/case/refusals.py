@@ -21,6 +21,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartAxis, ChartSection
 from fpsolve.case.curves import make_curve
 from fpsolve.case.messages import Refusal, nearest, shown
+from fpsolve.case.output import OutputSection
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.case.sections import (
     Expectation,
@@ -28,7 +29,6 @@ from fpsolve.case.sections import (
     MeshSection,
     Moments,
     MonteCarloSection,
-    OutputSection,
     Varied,
     same,
 )
@@ -147,16 +147,18 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     if not {"oscillator", "noise", "vary"} <= valid.keys():
         return
     p = np.array(section.p or (0.0,))
-    for varied in valid["vary"].sets():
+    vary: Vary = valid["vary"]
+    for place, varied in enumerate(vary.sets()):
+        row = f"{vary.file}:{vary.lines[place]}: " if isinstance(vary, FileVary) else ""
         reason, faults = _obstacle(valid, varied, p), {}
         with suppress(ValidationError):  # that is the reason
             curve = make_curve(valid["oscillator"], valid["noise"], varied)
             faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
         for name, text in faults.items():
             if getattr(section, name) is not None:
-                yield (name,), getattr(section, name), _with(varied) + text
+                yield (name,), getattr(section, name), row + _with(varied) + text
         if reason:
-            yield ("p",), section.p, _with(varied) + reason
+            yield ("p",), section.p, row + _with(varied) + reason
         if faults or reason:
             return
 
@@ -176,8 +178,13 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
 
 
 def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    """Eigenfunctions at p that are not among the moments, and a figure of what is not computed."""
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
-    return _of_orders(valid, wanted, "output.eigenfunctions")
+    yield from _of_orders(valid, wanted, "output.eigenfunctions")
+    figure: FigureSection | None = valid.get("figure")
+    if figure is not None and figure.y not in output.quantities:
+        text = f"has no {shown(figure.y)}, which figure.y draws; add it, or let figure.y be one of the names here"
+        yield ("quantities",), output.quantities, text
 
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
