@@ -15,7 +15,7 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.case.sections import Sweep
-from fpsolve.case.vary import Vary
+from fpsolve.case.vary import Vary, assignments, legend
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
@@ -242,6 +242,19 @@ def test_expectations_select_curves_by_texts(write: Write) -> None:
     for value, words in [('"exat"', 'got "exat"'), ("1.0", "got 1.0")]:
         message = only_fault(write(vary, f"{expected}{value} }}"))
         assert f'expect[0].where."noise.treatment": {words}; must be one of ["ou-reduction", "exact"]; ' in message
+
+
+def test_texts_and_numbers_are_written_for_the_eye() -> None:
+    varied = {"noise.D0": 0.1234567890123, "noise.treatment": "exact", "oscillator.impact": "delta"}
+    assert assignments(varied, "g") == "noise.D0 = 0.123457, noise.treatment = exact, oscillator.impact = delta"
+    assert assignments(varied).startswith("noise.D0 = 0.1234567890123, ")
+    assert legend(varied) == "$D_0$ = 0.123457, treatment = exact, impact = delta"
+
+
+def test_a_simulation_that_is_not_right_names_the_row(write: Write, tmp_path: Path) -> None:
+    sets_file(tmp_path, "noise.tau0\n0.5\n\n1e-3\n")
+    message = only_fault(write('file = "sets.csv"', "[monte_carlo]\nstep = 0.1"))
+    assert message.startswith("monte_carlo.step: sets.csv:4: with noise.tau0 = 0.001: got 0.1, too large for ")
 
 
 def test_a_mesh_is_judged_for_each_treatment(write: Write) -> None:
