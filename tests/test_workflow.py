@@ -11,6 +11,7 @@ from importlib.metadata import version
 
 import numpy as np
 import pytest
+import pyvista
 
 import fpsolve
 from fpsolve.analysis import stationary_density, tilted_density
@@ -368,6 +369,32 @@ def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
     np.testing.assert_array_equal(result.moments_perturbation, reduced.moments_perturbation)
     assert result.curve.is_exact
     assert not reduced.curve.is_exact
+
+
+def test_a_text_is_varied_in_every_file(tmp_path):
+    """Of curves with either noise the theory is that of the reduced one."""
+    sets = ['vary={ noise.treatment = ["ou-reduction", "exact"] }', "output={ eigenfunctions = [2.0] }"]
+    case = write(tmp_path, TEXT, sets)
+    fpsolve.run(case, tmp_path / "out")
+    folder = tmp_path / "out/test"
+    with (folder / "moments.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["noise.treatment"] for row in rows] == ["ou-reduction"] * 3 + ["exact"] * 3
+    reduced, exact = rows[:3], rows[3:]
+    assert [row["perturbation"] for row in reduced] == [row["perturbation"] for row in exact]
+    assert float(reduced[0]["value"]) != pytest.approx(float(exact[0]["value"]), rel=1e-3)
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert [curve["varied"] for curve in summary["curves"]] == [
+        {"noise.treatment": "ou-reduction"},
+        {"noise.treatment": "exact"},
+    ]
+    for stem, treatment in (("eigenfunctions", "ou-reduction"), ("eigenfunctions-2", "exact")):
+        (file,) = (folder / stem).glob("*.vtu")
+        assert pyvista.read(file).field_data["noise.treatment"][0] == treatment
+    written = files(folder)
+    with pytest.raises(KeyboardInterrupt):
+        simulate_case(case, tmp_path / "out", watch=Watch(bar=lambda *_: nullcontext(raising_at(1, KeyboardInterrupt))))
+    assert files(folder) == written
 
 
 def test_an_unwritable_folder_is_refused_before_solving(case, tmp_path):
