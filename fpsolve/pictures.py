@@ -162,4 +162,4 @@ def finish(axes: Axes, **kwargs: Any) -> None:
 
 def add_legend(axes: Axes) -> None:
     """A legend in letters a little smaller than those of the axes."""
-    axes.legend(frameon=False, fontsize=0.85 * axes.xaxis.label.get_fontsize())
+    axes.legend(frameon=False, fontsize=0.85 * float(axes.xaxis.label.get_fontsize()))
