@@ -161,8 +161,8 @@ def test_torn_and_damaged_records_are_solved_again(place):
 
 def test_a_changed_parameter_solves_only_what_it_changes(place):
     shutil.copytree(place / "whole", place / "changed")
-    omega, D0 = "[0.5, 0.7]", f"{{ start = 0.1, stop = 1.0, num = {SIZE}, scale = \"log\" }}"
-    sets = f"vary={{ \"noise.D0\" = {D0}, \"oscillator.omega\" = {omega} }}"
+    omega, D0 = "[0.5, 0.7]", f'{{ start = 0.1, stop = 1.0, num = {SIZE}, scale = "log" }}'
+    sets = f'vary={{ "noise.D0" = {D0}, "oscillator.omega" = {omega} }}'
     run(place, "changed", "--jobs", "1", "--set", sets)
     assert len(lines(place, "changed")) == SIZE**2 + SIZE  # omega = 0.5 is known
     run(place, "changed", "--jobs", "1", "--set", 'title="Another"', "--set", "figure.x=p")
