@@ -9,7 +9,7 @@ import pytest
 import fpsolve
 
 ROOMS = {
-    "": ["errors", "arrays", "files", "process", "pictures", "data"],
+    "": ["errors", "arrays", "files", "process", "pool", "pictures", "data"],
     "model": [
         "parameters",
         "words",

@@ -14,13 +14,12 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, begun, found, traced
 from fpsolve.analysis.curve import Trace
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, rows_of, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.zero import Axis, Quantity, Zero, said, zero_of
+from fpsolve.analysis.zero import Axis, Quantity, Zero, check_axes, zero_of
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, brief, dataset, described
 from fpsolve.exponent.adapt import Budget
@@ -131,7 +130,7 @@ class Boundary(Result):
         other = replace(self, x=x or self.x, y=y or self.y, traces=(), scan=None)
         if (other.x.key, other.y.key) != (self.x.key, self.y.key):
             raise ValueError(f"a frame of {other.x.key}, {other.y.key}: use `started_from` for other parameters")
-        _check_axes(self.family, other.x, other.y)
+        check_axes(self.family, other.x, other.y)
         seeds = (
             np.array([other.x.share(x), other.y.share(y)])
             for branch in self.branches
@@ -148,7 +147,7 @@ class Boundary(Result):
         here = self.branches[branch]
         values = {self.x.key: float(here.x[point]), self.y.key: float(here.y[point])}
         family = self.family.at(values)
-        _check_axes(family, x, y)
+        check_axes(family, x, y)
         theta = {axis.key: family.directions()[axis.key].theta for axis in (x, y)}
         start = np.array([axis.share(theta[axis.key]) for axis in (x, y)])
         if np.any((start < 0) | (start > 1)):
@@ -303,33 +302,13 @@ def boundary(
             `nodes` is none of these.
     """
     family = Family(problem, original)
-    _check_axes(family, x, y)
+    check_axes(family, x, y)
     if isinstance(nodes, bool) or not isinstance(nodes, int) or nodes < 2:
         raise ValueError(f"got nodes = {nodes!r}; must be a whole number from 2")
     empty = Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
     line = Boundary(zero_of(zero), x, y, family, scan=empty, step=_checked_step(step), budget=budget or Budget())
     *_, whole = line.grown()
     return whole
-
-
-def _check_axes(family: Family, x: Axis, y: Axis) -> None:
-    """Refuse axes that span no frame. Raises `ValueError`."""
-    known = family.directions()
-    for axis in (x, y):
-        if not isinstance(axis, Axis):
-            raise ValueError(f"got {axis!r} as an axis; must be an Axis")
-        if axis.key not in known:
-            raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known) or 'none'}")
-        for name, value in (("start", axis.start), ("stop", axis.stop)):
-            try:
-                family.at({axis.key: value})
-            except ValidationError as failure:
-                if failure.errors()[0]["loc"]:  # of this parameter alone
-                    raise ValueError(f"got {axis.key} with {name} = {value:g}: {said(failure)}") from failure
-            except ValueError:  # elsewhere in the frame it may be one
-                continue
-    if x.key == y.key:
-        raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
 
 
 def _checked_step(step: float) -> float:

@@ -154,6 +154,26 @@ def said(failure: ValueError) -> str:
     return "; ".join(f"{key}: {text}" if key else text for key, text in faults)
 
 
+def check_axes(family: Family, x: Axis, y: Axis) -> None:
+    """Refuse axes that span no frame. Raises `ValueError`."""
+    known = family.directions()
+    for axis in (x, y):
+        if not isinstance(axis, Axis):
+            raise ValueError(f"got {axis!r} as an axis; must be an Axis")
+        if axis.key not in known:
+            raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known) or 'none'}")
+        for name, value in (("start", axis.start), ("stop", axis.stop)):
+            try:
+                family.at({axis.key: value})
+            except ValidationError as failure:
+                if failure.errors()[0]["loc"]:  # of this parameter alone
+                    raise ValueError(f"got {axis.key} with {name} = {value:g}: {said(failure)}") from failure
+            except ValueError:  # elsewhere in the frame it may be one
+                continue
+    if x.key == y.key:
+        raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
+
+
 class Quantity:
     """F over the unit square: λ or Λ(p)/p, with its gradient.
 

@@ -79,6 +79,7 @@ _MAKERS: Mapping[str, Callable[[Any], Any]] = {
     "Estimator": str,
     "FloatArray": _array,
     "tuple[str, ...]": tuple,
+    "Mapping[str, float | str]": dict,
     "tuple[MomentEstimate, ...]": _estimates,
     "dict[str, tuple[float, float]]": lambda pairs: {key: (float(a), float(b)) for key, (a, b) in pairs.items()},
 }

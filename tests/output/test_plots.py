@@ -11,7 +11,7 @@ from fpsolve.exponent.quantities import MOMENT
 from fpsolve.output.figures import draw
 from fpsolve.output.plots import Series, write_figure, write_response_figure
 from fpsolve.simulation.response import MEANS, Response
-from fpsolve.study.solve import solve_curves
+from tests.solving import solve_case
 
 ROOT = Path(__file__).parents[2]
 
@@ -108,7 +108,7 @@ def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
 @pytest.mark.parametrize(("p", "count"), [("[-1.0, 2.0]", 1), ("[1.0, 2.0]", 0)])
 def test_stability_index_of_a_case_is_marked_where_p_reaches_it(drawn, tmp_path, p, count):
     case = load_case(ROOT / "cases/minimal.toml", [f"moments.p={p}"])
-    results = list(solve_curves(case))
+    results = solve_case(case)
     draw(case, results, [], tmp_path)
     found = [x for x, _, _ in marks(drawn[0])]
     assert found == [results[0].stability_index.value][:count]

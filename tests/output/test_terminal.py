@@ -7,7 +7,7 @@ import pytest
 from fpsolve.case.case import load_case
 from fpsolve.output.terminal import print_remark, print_results, print_simulation
 from fpsolve.study.simulate import simulate_curves
-from fpsolve.study.solve import solve_curves
+from tests.solving import solve_case
 from tests.test_workflow import TEXT
 
 NONLINEAR = ["vary={}", "oscillator.c1=0.8", "oscillator.c2=0.5", "monte_carlo={ paths = 64, time = 100.0 }"]
@@ -24,7 +24,7 @@ def case(tmp_path_factory):
 @pytest.mark.parametrize("width", [60, 80, 200])
 def test_quantities_are_whole(case, width, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))
-    results, simulated = tuple(solve_curves(case)), tuple(simulate_curves(case))
+    results, simulated = solve_case(case), tuple(simulate_curves(case))
     capsys.readouterr()
     for show, names in (
         (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)", "N", "R_c"}),

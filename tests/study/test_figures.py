@@ -9,8 +9,9 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.study.solve import compare, solve_curves
+from fpsolve.study.solve import compare
 from tests.oracles import perturbation
+from tests.solving import solve_case
 
 CASES = Path(__file__).parents[2] / "cases"
 NAMES = sorted(path.stem for path in CASES.glob("*.toml"))
@@ -19,7 +20,7 @@ NAMES = sorted(path.stem for path in CASES.glob("*.toml"))
 @cache
 def solved(name):
     case = load_case(CASES / f"{name}.toml")
-    return case, [result.without_pairs() for result in solve_curves(case)]
+    return case, solve_case(case)
 
 
 def index(result):
@@ -57,7 +58,7 @@ def test_every_case_converges_to_its_rtol(name):
 def test_fig1_differs_little_from_perturbation_theory():
     """«the differences between analytical and numerical results are very small»"""
     _, values, results = curves("fig1")
-    theory = np.array([result.moments_perturbation for result in results])
+    theory = np.array([result.moments.perturbation for result in results])
     assert np.max(np.abs(values - theory)) < 2e-3 * np.max(np.abs(theory))
     assert np.max(np.abs(values - theory)) > 1e-5  # and yet they are there
 

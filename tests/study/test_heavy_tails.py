@@ -8,7 +8,7 @@ import pytest
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.output.figures import _moment_series
-from fpsolve.study.solve import solve_curves
+from tests.solving import solve_case
 
 CASE = """
 title = "Heavy tails"
@@ -56,13 +56,13 @@ def test_a_positive_exponent_is_no_slope(path, tmp_path):
     for c1, is_slope in (("0.0", False), ("-0.5", True)):
         other = tmp_path / f"c{c1}.toml"
         other.write_text(CASE.replace("c1 = 0.0", f"c1 = {c1}"), encoding="utf-8")
-        (result,) = solve_curves(load_case(other))
+        (result,) = solve_case(load_case(other))
         assert (result.lyapunov_exponent.value < 0) == is_slope
         assert ("not Λ′(0)" in result.notes[0]) != is_slope
 
 
 def test_the_figure_tells_rare_paths_apart(path):
-    (result,) = solve_curves(load_case(path))
+    (result,) = solve_case(load_case(path))
     np.testing.assert_array_equal(_moment_series(result, None).rare, [False, True, False])
 
 

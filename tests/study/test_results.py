@@ -9,7 +9,8 @@ import pytest
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.study.simulate import simulate_curves
-from fpsolve.study.solve import compare, solve_curves
+from fpsolve.study.solve import compare
+from tests.solving import solve_sets
 
 CASE = """
 title = "A curve"
@@ -54,20 +55,32 @@ def case(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def result(case):
-    (found,) = solve_curves(case)
+def solved(case):
+    (found,) = solve_sets(case)
     return found
 
 
-@pytest.mark.parametrize("has_pairs", [True, False])
-def test_solved_curves_pickle(case, result, has_pairs):
-    original = result if has_pairs else result.without_pairs()
-    again = pickle.loads(pickle.dumps(original))
+@pytest.fixture(scope="module")
+def result(solved):
+    return solved.result
+
+
+def test_results_pickle(case, result):
+    again = pickle.loads(pickle.dumps(result))
     np.testing.assert_array_equal(again.moments.value, result.moments.value)
     assert again.estimates == result.estimates
     assert again.curve == result.curve
-    assert len(again.eigenpairs) == has_pairs
     assert compare(case, [again]) == compare(case, [result])
+
+
+def test_solved_curves_pickle_with_their_eigenpairs(solved):
+    again = pickle.loads(pickle.dumps(solved))
+    np.testing.assert_array_equal(again.result.moments.value, solved.result.moments.value)
+    [pair], [original] = again.eigenpairs, solved.eigenpairs
+    assert pair.p == original.p == 1.0
+    for one, other in ((pair, original), (again.stationary, solved.stationary)):
+        np.testing.assert_array_equal(one.right, other.right)
+        np.testing.assert_array_equal(one.left, other.left)
 
 
 def test_comparisons_pickle(case, result):

@@ -65,6 +65,16 @@ def raising(exception):
     return fail
 
 
+def names(folder):
+    """Of all in a folder of results but the records."""
+    return {path.name for path in folder.iterdir()} - {"records"}
+
+
+def records(out):
+    """How many simulations are kept."""
+    return sum(len(path.read_bytes().splitlines()) for path in out.glob("quick/records/simulated/*.jsonl"))
+
+
 def read(path):
     return json.loads(Path(path).read_text(encoding="utf-8"))
 
@@ -86,13 +96,14 @@ def test_monte_carlo_json(case, out, capsys):
     printed = capsys.readouterr()
     assert "6400 paths" in printed.out
     assert "λ =" in printed.out
-    assert sorted(path.name for path in (out / "quick").iterdir()) == ["monte_carlo.json"]
+    assert names(out / "quick") == {"monte_carlo.json"}
+    assert records(out) == 1
 
 
 def test_vtk_is_not_loaded_where_there_is_no_response(case, out, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyvista", None)
     assert simulate(case, "--out", out, *QUICK) == 0
-    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+    assert names(out / "quick") == {"monte_carlo.json"}
 
 
 def test_options_replace_those_of_the_case(case, out):
@@ -118,7 +129,7 @@ def test_each_curve_has_its_file_and_stale_ones_go(case, out):
         {"noise.D0": 0.1}, {"noise.D0": 0.2},
     ]  # fmt: skip
     assert simulate(case, "--out", out, *QUICK) == 0
-    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+    assert names(out / "quick") == {"monte_carlo.json"}
 
 
 def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out, capsys, monkeypatch):
@@ -129,8 +140,8 @@ def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out
         (out / "quick" / name).write_text("{}", encoding="utf-8")
     monkeypatch.setattr(simulated, "simulate_curve", raising(KeyboardInterrupt))
     assert simulate(case, "--out", out) == 130
-    assert [path.name for path in (out / "quick").iterdir()] == ["notes.txt"]
-    assert capsys.readouterr().err.strip() == "interrupted after 0 of 1 curve; run it again to start over"
+    assert {path.name for path in (out / "quick").iterdir()} == {"notes.txt"}
+    assert capsys.readouterr().err.strip() == "interrupted after 0 of 1 curve; run it again to go on"
 
 
 def test_the_nonlinear_response_is_written(case, out):
@@ -140,8 +151,8 @@ def test_the_nonlinear_response_is_written(case, out):
     ]
     assert simulate(case, "--out", out, *nonlinear) == 0
     folder = out / "quick"
-    names = {"monte_carlo.json", "response.csv", "response.vti", "response.png", "response.pdf"}
-    assert {path.name for path in folder.iterdir()} == names
+    written = {"monte_carlo.json", "response.csv", "response.vti", "response.png", "response.pdf"}
+    assert names(folder) == written
     response = read(folder / "monte_carlo.json")["response"]
     assert response["means"].keys() == {"x", "x_squared", "v_squared", "amplitude", "energy"}
     with (folder / "response.csv").open(encoding="utf-8") as file:
@@ -198,7 +209,7 @@ def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, ou
     assert (out / "quick/summary.json").exists()
     printed = capsys.readouterr()
     assert "δ_p" in printed.out
-    message = f"interrupted; what was solved is kept in {out / 'quick'}; run it again to start over"
+    message = f"interrupted; what was solved is kept in {out / 'quick'}; run it again to go on"
     assert printed.err.strip() == message
 
 
@@ -223,7 +234,7 @@ def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, m
 def kept(out, curve, planned):
     """The message of a simulation that was interrupted when something was done."""
     place = f"in the simulation of curve {curve} of {planned}"
-    return f"interrupted {place}; what was done is kept in {out / 'quick'}; run it again to start over"
+    return f"interrupted {place}; what was done is kept in {out / 'quick'}; run it again to go on"
 
 
 def test_an_interrupted_simulation_of_a_run_says_how_to_go_on(case, out, capsys, monkeypatch):
@@ -245,7 +256,7 @@ def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys,
     monkeypatch.setattr(response, "stationary_response", raising(KeyboardInterrupt))
     sets = ["oscillator.c2=0.5", "oscillator.c1=0.8", 'vary."noise.D0"=[0.1, 0.2]']
     assert simulate(case, "--out", out, *(f"--set={text}" for text in sets)) == 130
-    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+    assert names(out / "quick") == {"monte_carlo.json"}
     found = read(out / "quick/monte_carlo.json")
     assert "no stationary response: stopped before it was reached" in found["warnings"]
     assert kept(out, 1, 2) in capsys.readouterr().err
@@ -262,10 +273,37 @@ def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
 
     monkeypatch.setattr(simulated, "simulate_curve", interrupted)
     assert simulate(case, "--out", out, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]') == 130
-    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"]
+    assert names(out / "quick") == {"monte_carlo.json"}
     printed = capsys.readouterr()
     assert kept(out, 2, 2) in printed.err
     assert "64 paths" in printed.out
+
+
+def test_simulations_that_are_finished_are_not_made_again(case, out, monkeypatch):
+    """Nor where they were interrupted later; what is written then is what an undisturbed simulation writes."""
+    original, made, fails = simulated.simulate_curve, [], [0.2]
+
+    def counted(curve, *others):
+        made.append(curve.varied["noise.D0"])
+        if made[-1] in fails:
+            raise KeyboardInterrupt
+        return original(curve, *others)
+
+    monkeypatch.setattr(simulated, "simulate_curve", counted)
+    command = [case, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]', "--out"]
+    assert simulate(*command, out) == 130
+    fails.clear()
+    assert simulate(*command, out) == 0
+    assert made == [0.1, 0.2, 0.2]
+    assert simulate(*command, out, "--seed", "1") == 0
+    assert made[3:] == [0.1, 0.2]
+    assert simulate(*command, out) == 0
+    assert len(made) == 5
+    assert simulate(*command, out.parent / "anew") == 0
+    assert simulate(*command, out, "--fresh") == 0
+    assert made[5:] == [0.1, 0.2] * 2
+    for name in ("monte_carlo.json", "monte_carlo-2.json"):
+        assert (out / "quick" / name).read_bytes() == (out.parent / "anew/quick" / name).read_bytes()
 
 
 def wait_for(path):
@@ -297,7 +335,8 @@ def test_a_real_interrupt(case, out):
         assert time.monotonic() - begun < 20
     is_kept = "what was done is kept" in err
     assert is_kept or "interrupted after 0 of 1 curve" in err
-    assert [path.name for path in (out / "quick").iterdir()] == ["monte_carlo.json"] * is_kept
+    assert names(out / "quick") == ({"monte_carlo.json"} if is_kept else set())
+    assert records(out) == 1  # the first one
     assert not is_kept or read(out / "quick/monte_carlo.json")["paths"] == 400_000
 
 
@@ -323,7 +362,8 @@ def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
     assert not any("stopped early" in text for text in first["warnings"])
     assert any("stopped early" in text for text in second["warnings"])
     assert second["time"] < 0.7 * first["time"]
-    assert len(list((out / "quick").iterdir())) == 2  # an earlier third one is gone
+    assert names(out / "quick") == {"monte_carlo.json", "monte_carlo-2.json"}  # an earlier third one is gone
+    assert records(out) == 1
     assert kept(out, 2, 3) in capsys.readouterr().err
 
 

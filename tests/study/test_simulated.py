@@ -50,6 +50,7 @@ RESULT = MonteCarlo(
     impacts=0,
     warnings=("Λ(p) at p = 2", 'a "quoted" one\nof two lines'),
     interrupted=True,
+    parameters={"noise.D0": 0.1, "noise.treatment": "exact"},
 )
 
 
