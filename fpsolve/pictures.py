@@ -157,4 +157,9 @@ def finish(axes: Axes, **kwargs: Any) -> None:
     if low < 0 < high:
         mark_zero(axes)
     if "label" in kwargs or len(set(axes.get_legend_handles_labels()[1])) > 1:
-        axes.legend(frameon=False)
+        add_legend(axes)
+
+
+def add_legend(axes: Axes) -> None:
+    """A legend in letters a little smaller than those of the axes."""
+    axes.legend(frameon=False, fontsize=0.85 * float(axes.xaxis.label.get_fontsize()))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
+import re
 import signal
 import threading
 import time
@@ -213,9 +214,11 @@ def _client(address: str) -> Any:
         raise FpsolveError("Dask is not installed; install it with: pip install 'fpsolve[cluster]'") from None
     connect: Callable[..., Any] = distributed.Client
     logging.getLogger("distributed").setLevel(logging.ERROR)  # it tells of workers that come and go
+    if not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
+        raise FpsolveError(f'--scheduler: got "{address}"; must be an address such as tcp://host:8786')
     try:
         client = connect(address, timeout=CONNECT_SECONDS, set_as_default=False)
-    except (OSError, ValueError) as failure:
+    except OSError as failure:
         raise FpsolveError(
             f"no scheduler answers at {address} ({failure}); start one with: dask scheduler"
         ) from failure

@@ -37,7 +37,7 @@ ROOMS = {
         "regions",
     ],
     "case": [
-        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "chart", "curves"),
+        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "chart", "output", "curves"),
         *("remedies", "refusals", "case"),
     ],
     "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart"],

@@ -22,7 +22,7 @@ from fpsolve.model.quantity import (
     moment_at,
     parameter_of,
 )
-from fpsolve.pictures import draw_bars
+from fpsolve.pictures import add_legend, draw_bars
 
 if TYPE_CHECKING:
     import xarray
@@ -90,7 +90,7 @@ class Sensitivities(Result):
         draw_bars(axes, bars, [parameter_of(key).latex or key for key in self.theta], **kwargs)
         axes.set_xlabel(r"effect of a relative change, $\theta\,\partial/\partial\theta$ (1/time)")
         if bars:
-            axes.legend(frameon=False)
+            add_legend(axes)
 
     def _said(self) -> str:
         what = [*self.indices, *[f"Λ({p:g})" for p in self.p[:1]], *["..."] * (self.p.size > 1)]

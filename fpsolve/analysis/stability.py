@@ -27,7 +27,7 @@ from fpsolve.model.direction import Family
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import parameter_of, parameter_values
-from fpsolve.pictures import coloured, label_of, plain_numbers
+from fpsolve.pictures import add_legend, coloured, label_of, plain_numbers
 
 if TYPE_CHECKING:
     import xarray
@@ -270,7 +270,7 @@ def _draw_lines(line: Boundary, found: xarray.Dataset, axes: Axes, **kwargs: Any
     for side, axis in ((axes.xaxis, line.x), (axes.yaxis, line.y)):
         if axis.scale == "log":
             plain_numbers(side, axis.start, axis.stop)
-    axes.legend(frameon=False)
+    add_legend(axes)
 
 
 @of_problem

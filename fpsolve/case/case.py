@@ -13,6 +13,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartSection
 from fpsolve.case.curves import Curve, make_curve
 from fpsolve.case.messages import explain, refuse, shortened
+from fpsolve.case.output import OutputSection
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
     Expectation,
@@ -21,7 +22,6 @@ from fpsolve.case.sections import (
     Moments,
     MonteCarloSection,
     NoiseSection,
-    OutputSection,
     Section,
     Text,
     Varied,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from typing import Any
 
 from fpsolve.case.sections import NoiseSection, Value, Varied, flat
-from fpsolve.case.vary import assignments
+from fpsolve.case.vary import RECORDS, assignments
 from fpsolve.model.noise import ColouredNoise, NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
@@ -58,21 +59,45 @@ class Curve:
     @property
     def original_noise(self) -> NonGaussianNoise:
         """The noise of Eq. (7), whatever its treatment."""
-        return NoiseSection(**_section("noise", self.parameters)).original()
+        return _noise(*(self.parameters[key] for key in NOISE)).original()
 
 
 def make_curve(oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Varied, number: int = 1) -> Curve:
     """The curve on which some parameters are replaced, by their dotted keys."""
-    system = asdict(oscillator) | {"impact": oscillator.impact.value}
-    parameters: dict[str, Any] = flat({"oscillator": system, "noise": noise.model_dump()}) | varied
+    parameters = {**_stated(oscillator, noise), **varied}
     return Curve(
-        oscillator=VibroImpactOscillator(**_section("oscillator", parameters)),
-        noise=NoiseSection(**_section("noise", parameters)).process(),
+        oscillator=_oscillator(*(parameters[key] for key in OSCILLATOR)),
+        noise=_noise(*(parameters[key] for key in NOISE)).process(),
         parameters=parameters,
         varied=varied,
         number=number,
     )
 
 
-def _section(name: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
-    return {key.partition(".")[2]: value for key, value in parameters.items() if key.startswith(f"{name}.")}
+OSCILLATOR, NOISE = (tuple(key for key in RECORDS if key.startswith(section)) for section in ("oscillator.", "noise."))
+"""The dotted keys of either half of a problem, in the order of its fields."""
+
+
+@lru_cache(maxsize=4)
+def _stated(oscillator: VibroImpactOscillator, noise: NoiseSection) -> dict[str, Value]:
+    """Every parameter of a case by its dotted key."""
+    system = asdict(oscillator) | {"impact": oscillator.impact.value}
+    stated: dict[str, Value] = flat({"oscillator": system, "noise": noise.model_dump()})
+    return stated
+
+
+@lru_cache(maxsize=1024)
+def _oscillator(*values: Any) -> VibroImpactOscillator:
+    """The oscillator with these parameters; curves that vary the noise alone share it."""
+    return VibroImpactOscillator(**_named(OSCILLATOR, values))
+
+
+@lru_cache(maxsize=1024)
+def _noise(*values: Any) -> NoiseSection:
+    """The noise with these parameters; curves that vary the oscillator alone share it."""
+    return NoiseSection(**_named(NOISE, values))
+
+
+def _named(keys: Sequence[str], values: Sequence[Any]) -> dict[str, Any]:
+    """Values by the names of their fields."""
+    return {key.partition(".")[2]: value for key, value in zip(keys, values, strict=True)}

@@ -21,6 +21,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartAxis, ChartSection
 from fpsolve.case.curves import make_curve
 from fpsolve.case.messages import Refusal, nearest, shown
+from fpsolve.case.output import OutputSection
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.case.sections import (
     Expectation,
@@ -28,7 +29,6 @@ from fpsolve.case.sections import (
     MeshSection,
     Moments,
     MonteCarloSection,
-    OutputSection,
     Varied,
     same,
 )
@@ -37,7 +37,7 @@ from fpsolve.case.vary import ABSCISSAE, WORDS, Vary, assignments
 from fpsolve.errors import MeshError, NoSuchExponent
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Discretisation, noise_space
-from fpsolve.model.noise import check_existence
+from fpsolve.model.noise import NonGaussianNoise, check_existence
 from fpsolve.simulation.setup import obstacles
 from fpsolve.theory.perturbation import second_order
 
@@ -124,9 +124,14 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
 
 
 def _misfit(mesh: CylinderMesh, valid: Known) -> str:
-    """Why the mesh does not serve some noise, or nothing; in noise units a noise is told by its r0 and treatment."""
+    """Why the mesh does not serve some noise, or nothing; in noise units all reduced noises are one, others have r0."""
+    judged = set[float | None]()
     for varied in valid["vary"].among(("noise.r0", "noise.treatment")):
-        noise = make_curve(valid["oscillator"], valid["noise"], varied).noise
+        curve = make_curve(valid["oscillator"], valid["noise"], varied)
+        noise, shape = curve.noise, curve.noise.r0 if isinstance(curve.noise, NonGaussianNoise) else None
+        if shape in judged:
+            continue
+        judged.add(shape)
         chosen = Discretisation.on(mesh, noise)
         size, most = chosen.unknowns(noise), valid["budget"].unknowns
         if size > most:
@@ -147,16 +152,19 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     if not {"oscillator", "noise", "vary"} <= valid.keys():
         return
     p = np.array(section.p or (0.0,))
-    for varied in valid["vary"].sets():
-        reason, faults = _obstacle(valid, varied, p), {}
+    vary: Vary = valid["vary"]
+    is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
+    for place, varied in enumerate(vary.sets()):
+        row = f"{vary.file}:{vary.lines[place]}: " if isinstance(vary, FileVary) else ""
+        reason, faults = "" if is_known else _obstacle(valid, varied, p), {}
         with suppress(ValidationError):  # that is the reason
             curve = make_curve(valid["oscillator"], valid["noise"], varied)
             faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
         for name, text in faults.items():
             if getattr(section, name) is not None:
-                yield (name,), getattr(section, name), _with(varied) + text
+                yield (name,), getattr(section, name), row + _with(varied) + text
         if reason:
-            yield ("p",), section.p, _with(varied) + reason
+            yield ("p",), section.p, row + _with(varied) + reason
         if faults or reason:
             return
 
@@ -176,8 +184,13 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
 
 
 def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    """Eigenfunctions at p that are not among the moments, and a figure of what is not computed."""
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
-    return _of_orders(valid, wanted, "output.eigenfunctions")
+    yield from _of_orders(valid, wanted, "output.eigenfunctions")
+    figure: FigureSection | None = valid.get("figure")
+    if figure is not None and figure.y not in output.quantities:
+        text = f"has no {shown(figure.y)}, which figure.y draws; add it, or let figure.y be one of the names here"
+        yield ("quantities",), output.quantities, text
 
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:

@@ -16,9 +16,9 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.messages import LIST, TABLE, Refusal, nearest, refuse, shown, shown_with_kind
+from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
 from fpsolve.errors import MeshError
-from fpsolve.exponent.quantities import QUANTITIES, DrawnName, QuantityName
+from fpsolve.exponent.quantities import DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, vertices_at
 from fpsolve.fem.mesh_file import read_mesh
 from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
@@ -241,52 +241,6 @@ class FigureSection(Section):
         else:
             return self
         refuse([(("y",), self.y, f'got "{self.y}"; {remedy}')])
-        return self
-
-
-SENSITIVITIES, EIGENFUNCTIONS = "sensitivities", "eigenfunctions"
-QUANTITY_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS)
-"""What may be asked for; eigenfunctions with the stationary density."""
-
-
-def _quantities(value: Any) -> Any:
-    """A list of names, each known and there once."""
-    known = ", ".join(f'"{name}"' for name in QUANTITY_NAMES)
-    if not isinstance(value, list | tuple) or not value:
-        text = f"got {shown_with_kind(value)}; must be a non-empty list of some of {known}; name one"
-        refuse([((), value, text)])
-    refusals = list[Refusal]()
-    for i, name in enumerate(value):
-        if name not in QUANTITY_NAMES:
-            guess = nearest(name, QUANTITY_NAMES) if isinstance(name, str) else ""
-            text = f"got {shown_with_kind(name)};{guess} known names: {known}; rename or remove it"
-            refusals.append(((i,), name, text))
-        elif name in value[:i]:
-            refusals.append(((i,), name, f"got {shown(name)} twice; names must be distinct; remove one"))
-    refuse(refusals)
-    return tuple(value)
-
-
-class OutputSection(Section):
-    """[output]: what is computed, the p whose eigenfunctions are written, and whether sensitivities are drawn."""
-
-    quantities: Annotated[
-        tuple[str, ...],
-        BeforeValidator(_quantities),
-        parameter("what is computed", 'quantities = ["lyapunov_exponent", "stability_index"]'),
-    ] = QUANTITY_NAMES
-    eigenfunctions: Annotated[
-        Values | None,
-        parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False, max_length=MAX_MOMENTS),
-    ] = None
-    sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
-
-    @model_validator(mode="after")
-    def _distinct(self) -> Self:
-        wanted = self.eigenfunctions or ()
-        first = {p: i for i, p in reversed(list(enumerate(wanted)))}
-        twice = ((i, p) for i, p in enumerate(wanted) if first[p] != i)
-        refuse((("eigenfunctions", i), p, f"got {p} twice; values must be distinct; remove one") for i, p in twice)
         return self
 
 

@@ -149,12 +149,17 @@ def _numbers(key: str, cells: Sequence[str]) -> tuple[Sequence[Value], dict[int,
             values.append(float(cell) + 0.0)
         except ValueError:
             values.append(float("nan"))
-            is_decimal = _DECIMAL_COMMA.fullmatch(cell)
-            remedy = f"write the decimal point as {cell.replace(',', '.')}" if is_decimal else "write a number"
-            no_numbers[i] = f"{_got(cell)}; {must}; {remedy}"
+            no_numbers[i] = f"{_got(cell)}; {must}; {_remedy(cell)}"
     return values, {
         i: no_numbers.get(i) or f"{_got(cells[i])}; {must}; change it, or remove the row" for i in _invalid(key, values)
     }
+
+
+def _remedy(cell: str) -> str:
+    """What to do about a cell that is no number."""
+    if _DECIMAL_COMMA.fullmatch(cell):
+        return f"write the decimal point as {cell.replace(',', '.')}"
+    return "write commas between cells, and decimal points in numbers" if ";" in cell else "write a number"
 
 
 def _invalid(key: str, values: Sequence[float]) -> Iterator[int]:

@@ -194,13 +194,15 @@ def _override_path(text: str) -> tuple[str | int, ...]:
 def _assign(table: dict[str, Any], path: Sequence[str], value: Any) -> None:
     """Set a key that stands in nested tables or, with its dots, quoted in one."""
     rest = ".".join(path)
-    if len(path) == 1 or rest in table:
-        table[rest] = value
+    key = max((key for key in table if f"{rest}.".startswith(f"{key}.")), key=len, default=path[0])
+    inner = path[key.count(".") + 1 :]
+    if not inner:
+        table[key] = value
         return
-    child = table.setdefault(path[0], {})
+    child = table.setdefault(key, {})
     if not isinstance(child, dict):
-        raise ValueError(f"{path[0]} is not a table, so it has no key {path[1]}")
-    _assign(child, path[1:], value)
+        raise ValueError(f"{key} is not a table, so it has no key {inner[0]}")
+    _assign(child, inner, value)
 
 
 def read_document(

@@ -15,7 +15,7 @@ from fpsolve import __version__
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.case.sections import SENSITIVITIES
+from fpsolve.case.output import SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.exponent.quantities import INDICES, MOMENT, Index
 from fpsolve.files import atomic, write_csv, write_json

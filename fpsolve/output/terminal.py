@@ -29,7 +29,7 @@ from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.theory.far import grows_far_out
 
-MOST_TABLES, MOST_REMARKS = 50, 50
+MOST_TABLES, MOST_REMARKS = 50, 20
 """Curves whose tables are printed, and remarks on them."""
 
 

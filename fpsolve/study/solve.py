@@ -14,8 +14,9 @@ from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, solve_se
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
+from fpsolve.case.output import EIGENFUNCTIONS, SENSITIVITIES
 from fpsolve.case.remedies import in_words_of_a_case
-from fpsolve.case.sections import EIGENFUNCTIONS, SENSITIVITIES, Expectation
+from fpsolve.case.sections import Expectation
 from fpsolve.errors import NoSuchExponent, NotConverged, Remedy
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair

@@ -878,6 +878,7 @@ TRIES = [
         BIG,
     ),
     *('"\\u0000"', "{ start = 0, stop = 1, num = 2 }", "[{}]", "1e308", "1e-320", "'''\n'''", "[\n1,\n]"),
+    *('{ start = 1, stop = 2, num = 3, scale = "log" }', '["exact"]', '["moment", "moment"]'),
     *("{ noise.D0 = [2] }", "[1e308, -1e308]", '"noise.D0"', '"lyapunov_exponent"', "07:32:00"),
 ]
 FUZZ = settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -97,6 +97,28 @@ def test_mutated_bytes_are_read_or_refused(tmp_path):
         assert all(refusals(path))
 
 
+SETS = "noise.D0,noise.r0,noise.treatment\n" + "".join(
+    f"{0.1 + i},0.9,{'exact' if i % 2 else 'ou-reduction'}\n" for i in range(8)
+)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_mutated_files_of_sets_are_read_or_refused(seed, tmp_path):
+    rng, refused = random.Random(seed), 0
+    path, sets = tmp_path / "case.toml", tmp_path / "sets.csv"
+    text = (CASES[0].parent / "minimal.toml").read_text(encoding="utf-8").partition("[vary]")[0]
+    path.write_text(f'{text}[vary]\nfile = "sets.csv"\n', encoding="utf-8")
+    for _ in range(COUNT):
+        data = bytearray(mutated(SETS, rng).encode())
+        if rng.random() < 0.5:
+            data[rng.randrange(len(data))] = rng.choice([*b',";\r\n-.e\0', rng.randrange(256)])
+        sets.write_bytes(bytes(data))
+        faults = refusals(path)
+        refused += bool(faults)
+        assert all("sets.csv" in fault for fault in faults)
+    assert COUNT // 10 < refused < COUNT
+
+
 @pytest.mark.parametrize("ending", [".vtu", ".msh"])
 def test_mutated_meshes_are_read_or_refused(ending, tmp_path):
     original, path = tmp_path / f"good{ending}", tmp_path / f"bad{ending}"

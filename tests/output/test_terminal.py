@@ -46,3 +46,23 @@ def test_remarks_are_wrapped(width, capsys, monkeypatch):
     assert all(line.startswith("  ") for line in others)
     assert " ".join([first, *(line.strip() for line in others)]) == text
     assert all(len(line) < width for line in [first, *others[:-1]])
+
+
+@pytest.mark.parametrize(
+    ("treatments", "star"),
+    [(["exact", "ou-reduction"], True), (["ou-reduction"], False), (["exact"], True)],
+)
+def test_a_star_tells_of_exact_noise_on_any_curve(treatments, star, tmp_path, capsys, monkeypatch):
+    """Texts give way to numbers, which are whole."""
+    monkeypatch.setenv("COLUMNS", "80")
+    path = tmp_path / "mixed.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    sets = [f"vary={{ noise.D0 = [0.1, 1.0], noise.treatment = {treatments} }}".replace("'", '"')]
+    case = load_case(path, [*sets, "output.eigenfunctions=[]", 'figure={ x = "noise.D0", y = "lyapunov_exponent" }'])
+    results = tuple(solve_curves(case))
+    print_results(case, results)
+    out = capsys.readouterr().out
+    assert ("Eq. (39)*" in out, "* for the noise reduced by" in out) == (star, star)
+    assert "…" not in out
+    for result in results:
+        assert f"{result.lyapunov_exponent.value:#.7g}"[:8] in out

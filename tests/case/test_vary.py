@@ -1,0 +1,452 @@
+"""[vary]: lists and ranges, products and sets side by side, files of sets; and which quantities are asked for."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import os
+import pickle
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.case.sections import Sweep
+from fpsolve.case.vary import Vary, assignments, legend
+from fpsolve.cli import main
+from fpsolve.errors import CaseError
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.theory.perturbation import second_order
+
+TEXT = """\
+title = "varied"
+oscillator = { omega = 2, restitution = 0.9, c1 = 0.1, epsilon = 0.5, impact = "restitution" }
+noise = { D0 = 1, tau0 = 1, r0 = 0.9 }
+moments.p = [2, -1]
+"""
+Write = Callable[[str], Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def write_text(vary: str, rest: str = "") -> Path:
+        path = tmp_path / "varied.toml"
+        path.write_text(f"{TEXT}[vary]\n{vary}\n{rest}", encoding="utf-8")
+        return path
+
+    return write_text
+
+
+def faults_of(path: Path, overrides: Sequence[str] = ()) -> list[str]:
+    """Key and sentence of each fault."""
+    with pytest.raises(CaseError) as raised:
+        load_case(path, overrides)
+    return [f"{fault.key}: {fault.sentence}" for fault in raised.value.faults]
+
+
+def only_fault(path: Path, overrides: Sequence[str] = ()) -> str:
+    [text] = faults_of(path, overrides)
+    return text
+
+
+COLUMNS = {"noise.D0": (0.1, 0.5, 1.0), "noise.treatment": ("exact", "ou-reduction"), "oscillator.omega": (1.0, 2.0)}
+
+
+def test_a_product_has_all_combinations_the_last_key_fastest() -> None:
+    vary = Vary(COLUMNS)
+    expected = [dict(zip(COLUMNS, values, strict=True)) for values in itertools.product(*COLUMNS.values())]
+    assert list(vary.sets()) == expected
+    assert len(vary) == 12
+    assert vary.keys == tuple(COLUMNS)
+    for start, stop in [(0, 0), (3, 7), (11, None), (5, 100), (12, None)]:
+        assert list(vary.sets(start, stop)) == expected[start:stop]
+
+
+def test_sets_side_by_side() -> None:
+    vary = Vary({"noise.D0": (0.1, 0.5, 0.1), "noise.r0": (0.9, 0.9, 0.8)}, "zip")
+    assert len(vary) == 3
+    assert list(vary.sets(1)) == [{"noise.D0": 0.5, "noise.r0": 0.9}, {"noise.D0": 0.1, "noise.r0": 0.8}]
+    assert vary.values("noise.D0") == (0.1, 0.5)
+    assert list(vary.among(["noise.r0"])) == [{"noise.r0": 0.9}, {"noise.r0": 0.8}]
+
+
+@pytest.mark.parametrize("mode", ["product", "zip"])
+def test_nothing_varied_is_one_set(mode: str) -> None:
+    vary = Vary({}, mode)  # type: ignore[arg-type]
+    assert not vary
+    assert (len(vary), list(vary.sets()), vary.keys) == (1, [{}], ())
+
+
+def test_any_place_of_a_large_product_is_reached_at_once() -> None:
+    vary = Vary({f"key {i}": tuple(map(float, range(1000))) for i in range(4)})
+    started = time.process_time()
+    assert next(vary.sets(123_456_789_012)) == {"key 0": 123, "key 1": 456, "key 2": 789, "key 3": 12}
+    assert len(vary) == 10**12
+    assert time.process_time() - started < 0.1
+
+
+def test_a_vary_pickles() -> None:
+    vary = Vary(COLUMNS)
+    assert pickle.loads(pickle.dumps(vary)) == vary
+
+
+def test_curves_are_made_when_they_are_asked_for(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = load_case(write('"noise.D0" = { start = 1.0, stop = 2.0, num = 100 }\n"oscillator.c1" = [0.1, 0.2, 0.3]'))
+    made = []
+    monkeypatch.setattr("fpsolve.case.case.make_curve", lambda *arguments: made.append(arguments[-1]) or arguments[-1])
+    assert case.planned == 300
+    assert list(itertools.islice(case.curves(297), 2)) == made == [298, 299]
+    assert list(case.curves(1, 3)) == [2, 3]
+
+
+@pytest.mark.parametrize(
+    ("sweep", "values"),
+    [
+        ((1e-4, 1e-1, 4, "log"), [1e-4, 1e-3, 1e-2, 1e-1]),
+        ((0.1, 10.0, 3, "log"), [0.1, 1.0, 10.0]),
+        ((1e-15, 1e15, 31, "log"), [float(f"1e{power}") for power in range(-15, 16)]),
+        ((1.0, 2.0, 3, "log"), [1.0, 1.41421356237, 2.0]),
+        ((0.1234567890123456, 0.3, 2, "log"), [0.1234567890123456, 0.3]),
+        ((1e-15, 5e-15, 5, "linear"), [1e-15, 2e-15, 3e-15, 4e-15, 5e-15]),
+        ((-0.3, 0.1, 5, "linear"), [-0.3, -0.2, -0.1, 0.0, 0.1]),
+    ],
+)
+def test_values_of_ranges_have_no_needless_digits(sweep: tuple[float, float, int, str], values: list[float]) -> None:
+    start, stop, num, scale = sweep
+    found = Sweep(start=start, stop=stop, num=num, scale=scale).values.tolist()  # type: ignore[arg-type]
+    assert list(map(repr, found)) == list(map(repr, values))
+
+
+def test_a_range_has_a_constant_factor() -> None:
+    values = Sweep(start=0.37, stop=91.0, num=50, scale="log").values
+    np.testing.assert_allclose(values[1:] / values[:-1], (91 / 0.37) ** (1 / 49), rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    "spelling",
+    [
+        '"noise.D0" = { start = 0.1, stop = 10.0, num = 3, scale = "log" }',
+        'noise.D0 = { start = 0.1, stop = 10.0, num = 3, scale = "log" }',
+        'noise = { D0 = { start = 0.1, stop = 10.0, num = 3, scale = "log" } }',
+        '[vary.noise.D0]\nstart = 0.1\nstop = 10.0\nnum = 3\nscale = "log"',
+        '[vary."noise.D0"]\nstart = 0.1\nstop = 10.0\nnum = 3\nscale = "log"',
+        'noise.D0.start = 0.1\nnoise.D0.stop = 10.0\nnoise.D0.num = 3\nnoise.D0.scale = "log"',
+    ],
+)
+def test_spellings_of_a_range(write: Write, spelling: str) -> None:
+    assert load_case(write(spelling)).vary == Vary({"noise.D0": (0.1, 1.0, 10.0)})
+
+
+def test_moments_of_a_logarithmic_range(write: Write) -> None:
+    case = load_case(write(""), ['moments.p={ start = 0.01, stop = 1.0, num = 3, scale = "log" }'])
+    assert case.p.tolist() == [0.01, 0.1, 1.0]
+    message = only_fault(write(""), ['moments.p={ start = -1.0, stop = 1.0, num = 3, scale = "log" }'])
+    assert 'moments.p.start: got -1.0; must be > 0 where scale = "log"; use a positive start' in message
+
+
+RANGES = [  # a range of noise.D0, the key, what the message says
+    ("{ start = 1, stop = 2 }", ".num", "missing; must be a whole number >= 2|add it, for example num = 33"),
+    ("{ stop = 2, num = 3 }", ".start", "missing; must be a finite number|add it, for example start = "),
+    ("{ start = 1, stop = 2, num = 1 }", ".num", "got 1; must be a whole number >= 2 and <= 100000|num = 33"),
+    ("{ start = 1, stop = 2, num = 3.0 }", ".num", "got 3.0 (a number); must be a whole number|num = 33"),
+    ("{ start = 2, stop = 1, num = 3 }", "", "got start = 2.0, stop = 1.0; must be start < stop|exchange the two"),
+    ("{ start = 2, stop = 2, num = 3 }", "", "got start = 2.0, stop = 2.0; must be start < stop|[2.0]"),
+    ("{ start = 1, stop = 2, num = 3, step = 1 }", ".step", "unknown key; did you mean|start, stop, num, scale"),
+    ("{ strat = 1, stop = 2, num = 3 }", ".strat", 'unknown key; did you mean "start"?|rename or remove it'),
+    ('{ start = "a", stop = 2, num = 3 }', ".start", 'got "a" (a string); must be a finite number|start = '),
+    ("{ start = nan, stop = 2, num = 3 }", ".start", "got nan|finite number"),
+    ('{ start = 1, stop = 2, num = 3, scale = "lg" }', ".scale", 'got "lg"|"linear", "log"|did you mean "log"?'),
+    ('{ start = 0, stop = 2, num = 3, scale = "log" }', ".start", 'got 0.0; must be > 0 where scale = "log"|linear'),
+    ("{ start = -1, stop = 2, num = 3 }", ".start", "got -1.0; must be a finite number >= 1e-15 and <= 1e15 (noise"),
+    ("{ start = 1, stop = 1e16, num = 3 }", ".stop", "got 1e+16; must be a finite number >= 1e-15 and <= 1e15 (noise"),
+    ("{ start = 1, stop = 1.000000001, num = 9999 }", ".num", "got num = 9999|equal to 12 digits|use a smaller num"),
+]
+
+
+@pytest.mark.parametrize("spelling", ['"noise.D0"', "noise.D0"])
+@pytest.mark.parametrize(("table", "key", "words"), RANGES, ids=[row[0] for row in RANGES])
+def test_bad_range(write: Write, spelling: str, table: str, key: str, words: str) -> None:
+    path = write(f"oscillator.omega = [1, 2]\n{spelling} = {table}")
+    with pytest.raises(CaseError) as raised:
+        load_case(path)
+    message = str(raised.value)
+    assert message.startswith(f'{path}:7: vary."noise.D0"{key}: ')
+    assert len(message.splitlines()) == 1
+    assert [word for word in words.split("|") if word not in message] == []
+
+
+def test_the_treatment_of_the_noise_and_the_impact_law_vary(write: Write) -> None:
+    """Eq. (37) has the reduced noise on every curve; on the exact ones the solution has another."""
+    case = load_case(write('noise.treatment = ["ou-reduction", "exact"]\noscillator.impact = ["delta", "restitution"]'))
+    curves = list(case.curves())
+    assert [type(curve.noise) for curve in curves] == [OrnsteinUhlenbeck] * 2 + [NonGaussianNoise] * 2
+    assert [curve.is_exact for curve in curves] == [False, False, True, True]
+    assert [curve.oscillator.impact for curve in curves] == ["delta", "restitution"] * 2
+    assert curves[3].label == "noise.treatment = exact, oscillator.impact = restitution"
+    assert second_order(curves[0].problem).moment_exponent(2.0) == second_order(curves[2].problem).moment_exponent(2.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ('noise.treatment = ["exact", "exat"]', 'vary."noise.treatment"[1]: got "exat" (a string); must be one of '),
+        ('noise.treatment = ["exact", 1]', 'vary."noise.treatment"[1]: got 1 (a number); must be one of '),
+        ('noise.treatment = "exact"', 'vary."noise.treatment": got "exact" (a string); must be a non-empty list of '),
+        ("noise.treatment = []", 'vary."noise.treatment": got [] (a list); must be a non-empty list of '),
+        ('noise.treatment = ["exact", "exact"]', 'vary."noise.treatment"[1]: got exact twice; values must be dist'),
+        ("oscillator.impact = { start = 1, stop = 2, num = 3 }", 'vary."oscillator.impact": got {start = 1, stop = 2'),
+        ('noise.D0 = ["exact"]', 'vary."noise.D0"[0]: got "exact" (a string); must be a finite number'),
+        ('mode = "zap"', 'vary.mode: got "zap" (a string); must be one of "product", "zip"; did you mean "zip"?'),
+        ("mode = 3", 'vary.mode: got 3 (a number); must be one of "product", "zip"; write mode = "zip"'),
+        ("modes = 3", 'vary.modes: cannot be varied; did you mean "mode"?'),
+        ('mode = "zip"\nnoise.D0 = [1, 2]\nnoise.r0 = [0.9]', "vary: noise.D0 has 2, noise.r0 has 1; with mode"),
+        ('mode = "zip"\nnoise.D0 = [1, 2, 1]\nnoise.r0 = [0, 0, 0]', 'vary."noise.D0"[2]: sets 1 and 3 are both noise'),
+    ],
+)
+def test_bad_texts_and_modes(write: Write, line: str, fault: str) -> None:
+    assert only_fault(write(line)).startswith(fault)
+
+
+def test_sets_side_by_side_may_share_values(write: Write) -> None:
+    text = (
+        'mode = "zip"\nnoise.D0 = [1, 2, 1]\nnoise.tau0 = { start = 1, stop = 3, num = 3 }\nnoise.r0 = [0.9, 0.9, 0.9]'
+    )
+    case = load_case(write(text))
+    assert [tuple(curve.varied.values()) for curve in case.curves()] == [(1, 1, 0.9), (2, 2, 0.9), (1, 3, 0.9)]
+
+
+def test_sets_that_differ_by_rounding_only_are_one(write: Write) -> None:
+    values = "noise.D0 = [0.3, 0.5, 0.30000000000000004]"
+    assert "sets 1 and 3 are both" in only_fault(write(f'mode = "zip"\n{values}\nnoise.r0 = [0.9, 0.9, 0.9]'))
+    assert load_case(write(f'mode = "zip"\n{values}\nnoise.r0 = [0.9, 0.9, 0.8]')).planned == 3
+
+
+def test_a_figure_needs_a_number_along_its_axis(write: Write) -> None:
+    path = write(
+        'noise.treatment = ["exact", "ou-reduction"]', '[figure]\nx = "noise.treatment"\ny = "stability_index"'
+    )
+    fault = 'figure.x: got "noise.treatment", whose values are texts; must be one of p; choose one of them'
+    assert only_fault(path) == fault
+
+
+def test_expectations_select_curves_by_texts(write: Write) -> None:
+    expected = (
+        '[[expect]]\nquantity = "variance_rate"\nvalue = 1\nrtol = 1\nsource = "none"\nwhere = { noise.treatment = '
+    )
+    vary = 'noise.treatment = ["ou-reduction", "exact"]\nnoise.D0 = [1, 2]'
+    case = load_case(write(vary, f'{expected}"exact" }}'))
+    assert [case.expect[0].selects(curve.varied) for curve in case.curves()] == [False, False, True, True]
+    for value, words in [('"exat"', 'got "exat"'), ("1.0", "got 1.0")]:
+        message = only_fault(write(vary, f"{expected}{value} }}"))
+        assert f'expect[0].where."noise.treatment": {words}; must be one of ["ou-reduction", "exact"]; ' in message
+
+
+def test_texts_and_numbers_are_written_for_the_eye() -> None:
+    varied = {"noise.D0": 0.1234567890123, "noise.treatment": "exact", "oscillator.impact": "delta"}
+    assert assignments(varied, "g") == "noise.D0 = 0.123457, noise.treatment = exact, oscillator.impact = delta"
+    assert assignments(varied).startswith("noise.D0 = 0.1234567890123, ")
+    assert legend(varied) == "$D_0$ = 0.123457, treatment = exact, impact = delta"
+
+
+def test_a_simulation_that_is_not_right_names_the_row(write: Write, tmp_path: Path) -> None:
+    sets_file(tmp_path, "noise.tau0\n0.5\n\n1e-3\n")
+    message = only_fault(write('file = "sets.csv"', "[monte_carlo]\nstep = 0.1"))
+    assert message.startswith("monte_carlo.step: sets.csv:4: with noise.tau0 = 0.001: got 0.1, too large for ")
+
+
+def test_a_mesh_is_judged_for_each_treatment(write: Write) -> None:
+    """Bounded noise cuts the mesh off, Gaussian noise does not."""
+    mesh = "[mesh]\nxi_max = 100.0"
+    load_case(write('noise.treatment = ["exact"]', mesh))
+    assert "with noise.treatment = ou-reduction: from xi" in only_fault(
+        write('noise.treatment = ["exact", "ou-reduction"]', mesh)
+    )
+
+
+def sets_file(folder: Path, text: str | bytes) -> None:
+    (folder / "sets.csv").write_bytes(text.encode() if isinstance(text, str) else text)
+
+
+def test_a_file_of_sets(write: Write, tmp_path: Path) -> None:
+    """With the mark that Excel writes, its line ends, blank lines, quotes and empty cells at the end."""
+    text = '\ufeffnoise.D0, "noise.treatment",oscillator.c1\r\n\r\n0.1,exact,-0\r\n 1e0 ,"ou-reduction",.5\r\n,,\r\n'
+    sets_file(tmp_path, text.replace(', "', ',"'))
+    for path in (write('file = "sets.csv"'), write('file = "sets.csv"\nmode = "zip"')):
+        case = load_case(path)
+        assert [curve.varied for curve in case.curves()] == [
+            {"noise.D0": 0.1, "noise.treatment": "exact", "oscillator.c1": 0.0},
+            {"noise.D0": 1.0, "noise.treatment": "ou-reduction", "oscillator.c1": 0.5},
+        ]
+        assert (case.planned, case.vary.mode) == (2, "zip")
+        assert str(next(case.curves()).varied["oscillator.c1"]) == "0.0"
+
+
+FILES: list[tuple[str | bytes, str]] = [
+    ("", "sets.csv: is empty; its first row must name keys"),
+    ("\n \n", "sets.csv: is empty; its first row must name keys"),
+    ("noise.D0\n", "sets.csv: has a header but no sets; write a row"),
+    ("noise.d0\n1\n", 'sets.csv:1: noise.d0: cannot be varied; did you mean "noise.D0"? known keys: '),
+    ("\nnoise.D0,noise.D0\n1,1\n", "sets.csv:2: noise.D0: stands twice in the header; remove one of them"),
+    ("noise.D0,\n1,2\n", "sets.csv:1: column 2: has no key in the header; known keys: "),
+    ("noise.D0;noise.r0\n1;2\n", "sets.csv:1: is separated by semicolons; write commas, and decimal points"),
+    ("noise.D0\tnoise.r0\n1\t2\n", "sets.csv:1: is separated by tabs; write commas"),
+    ("noise.D0,noise.tau0\n1;0,9\n", "sets.csv:2: noise.D0: got 1;0; must be a finite number"),
+    ("noise.D0,noise.r0\n1;0.9\n", "sets.csv:2: has 1 cell; must have 2, one for each key; write commas"),
+    ("noise.D0,noise.r0\n1,2,3\n", "sets.csv:2: has 3 cells; must have 2, one for each key; remove the others, and wr"),
+    ("noise.D0,noise.r0\n1\n", "sets.csv:2: has 1 cell; must have 2, one for each key; add those that are missing"),
+    ('noise.D0\n"0,5"\n', "sets.csv:2: noise.D0: got 0,5; must be a finite number >= 1e-15 and <= 1e15 (noise inten"),
+    ("noise.D0,noise.r0\n1,\n", "sets.csv:2: noise.r0: is empty; must be a finite number"),
+    ("noise.r0\n1.7\n", "sets.csv:2: noise.r0: got 1.7; must be a finite number >= -1e6 and < 5/3 (departure"),
+    ("noise.D0\nnan\n", "sets.csv:2: noise.D0: got nan; must be a finite number"),
+    ("noise.D0\ninf\n", "sets.csv:2: noise.D0: got inf; must be a finite number"),
+    ("noise.D0\nfast\n", "sets.csv:2: noise.D0: got fast; must be a finite number"),
+    ("noise.treatment\nexat\n", "sets.csv:2: noise.treatment: got exat; must be one of ou-reduction, exact; did you m"),
+    ("noise.D0\n1\n2\n1.0\n", "sets.csv:4: is the same set as line 2; must be distinct; remove one of them"),
+    ("oscillator.epsilon\n0.1\n9\n", "sets.csv:3: with oscillator.epsilon = 9.0: the restitution law needs 1 - eps"),
+    ("noise.treatment,noise.r0\nexact,1.1\n", "sets.csv:2: with noise.treatment = exact, noise.r0 = 1.1: Λ(2) is inf"),
+    ('noise.D0\n1\n"2\n', "sets.csv:3: cannot be read as comma-separated values (unexpected end of data); mend its qu"),
+    ("noise.D0\n1\n" + "9" * 200_000, "sets.csv:3: cannot be read as comma-separated values (field larger than"),
+    ("noise.D0\n1\n".encode("utf-16"), "sets.csv: is binary or UTF-16, not UTF-8 text; name a comma-separated file"),
+    ("noise.D0\n1\n# ö\n".encode("latin-1"), "sets.csv:3: is not UTF-8 text: byte 0xf6; save it as UTF-8"),
+]
+
+
+@pytest.mark.parametrize(("text", "words"), FILES, ids=[row[1][:40] for row in FILES])
+def test_bad_file(write: Write, tmp_path: Path, text: str | bytes, words: str) -> None:
+    path = write('file = "sets.csv"')
+    sets_file(tmp_path, text)
+    with pytest.raises(CaseError) as raised:
+        load_case(path)
+    assert str(raised.value).startswith(f"{path}:6: vary.file: {words}")
+    assert len(raised.value.faults) == 1
+
+
+def test_a_decimal_comma_is_told_with_its_remedy(write: Write, tmp_path: Path) -> None:
+    sets_file(tmp_path, 'noise.D0\n"0,5"\n')
+    assert only_fault(write('file = "sets.csv"')).endswith("; write the decimal point as 0.5")
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ('"nowhere.csv"', "vary.file: nowhere.csv: no such file; look in {folder} or give the full path"),
+        ('"folder"', "vary.file: folder: is a directory; name a file of sets in it, such as sets.csv"),
+        ('"pipe"', "vary.file: pipe: is a pipe or a device, not a file; write the sets into a file and name that"),
+        ("3", "vary.file: got 3 (a number); must be the path of a file of sets; write, for example, file = "),
+        ('""', 'vary.file: got "" (a string); must be the path of a file of sets'),
+        ('"pipe"\nnoise.D0 = [1]', "vary.file: gives every value, so nothing may stand beside it, but noise.D0 does;"),
+        ('"pipe"\nmode = "product"', 'vary.mode: got "product"; the rows of a file are sets side by side; remove it'),
+    ],
+)
+def test_no_file(write: Write, tmp_path: Path, file: str, words: str) -> None:
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    assert only_fault(write(f"file = {file}")).startswith(words.format(folder=tmp_path))
+
+
+def test_the_faulty_rows_of_a_long_file_are_told_together(
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Five kinds among 200 rows; nothing is run or written."""
+    rows = [[str(1 + i / 100), "0.5", "exact" if i % 2 else "ou-reduction"] for i in range(200)]
+    rows[9][0] = "fast"
+    rows[49] = rows[49][:2]
+    rows[99][2] = "exat"
+    rows[120] = list(rows[20])
+    rows[150][1] = "-3"
+    rows[151][1] = "1.2"  # of exact noise, with p = 2
+    with (tmp_path / "sets.csv").open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream).writerows([["noise.D0", "noise.r0", "noise.treatment"], *rows])
+    path = write('file = "sets.csv"', "[budget]\nunknowns = 1")
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    starts = [
+        "11: noise.D0: got fast; must be ",
+        "51: has 2 cells; must have 3",
+        "101: noise.treatment: got exat; ",
+        "122: is the same set as line 22; ",
+        "153: with noise.D0 = 2.51, noise.r0 = 1.2, noise.treatment = exact: Λ(2) is infinite",
+    ]
+    for line, start in zip(lines, starts, strict=False):
+        assert line.startswith(f"{path}:6: vary.file: sets.csv:{start}")
+    assert len(lines) == len(starts) + 1
+    assert lines[-1].startswith(f"{path}:8: budget.unknowns: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_of_many_faulty_rows_the_first_are_told(write: Write, tmp_path: Path) -> None:
+    sets_file(tmp_path, "noise.D0\n" + "-1\n" * 300)
+    with pytest.raises(CaseError) as raised:
+        load_case(write('file = "sets.csv"'))
+    lines = str(raised.value).splitlines()
+    assert len(lines) == 51
+    assert lines[49].split(": ")[2] == "sets.csv:51"
+    assert lines[50].endswith(": and 250 more")
+
+
+def test_overrides_of_ranges_and_files(write: Write, tmp_path: Path) -> None:
+    sets_file(tmp_path, "noise.D0\n0.3\n0.4\n")
+    path = write('"noise.D0" = { start = 1, stop = 2, num = 5 }')
+    assert load_case(path, ["vary.noise.D0.num=3"]).vary.values("noise.D0") == (1.0, 1.5, 2.0)
+    assert load_case(path, ['vary."noise.D0"=[4.0]']).vary.values("noise.D0") == (4.0,)
+    ranged = load_case(path, ['vary.noise.D0={ start = 1, stop = 100, num = 3, scale = "log" }'])
+    assert ranged.vary.values("noise.D0") == (1.0, 10.0, 100.0)
+    assert load_case(path, ['vary={ file = "sets.csv" }']).vary.values("noise.D0") == (0.3, 0.4)
+    assert load_case(write('file = "other.csv"'), ["vary.file=sets.csv"]).vary.values("noise.D0") == (0.3, 0.4)
+    assert not load_case(write('file = "other.csv"'), ["vary={}"]).vary
+    path = write('"noise.D0" = { start = 1, stop = 2, num = 5 }')
+    assert only_fault(path, ["vary.noise.D0.num=1"]).startswith(
+        '--set vary.noise.D0.num=1: vary."noise.D0".num: got 1;'
+    )
+    assert only_fault(path, ["vary.file=sets.csv"]).startswith("--set vary.file=sets.csv: vary.file: gives every value")
+    (hidden,) = faults_of(path, ['vary={ file = "sets.csv" }', "noise.D0=3.0"])
+    assert hidden.startswith("--set noise.D0=3.0: noise.D0: has no effect, as the case varies noise.D0; ")
+
+
+@pytest.mark.parametrize("kind", ["product", "file"])
+def test_ten_thousand_sets_are_read_within_seconds(write: Write, tmp_path: Path, kind: str) -> None:
+    rows = (f"{0.1 + i / 1000},{1 + i / 7000},{'exact' if i % 3 else 'ou-reduction'}\n" for i in range(10_000))
+    sets_file(tmp_path, "noise.D0,oscillator.omega,noise.treatment\n" + "".join(rows))
+    sweep = '{ start = 0.1, stop = 10.0, num = 100, scale = "log" }'
+    path = write('file = "sets.csv"' if kind == "file" else f"noise.D0 = {sweep}\noscillator.omega = {sweep}")
+    started = time.process_time()
+    case = load_case(path)
+    assert time.process_time() - started < 8  # some 2 where nothing else runs
+    assert case.planned == 10_000
+
+
+QUANTITIES = [
+    ('["moment", "lyapunov"]', 'output.quantities[1]: got "lyapunov" (a string);'),
+    (
+        '["moment", "stability_indx"]',
+        'output.quantities[1]: got "stability_indx" (a string); did you mean "stability_in',
+    ),
+    ('["moment", 1]', "output.quantities[1]: got 1 (a number); known names: "),
+    ('["moment", "moment"]', 'output.quantities[1]: got "moment" twice; names must be distinct; remove one'),
+    ("[]", 'output.quantities: got [] (a list); must be a non-empty list of some of "moment", "lyapunov_exponent", '),
+    ('"moment"', 'output.quantities: got "moment" (a string); must be a non-empty list of some of '),
+    ('["lyapunov_exponent"]', 'output.quantities: has no "moment", which figure.y draws; add it, or let figure.y be'),
+    (
+        '["moment"]\nsensitivities = true',
+        'output.sensitivities: got true, but output.quantities has no "sensitivities"',
+    ),
+    ('["moment"]\neigenfunctions = [2.0]', "output.eigenfunctions: got [2.0], but output.quantities has no "),
+]
+
+
+@pytest.mark.parametrize(("line", "fault"), QUANTITIES, ids=[row[0] for row in QUANTITIES])
+def test_bad_quantities(write: Write, line: str, fault: str) -> None:
+    assert only_fault(write("", f"[output]\nquantities = {line}")).startswith(fault)
+
+
+def test_quantities(write: Write) -> None:
+    everything = ("moment", "lyapunov_exponent", "stability_index", "variance_rate", "impact_rate")
+    everything += ("critical_impact_factor", "critical_restitution", "sensitivities", "eigenfunctions")
+    assert load_case(write("")).output.quantities == everything
+    some = '[output]\nquantities = ["stability_index", "moment"]\neigenfunctions = []\nsensitivities = false\n'
+    assert load_case(write("", some)).output.quantities == ("stability_index", "moment")
+    expected = '[[expect]]\nquantity = "variance_rate"\nvalue = 1\nrtol = 1\nsource = "none"\n'
+    assert load_case(write("", some + expected)).expect

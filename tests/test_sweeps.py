@@ -1,0 +1,286 @@
+"""Sweeps: results do not depend on who works, nor on kills, full disks and dead workers on the way."""
+
+import json
+import os
+import random
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from fpsolve.case.case import load_case
+from fpsolve.output.records import Records
+from fpsolve.workflow.sets import SOLVED_RECORDS
+from tests.conftest import heed_signals
+
+CASE = """
+title = "A sweep"
+[oscillator]
+epsilon = 0.5
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 0.5
+tau0 = 0.5
+r0 = 0.95
+[moments]
+p = {{ start = -2.0, stop = 4.0, num = 4 }}
+[vary]
+"noise.D0" = {{ start = 0.1, stop = 1.0, num = {size}, scale = "log" }}
+"oscillator.omega" = {{ start = 0.5, stop = 3.0, num = {size} }}
+[output]
+quantities = ["moment", "lyapunov_exponent", "stability_index", "variance_rate", "critical_impact_factor"]
+"""
+SIZE, KILLS = 6, 2
+"""Sets each way, and how often they are interrupted; 20 and 5 take two minutes."""
+MAIN = "from fpsolve.cli import main; raise SystemExit(main())"
+PASSING = {"started", "wall_seconds", "command", "host"}
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals and limits of POSIX")
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with a case, which is solved there in `whole`, by this process alone."""
+    folder = tmp_path_factory.mktemp("sweeps")
+    (folder / "sweep.toml").write_text(CASE.format(size=SIZE), encoding="utf-8")
+    run(folder, "whole", "--jobs", "1")
+    return folder
+
+
+def started(folder, out, *options, before=heed_signals):
+    """A run in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-c", MAIN, "run", "sweep.toml", "--out", out, *options],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=before,
+    )  # fmt: skip
+
+
+def run(folder, out, *options, code=0):
+    process = started(folder, out, *options)
+    said = process.communicate(timeout=300)
+    assert process.returncode == code, said
+    return said
+
+
+def lines(folder, out):
+    """All records that were written, the torn ones too."""
+    paths = (folder / out / "sweep" / SOLVED_RECORDS).glob("*")
+    return [line for path in paths for line in path.read_bytes().splitlines(keepends=True)]
+
+
+def assert_same_results(folder, out, whole="whole"):
+    """results.nc bit for bit, but for seconds and times; and the curves of summary.json."""
+    with (
+        xr.open_dataset(folder / out / "sweep/results.nc") as one,
+        xr.open_dataset(folder / whole / "sweep/results.nc") as two,
+    ):
+        assert one.drop_vars("seconds").equals(two.drop_vars("seconds"))
+        for name in set(one.data_vars) - {"seconds"}:
+            assert one[name].values.tobytes() == two[name].values.tobytes(), name
+            np.testing.assert_equal(one[name].attrs, two[name].attrs)
+        kept = [{key: value for key, value in each.attrs.items() if key not in PASSING} for each in (one, two)]
+        assert kept[0] == kept[1]
+        assert one.attrs["complete"] == 1
+    curves = [
+        json.loads((folder / each / "sweep/summary.json").read_text(encoding="utf-8"))["curves"]
+        for each in (out, whole)
+    ]
+    assert [{**curve, "seconds": 0} for curve in curves[0]] == [{**curve, "seconds": 0} for curve in curves[1]]
+
+
+def test_results_do_not_depend_on_the_number_of_processes(place):
+    run(place, "two", "--jobs", "2")
+    assert_same_results(place, "two")
+    assert len(lines(place, "two")) == SIZE**2
+
+
+def test_killed_again_and_again(place):
+    """At most one set for each worker is solved twice, and the result is that of an undisturbed run."""
+    begun = time.monotonic()
+    run(place, "timed", "--jobs", "2")
+    duration, rng, killed = time.monotonic() - begun, random.Random(7), 0
+    for _ in range(KILLS):
+        process = started(place, "killed", "--jobs", "2")
+        time.sleep(rng.uniform(0.5, 0.8) * duration)
+        killed += process.poll() is None
+        process.kill()
+        process.communicate(timeout=60)
+    assert killed
+    run(place, "killed", "--jobs", "2")
+    assert_same_results(place, "killed")
+    assert SIZE**2 <= len(lines(place, "killed")) <= SIZE**2 + 2 * killed
+    before = lines(place, "killed")
+    run(place, "killed", "--jobs", "2")
+    assert lines(place, "killed") == before
+    assert_same_results(place, "killed")
+
+
+def limited():
+    """Files may have 40 kB, which a disk that fills up during the sweep looks like."""
+    import resource
+
+    heed_signals()
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
+
+
+def test_a_full_disk(place):
+    process = started(place, "full", "--jobs", "1", before=limited)
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 2
+    assert "cannot be written" in said
+    assert "Traceback" not in said
+    done = len(lines(place, "full"))
+    assert 0 < done < SIZE**2
+    run(place, "full", "--jobs", "1")
+    assert_same_results(place, "full")
+    assert len(lines(place, "full")) == SIZE**2
+
+
+def test_torn_and_damaged_records_are_solved_again(place):
+    shutil.copytree(place / "whole", place / "torn")
+    [path] = (place / "torn/sweep" / SOLVED_RECORDS).glob("*")
+    content = path.read_bytes().splitlines(keepends=True)
+    content[3] = content[3].replace(b"0.", b"1.", 1) if b"0." in content[3] else content[3][1:]
+    content[5] = b"\0" * len(content[5])
+    content[-1] = content[-1][: len(content[-1]) // 2]
+    path.write_bytes(b"".join(content))
+    run(place, "torn", "--jobs", "1")
+    assert_same_results(place, "torn")
+    assert len(lines(place, "torn")) - len(content) == 3
+
+
+def test_a_changed_parameter_solves_only_what_it_changes(place):
+    shutil.copytree(place / "whole", place / "changed")
+    omega, D0 = "[0.5, 0.7]", f'{{ start = 0.1, stop = 1.0, num = {SIZE}, scale = "log" }}'
+    sets = f'vary={{ "noise.D0" = {D0}, "oscillator.omega" = {omega} }}'
+    run(place, "changed", "--jobs", "1", "--set", sets)
+    assert len(lines(place, "changed")) == SIZE**2 + SIZE  # omega = 0.5 is known
+    run(place, "changed", "--jobs", "1", "--set", 'title="Another"', "--set", "figure.x=p")
+    assert_same_numbers = json.loads((place / "changed/sweep/summary.json").read_text(encoding="utf-8"))
+    assert (assert_same_numbers["done"], assert_same_numbers["title"]) == (SIZE**2, "Another")
+    assert len(lines(place, "changed")) == SIZE**2 + SIZE
+    run(place, "changed", "--jobs", "1", "--fresh")
+    assert len(lines(place, "changed")) == SIZE**2
+
+
+def test_an_interrupt_keeps_what_is_solved(place):
+    process = started(place, "interrupted", "--jobs", "2")
+    folder = place / "interrupted/sweep" / SOLVED_RECORDS
+    for _ in range(600):
+        if len(lines(place, "interrupted")) > 3:
+            break
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "run it again to go on" in said
+    assert "Traceback" not in said
+    summary = json.loads((place / "interrupted/sweep/summary.json").read_text(encoding="utf-8"))
+    assert not summary["complete"]
+    assert summary["done"] == len(summary["curves"]) >= 3
+    with xr.open_dataset(place / "interrupted/sweep/results.nc") as found:
+        assert found.attrs["complete"] == 0
+        assert int((found.status != 3).sum()) == summary["done"]
+    assert Records(folder).look().are_there
+    run(place, "interrupted", "--jobs", "2")
+    assert_same_results(place, "interrupted")
+
+
+def children(process):
+    """The workers of a run."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            if int(path.read_text().rpartition(")")[2].split()[1]) == process.pid:
+                line = (path.parent / "cmdline").read_text()
+                found += [int(path.parent.name)] if "spawn_main" in line else []
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds processes as Linux tells them")
+def test_a_killed_worker_costs_its_batch_only(place):
+    process = started(place, "orphan", "--jobs", "2")
+    for _ in range(600):
+        if len(lines(place, "orphan")) > 3:
+            break
+        time.sleep(0.05)
+    os.kill(children(process)[0], signal.SIGKILL)
+    said = process.communicate(timeout=120)
+    assert process.returncode == 0, said
+    assert_same_results(place, "orphan")
+
+
+def test_workers_end_with_a_run_that_is_killed(place):
+    process = started(place, "left", "--jobs", "2")
+    for _ in range(600):
+        if lines(place, "left"):
+            break
+        time.sleep(0.05)
+    workers = children(process)
+    assert len(workers) == 2
+    process.kill()
+    process.communicate(timeout=60)
+    for _ in range(100):
+        if not any(Path(f"/proc/{each}").exists() for each in workers):
+            return
+        time.sleep(0.05)
+    pytest.fail("workers go on")
+
+
+@contextmanager
+def dask_cluster(count=2):
+    """The address of a scheduler with workers, each a process of its own, on the loopback."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    options = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    dask = [sys.executable, "-m", "dask"]
+    port = address.rpartition(":")[2]
+    scheduler = subprocess.Popen(
+        [*dask, "scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard"], **options
+    )
+    worker = [*dask, "worker", address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
+    workers = [subprocess.Popen(worker, **options) for _ in range(count)]
+    try:
+        from distributed import Client
+
+        with Client(address, timeout=30, set_as_default=False) as client:
+            client.wait_for_workers(count, timeout=60)
+        yield address, workers
+    finally:
+        for each in [*workers, scheduler]:
+            each.kill()
+            each.wait()
+
+
+def test_a_cluster_gives_the_same_results(place):
+    pytest.importorskip("distributed")
+    with dask_cluster() as (address, workers):
+        process = started(place, "cluster", "--scheduler", address)
+        for _ in range(600):
+            if len(lines(place, "cluster")) > 3:
+                break
+            time.sleep(0.05)
+        workers[0].kill()
+        said = process.communicate(timeout=120)
+        assert process.returncode == 0, said
+    assert_same_results(place, "cluster")
+    assert len(lines(place, "cluster")) <= SIZE**2 + 1
+
+
+def test_batches_follow_from_the_case_alone(place):
+    from fpsolve.study.sweep import batch_size
+
+    case = load_case(place / "sweep.toml")
+    assert case.planned == SIZE**2
+    assert [batch_size(n) for n in (1, 49, 256, 512, 10_000, 10**7)] == [1, 1, 1, 2, 39, 64]
