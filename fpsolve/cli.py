@@ -19,7 +19,7 @@ from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.process import drop_blocked_output, ended_by_signals, flush_output
 
 if TYPE_CHECKING:
-    from fpsolve.workflow import Watch
+    from fpsolve.workflow.cases import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
 
@@ -60,7 +60,7 @@ def run(
     """
     from fpsolve.exponent.quantities import STABILITY_INDEX
     from fpsolve.output.terminal import print_remark
-    from fpsolve.workflow import run_case
+    from fpsolve.workflow.cases import run_case
 
     code, loaded = 0, load_to_write(cases, overrides, {}, monte_carlo=monte_carlo)
     pool = pool_of(jobs, scheduler)
@@ -103,7 +103,7 @@ def simulate(
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
-    from fpsolve.workflow import simulate_case
+    from fpsolve.workflow.cases import simulate_case
 
     stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
     options = {
@@ -130,7 +130,7 @@ def check(cases: Cases, *, jobs: Jobs = None, scheduler: Scheduler = "", overrid
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
     from fpsolve.output.terminal import print_comparisons, print_warnings
-    from fpsolve.workflow import check_case
+    from fpsolve.workflow.cases import check_case
 
     code, loaded = 0, load(cases, overrides, {})
     pool = pool_of(jobs, scheduler)
@@ -160,7 +160,7 @@ def chart(
     """
     from fpsolve.output.terminal import print_chart
     from fpsolve.study.chart import refuse_no_chart
-    from fpsolve.workflow import chart_case
+    from fpsolve.workflow.cases import chart_case
 
     code, loaded = 0, load_to_write(cases, overrides, {}, monte_carlo=False)
     for case in loaded:
@@ -280,7 +280,7 @@ def _in_one_line(summary: Path) -> str:
 def _watch(*, is_silent: bool = False) -> Watch:
     """Shows bars, and prints what is found, or only what limits it."""
     from fpsolve.output.terminal import print_results, print_simulation, print_warnings
-    from fpsolve.workflow import Watch
+    from fpsolve.workflow.cases import Watch
 
     return Watch(_bar, print_warnings) if is_silent else Watch(_bar, print_results, print_simulation)
 

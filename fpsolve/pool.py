@@ -215,7 +215,7 @@ def _client(address: str) -> Any:
     connect: Callable[..., Any] = distributed.Client
     logging.getLogger("distributed").setLevel(logging.ERROR)  # it tells of workers that come and go
     if not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
-        raise FpsolveError(f'--scheduler: got "{address}"; must be an address such as tcp://host:8786')
+        raise FpsolveError(f'got "{address}" as the address of a scheduler; must be one such as tcp://host:8786')
     try:
         client = connect(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except OSError as failure:

@@ -12,16 +12,20 @@ from importlib.metadata import version
 import numpy as np
 import pytest
 import pyvista
+import xarray
 
 import fpsolve
 from fpsolve.analysis import stationary_density, tilted_density
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import CaseError, NotConverged, OutputError, Remedy
+from fpsolve.exponent.fields import UNRESOLVED
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
 from fpsolve.output.tables import write_results
-from fpsolve.study.solve import UNRESOLVED, compare, solve_curves, solving_work
+from fpsolve.study import sweep
+from fpsolve.study.solve import compare, solve_curve
 from fpsolve.workflow import Watch, check_case, run_case, simulate_case
+from tests.solving import solve_case, solve_sets
 
 TEXT = """
 title = "A test"
@@ -59,13 +63,25 @@ def files(folder):
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
+TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
+"""Of what is solved."""
+
+
+def beside_records(folder):
+    """All files but the records."""
+    return {name for name in files(folder) if not name.startswith("records/")}
+
+
 def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
     results = fpsolve.run(case, tmp_path / "out")
     summary = json.loads((tmp_path / "out" / "test" / "summary.json").read_text(encoding="utf-8"))
-    assert list(summary) == ["case", "title", "fpsolve_version", "complete", "planned", "done", "curves"]
+    state = ["case", "title", "fpsolve_version", "complete", "planned", "done"]
+    facts = ["versions", "command", "host", "started", "wall_seconds", "overrides", "case_text"]
+    assert list(summary) == [*state, *facts, "curves"]
     assert (summary["case"], summary["title"]) == ("test", "A test")
     assert summary["fpsolve_version"] == version("fpsolve")
     assert (summary["complete"], summary["planned"], summary["done"]) == (True, 2, 2)
+    assert (summary["case_text"], summary["overrides"]) == (TEXT, [])
     for curve, result, D0 in zip(summary["curves"], results, (0.1, 1.0), strict=True):
         assert curve["varied"] == {"noise.D0": D0}
         assert curve["parameters"]["noise.D0"] == D0
@@ -88,15 +104,16 @@ def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
         assert used["unknowns"] == used["xi_size"] * sum(degree + 1 for degree in used["phi_degrees"])
         assert len(used["phi_degrees"]) == used["phi_cells"]
         assert used["tilt"] > 0
-        assert curve["warnings"] == []
+        assert (curve["status"], curve["warnings"]) == ("converged", [])
+        assert curve["seconds"] == pytest.approx(result.seconds, abs=1e-6)
     assert summary["curves"][1]["moments"][0]["value"] == pytest.approx(0.0141631436533, rel=1e-10)
     assert summary["curves"][1]["moments"][0]["perturbation"] == pytest.approx(0.014149421727, rel=1e-10)
 
 
 def test_writing_tables_makes_no_curves(case, tmp_path, monkeypatch):
-    """There may be many, and the tables are written after each."""
+    """There may be many, and the tables are written again and again."""
     monkeypatch.setattr("fpsolve.case.case.make_curve", None)
-    write_results(case, [], tmp_path / "out")
+    write_results(case, [], tmp_path / "out", {})
     summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
     assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 0)
 
@@ -114,18 +131,31 @@ def test_table_holds_every_curve_and_moment(case, tmp_path):
 def test_all_files_are_there_and_no_temporary_ones(case, tmp_path):
     fpsolve.run(case, tmp_path / "out")
     names = files(tmp_path / "out" / "test")
-    expected = {"summary.json", "moments.csv", "figure.png", "figure.pdf", "density.vtu", "show.py"}
+    expected = {*TABLES, "figure.png", "figure.pdf", "density.vtu", "show.py"}
     assert expected | {"eigenfunctions.pvd", "eigenfunctions-2.pvd"} <= names
     assert not [name for name in names if name.split("/")[-1].startswith(".")]
     assert (tmp_path / "out" / "test" / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "out" / "test" / "figure.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_tables_are_the_same_bytes_twice(case, tmp_path):
+def without_times(folder):
+    """The texts of all tables, without what tells one run from another of the same case."""
+    summary, moments, curves = (
+        (folder / name).read_text(encoding="utf-8") for name in ("summary.json", "moments.csv", "curves.csv")
+    )
+    for name in ("command", "started", "wall_seconds", "seconds"):
+        summary, count = re.subn(rf'("{name}": ).*', r"\1", summary)
+        assert count
+    assert curves.splitlines()[0].endswith(",seconds")
+    return summary, moments, [line.rpartition(",")[0] for line in curves.splitlines()]
+
+
+def test_tables_are_the_same_twice(case, tmp_path):
     for name in ("first", "second"):
         fpsolve.run(case, tmp_path / name)
-    for file in ("summary.json", "moments.csv"):
-        assert (tmp_path / "first/test" / file).read_bytes() == (tmp_path / "second/test" / file).read_bytes()
+    assert without_times(tmp_path / "first/test") == without_times(tmp_path / "second/test")
+    first, second = (xarray.load_dataset(tmp_path / name / "test/results.nc") for name in ("first", "second"))
+    assert first.drop_vars("seconds").equals(second.drop_vars("seconds"))
 
 
 def test_no_eigenfunctions_where_none_are_asked_for(tmp_path):
@@ -208,8 +238,11 @@ def test_zero_has_no_sign(tmp_path):
         "output.eigenfunctions=[-0.0]",
     ]
     run_case(write(tmp_path, TEXT, [*sets, "monte_carlo={ paths = 64, time = 40.0 }"]), tmp_path, monte_carlo=True)
-    for name in ("summary.json", "moments.csv", "monte_carlo.json", "eigenfunctions.pvd"):
-        assert "-0.0" not in re.findall(r"-?[\d.e+-]+", (tmp_path / "test" / name).read_text(encoding="utf-8")), name
+    for name in ("summary.json", "moments.csv", "curves.csv", "monte_carlo.json", "eigenfunctions.pvd"):
+        text = (tmp_path / "test" / name).read_text(encoding="utf-8")
+        if name == "summary.json":  # what was written is kept as it was
+            text = json.dumps(json.loads(text)["curves"])
+        assert "-0.0" not in re.findall(r"-?[\d.e+-]+", text), name
 
 
 def raising_at(count, exception):
@@ -224,48 +257,87 @@ def raising_at(count, exception):
     return called
 
 
-def test_an_interruption_keeps_the_finished_curves(case, tmp_path):
-    with pytest.raises(KeyboardInterrupt):
-        fpsolve.run(case, tmp_path / "out", progress=raising_at(5, KeyboardInterrupt))
+def interrupt_curve(monkeypatch, number, exception=KeyboardInterrupt):
+    """The solving of a curve is interrupted."""
+
+    def interrupted(curve, *others):
+        if curve.number == number:
+            raise exception
+        return solve_curve(curve, *others)
+
+    monkeypatch.setattr(sweep, "solve_curve", interrupted)
+
+
+def test_an_interruption_keeps_the_finished_curves(case, tmp_path, monkeypatch):
+    interrupt_curve(monkeypatch, 2)
+    with pytest.raises(KeyboardInterrupt, match=r"^interrupted after 1 of 2 curves; .*; run it again to go on$"):
+        fpsolve.run(case, tmp_path / "out")
     summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
     assert [curve["varied"]["noise.D0"] for curve in summary["curves"]] == [0.1]
     assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 1)
-    assert "eigenfunctions.pvd" in files(tmp_path / "out/test")
+    assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
+
+
+def test_a_run_goes_on_where_it_was_interrupted(case, tmp_path, monkeypatch):
+    """With the numbers of a run that nobody interrupts; files but records are made anew."""
+    fpsolve.run(case, tmp_path / "whole")
+    interrupt_curve(monkeypatch, 2)
+    with pytest.raises(KeyboardInterrupt):
+        fpsolve.run(case, tmp_path / "out")
+    interrupt_curve(monkeypatch, 1)  # which is not solved again
+    fpsolve.run(case, tmp_path / "out")
+    folder = tmp_path / "out/test"
+    assert without_times(folder) == without_times(tmp_path / "whole/test")
+    assert beside_records(folder) == beside_records(tmp_path / "whole/test")
+    for name in beside_records(folder):
+        (folder / name).unlink()
+    interrupt_curve(monkeypatch, 0)
+    fpsolve.run(case, tmp_path / "out")
+    assert without_times(folder) == without_times(tmp_path / "whole/test")
+    assert beside_records(folder) == beside_records(tmp_path / "whole/test")
+    interrupt_curve(monkeypatch, 1)
+    with pytest.raises(KeyboardInterrupt, match=r"^interrupted after 0 of 2 curves; run it again to go on$"):
+        fpsolve.run(case, tmp_path / "out", fresh=True)
+    assert files(folder) == TABLES
 
 
 SIMULATED = {"monte_carlo.json", "monte_carlo-2.json", "response.vti", "response.csv", "response-2.png"}
 """Files of simulations."""
 
 
-@pytest.mark.parametrize("exception", [KeyboardInterrupt, RuntimeError])
-def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(case, tmp_path, exception):
-    """It ends in the first curve: there are tables that say so, and the files of others."""
+@pytest.mark.parametrize(
+    ("exception", "raised", "left"),
+    [(KeyboardInterrupt, KeyboardInterrupt, TABLES), (OSError, OutputError, TABLES - {"results.nc"})],
+)
+def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(case, tmp_path, monkeypatch, exception, raised, left):
+    """It begins anew and ends in the first curve: there are tables that say so, and the files of others."""
     fpsolve.run(case, tmp_path)
     folder = tmp_path / "test"
     others = {"monte_carlo.txt", "response-a.vti", "eigenfunctions.png", "figure.svg", "notes/summary.json"}
     (folder / "notes").mkdir()
     for name in others | SIMULATED:
         (folder / name).write_text("mine", encoding="utf-8")
-    with pytest.raises(exception):
-        fpsolve.run(case, tmp_path, progress=raising_at(2, exception))
-    assert files(folder) == {"summary.json", "moments.csv"} | others
+    interrupt_curve(monkeypatch, 1, exception)
+    with pytest.raises(raised):
+        fpsolve.run(case, tmp_path, fresh=True)
+    assert files(folder) == left | others
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["curves"] == []
     assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 0)
 
 
-def test_a_run_with_simulation_that_ends_early_leaves_nothing_of_an_earlier_simulation(case, tmp_path):
+def test_a_run_with_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, tmp_path, monkeypatch):
     (tmp_path / "test").mkdir()
     for name in SIMULATED:
         (tmp_path / "test" / name).write_text("{}", encoding="utf-8")
-    watch = Watch(bar=lambda *_: nullcontext(raising_at(1, KeyboardInterrupt)))
+    interrupt_curve(monkeypatch, 1)
     with pytest.raises(KeyboardInterrupt):
-        run_case(case, tmp_path, monte_carlo=True, watch=watch)
-    assert files(tmp_path / "test") == {"summary.json", "moments.csv"}
+        run_case(case, tmp_path, monte_carlo=True)
+    assert files(tmp_path / "test") == TABLES
 
 
 def test_a_run_and_a_simulation_of_the_same_parameters_stay_together(case, tmp_path):
-    """Each keeps what the other wrote, unless that is of parameters that the case does not have."""
+    """Each keeps what the other wrote, unless that is of parameters that the case does not have; records stay."""
     folder = tmp_path / "test"
     first, second = fpsolve.load_case(case.path), fpsolve.load_case(case.path, ["oscillator.omega=2.0"])
     fpsolve.run(first, tmp_path)
@@ -283,7 +355,7 @@ def test_a_run_and_a_simulation_of_the_same_parameters_stay_together(case, tmp_p
     assert files(folder) == solved
     with pytest.raises(KeyboardInterrupt):
         simulate_case(first, tmp_path, watch=watch)
-    assert files(folder) == set()
+    assert beside_records(folder) == set()
 
 
 def test_infinite_moments_are_refused_before_anything_is_written(tmp_path):
@@ -364,9 +436,8 @@ def test_a_place_that_cannot_be_written_is_an_output_error(case, tmp_path):
 
 def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
     case = write(tmp_path, TEXT, ["noise.treatment='exact'"])
-    result = next(solve_curves(case))
-    reduced = next(solve_curves(write(tmp_path, TEXT)))
-    np.testing.assert_array_equal(result.moments_perturbation, reduced.moments_perturbation)
+    result, reduced = solve_case(case)[0], solve_case(write(tmp_path, TEXT))[0]
+    np.testing.assert_array_equal(result.moments.perturbation, reduced.moments.perturbation)
     assert result.curve.is_exact
     assert not reduced.curve.is_exact
 
@@ -421,7 +492,7 @@ def test_a_folder_that_another_run_writes_into_is_refused(case, tmp_path, start)
 def test_progress_is_called_once_for_each_moment(case, tmp_path):
     calls = []
     fpsolve.run(case, tmp_path, progress=lambda: calls.append(1))
-    assert len(calls) == solving_work(case) == 6
+    assert len(calls) == 6
 
 
 def test_expectations_are_compared_where_they_select(tmp_path):
@@ -440,7 +511,7 @@ atol = 1e-3
 source = "wrong on purpose"
 """
     case = write(tmp_path, TEXT + expect)
-    comparisons = compare(case, list(solve_curves(case)))
+    comparisons = compare(case, solve_case(case))
     assert [(item.varied["noise.D0"], item.met) for item in comparisons] == [(1.0, True), (0.1, False), (1.0, False)]
 
 
@@ -448,15 +519,15 @@ def test_tilted_densities_that_python_refuses_are_warned_of(tmp_path):
     """Each shown p is judged, by the measure of `tilted_density`."""
     overrides = ["oscillator.epsilon=1.0", "oscillator.restitution=1.0", "noise.r0=1.0", "noise.tau0=1.0"]
     overrides += ["moments={p=[1.0, 3.0, 4.0], rtol=1e-5}", "output.eigenfunctions=[1.0, 3.0, 4.0]", "vary={}"]
-    [result] = solve_curves(write(tmp_path, TEXT.replace("c1 = 0.1", "c1 = 0.0"), overrides))
+    [solved] = solve_sets(write(tmp_path, TEXT.replace("c1 = 0.1", "c1 = 0.0"), overrides))
     refused = []
-    for pair in result.eigenpairs:
+    for pair in solved.eigenpairs:
         try:
             tilted_density(pair)
         except NotConverged:
             refused.append(pair.p)
     assert refused == [3.0, 4.0]
-    told = [text for text in result.warnings if text.startswith("tilted_density at p = ")]
+    told = [text for text in solved.result.warnings if text.startswith("tilted_density at p = ")]
     assert [float(text.split()[4]) for text in told] == refused
 
 
@@ -473,9 +544,9 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
         TEXT,
         [*sets, "moments.p=[4.0]", "output.eigenfunctions=[4.0]", "moments.rtol=1e-5", 'vary={"noise.D0"=[0.5]}'],
     )
-    (result,) = solve_curves(case)
-    pair = result.eigenpairs[0]
-    told = [text for text in result.warnings if text.startswith("T") and "do not read its picture" in text]
+    (solved,) = solve_sets(case)
+    pair = solved.eigenpairs[0]
+    told = [text for text in solved.result.warnings if text.startswith("T") and "do not read its picture" in text]
     assert len(told) == sum(defect > UNRESOLVED for defect in pair.sign_defects) == 1
     assert min(pair.sign_defects) < 1e-4
 

@@ -96,7 +96,7 @@ class Boundary(Result):
     @property
     def branches(self) -> tuple[Branch, ...]:
         """The branches in the parameters themselves."""
-        return tuple(self._branch(trace) for trace in self.traces)
+        return tuple(_branch(self, trace) for trace in self.traces)
 
     @property
     def quantity(self) -> Quantity:
@@ -218,16 +218,18 @@ class Boundary(Result):
         branches = f"{count} branch{'es' * (count != 1)}"
         return f"{self.zero.equation}: {branches} over {self.x.key} and {self.y.key}"
 
-    def _branch(self, trace: Trace) -> Branch:
-        at = np.array([point.sample.at for point in trace.points])
-        return Branch(
-            x=np.asarray(self.x.value(at[:, 0])),
-            y=np.asarray(self.y.value(at[:, 1])),
-            width=np.array([point.sample.width for point in trace.points]),
-            labels=tuple(point.label for point in trace.points),
-            closed=trace.closed,
-            obstacles=trace.obstacles,
-        )
+
+def _branch(line: Boundary, trace: Trace) -> Branch:
+    """A branch of a line in the parameters themselves."""
+    at = np.array([point.sample.at for point in trace.points])
+    return Branch(
+        x=np.asarray(line.x.value(at[:, 0])),
+        y=np.asarray(line.y.value(at[:, 1])),
+        width=np.array([point.sample.width for point in trace.points]),
+        labels=tuple(point.label for point in trace.points),
+        closed=trace.closed,
+        obstacles=trace.obstacles,
+    )
 
 
 def _dataset(line: Boundary) -> xarray.Dataset:

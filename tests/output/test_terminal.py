@@ -59,7 +59,7 @@ def test_a_star_tells_of_exact_noise_on_any_curve(treatments, star, tmp_path, ca
     path.write_text(TEXT, encoding="utf-8")
     sets = [f"vary={{ noise.D0 = [0.1, 1.0], noise.treatment = {treatments} }}".replace("'", '"')]
     case = load_case(path, [*sets, "output.eigenfunctions=[]", 'figure={ x = "noise.D0", y = "lyapunov_exponent" }'])
-    results = solved(case)
+    results = solve_case(case)
     print_results(case, results)
     out = capsys.readouterr().out
     assert ("Eq. (39)*" in out, "* for the noise reduced by" in out) == (star, star)
