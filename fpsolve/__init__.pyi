@@ -7,7 +7,6 @@ from .errors import CaseError as CaseError
 from .errors import FpsolveError as FpsolveError
 from .errors import NotConverged as NotConverged
 from .exponent.eigen import principal_pair as principal_pair
-from .exponent.eigen import spectrum as spectrum
 from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
 from .exponent.moments import moment_lyapunov as moment_lyapunov
 from .exponent.quantities import lyapunov_exponent as lyapunov_exponent
@@ -20,7 +19,8 @@ from .model.noise import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .model.plane import PlaneSystem as PlaneSystem
 from .model.problem import Problem as Problem
 from .model.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
+from .output.datasets import open_results as open_results
 from .simulation.estimators import simulate as simulate
-from .workflow import run as run
+from .workflow.cases import run as run
 
 __version__: str

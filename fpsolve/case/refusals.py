@@ -188,7 +188,7 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
     yield from _of_orders(valid, wanted, "output.eigenfunctions")
     figure: FigureSection | None = valid.get("figure")
-    if figure is not None and figure.y not in output.quantities:
+    if figure is not None and figure.model_fields_set and figure.y not in output.quantities:
         text = f"has no {shown(figure.y)}, which figure.y draws; add it, or let figure.y be one of the names here"
         yield ("quantities",), output.quantities, text
 

@@ -22,7 +22,12 @@ Pair = tuple[CurveResult, SimulatedCurve | None]
 
 
 def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path) -> None:
-    """Draw figure.png and figure.pdf: finite elements, perturbation theory, and what is simulated as dots."""
+    """Draw figure.png and figure.pdf: finite elements, perturbation theory, and what is simulated as dots.
+
+    Without a [figure] there is none of a case that does not ask for Λ(p).
+    """
+    if case.figure.y not in case.output.quantities:
+        return
     samples = {each.curve.key: each for each in simulated}
     pairs = [(result, samples.get(result.curve.key)) for result in results]
     is_many = len(pairs) > MOST_LABELLED

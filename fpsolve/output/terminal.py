@@ -25,6 +25,7 @@ from fpsolve.exponent.quantities import (
     VARIANCE_RATE,
     Quantity,
 )
+from fpsolve.output.tables import asked
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.theory.far import grows_far_out
@@ -43,7 +44,7 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
             if result.moments.p.size:
                 console.print(_moment_table(case, result))
             if any(result.estimates.values()):
-                lines = [line for group in _indices(result) for line in _packed(group, console.width)]
+                lines = [line for group in _indices(case, result) for line in _packed(group, console.width)]
                 _print_lines(console, [*lines, ""])
     else:
         console.print(_curve_table(case, results))
@@ -193,10 +194,11 @@ def _moment_table(case: Case, result: CurveResult) -> Table:
     return table
 
 
-def _indices(result: CurveResult) -> list[list[str]]:
-    """λ, δ_p and Λ″(0), each with its error, and apart from them what concerns impacts."""
+def _indices(case: Case, result: CurveResult) -> list[list[str]]:
+    """λ, δ_p and Λ″(0), each with its error, and apart from them what concerns impacts; what the case asks for."""
     groups: list[list[str]] = [[]]
-    for name, estimate in result.estimates.items():
+    for name in asked(case):
+        estimate = result.estimates[name]
         error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
         if name == IMPACT_RATE.name:
             groups.append([])
@@ -206,7 +208,7 @@ def _indices(result: CurveResult) -> list[list[str]]:
 
 def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
     """One row for each parameter set: λ, Eq. (39), δ_p and Eq. (38)."""
-    indices = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
+    indices = [INDICES[name] for name in (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name) if name in asked(case)]
     is_exact = any(result.curve.is_exact for result in results)
     headings = (text for index in indices for text in (index.symbol, _theory(index, is_exact)))
     table = _table(case.headline, *_varied_columns(case), *headings)

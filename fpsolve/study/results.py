@@ -11,11 +11,15 @@ from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.curves import Curve
 from fpsolve.case.sections import Expectation, Varied
+from fpsolve.data import Result, dataset, described
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
-from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
+from fpsolve.model.quantity import DERIVATIVE, MOMENT, P
 
-if TYPE_CHECKING:  # numba takes half a second to import
+if TYPE_CHECKING:  # which take half a second to import
+    import xarray
+
     from fpsolve.simulation.estimators import MonteCarlo
     from fpsolve.simulation.response import Response
 
@@ -49,8 +53,8 @@ class Status(IntEnum):
     MISSING = 3
 
 
-@dataclass(frozen=True, eq=False)
-class CurveResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class CurveResult(Result):
     """What was computed for one parameter set: numbers and sentences, which a record can hold.
 
     Attributes:
@@ -97,6 +101,27 @@ class CurveResult:
         if not self.failures:
             return Status.CONVERGED
         return Status.PARTLY if self.moments.p.size else Status.FAILED
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
+        found = self.moments
+        theory = described("moment Lyapunov exponent by perturbation theory", units=MOMENT.unit, equation="(37)")
+        variables = {
+            **MOMENT.with_error(found.value, found.error_estimate, "p"),
+            **DERIVATIVE.variable(found.derivative, "p"),
+            "moment_perturbation": ("p", found.perturbation, theory),
+        }
+        for name, each in self.estimates.items():
+            if each:
+                variables |= INDICES[name].with_error(each.value, each.error_estimate)
+        title, places = f"{MOMENT.words}, {self.curve.label}".removesuffix(", "), P.variable(found.p, "p")
+        more = {"warnings": self.warnings, "notes": self.notes, "failures": [each.reason for each in self.failures]}
+        return dataset(title, "finite elements", variables, places, self.curve.parameters, **more)
+
+    def _said(self) -> str:
+        found, exponent = self.moments, self.lyapunov_exponent
+        parts = [self.curve.label, self.status.name.lower(), f"{found.p.size} p", f"λ = {exponent}" if exponent else ""]
+        return ", ".join(filter(None, parts))
 
 
 @dataclass(frozen=True, eq=False)

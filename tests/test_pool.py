@@ -1,0 +1,159 @@
+"""Whoever runs tasks, the results are the same; what dies costs its task only."""
+
+import os
+import signal
+import time
+from concurrent.futures import Executor, Future
+
+import pytest
+
+from fpsolve import pool
+from fpsolve.errors import FpsolveError
+from fpsolve.pool import Pool, cluster, here, several
+from fpsolve.process import processors
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+
+
+def square(number):
+    return number * number
+
+
+def deadly(number):
+    if number == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(0.01)
+    return number
+
+
+def faulty(number):
+    if number == 3:
+        raise OSError(28, "No space left on device")
+    return number
+
+
+def whereabouts(_):
+    time.sleep(0.05)
+    return os.getpid(), processors()
+
+
+class KilledWorker(Exception):
+    """As Dask calls it."""
+
+
+class Cluster(Executor):
+    """Gives one task up, as Dask does where several workers died on it."""
+
+    def submit(self, function, /, task, item):
+        future = Future()
+        if item == 7:
+            future.set_exception(KilledWorker())
+        else:
+            future.set_result(function(task, item))
+        return future
+
+
+@pytest.mark.parametrize("count", [1, 2, None])
+def test_map_keeps_the_order(count):
+    with several(count) as workers:
+        assert list(workers.map(square, range(300))) == [number**2 for number in range(300)]
+        assert list(workers.map(square, ())) == []
+        assert list(workers.map(square, [4])) == [16]  # the workers are still there
+
+
+def test_items_are_taken_when_they_are_needed():
+    """They may be many, and may follow from results."""
+    taken = []
+
+    def items():
+        for number in range(1000):
+            taken.append(number)
+            yield number
+
+    with several(2) as workers:
+        found = workers.run(square, items())
+        next(found)
+        assert len(taken) <= 2 * pool.AHEAD + 1
+        found.close()
+
+    class Growing:
+        left = [3]
+
+        def __iter__(self):
+            return self
+
+        def __next__(self):
+            if not self.left:
+                raise StopIteration
+            return self.left.pop()
+
+    items = Growing()
+    with here() as workers:
+        for done in workers.run(square, items):
+            if done.item:
+                items.left.append(done.item - 1)
+            last = done
+    assert last.item == 0
+
+
+@pytest.mark.parametrize("workers", [several(2), Pool(Cluster, ahead=3)])
+def test_a_dead_worker_costs_its_task_only(workers):
+    with workers:
+        found = {done.item: done for done in workers.run(deadly, range(15))}
+    assert sorted(found) == list(range(15))
+    assert [item for item, done in found.items() if done.is_lost] == [7]
+    assert found[7].result is None
+    assert all(done.result == item for item, done in found.items() if item != 7)
+
+
+def test_a_dead_worker_ends_a_map():
+    with several(2) as workers, pytest.raises(FpsolveError, match="a worker died"):
+        list(workers.map(deadly, range(15)))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_exceptions_are_raised_here(count):
+    with several(count) as workers, pytest.raises(OSError, match="No space"):
+        list(workers.run(faulty, range(20)))
+
+
+def test_workers_are_other_processes_with_one_processor_each():
+    with several(2) as workers:
+        found = set(workers.map(whereabouts, range(20)))
+    assert len(found) == 2
+    assert {count for _, count in found} == {1}
+    assert os.getpid() not in {number for number, _ in found}
+
+
+def test_little_work_is_done_here(monkeypatch):
+    """Others would take as long to start."""
+    monkeypatch.setattr(pool, "processors", lambda: 2)
+    with several() as workers:
+        assert {number for number, _ in workers.map(whereabouts, range(3))} == {os.getpid()}
+    monkeypatch.setattr(pool, "START_SECONDS", 0.1)
+    with several() as workers:
+        found = [number for number, _ in workers.map(whereabouts, range(30))]
+    assert found[0] == os.getpid()
+    assert len(set(found)) == 3
+
+
+@pytest.mark.parametrize("address", ["host", "tls://host:8786", "tcp://host", "host:port", "tcp://a b:1"])
+def test_what_is_no_address_is_refused(address):
+    pytest.importorskip("distributed")
+    with pytest.raises(FpsolveError, match=r"must be one such as tcp://host:8786"):
+        cluster(address)
+
+
+def test_a_scheduler_that_does_not_answer(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(pool, "CONNECT_SECONDS", 0.5)
+    with pytest.raises(
+        FpsolveError, match=r"no scheduler answers at tcp://127.0.0.1:9 .*start one with: dask scheduler"
+    ):
+        cluster("tcp://127.0.0.1:9")
+
+
+def test_without_dask(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    with pytest.raises(FpsolveError, match=r"pip install 'fpsolve\[cluster\]'"):
+        cluster("tcp://127.0.0.1:8786")
