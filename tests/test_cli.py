@@ -17,9 +17,9 @@ from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_C
 from fpsolve.files import alone
 from fpsolve.model.parameters import unit_of
 from fpsolve.output.terminal import digits
-from fpsolve.study import solve
+from fpsolve.study import sweep
 from tests.conftest import heed_signals
-from tests.test_workflow import HOPELESS, TEXT, files
+from tests.test_workflow import HOPELESS, TABLES, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
 
@@ -238,25 +238,24 @@ def test_a_folder_in_use_exits_2(case, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("moments", "message"),
+    ("number", "message"),
     [
-        (1, "interrupted after 0 of 2 curves; run it again to start over"),
-        (5, "interrupted after 1 of 2 curves; what was done is kept in results/test; run it again to start over"),
+        (1, "interrupted after 0 of 2 curves; run it again to go on"),
+        (2, "interrupted after 1 of 2 curves; what was done is kept in results/test; run it again to go on"),
     ],
 )
-def test_an_interrupted_run_says_what_is_kept(case, tmp_path, capsys, monkeypatch, moments, message):
-    original, solved = solve._solve_curve, []
+def test_an_interrupted_run_says_what_is_kept(case, tmp_path, capsys, monkeypatch, number, message):
+    original = sweep.solve_curve
 
-    def interrupted(*arguments):
+    def interrupted(curve, wanted, numerics, _):
         def progress():
-            solved.append(1)
-            if len(solved) == moments:
+            if curve.number == number:
                 raise KeyboardInterrupt
 
-        return original(*arguments[:-1], progress)
+        return original(curve, wanted, numerics, progress)
 
-    monkeypatch.setattr(solve, "_solve_curve", interrupted)
-    assert main(["run", case]) == INTERRUPTED
+    monkeypatch.setattr(sweep, "solve_curve", interrupted)
+    assert main(["run", case, "--jobs", "1"]) == INTERRUPTED
     assert capsys.readouterr().err.strip() == message
     assert "summary.json" in files(tmp_path / "results/test")
 
@@ -271,13 +270,13 @@ def raising(failure):
 LONG = """
 import sys
 from fpsolve.cli import main
-from fpsolve.study import solve
+from fpsolve.study import sweep
 
 def wait(*_):
     print("begun", flush=True)
     sys.stdin.read()
 
-solve._solve_curve = wait
+sweep.solve_curve = wait
 sys.exit(main(sys.argv[1:]))
 """
 
@@ -306,7 +305,7 @@ def test_signals_end_a_run_as_ctrl_c_does(case, tmp_path, name):
     assert process.returncode == 128 + getattr(signal, name)
     assert "interrupted" in err
     assert "Traceback" not in err
-    assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
+    assert files(tmp_path / "results/test") == TABLES
 
 
 def test_a_second_signal_does_not_hinder_the_message(case, capsys, monkeypatch):
@@ -316,10 +315,10 @@ def test_a_second_signal_does_not_hinder_the_message(case, capsys, monkeypatch):
         signal.raise_signal(signal.SIGHUP)
         original(text)
 
-    monkeypatch.setattr(solve, "_solve_curve", lambda *_: signal.raise_signal(signal.SIGTERM))
+    monkeypatch.setattr(sweep, "solve_curve", lambda *_: signal.raise_signal(signal.SIGTERM))
     monkeypatch.setattr(cli, "_print_error", interrupted)
     assert main(["run", case]) == 128 + signal.SIGTERM
-    assert capsys.readouterr().err == "interrupted after 0 of 2 curves; run it again to start over\n"
+    assert capsys.readouterr().err == "interrupted after 0 of 2 curves; run it again to go on\n"
 
 
 SIGNAL_IN_VTK = """
@@ -343,8 +342,8 @@ def test_a_signal_while_vtk_is_loaded_ends_a_run_in_order(case, tmp_path, name):
     command = [sys.executable, "-c", SIGNAL_IN_VTK, str(int(number)), "run", case]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, preexec_fn=heed_signals)
     assert done.returncode == 128 + number
-    assert done.stderr == "interrupted after 0 of 2 curves; run it again to start over\n"
-    assert files(tmp_path / "results/test") == {"summary.json", "moments.csv"}
+    assert done.stderr == "interrupted after 0 of 2 curves; run it again to go on\n"
+    assert files(tmp_path / "results/test") == TABLES
 
 
 def test_an_ignored_signal_stays_ignored(case):
@@ -400,7 +399,7 @@ def test_a_full_output_is_said_in_one_sentence(case, tmp_path, arguments, unbuff
     ],
 )
 def test_any_failure_to_write_is_said_in_one_sentence(case, capsys, monkeypatch, failure, said):
-    monkeypatch.setattr(solve, "_solve_curve", raising(failure))
+    monkeypatch.setattr(sweep, "solve_curve", raising(failure))
     assert main(["check", case]) == BAD_INPUT
     err = capsys.readouterr().err
     assert err.startswith(said)
