@@ -156,9 +156,8 @@ class _Meter:
         if size > self.budget.unknowns:
             self.stop(f"the next mesh has {size} unknowns, more than budget.unknowns = {self.budget.unknowns}")
         if seconds > self.budget.seconds:
-            self.stop(
-                f"the next mesh needs some {seconds:.2g} s by the clock, more than budget.seconds = {self.budget.seconds:g}"
-            )
+            most = f"more than budget.seconds = {self.budget.seconds:g}"
+            self.stop(f"the next mesh needs some {seconds:.2g} s by the clock, {most}")
         if self.stages >= MAX_STAGES:
             self.stop(f"{MAX_STAGES} meshes were tried")
         self.last, self.stages = (elapsed, size), self.stages + 1

@@ -1,0 +1,140 @@
+"""results.nc: what it holds and means, read without fpsolve; many runs as one."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fpsolve
+from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve.exponent.quantities import INDICES
+
+TEXT = """
+title = "A test"
+[oscillator]
+epsilon = 0.1
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 0.5
+tau0 = 0.5
+r0 = 0.95
+[moments]
+p = [2.0, 0.0, -1.0]
+[output]
+eigenfunctions = []
+"""
+PRODUCT = '[vary]\n"noise.D0" = [1.0, 0.1]\n"noise.treatment" = ["exact", "ou-reduction"]\n'
+ZIP = '[vary]\nmode = "zip"\n"oscillator.omega" = [1.0, 2.0, 2.0]\n"oscillator.c1" = [0.1, 0.1, 0.2]\n'
+HOPELESS = '[vary]\n"oscillator.epsilon" = [0.01, 3.0]\n[budget]\nunknowns = 300\n'
+
+
+def solved(folder, text, name="test", overrides=()):
+    (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+    case = fpsolve.load_case(folder / f"{name}.toml", overrides)
+    try:
+        results = fpsolve.run(case, folder / "out")
+    except NotConverged as failure:
+        results = failure.partial
+    with xr.open_dataset(folder / "out" / name / "results.nc") as found:
+        return case, results, found.load()
+
+
+def test_a_product_has_a_dimension_for_each_key(tmp_path):
+    case, results, found = solved(tmp_path, TEXT + PRODUCT)
+    assert dict(found.sizes) == {"noise.D0": 2, "noise.treatment": 2, "p": 3}
+    assert found.p.values.tolist() == [2.0, 0.0, -1.0]
+    for result in results:
+        here = found.sel(dict(result.curve.varied))
+        np.testing.assert_array_equal(here.moment, result.moments.value)
+        np.testing.assert_array_equal(here.moment_error, result.moments.error_estimate)
+        np.testing.assert_array_equal(here.moment_derivative, result.moments.derivative)
+        np.testing.assert_array_equal(here.moment_perturbation, result.moments.perturbation)
+        for name, estimate in result.estimates.items():
+            assert float(here[name]) == estimate.value
+            assert float(here[f"{name}_error"]) == estimate.error_estimate
+            assert float(here[f"{name}_perturbation"]) == INDICES[name].theory(result.curve.problem)
+        assert int(here.status) == 0
+        assert float(here.seconds) == result.seconds > 0
+    assert found.attrs["oscillator.c1"] == 0.1
+    assert "noise.D0" not in found.attrs
+    assert json.loads(found.attrs["versions"])["fpsolve"] == fpsolve.__version__
+    assert found.attrs["case_text"] == case.text == TEXT + PRODUCT
+    for name, variable in found.data_vars.items():
+        assert variable.attrs["long_name"], name
+        assert variable.attrs["units"], name
+    assert found.moment.attrs["equation"] == "(37)"
+    assert found["noise.D0"].attrs == {"long_name": "noise intensity", "units": "1/time"}
+
+
+def test_sets_side_by_side_have_one_dimension(tmp_path):
+    _, results, found = solved(tmp_path, TEXT + ZIP)
+    assert dict(found.sizes) == {"set": 3, "p": 3}
+    assert found["oscillator.omega"].dims == ("set",)
+    assert found["oscillator.c1"].values.tolist() == [0.1, 0.1, 0.2]
+    np.testing.assert_array_equal(found.moment, [result.moments.value for result in results])
+
+
+def test_what_failed_is_nan_and_said(tmp_path):
+    _, results, found = solved(tmp_path, TEXT + HOPELESS)
+    assert found.status.values.tolist() == [0, 1]
+    assert found.status.attrs["flag_meanings"].split()[1] == "partly"
+    assert found.status.attrs["flag_values"].tolist() == [0, 1, 2, 3]
+    bad = found.isel({"oscillator.epsilon": 1})
+    assert results[1].moments.p.tolist() == [0.0]
+    assert np.isnan(bad.moment).values.tolist() == [True, False, True]
+    assert math.isnan(bad.lyapunov_exponent)
+    assert np.isfinite(found.isel({"oscillator.epsilon": 0}).moment).all()
+    assert found.attrs["complete"] == 1
+
+
+def test_what_is_not_asked_for_is_not_there(tmp_path):
+    sets = ['output.quantities=["lyapunov_exponent", "stability_index"]']
+    _, results, found = solved(tmp_path, TEXT + PRODUCT, overrides=sets)
+    names = {"lyapunov_exponent", "stability_index"}
+    wanted = {f"{name}{ending}" for name in names for ending in ("", "_error", "_perturbation")}
+    assert set(found.data_vars) == wanted | {"status", "seconds"}
+    assert "p" not in found.dims
+    assert json.loads(found.attrs["overrides"]) == sets
+    folder = tmp_path / "out/test"
+    [curve, *_] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
+    assert names < set(curve)
+    assert not {"moments", "variance_rate", "impact_rate", "sensitivities"} & set(curve)
+    header = (folder / "curves.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert header[2:6] == ["lyapunov_exponent", "lyapunov_exponent_error", "stability_index", "stability_index_error"]
+    assert not list(folder.glob("*.vtu"))
+    assert all(result.sensitivities is None and not result.moments.p.size for result in results)
+
+
+def test_many_runs_are_one_dataset(tmp_path, monkeypatch):
+    solved(tmp_path, TEXT + PRODUCT, "product")
+    solved(tmp_path, TEXT + ZIP, "sets", ["moments.p=[2.0, 4.0]"])
+    solved(tmp_path, TEXT, "alone")
+    monkeypatch.chdir(tmp_path)
+    found = fpsolve.open_results("out/*")
+    assert dict(found.sizes) == {"set": 8, "p": 4}
+    assert found.p.values.tolist() == [-1.0, 0.0, 2.0, 4.0]
+    assert found.run.values.tolist() == ["alone", *["product"] * 4, *["sets"] * 3]
+    assert found["oscillator.omega"].values.tolist() == [1.0] * 6 + [2.0] * 2
+    assert found["noise.treatment"].values.tolist()[1:3] == ["exact", "ou-reduction"]
+    alone = fpsolve.open_results("out/alone")
+    assert float(found.moment.sel(p=2.0)[0]) == float(alone.moment.sel(p=2.0).item())
+    assert np.isnan(found.moment.sel(p=4.0)[:5]).all()
+    assert np.isfinite(found.moment.sel(p=4.0)[5:]).all()
+    assert len(found.to_dataframe()) == 32
+
+
+@pytest.mark.parametrize("places", [("nowhere",), ("out/*.toml", "none*"), ()])
+def test_no_results(tmp_path, monkeypatch, places):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(FpsolveError, match=r"no results.nc"):
+        fpsolve.open_results(*places)
+
+
+def test_a_damaged_file_is_named(tmp_path):
+    (tmp_path / "results.nc").write_bytes(b"no netCDF")
+    with pytest.raises(FpsolveError, match=r"results.nc cannot be read"):
+        fpsolve.open_results(tmp_path)

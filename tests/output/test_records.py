@@ -1,0 +1,144 @@
+"""Records: exact, in files that only grow; what is torn or damaged is none."""
+
+import json
+import math
+import multiprocessing
+import os
+
+import numpy as np
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.exponent.adapt import Budget
+from fpsolve.fem.mesh import make_mesh
+from fpsolve.output.records import Records, append
+from fpsolve.study import records as plain
+from fpsolve.study.records import key_of, record_of, result_of
+from fpsolve.study.solve import Numerics, Wanted
+from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
+from tests.solving import solve_case
+
+VALUES = {"numbers": [0.1, 1 / 3, 1e-300, math.inf, -0.0], "text": 'Λ(2) "quoted" , "record": {}\n', "nothing": None}
+
+
+def same(one, two):
+    """Equal to the last bit, NaN included."""
+    return json.dumps(one) == json.dumps(two)
+
+
+def test_what_is_appended_is_read(tmp_path):
+    places = [append(tmp_path / "here", f"key{i}", {**VALUES, "i": i}) for i in range(5)]
+    records = Records(tmp_path / "here").look()
+    for i, place in enumerate(places):
+        assert records.place(f"key{i}") == place
+        assert records.read(place) == {**VALUES, "i": i}
+    assert records.place("another") is None
+    [path] = (tmp_path / "here").glob("*")
+    assert [json.loads(line)["key"] for line in path.read_text(encoding="utf-8").splitlines()] == [
+        f"key{i}" for i in range(5)
+    ]
+    append(tmp_path / "here", "key1", {"i": "new"})
+    assert records.look().read(records.place("key1")) == {"i": "new"}
+    records.remove()
+    assert not Records(tmp_path / "here").look().are_there
+
+
+def test_there_are_none_without_a_folder(tmp_path):
+    assert not Records(tmp_path / "none").look().are_there
+
+
+def test_each_process_has_a_file(tmp_path):
+    context = multiprocessing.get_context("spawn")
+    workers = [context.Process(target=append, args=(tmp_path, f"key{i}", VALUES)) for i in range(2)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    append(tmp_path, "key2", VALUES)
+    assert len(list(tmp_path.glob("*.jsonl"))) == 3
+    records = Records(tmp_path).look()
+    assert all(records.read(records.place(f"key{i}")) == VALUES for i in range(3))
+
+
+@pytest.mark.parametrize("damage", [lambda line: line[: len(line) // 2], lambda line: b"\0" * len(line)])
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_a_torn_line_is_no_record(tmp_path, damage, which):
+    for i in range(3):
+        append(tmp_path, f"key{i}", {"i": i})
+    [path] = tmp_path.glob("*")
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[which] = damage(lines[which])
+    path.write_bytes(b"".join(lines))
+    records = Records(tmp_path).look()
+    swallowed = {which, which + 1}  # a torn line has no end, so that it takes the next one with it
+    for i in range(3):
+        place = records.place(f"key{i}")
+        assert (place is None) == (i in swallowed)
+        assert place is None or records.read(place) == {"i": i}
+
+
+def test_every_changed_byte_of_the_numbers_is_seen(tmp_path):
+    place = append(tmp_path, "key", {"numbers": [0.125, 17.0]})
+    path = tmp_path / place.file
+    content = path.read_bytes()
+    for i in range(content.index(b'"record"') + 10, len(content)):
+        path.write_bytes(content[:i] + bytes([content[i] ^ 1]) + content[i + 1 :])
+        assert not Records(tmp_path).look().are_there, i
+    records = Records(tmp_path)
+    with pytest.raises(ValueError, match="has changed"):
+        records.read(place)
+
+
+def test_what_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
+    append(tmp_path, "key0", {"i": 0})
+    [path] = tmp_path.glob("*")
+    whole, write = path.read_bytes(), os.write
+    monkeypatch.setattr("fpsolve.output.records.os.write", lambda handle, line: write(handle, line[:10]))
+    with pytest.raises(OSError, match="space"):
+        append(tmp_path, "key1", {"i": 1})
+    assert path.read_bytes() == whole
+    monkeypatch.undo()
+    append(tmp_path, "key2", {"i": 2})
+    records = Records(tmp_path).look()
+    assert [records.place(f"key{i}") is not None for i in range(3)] == [True, False, True]
+
+
+@pytest.mark.parametrize("text", [TEXT + PRODUCT, TEXT + HOPELESS])
+def test_results_are_the_same_from_their_records(tmp_path, text):
+    (tmp_path / "test.toml").write_text(text, encoding="utf-8")
+    for result in solve_case(load_case(tmp_path / "test.toml")):
+        record = record_of(result)
+        again = result_of(json.loads(json.dumps(record)), result.curve)
+        assert same(record_of(again), record)
+        for name in ("p", "value", "derivative", "error_estimate", "residual", "perturbation", "rare"):
+            np.testing.assert_array_equal(getattr(again.moments, name), getattr(result.moments, name))
+        assert again.estimates == result.estimates
+        assert (again.warnings, again.notes, again.failures) == (result.warnings, result.notes, result.failures)
+        assert again.status == result.status
+        assert again.sensitivities.moments == result.sensitivities.moments
+        assert again.sensitivities.indices == result.sensitivities.indices
+
+
+def test_a_key_follows_from_all_that_changes_a_result(tmp_path, monkeypatch):
+    (tmp_path / "test.toml").write_text(TEXT + PRODUCT, encoding="utf-8")
+    curve, other, *_ = load_case(tmp_path / "test.toml").curves()
+    wanted, numerics = Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",)), Numerics(1e-8, Budget(), None)
+    mesh = make_mesh(phi_cells=2, xi_cells=4)
+    keys = [
+        key_of(curve, wanted, numerics),
+        key_of(other, wanted, numerics),
+        key_of(curve, Wanted(np.array([1.0, 3.0]), ("lyapunov_exponent",)), numerics),
+        key_of(curve, Wanted(np.array([1.0, 2.0]), ()), numerics),
+        key_of(curve, Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",), shown=(1.0,)), numerics),
+        key_of(curve, Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",), density=True), numerics),
+        key_of(curve, Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",), differentiated=(1.0,)), numerics),
+        key_of(curve, wanted, Numerics(1e-9, Budget(), None)),
+        key_of(curve, wanted, Numerics(1e-8, Budget(unknowns=500), None)),
+        key_of(curve, wanted, Numerics(1e-8, Budget(seconds=5.0), None)),
+        key_of(curve, wanted, Numerics(1e-8, Budget(), mesh)),
+        key_of(curve, wanted, Numerics(1e-8, Budget(), make_mesh(phi_cells=2, xi_cells=4, xi_max=8.5))),
+    ]
+    assert len(set(keys)) == len(keys)
+    assert keys[0] == key_of(curve, wanted, numerics)
+    monkeypatch.setattr(plain, "RESULT_VERSION", 0)
+    assert key_of(curve, wanted, numerics) not in keys
