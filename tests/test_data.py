@@ -14,15 +14,19 @@ from matplotlib.colors import to_hex
 
 import fpsolve
 from fpsolve.analysis import Axis
+from fpsolve.case.curves import make_curve
+from fpsolve.case.sections import NoiseSection
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent import INDICES
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate, Failure
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT, noise_of, parameter_of, parameter_values
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
 from fpsolve.simulation.response import MEANS
+from fpsolve.study.solve import Numerics, Wanted, solve_curve
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 
 matplotlib.use("Agg")
@@ -46,6 +50,8 @@ MAIN = {
     "simulation": "moment",
     "no estimate": "moment",
     "response": "density",
+    "curve": "moment",
+    "indices of a curve": "moment",
 }
 """Results, by their names here, each with its main variable."""
 
@@ -66,6 +72,11 @@ def response():
         density=density, amplitude_edges=edges, amplitude_density=decay, amplitude_error=0.01 * decay,
         outside=1e-4, impact_rate=0.3, time=500.0,
     )  # fmt: skip
+
+
+def curve(p, *indices):
+    curve = make_curve(FIG1, NoiseSection(D0=1.0, tau0=0.5, r0=0.95), {"noise.D0": 0.5})
+    return solve_curve(curve, Wanted(np.array(p), indices), Numerics(1e-8, Budget(), None)).result
 
 
 @pytest.fixture(scope="module")
@@ -93,6 +104,8 @@ def results(fig1_solver):
         "simulation": simulated(estimates),
         "no estimate": simulated(()),
         "response": response(),
+        "curve": curve([-1.0, 2.0], "lyapunov_exponent"),
+        "indices of a curve": curve([], "lyapunov_exponent", "stability_index"),
     }
     assert set(found) == set(MAIN)
     return found

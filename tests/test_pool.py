@@ -77,7 +77,8 @@ def test_items_are_taken_when_they_are_needed():
         found.close()
 
     class Growing:
-        left = [3]
+        def __init__(self):
+            self.left = [3]
 
         def __iter__(self):
             return self

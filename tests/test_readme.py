@@ -5,18 +5,21 @@ from pathlib import Path
 
 import matplotlib
 
+import fpsolve
+
 README = Path(__file__).parents[1] / "README.md"
 
 
 def test_the_blocks_of_python_run(tmp_path, monkeypatch, capsys):
     matplotlib.use("Agg")
     monkeypatch.chdir(tmp_path)
+    fpsolve.run(fpsolve.load_case(README.parent / "cases/fig1.toml"))  # as the README does above them
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) >= 4
     names: dict[str, object] = {}
     for block in blocks:
         exec(block, names)
-    assert {path.name for path in tmp_path.iterdir()} == {"moments.nc", "moments.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {"results", "moments.nc", "moments.png"}
     printed = capsys.readouterr().out
     for number in ("0.014163143653", "0.013021271916", "-0.3734584986", "0.3179308", "0.9945938", "0.4579225"):
         assert number in printed  # as the comments beside them say
