@@ -1,4 +1,4 @@
-"""A run that is killed, at any moment, leaves whole files, and the next one begins as if it had not been."""
+"""A run that is killed, at any moment, leaves whole files, and the next one goes on where it was."""
 
 import json
 import os
@@ -10,6 +10,7 @@ import time
 
 import pytest
 
+from fpsolve.process import processors
 from tests.conftest import heed_signals
 
 CASE = """
@@ -26,7 +27,7 @@ r0 = 0.95
 [moments]
 p = [-1.0, 2.0]
 [vary]
-"noise.D0" = [0.5, 1.0, 1.5]
+"noise.D0" = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
 """
 ROUNDS = 1
 """Of four kills; fifteen take three minutes."""
@@ -53,34 +54,54 @@ def started(case, out):
     return process
 
 
+def numbers(curves):
+    """What a summary tells of its curves, but how long these took."""
+    return [{name: value for name, value in curve.items() if name != "seconds"} for curve in curves]
+
+
 def contents(folder):
-    """The numbers of a summary, and the names of all files but hidden ones."""
+    """The numbers of a summary, and the names of all files but records and hidden ones."""
     curves = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
-    return curves, {path.relative_to(folder).as_posix() for path in folder.rglob("[!.]*") if path.is_file()}
+    names = {path.relative_to(folder).as_posix() for path in folder.rglob("[!.]*") if path.is_file()}
+    return numbers(curves), {name for name in names if not name.startswith("records/")}
+
+
+def kept(folder):
+    """The keys of all whole records."""
+    lines = [line for path in folder.glob("records/solved/*.jsonl") for line in path.read_bytes().splitlines(True)]
+    return {json.loads(line)["key"] for line in lines if line.endswith(b"\n")}
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_killed_runs_leave_nothing_torn(case, tmp_path):
-    for _ in range(2):  # the second does not wait for caches; signals must not come after the end
-        process, begun = started(case, tmp_path / "whole"), time.monotonic()
+    for name in ("first", "whole"):  # the second does not wait for caches; signals must not come after the end
+        process, begun = started(case, tmp_path / name), time.monotonic()
         process.communicate(timeout=120)
         assert process.returncode == 0
     duration, whole = time.monotonic() - begun, contents(tmp_path / "whole" / "killed")
-    rng, out = random.Random(3), tmp_path / "out"
+    rng, out = random.Random(9), tmp_path / "out"
     for kind in (signal.SIGKILL, signal.SIGHUP, signal.SIGINT, signal.SIGTERM) * ROUNDS:
+        before = kept(out / "killed")
         process = started(case, out)
         time.sleep(rng.uniform(0.05, 0.7) * duration)
         process.send_signal(kind)
         _, said = process.communicate(timeout=60)
+        done = kept(out / "killed")
+        assert before <= done
         assert process.returncode in (0, -signal.SIGKILL, 129, 130, 143)
         assert "Traceback" not in said
         summary = out / "killed" / "summary.json"
         if summary.exists():
             left = json.loads(summary.read_text(encoding="utf-8"))
             assert left["complete"] == (left["done"] == left["planned"])
-            assert left["curves"] == whole[0][: left["done"]]
+            assert len(left["curves"]) == left["done"]
+            found = numbers(left["curves"])
+            assert found == [curve for curve in whole[0] if curve in found]
+            if kind != signal.SIGKILL and len(done) > len(before):  # what a worker finished last is told the next time
+                assert left["done"] >= len(done) - processors()
     process = started(case, out)
     process.communicate(timeout=120)
     assert process.returncode == 0
     assert contents(out / "killed") == whole
+    assert len(kept(out / "killed")) == len(whole[0])
     assert not [path for path in (out / "killed").rglob(".*") if path.name.startswith(".fpsolve-")]
