@@ -547,3 +547,38 @@ def test_theories_outside_their_range_are_noted(tmp_path, capsys):
     err = " ".join(capsys.readouterr().err.split())
     assert "note: minimal: the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = 0.3 > 0.1" in err
     assert "note: minimal: Eq. (37) is for weak noise" in err
+
+
+def test_json_prints_the_summary_and_nothing_else(case, tmp_path, capsys):
+    assert main(["run", case, "--json", "--set", "output.eigenfunctions=[]"]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("\n") == 1
+    assert json.loads(out) == json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))
+    assert err == ""
+
+
+def test_json_of_several_cases_is_a_line_each_and_warnings_are_apart(case, tmp_path, capsys):
+    (tmp_path / "other.toml").write_text(TEXT.replace("A test", "Another\\n test"), encoding="utf-8")
+    sets = ["--set", "output.quantities=['moment', 'lyapunov_exponent']", "--set", "output.eigenfunctions=[]"]
+    hopeless = ["--set", HOPELESS, "--set", "oscillator.epsilon=1.5"]
+    assert main(["run", case, "other.toml", "--json", *sets, *hopeless]) == NOT_CONVERGED
+    out, err = capsys.readouterr()
+    assert [json.loads(line)["title"] for line in out.splitlines()] == ["A test", "Another\n test"]
+    assert "not converged: other" in err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--jobs", "0"], "--jobs: got 0; must be at least 1"),
+        (["--jobs", "-3"], "--jobs: got -3; must be at least 1"),
+        (["--jobs", "2", "--scheduler", "tcp://host:8786"], "name one of them"),
+        (["--scheduler", "host"], 'got "host" as the address of a scheduler; must be one such as tcp://host:8786'),
+        (["--jobs", "2.5"], '"2.5"'),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "check", "simulate"])
+def test_bad_workers(case, tmp_path, capsys, command, options, message):
+    assert main([command, case, *options]) == BAD_INPUT
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "results").exists()
