@@ -30,7 +30,10 @@ Overrides = Annotated[
 
 def _whole(_: type, tokens: Sequence[Token]) -> int:
     """A whole number; cyclopts alone would take 2.5 for 2."""
-    return int(tokens[0].value)
+    try:
+        return int(tokens[0].value)
+    except ValueError:
+        raise ValueError(f'got "{tokens[0].value}"; must be a whole number') from None
 
 
 Count = Annotated[int, Parameter(converter=_whole)]

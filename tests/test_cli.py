@@ -574,7 +574,7 @@ def test_json_of_several_cases_is_a_line_each_and_warnings_are_apart(case, tmp_p
         (["--jobs", "-3"], "--jobs: got -3; must be at least 1"),
         (["--jobs", "2", "--scheduler", "tcp://host:8786"], "name one of them"),
         (["--scheduler", "host"], 'got "host" as the address of a scheduler; must be one such as tcp://host:8786'),
-        (["--jobs", "2.5"], '"2.5"'),
+        (["--jobs", "2.5"], 'got "2.5"; must be a whole number'),
     ],
 )
 @pytest.mark.parametrize("command", ["run", "check", "simulate"])
