@@ -278,6 +278,12 @@ def test_a_cluster_gives_the_same_results(place):
     assert len(lines(place, "cluster")) <= SIZE**2 + 1
 
 
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_single_set(place, jobs):
+    run(place, f"single{jobs}", "--jobs", jobs, "--set", "vary={}")
+    assert len(lines(place, f"single{jobs}")) == 1
+
+
 def test_batches_follow_from_the_case_alone(place):
     from fpsolve.study.sweep import batch_size
 

@@ -14,7 +14,7 @@ from fpsolve.output.provenance import Run
 from fpsolve.output.records import Place, Records, Results, append
 from fpsolve.output.tables import write_results
 from fpsolve.output.vtk import write_functions
-from fpsolve.pool import Pool
+from fpsolve.pool import Pool, here
 from fpsolve.study.records import key_of, record_of
 from fpsolve.study.results import CurveResult, Solved
 from fpsolve.study.solve import Numerics, everything, without_failed
@@ -70,12 +70,12 @@ class Sweep:
     def solve(self, pool: Pool, progress: Callable[[], None]) -> None:
         """Solve what is not known yet; tables are written at the beginning, and as they grow."""
         self.write_tables()
-        is_alone = self.case.planned == 1
+        is_alone = self.case.planned == 1 and not pool.is_elsewhere
         for _ in range(0 if self.wanted.draws else len(self.results) * self._steps_each):
             progress()
         queue = _Queue(batches(self.case, self._order, self.numerics))
-        with pool:
-            for done in pool.run(SolveBatch(Keep(self.folder), progress if is_alone else None), queue):
+        with here() if is_alone else pool as workers:
+            for done in workers.run(SolveBatch(Keep(self.folder), progress if is_alone else None), queue):
                 for number, found in self._lost(done.item, queue) if done.result is None else done.result:
                     if found is not None:
                         self.results.add(number, found)
