@@ -1,4 +1,4 @@
-"""What a sweep costs beside its solves, and what a second process saves. Run on an idle machine: pytest tests/benchmarks."""
+"""What a sweep costs beside its solves, and what a second process saves; for an idle machine."""
 
 import os
 import subprocess
