@@ -495,6 +495,18 @@ def test_progress_is_called_once_for_each_moment(case, tmp_path):
     assert len(calls) == 6
 
 
+@pytest.mark.parametrize(
+    "sets", [[], ["vary={}"], ["output.eigenfunctions=[]"], ["vary={}", "output.eigenfunctions=[]"]]
+)
+def test_progress_counts_what_is_known(tmp_path, sets):
+    """Also of a single curve whose eigenfunctions are drawn again."""
+    case = write(tmp_path, TEXT, sets)
+    for _ in range(2):
+        calls = []
+        fpsolve.run(case, tmp_path, progress=lambda calls=calls: calls.append(1))
+        assert len(calls) == 3 * case.planned
+
+
 def test_expectations_are_compared_where_they_select(tmp_path):
     expect = """
 [[expect]]

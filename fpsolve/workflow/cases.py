@@ -100,7 +100,7 @@ def run(
             `if __name__ == "__main__":` around what it does.
         scheduler: the address of a Dask scheduler whose workers solve instead, such as "tcp://host:8786".
         fresh: whether to solve all sets anew.
-        progress: called after each moment of each curve.
+        progress: called once for each moment of each curve; where there are several curves, as each is finished.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it; nothing is solved.

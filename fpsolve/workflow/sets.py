@@ -70,7 +70,7 @@ class Sweep:
     def solve(self, pool: Pool, progress: Callable[[], None]) -> None:
         """Solve what is not known yet; tables are written at the beginning, and as they grow."""
         self.write_tables()
-        is_alone = self.case.planned == 1 and not pool.is_elsewhere
+        is_alone = self.case.planned == 1 and not self.results and not pool.is_elsewhere
         for _ in range(0 if self.wanted.draws else len(self.results) * self._steps_each):
             progress()
         queue = _Queue(batches(self.case, self._order, self.numerics))
