@@ -19,12 +19,15 @@ from fpsolve.study.solve import Numerics, Wanted
 RESULT_VERSION = 1
 """Of what is computed from the same parameters; records of another one are computed anew."""
 Record = dict[str, Any]
+_FORM = [field.name for kind in (CurveResult, Moments, Estimate, Failure, Sensitivities) for field in fields(kind)]
+"""What a record holds; those of another form are not read."""
 
 
 def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
     """What a record is found by: a digest of all that its numbers and sentences follow from."""
     mesh, budget = numerics.mesh, numerics.budget
     content = {
+        "form": _FORM,
         "parameters": dict(curve.parameters),
         "p": wanted.p.tolist(),
         "wanted": [wanted.indices, wanted.shown, wanted.density, wanted.differentiated],

@@ -252,6 +252,7 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
         try:
             sweep.solve(pool, progress)
         except KeyboardInterrupt:
+            sweep.find()
             sweep.write_all()
             raise
         sweep.write_all()

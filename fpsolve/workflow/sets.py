@@ -56,11 +56,14 @@ class Sweep:
         self.results = Results(case, self.records)
         if is_fresh:
             self.records.remove()
-        elif self.records.look().are_there:
-            for curve in case.curves():
-                if place := self.records.place(self._key(curve)):
-                    self.results.add(curve.number, place)
+        self.find()
         self._tabled = 0
+
+    def find(self) -> None:
+        """Look for the records of all sets, also those that a worker has finished and not told of."""
+        for curve in self.case.curves() if self.records.look().are_there else ():
+            if place := self.records.place(self._key(curve)):
+                self.results.add(curve.number, place)
 
     @property
     def steps(self) -> int:
