@@ -18,6 +18,8 @@ import xarray as xr
 
 from fpsolve.case.case import load_case
 from fpsolve.output.records import Records
+from fpsolve.pool import cluster
+from fpsolve.workflow import run_case
 from fpsolve.workflow.sets import SOLVED_RECORDS
 from tests.conftest import heed_signals
 
@@ -276,6 +278,16 @@ def test_a_cluster_gives_the_same_results(place):
         assert process.returncode == 0, said
     assert_same_results(place, "cluster")
     assert len(lines(place, "cluster")) <= SIZE**2 + 1
+
+
+def test_a_cluster_works_for_one_case_after_the_other(place):
+    """Its client ends with each."""
+    pytest.importorskip("distributed")
+    case = load_case(place / "sweep.toml", ["vary={}"])
+    with dask_cluster(1) as (address, _):
+        pool = cluster(address)
+        numbers = [run_case(case, place / out, pool=pool).results[0].moments.value for out in ("first", "second")]
+    np.testing.assert_array_equal(*numbers)
 
 
 def test_batches_follow_from_the_case_alone(place):
