@@ -17,7 +17,7 @@ from fpsolve.model.quantity import UNNAMED, Quantity
 from fpsolve.study.results import CurveResult, Moments
 from fpsolve.study.solve import Numerics, Wanted
 
-RESULT_VERSION = 1
+RESULT_VERSION = 2
 """Of what is computed from the same parameters; records of another one are computed anew."""
 Record = dict[str, Any]
 
