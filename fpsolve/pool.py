@@ -6,6 +6,7 @@ A task is a function of one item, both of which pickle. What it finds must not d
 from __future__ import annotations
 
 import logging
+import math
 import multiprocessing
 import os
 import re
@@ -59,7 +60,7 @@ class Pool:
         start: makes an executor; again after one has broken, because a worker died.
         stop: ends an executor, and what it is at.
         ahead: how many tasks it is given at once.
-        own_seconds: of work that this process does before the executor is made.
+        own_seconds: of work that this process does before the executor is made; with inf it does all.
         is_elsewhere: whether other machines work.
     """
 
@@ -163,21 +164,9 @@ class Pool:
             self.stop(executor)
 
 
-class _Here(Executor):
-    """Runs every task in this process, as it is submitted."""
-
-    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        try:
-            future.set_result(function(*args, **kwargs))
-        except Exception as failure:
-            future.set_exception(failure)
-        return future
-
-
 def here() -> Pool:
-    """This process alone."""
-    return Pool(_Here)
+    """This process alone, item by item."""
+    return Pool(lambda: _processes(1), own_seconds=math.inf)
 
 
 def several(count: int | None = None) -> Pool:
@@ -194,14 +183,20 @@ def cluster(address: str) -> Pool:
     Raises:
         FpsolveError: Dask is not installed, nothing answers, or the workers cannot do it.
     """
-    client = _client(address)
-    threads = sum(client.nthreads().values())
+    clients: list[Any] = []
+    with _client(address) as client:
+        threads = sum(client.nthreads().values())
+
+    def start() -> Executor:
+        clients.append(_client(address))
+        executor: Executor = clients[-1].get_executor(pure=False)
+        return executor
 
     def stop(executor: Executor) -> None:
         executor.shutdown(wait=False)  # what is not done is cancelled
-        client.close()
+        clients.pop().close()
 
-    return Pool(partial(client.get_executor, pure=False), stop, max(AHEAD * threads, 32), is_elsewhere=True)
+    return Pool(start, stop, max(AHEAD * threads, 32), is_elsewhere=True)
 
 
 def _client(address: str) -> Any:

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from concurrent.futures import Executor, Future
 
@@ -11,6 +13,7 @@ from fpsolve import pool
 from fpsolve.errors import FpsolveError
 from fpsolve.pool import Pool, cluster, here, several
 from fpsolve.process import processors
+from tests.conftest import heed_signals
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 
@@ -110,6 +113,41 @@ def test_a_dead_worker_costs_its_task_only(workers):
 def test_a_dead_worker_ends_a_map():
     with several(2) as workers, pytest.raises(FpsolveError, match="a worker died"):
         list(workers.map(deadly, range(15)))
+
+
+INTERRUPTED = """
+import time
+from fpsolve.pool import here
+
+def task(number):
+    print("begun", flush=True)
+    end = time.monotonic() + 20
+    while time.monotonic() < end:
+        pass
+
+with here() as workers:
+    list(workers.run(task, [1]))
+"""
+
+
+def test_an_interrupt_reaches_a_task_of_this_process():
+    process = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED], stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=heed_signals
+    )
+    assert process.stdout.readline() == b"begun\n"
+    begun = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert b"KeyboardInterrupt" in said
+    assert time.monotonic() - begun < 10
+
+
+def test_a_map_of_this_process_is_as_lazy_as_the_builtin():
+    """Who looks at the first result need not wait for others."""
+    done = []
+    with here() as workers:
+        next(workers.map(done.append, range(100)))
+    assert done == [0]
 
 
 @pytest.mark.parametrize("count", [1, 2])

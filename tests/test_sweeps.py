@@ -17,7 +17,11 @@ import pytest
 import xarray as xr
 
 from fpsolve.case.case import load_case
+from fpsolve.output import records
 from fpsolve.output.records import Records
+from fpsolve.pool import cluster
+from fpsolve.study import sweep
+from fpsolve.workflow import run_case
 from fpsolve.workflow.sets import SOLVED_RECORDS
 from tests.conftest import heed_signals
 
@@ -284,9 +288,65 @@ def test_a_single_set(place, jobs):
     assert len(lines(place, f"single{jobs}")) == 1
 
 
+def test_a_cluster_works_for_one_case_after_the_other(place):
+    """Its client ends with each."""
+    pytest.importorskip("distributed")
+    case = load_case(place / "sweep.toml", ["vary={}"])
+    with dask_cluster(1) as (address, _):
+        pool = cluster(address)
+        numbers = [run_case(case, place / out, pool=pool).results[0].moments.value for out in ("first", "second")]
+    np.testing.assert_array_equal(*numbers)
+
+
 def test_batches_follow_from_the_case_alone(place):
     from fpsolve.study.sweep import batch_size
 
     case = load_case(place / "sweep.toml")
     assert case.planned == SIZE**2
     assert [batch_size(n) for n in (1, 49, 256, 512, 10_000, 10**7)] == [1, 1, 1, 2, 39, 64]
+
+
+def test_the_first_sets_come_one_by_one(place):
+    """This process, which begins alone, calls others once it sees that sets take long."""
+    from fpsolve.study.solve import Numerics, everything
+    from fpsolve.study.sweep import Order, batches
+
+    num = "{ start = 0.1, stop = 1.0, num = 40 }"
+    case = load_case(place / "sweep.toml", [f'vary={{ "noise.D0" = {num}, "noise.tau0" = {num} }}'])
+    found = list(batches(case, lambda curve: Order(curve, everything(case), ""), Numerics.of(case)))
+    assert [len(batch.orders) for batch in found[:8]] == [1] * 6 + [6] * 2
+    assert [order.curve.number for batch in found for order in batch.orders] == list(range(1, 1601))
+
+
+def test_records_are_read_once(tmp_path, monkeypatch):
+    """However often one looks, as after each set on which a worker died."""
+    parsed = []
+    original = records._parsed
+    monkeypatch.setattr(records, "_parsed", lambda line: parsed.append(line) or original(line))
+    known = Records(tmp_path)
+    for number in range(5):
+        records.append(tmp_path, f"key{number}", {"number": number})
+        place = known.look().place(f"key{number}")
+        assert len(parsed) == number + 1
+    [path] = tmp_path.glob("*.jsonl")
+    with path.open("ab") as file:
+        file.write(b'{"key": "torn')
+    assert known.look().place("key4") == place
+    monkeypatch.undo()
+    assert known.read(known.place("key3")) == {"number": 3}
+    known.remove()
+    records.append(tmp_path, "key0", {"number": 10})
+    assert known.look().read(known.place("key0")) == {"number": 10}
+
+
+def test_a_drawing_that_fails_costs_no_numbers(place, monkeypatch):
+    case = load_case(place / "sweep.toml", ["vary={}", "output={}", "moments.p=[1.0]"])
+    before = run_case(case, place / "drawn").results[0]
+
+    def fail(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(sweep, "solve_functions", fail)
+    outcome = run_case(case, place / "drawn")
+    assert not outcome.failures
+    np.testing.assert_array_equal(outcome.results[0].moments.value, before.moments.value)

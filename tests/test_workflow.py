@@ -205,12 +205,15 @@ def test_failures_are_values(tmp_path):
     case = write(tmp_path, text, [HOPELESS])
     outcome, checked = run_case(case, tmp_path / "out"), check_case(case)
     for results, failed in ((outcome.results, [2.0, -1.0]), (checked.results, [2.0])):  # what is not expected is left
-        assert [sorted((each.p for each in result.failures), reverse=True) for result in results] == [[], failed]
+        found = [[each.p for each in result.failures if each.p is not None] for result in results]
+        assert [sorted(each, reverse=True) for each in found] == [[], failed]
         assert not {failure.reason for failure in results[1].failures} & set(results[1].warnings)
-    assert (len(outcome.failures), len(checked.failures)) == (2, 1)
+    indices = [each.reason for each in outcome.results[0].failures]
+    assert all(reason.startswith("no ") for reason in indices)  # whose p are all there
+    assert (len(outcome.failures) - len(indices), len(checked.failures)) == (2, 1)
     assert not outcome.interruption
     curves = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
-    assert curves[1]["warnings"] == [*outcome.results[1].warnings, *outcome.failures]
+    assert curves[1]["warnings"] == [*outcome.results[1].warnings, *outcome.failures[len(indices) :]]
     assert files(tmp_path) == {"test.toml", *(f"out/test/{name}" for name in files(tmp_path / "out/test"))}
 
 
@@ -228,6 +231,27 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     assert curve["warnings"][0].endswith("as there is no Λ(0.001)") == bool(small)
     with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
         assert [row["derivative"] for row in csv.DictReader(file)] == [""] * (not small)
+
+
+@pytest.mark.parametrize(("p", "status"), [([], "failed"), ([0.0], "partly")])
+def test_an_index_that_does_not_converge_is_a_failure(tmp_path, p, status):
+    """Not only a warning: where no p is asked for, or all are there, nothing else tells of it."""
+    quantities = ["lyapunov_exponent", *(["moment"] if p else [])]
+    sets = [
+        f"output.quantities={quantities}",
+        "output.eigenfunctions=[]",
+        "oscillator.epsilon=2.0",
+        "budget.unknowns=100",
+    ]
+    text = TEXT.replace("eigenfunctions = [2.0]", "")
+    case = write(
+        tmp_path, text, [*(sets if p else sets[:1] + sets[2:]), f"moments.p={p or [1.0]}", 'vary={"noise.D0"=[1.0]}']
+    )
+    with pytest.raises(NotConverged, match=r"no λ: .*use a larger rtol"):
+        fpsolve.run(case, tmp_path / "out")
+    [curve] = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    assert curve["status"] == status
+    assert [text[:5] for text in curve["warnings"]] == ["no λ: "[:5]]
 
 
 def test_zero_has_no_sign(tmp_path):
@@ -578,7 +602,7 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     (curve,) = case.curves()
     with pytest.raises(NotConverged, match=r"\d% of it is negative") as refused:
         stationary_density(ExponentSolver(curve.problem, case.cylinder_mesh()).pair(0.0))
-    (result,) = fpsolve.run(case, tmp_path / "out")
+    (result,) = run_case(case, tmp_path / "out").results  # whose λ does not converge either
     told = f"neither the stationary density nor eigenfunctions are written: {refused.value.reason}; {Remedy.MESH}"
     assert in_words_of_a_case(told) in result.warnings
     assert "do not read its picture" not in " ".join(result.warnings)

@@ -97,7 +97,7 @@ class Failure:
     """Why there is no Λ(p), or none to be trusted.
 
     Attributes:
-        p: the moment; None where all of them are doubtful.
+        p: the moment; None where all of them are doubtful, or where another quantity is missing.
         reason: what happened, and what to do.
     """
 

@@ -94,15 +94,16 @@ def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
     for pair in pairs:
         others = tuple((key, value) for key, value in pair[0].curve.key if key != case.figure.x)
         groups.setdefault(others, []).append(pair)
-    return [_index_series(case, INDICES[case.figure.y], dict(others), group) for others, group in groups.items()]
+    count = 200 if len(groups) <= MOST_LABELLED else 0
+    return [_index_series(case, INDICES[case.figure.y], dict(others), group, count) for others, group in groups.items()]
 
 
-def _index_series(case: Case, index: Index, others: Varied, group: Sequence[Pair]) -> Series:
-    """λ or δ_p over the parameter; its perturbation theory, which has poles, where the index is sought."""
+def _index_series(case: Case, index: Index, others: Varied, group: Sequence[Pair], count: int) -> Series:
+    """λ or δ_p over the parameter; its perturbation theory, which has poles, at `count` points where it is sought."""
     x = np.array([result.curve.varied[case.figure.x] for result, _ in group])
     found = [result.estimates[index.name] for result, _ in group]
     y = np.array([np.nan if estimate is None else estimate.value for estimate in found])
-    line = np.linspace(x.min(), x.max(), 200)
+    line = np.linspace(x.min(), x.max(), count)
     curves = [case.curve({**others, case.figure.x: float(value)}) for value in line]
     line_y = np.array([index.theory(curve.problem) for curve in curves])
     line_y[(line_y < index.interval[0]) | (line_y > index.interval[1])] = np.nan

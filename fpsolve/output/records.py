@@ -42,11 +42,14 @@ class Records:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._places: dict[str, Place] = {}
+        self._seen: dict[str, int] = {}
 
     def look(self) -> Records:
-        """Find what has been written by now."""
+        """Find what has been written by now, since the last look."""
         for path in sorted(self.folder.glob("*.jsonl")):
-            self._places |= dict(_lines(path))
+            for key, place in _lines(path, self._seen.get(path.name, 0)):
+                self._places[key] = place
+                self._seen[path.name] = place.start + place.size
         return self
 
     @property
@@ -70,6 +73,7 @@ class Records:
     def remove(self) -> None:
         """Start over."""
         self._places.clear()
+        self._seen.clear()
         for path in self.folder.glob("*.jsonl"):
             path.unlink()
 
@@ -152,10 +156,10 @@ def _own_name() -> str:
     return _NAMES[number]
 
 
-def _lines(path: Path) -> Iterator[tuple[str, Place]]:
-    """The keys and places of the whole records of a file."""
-    start = 0
+def _lines(path: Path, start: int) -> Iterator[tuple[str, Place]]:
+    """The keys and places of the whole records of a file, from a byte on."""
     with path.open("rb") as file:
+        file.seek(start)
         for line in file:
             found = _parsed(line)
             if found is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -13,10 +13,11 @@ import numpy as np
 from fpsolve.analysis.sensitivity import Sensitivities, Slopes
 from fpsolve.case.curves import Curve
 from fpsolve.exponent.error import Estimate, Failure
+from fpsolve.model.quantity import UNNAMED, Quantity
 from fpsolve.study.results import CurveResult, Moments
 from fpsolve.study.solve import Numerics, Wanted
 
-RESULT_VERSION = 1
+RESULT_VERSION = 2
 """Of what is computed from the same parameters; records of another one are computed anew."""
 Record = dict[str, Any]
 _FORM = [field.name for kind in (CurveResult, Moments, Estimate, Failure, Sensitivities) for field in fields(kind)]
@@ -47,7 +48,7 @@ def record_of(result: CurveResult) -> Record:
     slopes = result.sensitivities
     return {
         "moments": _plain(result.moments),
-        "estimates": {name: _estimated(estimate) for name, estimate in result.estimates.items()},
+        "estimates": {name: each and _estimated(each) for name, each in result.estimates.items()},
         "discretisation": result.discretisation,
         "warnings": list(result.warnings),
         "notes": list(result.notes),
@@ -63,7 +64,7 @@ def result_of(record: Mapping[str, Any], curve: Curve) -> CurveResult:
     return CurveResult(
         curve=curve,
         moments=Moments(**{name: np.array(values, dtype=float) for name, values in record["moments"].items()}),
-        estimates={name: _estimate(row) for name, row in record["estimates"].items()},
+        estimates={name: row and _estimate(row) for name, row in record["estimates"].items()},
         discretisation=record["discretisation"],
         warnings=tuple(record["warnings"]),
         notes=tuple(record["notes"]),
@@ -79,12 +80,15 @@ def _plain(data: Any) -> Record:
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
 
 
-def _estimated(estimate: Estimate | None) -> list[Any] | None:
-    return None if estimate is None else list(asdict(estimate).values())
+def _estimated(estimate: Estimate) -> list[Any]:
+    """The numbers of an estimate, and its quantity where it has a name."""
+    *numbers, quantity = asdict(estimate).values()
+    return numbers if estimate.quantity == UNNAMED else [*numbers, quantity]
 
 
-def _estimate(row: list[Any] | None) -> Estimate | None:
-    return None if row is None else Estimate(*row)
+def _estimate(row: Sequence[Any]) -> Estimate:
+    value, error, scale, meaning, *named = row
+    return Estimate(value, error, scale, meaning, *(Quantity(**each) for each in named))
 
 
 def _sensitivities(found: Sensitivities) -> Record:
@@ -102,7 +106,7 @@ def _sensitivities(found: Sensitivities) -> Record:
 
 def _differentiated(record: Mapping[str, Any]) -> Sensitivities:
     def slopes(rows: Mapping[str, Any]) -> Slopes:
-        return {key: Estimate(*row) for key, row in rows.items()}
+        return {key: _estimate(row) for key, row in rows.items()}
 
     return Sensitivities(
         theta=record["theta"],

@@ -65,7 +65,7 @@ class CurveResult(Result):
         discretisation: what was used for the p of the largest size; None where no p was solved.
         warnings: what limits these numbers.
         notes: where the theories compared with are not valid.
-        failures: why some p are missing.
+        failures: why some p are missing, or with all p some indices.
         sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
         seconds: how long the processor took.
     """
@@ -97,10 +97,10 @@ class CurveResult(Result):
 
     @property
     def status(self) -> Status:
-        """Whether all p that were asked for are there."""
+        """Whether all that was asked for is there."""
         if not self.failures:
             return Status.CONVERGED
-        return Status.PARTLY if self.moments.p.size else Status.FAILED
+        return Status.PARTLY if self.moments.p.size or any(self.estimates.values()) else Status.FAILED
 
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""

@@ -118,10 +118,11 @@ def solve_curve(
     started = thread_time()
     solver = ExponentSolver(curve.problem, numerics.mesh, rtol=numerics.rtol, budget=numerics.budget)
     found = solve_moments(solver, wanted.p, progress=progress)
-    estimates, missing, absent = _solve_indices(solver, wanted.indices, found)
+    estimates, unsolved, missing, absent = _solve_indices(solver, wanted.indices, found)
+    failures = found.failures or tuple(Failure(None, text) for text in unsolved)
     pairs, stationary = _functions(solver, without_failed(wanted, found.failures))
     lost = _lost(stationary, solver.near.refinement)
-    warnings = [*found.warnings, *missing, *_imprecise(estimates, numerics)]
+    warnings = [*found.warnings, *missing, *(unsolved if found.failures else ()), *_imprecise(estimates, numerics)]
     warnings += lost or _unresolved(pairs)
     slopes = _sensitivities(solver, curve, wanted, found, estimates)
     notes = [*_notes(curve, found, estimates[LYAPUNOV_EXPONENT.name]), *absent, *(slopes.notes if slopes else ())]
@@ -133,7 +134,7 @@ def solve_curve(
         warnings=tuple(map(in_words_of_a_case, warnings)),
         sensitivities=slopes,
         notes=tuple(map(in_words_of_a_case, notes)),
-        failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in found.failures),
+        failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in failures),
         seconds=thread_time() - started,
     )
     return Solved(result, pairs, None if lost else stationary)
@@ -169,10 +170,11 @@ def _moments(found: MomentLyapunov) -> Moments:
 
 def _solve_indices(
     solver: ExponentSolver, names: Sequence[str], moments: MomentLyapunov
-) -> tuple[dict[str, Estimate | None], list[str], list[str]]:
-    """Indices, δ_p first, None for those not asked for; why some of those asked for are missing, or do not exist."""
+) -> tuple[dict[str, Estimate | None], list[str], list[str], list[str]]:
+    """Indices, δ_p first, None for those not asked for; why some did not converge, are infinite, or do not exist."""
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
     failed: dict[str, list[str]] = {}
+    infinite: dict[str, list[str]] = {}
     absent: dict[str, list[str]] = {}
     missing = []
     for index in sorted(INDICES.values(), key=lambda index: index != STABILITY_INDEX):
@@ -181,7 +183,8 @@ def _solve_indices(
         try:
             found = index.solve(solver, moments.root)
         except (NotConverged, NoSuchExponent) as failure:
-            failed.setdefault(str(failure), []).append(index.symbol)
+            reasons = failed if isinstance(failure, NotConverged) else infinite
+            reasons.setdefault(str(failure), []).append(index.symbol)
             continue
         if isinstance(found, Estimate):
             estimates[index.name] = found
@@ -191,10 +194,11 @@ def _solve_indices(
             missing.append(f"no stability index: {found.reason}")
     told = {failure.reason: f"as there is no Λ({failure.p:g})" for failure in moments.failures if failure.p is not None}
     failed = {told.get(reason, reason): symbols for reason, symbols in failed.items()}
-    warnings, notes = (
-        [f"no {', '.join(symbols)}: {reason}" for reason, symbols in each.items()] for each in (failed, absent)
+    unsolved, warnings, notes = (
+        [f"no {', '.join(symbols)}: {reason}" for reason, symbols in each.items()]
+        for each in (failed, infinite, absent)
     )
-    return estimates, missing + warnings, notes
+    return estimates, unsolved, missing + warnings, notes
 
 
 def _sensitivities(

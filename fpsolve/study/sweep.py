@@ -9,6 +9,7 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -75,20 +76,33 @@ def batch_size(planned: int) -> int:
 
 
 def batches(case: Case, order: Callable[[Curve], Order | None], numerics: Numerics) -> Iterator[Batch]:
-    """All batches of a case, without the sets of which nothing is wanted."""
+    """All batches of a case, without the sets of which nothing is wanted; the first sets come one by one.
+
+    So whoever begins sees soon how long they take.
+    """
     size = batch_size(case.planned)
-    for start in range(0, case.planned, size):
-        found = tuple(filter(None, map(order, case.curves(start, min(start + size, case.planned)))))
+    starts = [*range(min(size, case.planned)), *range(size, case.planned, size), case.planned]
+    for start, stop in pairwise(starts):
+        found = tuple(filter(None, map(order, case.curves(start, stop))))
         if found:
             yield Batch(found, numerics)
 
 
 def solved(order: Order, numerics: Numerics, progress: Callable[[], None] = lambda: None) -> Solved:
-    """What is wanted of a set; where that cannot be found, a result that says why."""
-    curve, wanted = order.curve, order.wanted
+    """What is wanted of a set; where that cannot be found, a result that says why, unless its numbers are known."""
+    if not order.is_known:
+        return _anew(order.curve, order.wanted, numerics, progress)
     try:
-        if order.is_known:
-            return Solved(None, *solve_functions(curve, wanted, numerics))
+        return Solved(None, *solve_functions(order.curve, order.wanted, numerics))
+    except OSError:
+        raise
+    except Exception:  # its numbers stay as they are
+        return Solved(None, (), None)
+
+
+def _anew(curve: Curve, wanted: Wanted, numerics: Numerics, progress: Callable[[], None]) -> Solved:
+    """A set of which nothing is known yet."""
+    try:
         return solve_curve(curve, wanted, numerics, progress)
     except FpsolveError as failure:
         return Solved(failed(curve, str(failure)), (), None)

@@ -75,7 +75,7 @@ class Outcome:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Why some p of some curves are missing."""
+        """Why some p or indices of some curves are missing."""
         return tuple(failure.reason for result in self.results for failure in result.failures)
 
 
@@ -104,7 +104,7 @@ def run(
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it; nothing is solved.
-        NotConverged: some p failed; everything else is written, and `partial` holds it.
+        NotConverged: some p or indices failed; everything else is written, and `partial` holds it.
     """
     pool = cluster(scheduler) if scheduler else several(jobs)
     outcome = run_case(case, out, pool=pool, is_fresh=fresh, watch=Watch(bar=lambda *_: nullcontext(progress)))

@@ -112,3 +112,18 @@ def test_stability_index_of_a_case_is_marked_where_p_reaches_it(drawn, tmp_path,
     draw(case, results, [], tmp_path)
     found = [x for x, _, _ in marks(drawn[0])]
     assert found == [results[0].stability_index.value][:count]
+
+
+def test_theory_that_is_not_drawn_is_not_computed(drawn, tmp_path, monkeypatch):
+    """Of many curves over a parameter: 200 points for each of 10,000 sets would take minutes."""
+    over = 'vary={ mode = "zip", "noise.D0" = {start=0.1,stop=0.2,num=30}, "noise.tau0" = {start=0.5,stop=0.6,num=30} }'
+    sets = [over, "expect=[]", 'figure={x="noise.D0",y="lyapunov_exponent"}', 'output.quantities=["lyapunov_exponent"]']
+    case = load_case(ROOT / "cases/minimal.toml", sets)
+    results = solve_case(case)
+    monkeypatch.setattr(type(case), "curve", lambda *_: pytest.fail("a point of a line that nobody sees"))
+    draw(case, results, [], tmp_path)
+    points = np.concatenate(
+        [each.get_offsets() for each in drawn[0].axes[0].collections if len(each.get_offsets()) > 1]
+    )
+    np.testing.assert_allclose(points[:, 0], np.linspace(0.1, 0.2, 30))
+    np.testing.assert_array_equal(points[:, 1], [each.lyapunov_exponent.value for each in results])

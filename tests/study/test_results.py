@@ -1,5 +1,6 @@
 """Results of cases are plain values: they travel to other processes."""
 
+import json
 import pickle
 from dataclasses import FrozenInstanceError
 
@@ -8,6 +9,7 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
+from fpsolve.study.records import record_of, result_of
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import compare
 from tests.solving import solve_sets
@@ -127,3 +129,16 @@ def test_a_density_that_is_none_is_not_written(tmp_path, capsys):
     assert "the stationary density at p = 0 is not resolved" in " ".join(capsys.readouterr().err.split())
     assert (tmp_path / "slow" / "summary.json").exists()
     assert not list((tmp_path / "slow").rglob("*.vtu"))
+
+
+def test_results_from_records_are_data_as_those_that_are_solved(case, solved):
+    """Also what comparisons leave out: the names and units of numbers, which pictures and arrays tell."""
+    record = json.loads(json.dumps(record_of(solved.result)))
+    found = result_of(record, solved.result.curve)
+    for name, estimate in solved.result.estimates.items():
+        again = found.estimates[name]
+        assert repr(again) == repr(estimate)
+        if estimate is not None:
+            assert again.quantity == estimate.quantity
+            assert again.to_xarray().identical(estimate.to_xarray())
+    assert found.sensitivities.to_xarray().identical(solved.result.sensitivities.to_xarray())
