@@ -1,5 +1,6 @@
 """What the figures show, read from the drawn figures themselves."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.figure
@@ -112,3 +113,15 @@ def test_stability_index_of_a_case_is_marked_where_p_reaches_it(drawn, tmp_path,
     draw(case, results, [], tmp_path)
     found = [x for x, _, _ in marks(drawn[0])]
     assert found == [results[0].stability_index.value][:count]
+
+
+@pytest.mark.parametrize("count", [7, 20])
+def test_the_legend_of_many_curves_stands_beside_them(drawn, tmp_path, count):
+    others = [replace(series(root=1.0), varied={"noise.D0": 0.1 * (i + 1)}) for i in range(count)]
+    write_figure(others, "p", MOMENT, "Title", [tmp_path / "figure.png"])
+    (axes,) = drawn[0].axes
+    entries = axes.get_legend().get_window_extent()
+    assert len(legend(drawn[0])) == count + 3
+    assert entries.x0 >= axes.get_window_extent().x1
+    assert entries.x1 <= drawn[0].bbox.x1
+    assert entries.y0 >= drawn[0].bbox.y0
