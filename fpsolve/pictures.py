@@ -47,8 +47,9 @@ def canvas_of(ax: Axes | None) -> Iterator[Axes]:
         return
     from matplotlib import pyplot, rc_context
 
+    figure = pyplot.figure(figsize=SIZE, layout="constrained")  # before the style, whose end undoes what notebooks set
     with rc_context(STYLE):
-        _, new = pyplot.subplots(figsize=SIZE, layout="constrained")
+        new = figure.subplots()
         new.tick_params(labelsize=STYLE["font.size"])  # which later ticks would take from another style
         yield new
 

@@ -9,7 +9,6 @@ preprocessors = pytest.importorskip("nbconvert.preprocessors", reason="no nbconv
 pytest.importorskip("ipykernel", reason="notebooks need ipykernel: pip install -e '.[test]'")
 
 START = """
-%matplotlib inline
 from fpsolve import NonGaussianNoise, VibroImpactOscillator, moment_lyapunov, sensitivities, stability_index
 from fpsolve import tilted_density
 from fpsolve.exponent import ExponentSolver
@@ -49,4 +48,5 @@ def test_results_show_as_html(outputs, cell):
 
 @pytest.mark.parametrize("cell", DRAWN)
 def test_pictures_show(outputs, cell):
+    """All of them, not just the first, in a notebook that has not set up matplotlib."""
     assert kinds(outputs[cell])["image/png"]

@@ -302,6 +302,14 @@ def test_an_interruption_keeps_the_finished_curves(case, tmp_path, monkeypatch):
     assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
 
 
+def test_a_run_takes_the_name_of_a_case_file(case, tmp_path):
+    by_name = fpsolve.run(str(tmp_path / "test.toml"), tmp_path / "named")
+    assert [each.curve for each in by_name] == [each.curve for each in fpsolve.run(case, tmp_path / "out")]
+    assert without_times(tmp_path / "named/test") == without_times(tmp_path / "out/test")
+    with pytest.raises(CaseError, match=r"other\.toml"):
+        fpsolve.run(tmp_path / "other.toml", tmp_path / "out")
+
+
 def test_a_run_goes_on_where_it_was_interrupted(case, tmp_path, monkeypatch):
     """With the numbers of a run that nobody interrupts; files but records are made anew."""
     fpsolve.run(case, tmp_path / "whole")

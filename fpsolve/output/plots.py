@@ -23,8 +23,8 @@ from fpsolve.pictures import COLOURS, SIZE, STYLE, draw_bars
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
 
-MOST_LABELLED = 20
-"""Curves that a legend can tell apart."""
+MOST_LABELLED, MOST_INSIDE = 20, 6
+"""Curves that a legend can tell apart, and those whose legend finds room among them."""
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
 _ROOT: dict[str, Any] = {"marker": "|", "linestyle": "none", "markersize": 16, "markeredgewidth": 2.2, "zorder": 4}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
@@ -66,7 +66,8 @@ def write_figure(
         paths: .png, .pdf or what else matplotlib writes.
         is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
-    with canvas(paths) as figure:
+    is_beside = MOST_INSIDE < len(series) <= MOST_LABELLED
+    with canvas(paths, width=SIZE[0] * (1.4 if is_beside else 1)) as figure:
         axes = figure.add_subplot(xlabel=axis_title(ABSCISSAE[x]), ylabel=y.title)
         axes.set_title(filled(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
@@ -75,7 +76,9 @@ def write_figure(
         else:
             for i, item in enumerate(series):
                 _draw(axes, item, i)
-            _add_legend(axes, series, y.equation + (", reduced noise" if is_reduced else ""))
+            handles = _legend_handles(axes, series, y.equation + (", reduced noise" if is_reduced else ""))
+            place = {"loc": "upper left", "bbox_to_anchor": (1.01, 1), "fontsize": 9} if is_beside else {"fontsize": 11}
+            axes.legend(handles.values(), handles.keys(), frameon=False, **place)
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
         axes.margins(x=0.03)
 
@@ -160,7 +163,7 @@ def _has_rare(item: Series) -> bool:
     return bool(np.any(item.rare))
 
 
-def _add_legend(axes: Any, series: Sequence[Series], equation: str) -> None:
+def _legend_handles(axes: Any, series: Sequence[Series], equation: str) -> dict[str, Any]:
     """Colours tell the curves apart; two to five grey entries tell what is drawn."""
     handles, labels = axes.get_legend_handles_labels()
     grey = {"color": "0.35"}
@@ -175,4 +178,4 @@ def _add_legend(axes: Any, series: Sequence[Series], equation: str) -> None:
         methods[r"stability index $\delta_p$"] = axes.plot([], [], **_ROOT, **grey)[0]
     if any(item.simulated is not None for item in series):
         methods["Monte Carlo ± 2 standard errors"] = axes.errorbar([], [], [], **_DOT)
-    axes.legend([*handles, *methods.values()], [*labels, *methods], frameon=False, fontsize=11)
+    return dict(zip(labels, handles, strict=True)) | methods

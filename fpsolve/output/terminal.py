@@ -43,31 +43,27 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
         for result in results:
             if result.moments.p.size:
                 console.print(_moment_table(case, result))
-            if any(result.estimates.values()):
-                lines = [line for group in _indices(case, result) for line in _packed(group, console.width)]
-                _print_lines(console, [*lines, ""])
+            groups = _indices(case, result) if any(result.estimates.values()) else []
+            _print_lines(console, [*(line for group in groups for line in _packed(group, console.width)), ""])
     else:
         console.print(_curve_table(case, results))
     print_warnings(case, results)
 
 
 def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
-    """What limits the numbers of each curve, why some are missing, and which theory is not valid."""
-    told, untold = 0, 0
-    for result in results:
-        failures = [failure.reason for failure in result.failures]
-        remarks = (("warning", "yellow", result.warnings), ("not converged", "bold red", failures))
-        for kind, style, texts in (*remarks, ("note", "cyan", result.notes)):
-            most = texts[: max(MOST_REMARKS - told, 0)]
-            _remark(case, result.curve, kind, style, most)
-            told, untold = told + len(most), untold + len(texts) - len(most)
+    """Why some numbers of some curves are missing, then what limits the others, then which theory is not valid."""
+    remarks = [
+        *(("not converged", "bold red", each.curve, fault.reason) for each in results for fault in each.failures),
+        *(("warning", "yellow", each.curve, text) for each in results for text in each.warnings),
+        *(("note", "cyan", each.curve, text) for each in results for text in each.notes),
+    ]
+    for kind, style, curve, text in remarks[:MOST_REMARKS]:
+        _remark(case, curve, kind, style, [text])
+    untold = Counter(kind for kind, *_ in remarks[MOST_REMARKS:])
     if untold:
-        print_remark(f"note: {case.name}: {untold} more remarks of this kind are in summary.json", "cyan")
-
-
-def _remark(case: Case, curve: Curve, kind: str, style: str, texts: Sequence[str]) -> None:
-    for text in texts:
-        print_remark(f"{kind}: {case.place(curve)}: {text}", style)
+        plural = {"warning": "warnings", "note": "notes"}
+        counts = ", ".join(f"{count} {plural.get(kind, kind)}" for kind, count in untold.items())
+        print_remark(f"note: {case.name}: more remarks are in summary.json: {counts}", "cyan")
 
 
 def _count(results: Sequence[CurveResult]) -> str:
@@ -75,6 +71,11 @@ def _count(results: Sequence[CurveResult]) -> str:
     counts = Counter(result.status for result in results)
     states = ", ".join(f"{count} {status.name.lower()}" for status, count in sorted(counts.items()))
     return f"{len(results)} curves: {states}; their numbers are in curves.csv and results.nc"
+
+
+def _remark(case: Case, curve: Curve, kind: str, style: str, texts: Sequence[str]) -> None:
+    for text in texts:
+        print_remark(f"{kind}: {case.place(curve)}: {text}", style)
 
 
 def print_remark(text: str, style: str) -> None:

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from fpsolve.case.case import Case
+from fpsolve.case.case import Case, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.files import writable
 from fpsolve.output.charts import draw_chart, write_chart
@@ -80,7 +80,7 @@ class Outcome:
 
 
 def run(
-    case: Case,
+    case: Case | str | Path,
     out: str | Path = "results",
     *,
     jobs: int | None = 1,
@@ -94,7 +94,7 @@ def run(
     anew, and what a simulation of other parameters wrote is removed. summary.json says whether all curves are there.
 
     Args:
-        case: from `load_case`.
+        case: a case file, or what `load_case` made of it.
         out: folder for the results.
         jobs: how many processes solve; None for one on each processor. A script that asks for several needs
             `if __name__ == "__main__":` around what it does.
@@ -103,11 +103,13 @@ def run(
         progress: called once for each moment of each curve; where there are several curves, as each is finished.
 
     Raises:
+        CaseError: with every fault of the file; nothing is solved.
         OutputError: the folder cannot be made or written to, or another run writes into it; nothing is solved.
         NotConverged: some p or indices failed; everything else is written, and `partial` holds it.
     """
     pool = cluster(scheduler) if scheduler else several(jobs)
-    outcome = run_case(case, out, pool=pool, is_fresh=fresh, watch=Watch(bar=lambda *_: nullcontext(progress)))
+    read = case if isinstance(case, Case) else load_case(case)
+    outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=Watch(bar=lambda *_: nullcontext(progress)))
     results = tuple(outcome.results)
     if outcome.failures:
         raise NotConverged("\n".join(outcome.failures), results)

@@ -1,11 +1,13 @@
 """What is printed fits the terminal, and no number is broken."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.output.terminal import print_remark, print_results, print_simulation
+from fpsolve.exponent.error import Failure
+from fpsolve.output.terminal import print_remark, print_results, print_simulation, print_warnings
 from fpsolve.study.simulate import simulate_curves
 from tests.solving import solve_case
 from tests.test_workflow import TEXT
@@ -66,3 +68,26 @@ def test_a_star_tells_of_exact_noise_on_any_curve(treatments, star, tmp_path, ca
     assert "…" not in out
     for result in results:
         assert f"{result.lyapunov_exponent.value:#.7g}"[:8] in out
+
+
+def test_tables_without_indices_stand_apart(tmp_path, capsys):
+    path = tmp_path / "moments.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    case = load_case(path, ['noise.treatment="exact"', "output={ quantities = ['moment'] }"])
+    print_results(case, solve_case(case))
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    ends = [i for i, line in enumerate(lines) if line.startswith("* for the noise reduced by")]
+    assert [lines[i + 1] for i in ends] == ["", ""]
+
+
+def test_what_is_missing_is_told_before_what_is_only_remarkable(case, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    (result,) = solve_case(case)
+    noted = replace(result, notes=tuple(f"note {i}" for i in range(25)), warnings=())
+    failed = replace(noted, notes=("a note",), warnings=("a warning",), failures=(Failure(2.0, "a reason"),))
+    capsys.readouterr()
+    print_warnings(case, [noted, failed])
+    first, second, *_, last = capsys.readouterr().err.splitlines()
+    assert re.fullmatch("not converged: .*: a reason", first)
+    assert re.fullmatch("warning: .*: a warning", second)
+    assert last.endswith("more remarks are in summary.json: 8 notes")
