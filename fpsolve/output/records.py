@@ -16,13 +16,17 @@ from dataclasses import dataclass
 from errno import ENOSPC
 from pathlib import Path
 from secrets import token_hex
+from time import monotonic, sleep
 from typing import Any, overload
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
+from fpsolve.errors import OutputError, Remedy
 from fpsolve.study.records import result_of
 from fpsolve.study.results import CurveResult
 
+SHARED_SECONDS = 60.0
+"""After which a file that another machine has written is there, if it ever is."""
 _NAMES: dict[int, str] = {}
 """The file of this process."""
 
@@ -60,6 +64,15 @@ class Records:
     def place(self, key: str) -> Place | None:
         """Where the record of a key is, if there is one."""
         return self._places.get(key)
+
+    def expect(self, place: Place) -> None:
+        """Wait for the file of a record, which a network may show late. Raises `OutputError` where it does not come."""
+        until = monotonic() + SHARED_SECONDS
+        while place.file not in self._seen and not (self.folder / place.file).exists():
+            if monotonic() > until:
+                raise OutputError(f"{self.folder} is not where the workers write: they must share it; {Remedy.FOLDER}")
+            sleep(0.5)
+        self._seen.setdefault(place.file, 0)
 
     def read(self, place: Place) -> dict[str, Any]:
         """A record. Raises OSError or ValueError where there is none."""

@@ -80,6 +80,8 @@ class Sweep:
         with here() if is_alone else pool as workers:
             for done in workers.run(SolveBatch(Keep(self.folder), progress if is_alone else None), queue):
                 for number, found in self._lost(done.item, queue) if done.result is None else done.result:
+                    if isinstance(found, Place):
+                        self.records.expect(found)
                     if found is not None:
                         self.results.add(number, found)
                     for _ in range(0 if is_alone else self._steps_each):

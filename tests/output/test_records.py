@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fpsolve.case.case import load_case
+from fpsolve.errors import OutputError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.output.records import Records, append
@@ -87,6 +88,14 @@ def test_every_changed_byte_of_the_numbers_is_seen(tmp_path):
     records = Records(tmp_path)
     with pytest.raises(ValueError, match="has changed"):
         records.read(place)
+
+
+def test_a_file_that_workers_do_not_share(tmp_path, monkeypatch):
+    place = append(tmp_path, "key", VALUES)
+    Records(tmp_path).expect(place)
+    monkeypatch.setattr("fpsolve.output.records.SHARED_SECONDS", 0.1)
+    with pytest.raises(OutputError, match="is not where the workers write: they must share it; choose another folder"):
+        Records(tmp_path / "elsewhere").expect(place)
 
 
 def test_what_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
