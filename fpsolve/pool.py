@@ -10,6 +10,7 @@ import multiprocessing
 import os
 import re
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -19,6 +20,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
+from types import ModuleType
 from typing import Any, Generic, TypeVar
 
 from fpsolve.errors import FpsolveError
@@ -33,6 +35,8 @@ AHEAD_IN_ORDER = 64
 START_SECONDS = 1.5
 """Of work that this process does itself before it starts others, as that takes as long."""
 CONNECT_SECONDS = 20
+MOST_JOBS = 1000
+"""Processes of this machine; each needs an open file."""
 _TURN = threading.Lock()
 
 
@@ -61,6 +65,7 @@ class Pool:
         ahead: how many tasks it is given at once.
         own_seconds: of work that this process does before the executor is made.
         is_elsewhere: whether other machines work.
+        is_here: whether this process does it all.
     """
 
     start: Callable[[], Executor]
@@ -68,6 +73,7 @@ class Pool:
     ahead: int = 1
     own_seconds: float = 0.0
     is_elsewhere: bool = False
+    is_here: bool = False
     _executor: Executor | None = field(default=None, init=False, repr=False)
 
     def __enter__(self) -> Pool:
@@ -140,12 +146,15 @@ class Pool:
         if self._executor is None:
             self._executor = self.start()
         try:
-            with _signals_blocked():
+            with _signals_blocked(), _without_main():
                 return self._executor.submit(_alone, task, item)
         except BrokenProcessPool as failure:
             broken: Future[Result] = Future()
             broken.set_exception(failure)
             return broken
+        except OSError as failure:
+            reason = failure.strerror or failure
+            raise FpsolveError(f"the processes cannot be started: {reason}; use fewer --jobs") from failure
 
     def _one_by_one(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
         """The items that were under way as a worker died, again, so that it shows which one was the reason."""
@@ -177,14 +186,25 @@ class _Here(Executor):
 
 def here() -> Pool:
     """This process alone."""
-    return Pool(_Here)
+    return Pool(_Here, is_here=True)
 
 
-def several(count: int | None = None) -> Pool:
-    """Processes of this machine; without a number as many as there are processors, once this one has begun."""
-    if count == 1 or (count is None and processors() == 1):
+def several(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
+    """Processes of this machine, but not more than there are tasks.
+
+    Args:
+        count: how many; None for as many as there are processors, once this one has begun.
+        tasks: how many tasks there will be, as far as that is known.
+
+    Raises:
+        FpsolveError: that is no number of processes.
+    """
+    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_JOBS):
+        known = f"must be a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
+        raise FpsolveError(f"--jobs (in Python jobs): got {count!r}; {known}")
+    size = min(count or processors(), tasks)
+    if size == 1:
         return here()
-    size = count or processors()
     return Pool(lambda: _processes(size), _kill, AHEAD * size, START_SECONDS if count is None else 0.0)
 
 
@@ -282,6 +302,17 @@ def _kill(executor: Executor) -> None:
     for process in list((getattr(executor, "_processes", None) or {}).values()):
         process.kill()
     executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Processes that are started in the body do not run the script of this one, of which no task needs anything."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 @contextmanager

@@ -103,6 +103,12 @@ def test_results_do_not_depend_on_the_number_of_processes(place):
     assert len(lines(place, "two")) == SIZE**2
 
 
+def test_a_single_set_by_several_processes(place):
+    """Its progress is reported within this one."""
+    run(place, "single", "--jobs", "2", "--set", "vary={}", "--set", "figure.x=p")
+    assert len(lines(place, "single")) == 1
+
+
 def test_killed_again_and_again(place):
     """At most one set for each worker is solved twice, and the result is that of an undisturbed run."""
     begun = time.monotonic()

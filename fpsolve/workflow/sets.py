@@ -70,16 +70,16 @@ class Sweep:
     def solve(self, pool: Pool, progress: Callable[[], None]) -> None:
         """Solve what is not known yet; tables are written at the beginning, and as they grow."""
         self.write_tables()
-        is_alone = self.case.planned == 1
+        steps_here = pool.is_here and self.case.planned == 1
         for _ in range(0 if self.wanted.draws else len(self.results) * self._steps_each):
             progress()
         queue = _Queue(batches(self.case, self._order, self.numerics))
         with pool:
-            for done in pool.run(SolveBatch(Keep(self.folder), progress if is_alone else None), queue):
+            for done in pool.run(SolveBatch(Keep(self.folder), progress if steps_here else None), queue):
                 for number, found in self._lost(done.item, queue) if done.result is None else done.result:
                     if found is not None:
                         self.results.add(number, found)
-                    for _ in range(0 if is_alone else self._steps_each):
+                    for _ in range(0 if steps_here else self._steps_each):
                         progress()
                 if len(self.results) >= GROWTH * self._tabled + 1:
                     self.write_tables()
