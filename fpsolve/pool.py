@@ -144,7 +144,8 @@ class Pool:
 
     def _submit(self, task: Callable[[Item], Result], item: Item) -> Future[Result]:
         if self._executor is None:
-            self._executor = self.start()
+            with _signals_blocked():
+                self._executor = self.start()
         try:
             with _signals_blocked(), _without_main():
                 return self._executor.submit(_alone, task, item)
@@ -233,7 +234,8 @@ def _client(address: str) -> Any:
     except ImportError:
         raise FpsolveError("Dask is not installed; install it with: pip install 'fpsolve[cluster]'") from None
     connect: Callable[..., Any] = distributed.Client
-    logging.getLogger("distributed").setLevel(logging.ERROR)  # it tells of workers that come and go
+    for name in ("distributed", "distributed.client", "tornado.application"):  # they tell of who comes and goes
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
         raise FpsolveError(f'got "{address}" as the address of a scheduler; must be one such as tcp://host:8786')
     try:

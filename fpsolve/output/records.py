@@ -45,7 +45,7 @@ class Records:
 
     def look(self) -> Records:
         """Find what has been written by now."""
-        for path in sorted(self.folder.glob("*.jsonl")):
+        for path in self._files():
             self._places |= dict(_lines(path))
         return self
 
@@ -70,8 +70,12 @@ class Records:
     def remove(self) -> None:
         """Start over."""
         self._places.clear()
-        for path in self.folder.glob("*.jsonl"):
+        for path in self._files():
             path.unlink()
+
+    def _files(self) -> list[Path]:
+        """The files of records; folders and pipes are none, whatever they are called."""
+        return sorted(path for path in self.folder.glob("*.jsonl") if path.is_file())
 
 
 class Results(Sequence[CurveResult]):
