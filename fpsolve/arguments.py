@@ -84,15 +84,14 @@ def load_to_write(
     return cases
 
 
-def pool_of(jobs: int | None, scheduler: str) -> Pool:
-    """Who does the work. Raises `FpsolveError`."""
-    from fpsolve.pool import cluster, several
+def pool_of(jobs: int | None, scheduler: str, cases: Sequence[Case] = ()) -> Pool:
+    """Who does the work: solves the sets of some cases, or something else. Raises `FpsolveError`."""
+    from fpsolve.pool import MOST_JOBS, cluster, several
     from fpsolve.process import limit_processors
 
     if jobs is not None and scheduler:
         raise FpsolveError("--jobs is for this machine, and --scheduler for a cluster; name one of them")
-    if jobs is not None and jobs < 1:
-        raise FpsolveError(f"--jobs: got {jobs}; must be at least 1; leave it out for one process on each processor")
+    pool = cluster(scheduler) if scheduler else several(jobs, max((case.planned for case in cases), default=MOST_JOBS))
     if jobs is not None:
         limit_processors(jobs)
-    return cluster(scheduler) if scheduler else several(jobs)
+    return pool

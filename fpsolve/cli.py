@@ -63,7 +63,7 @@ def run(
     from fpsolve.workflow.cases import run_case
 
     code, loaded = 0, load_to_write(cases, overrides, {}, monte_carlo=monte_carlo)
-    pool = pool_of(jobs, scheduler)
+    pool = pool_of(jobs, scheduler, loaded)
     for case in loaded:
         watch = _watch(is_silent=json)
         outcome = run_case(case, out, monte_carlo=monte_carlo, pool=pool, is_fresh=fresh, watch=watch)
@@ -133,7 +133,7 @@ def check(cases: Cases, *, jobs: Jobs = None, scheduler: Scheduler = "", overrid
     from fpsolve.workflow.cases import check_case
 
     code, loaded = 0, load(cases, overrides, {})
-    pool = pool_of(jobs, scheduler)
+    pool = pool_of(jobs, scheduler, loaded)
     for case in loaded:
         outcome = check_case(case, pool=pool, watch=_watch())
         print_comparisons(case, outcome.comparisons)

@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import re
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -20,6 +21,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
+from types import ModuleType
 from typing import Any, Generic, TypeVar
 
 from fpsolve.errors import FpsolveError
@@ -34,6 +36,8 @@ AHEAD_IN_ORDER = 64
 START_SECONDS = 1.5
 """Of work that this process does itself before it starts others, as that takes as long."""
 CONNECT_SECONDS = 20
+MOST_JOBS = 1000
+"""Processes of this machine; each needs an open file."""
 _TURN = threading.Lock()
 
 
@@ -139,14 +143,18 @@ class Pool:
 
     def _submit(self, task: Callable[[Item], Result], item: Item) -> Future[Result]:
         if self._executor is None:
-            self._executor = self.start()
-        try:
             with _signals_blocked():
+                self._executor = self.start()
+        try:
+            with _signals_blocked(), _without_main():
                 return self._executor.submit(_alone, task, item)
         except BrokenProcessPool as failure:
             broken: Future[Result] = Future()
             broken.set_exception(failure)
             return broken
+        except OSError as failure:
+            reason = failure.strerror or failure
+            raise FpsolveError(f"the processes cannot be started: {reason}; use fewer --jobs") from failure
 
     def _one_by_one(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
         """The items that were under way as a worker died, again, so that it shows which one was the reason."""
@@ -169,11 +177,22 @@ def here() -> Pool:
     return Pool(lambda: _processes(1), own_seconds=math.inf)
 
 
-def several(count: int | None = None) -> Pool:
-    """Processes of this machine; without a number as many as there are processors, once this one has begun."""
-    if count == 1 or (count is None and processors() == 1):
+def several(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
+    """Processes of this machine, but not more than there are tasks.
+
+    Args:
+        count: how many; None for as many as there are processors, once this one has begun.
+        tasks: how many tasks there will be, as far as that is known.
+
+    Raises:
+        FpsolveError: that is no number of processes.
+    """
+    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_JOBS):
+        known = f"must be a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
+        raise FpsolveError(f"--jobs (in Python jobs): got {count!r}; {known}")
+    size = min(count or processors(), tasks)
+    if size == 1:
         return here()
-    size = count or processors()
     return Pool(lambda: _processes(size), _kill, AHEAD * size, START_SECONDS if count is None else 0.0)
 
 
@@ -189,6 +208,7 @@ def cluster(address: str) -> Pool:
 
     def start() -> Executor:
         clients.append(_client(address))
+        clients[-1].run(_limit_to_threads)
         executor: Executor = clients[-1].get_executor(pure=False)
         return executor
 
@@ -208,7 +228,8 @@ def _client(address: str) -> Any:
     except ImportError:
         raise FpsolveError("Dask is not installed; install it with: pip install 'fpsolve[cluster]'") from None
     connect: Callable[..., Any] = distributed.Client
-    logging.getLogger("distributed").setLevel(logging.ERROR)  # it tells of workers that come and go
+    for name in ("distributed", "distributed.client", "tornado.application"):  # they tell of who comes and goes
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
         raise FpsolveError(f'got "{address}" as the address of a scheduler; must be one such as tcp://host:8786')
     try:
@@ -235,6 +256,11 @@ def _version() -> str:
     from fpsolve import __version__
 
     return __version__
+
+
+def _limit_to_threads(dask_worker: Any) -> None:
+    """A worker uses as many processors as it has threads, and leaves the others to others."""
+    limit_processors(dask_worker.state.nthreads)
 
 
 def _is_killed_worker(failure: Exception) -> bool:
@@ -277,6 +303,17 @@ def _kill(executor: Executor) -> None:
     for process in list((getattr(executor, "_processes", None) or {}).values()):
         process.kill()
     executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Processes that are started in the body do not run the script of this one, of which no task needs anything."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 @contextmanager

@@ -1,11 +1,13 @@
 """Whoever runs tasks, the results are the same; what dies costs its task only."""
 
+import math
 import os
 import signal
 import subprocess
 import sys
 import time
 from concurrent.futures import Executor, Future
+from pathlib import Path
 
 import pytest
 
@@ -174,6 +176,56 @@ def test_little_work_is_done_here(monkeypatch):
         found = [number for number, _ in workers.map(whereabouts, range(30))]
     assert found[0] == os.getpid()
     assert len(set(found)) == 3
+
+
+SCRIPT = """
+from fpsolve.pool import several
+from tests.test_pool import square
+with several(2) as workers:
+    print(sum(done.result for done in workers.run(square, range(4))))
+"""
+
+
+@pytest.mark.parametrize("is_file", [True, False])
+def test_a_script_needs_no_guard(tmp_path, is_file):
+    """Its processes do not run it again, nor look for it where it came through a pipe."""
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT, encoding="utf-8")
+    command = [sys.executable, str(script) if is_file else "-"]
+    done = subprocess.run(
+        command,
+        input="" if is_file else SCRIPT,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "14\n", "")
+
+
+def test_no_more_processes_than_tasks():
+    with several(1000, 2) as workers:
+        assert len(set(workers.map(whereabouts, range(20)))) == 2
+    assert several(2, 1).own_seconds == math.inf
+
+
+@pytest.mark.parametrize("count", [0, -1, 2.5, "2", True, 1001, 10**20])
+def test_what_is_no_number_of_processes_is_refused(count):
+    with pytest.raises(FpsolveError, match=r"jobs.*must be a whole number from 1 to 1000"):
+        several(count)
+
+
+def test_processes_that_cannot_be_started():
+    """Each needs an open file."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (len(list(Path("/dev/fd").iterdir())) + 12, before[1]))
+    try:
+        with several(100) as workers, pytest.raises(FpsolveError, match=r"cannot be started: .*; use fewer --jobs"):
+            list(workers.map(square, range(300)))
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
 
 
 @pytest.mark.parametrize("address", ["host", "tls://host:8786", "tcp://host", "host:port", "tcp://a b:1"])

@@ -107,6 +107,12 @@ def test_results_do_not_depend_on_the_number_of_processes(place):
     assert len(lines(place, "two")) == SIZE**2
 
 
+def test_a_single_set_by_several_processes(place):
+    """Its progress is reported within this one."""
+    run(place, "single", "--jobs", "2", "--set", "vary={}", "--set", "figure.x=p")
+    assert len(lines(place, "single")) == 1
+
+
 def test_killed_again_and_again(place):
     """At most one set for each worker is solved twice, and the result is that of an undisturbed run."""
     begun = time.monotonic()
@@ -163,6 +169,16 @@ def test_torn_and_damaged_records_are_solved_again(place):
     assert len(lines(place, "torn")) - len(content) == 3
 
 
+def test_what_is_no_file_holds_no_records(tmp_path):
+    (tmp_path / "folder.jsonl").mkdir()
+    (tmp_path / "lost.jsonl").symlink_to(tmp_path / "nowhere")
+    os.mkfifo(tmp_path / "pipe.jsonl")
+    records = Records(tmp_path)
+    assert not records.look().are_there
+    records.remove()
+    assert len(list(tmp_path.iterdir())) == 3
+
+
 def test_a_changed_parameter_solves_only_what_it_changes(place):
     shutil.copytree(place / "whole", place / "changed")
     omega, D0 = "[0.5, 0.7]", f'{{ start = 0.1, stop = 1.0, num = {SIZE}, scale = "log" }}'
@@ -198,6 +214,28 @@ def test_an_interrupt_keeps_what_is_solved(place):
     assert Records(folder).look().are_there
     run(place, "interrupted", "--jobs", "2")
     assert_same_results(place, "interrupted")
+
+
+def apart():
+    """A group of processes of its own, as a terminal makes."""
+    os.setsid()
+    heed_signals()
+
+
+@pytest.mark.parametrize(("kind", "code"), [(signal.SIGINT, 130), (signal.SIGHUP, 129)])
+def test_what_a_terminal_sends_to_all_ends_a_run_in_one_sentence(place, kind, code):
+    """Ctrl-C, and a terminal that is closed."""
+    out = f"terminal-{code}"
+    process = started(place, out, "--jobs", "2", before=apart)
+    for _ in range(600):
+        if lines(place, out):
+            break
+        time.sleep(0.05)
+    os.killpg(process.pid, kind)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert "run it again to go on" in said
+    assert len(said.splitlines()) == 1
 
 
 def children(process):
@@ -243,7 +281,7 @@ def test_workers_end_with_a_run_that_is_killed(place):
 
 @contextmanager
 def dask_cluster(count=2):
-    """The address of a scheduler with workers, each a process of its own, on the loopback."""
+    """The address of a scheduler, its workers and itself, each a process of its own, on the loopback."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
@@ -260,7 +298,7 @@ def dask_cluster(count=2):
 
         with Client(address, timeout=30, set_as_default=False) as client:
             client.wait_for_workers(count, timeout=60)
-        yield address, workers
+        yield address, workers, scheduler
     finally:
         for each in [*workers, scheduler]:
             each.kill()
@@ -269,7 +307,7 @@ def dask_cluster(count=2):
 
 def test_a_cluster_gives_the_same_results(place):
     pytest.importorskip("distributed")
-    with dask_cluster() as (address, workers):
+    with dask_cluster() as (address, workers, _):
         process = started(place, "cluster", "--scheduler", address)
         for _ in range(600):
             if len(lines(place, "cluster")) > 3:
@@ -296,6 +334,20 @@ def test_a_cluster_works_for_one_case_after_the_other(place):
         pool = cluster(address)
         numbers = [run_case(case, place / out, pool=pool).results[0].moments.value for out in ("first", "second")]
     np.testing.assert_array_equal(*numbers)
+
+
+def test_a_scheduler_that_dies_is_told_in_one_sentence(place):
+    pytest.importorskip("distributed")
+    with dask_cluster(1) as (address, _, scheduler):
+        process = started(place, "headless", "--scheduler", address)
+        for _ in range(600):
+            if lines(place, "headless"):
+                break
+            time.sleep(0.05)
+        scheduler.kill()
+        _, said = process.communicate(timeout=120)
+    assert process.returncode == 2
+    assert said == "the scheduler is gone; the same command goes on where it was\n"
 
 
 def test_batches_follow_from_the_case_alone(place):

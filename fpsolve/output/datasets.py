@@ -155,9 +155,10 @@ def open_results(*places: str | Path) -> xr.Dataset:
     paths = [path for place in places for path in _found(str(place))]
     if not paths:
         raise FpsolveError(f"no results.nc in {', '.join(map(str, places)) or 'nothing'}; run a case first")
-    return xr.concat(
-        [_long(path) for path in paths], SET, data_vars="all", join="outer", combine_attrs="drop_conflicts"
-    )
+    runs = [_long(path) for path in paths]
+    if any("p" in run.dims for run in runs):  # those of which no moments were wanted have none of the p
+        runs = [run if "p" in run.dims else run.assign_coords(p=("p", np.zeros(0))) for run in runs]
+    return xr.concat(runs, SET, data_vars="all", join="outer", combine_attrs="drop_conflicts")
 
 
 def _found(place: str) -> Sequence[Path]:
@@ -173,7 +174,7 @@ def _long(path: Path) -> xr.Dataset:
 
     try:
         found = xr.load_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError) as failure:
+    except (OSError, ValueError, LookupError, AttributeError, RuntimeError) as failure:  # whatever is damaged
         raise FpsolveError(f"{path} cannot be read: {failure}; run its case again") from failure
     over = [name for name in found.dims if name not in ("p", SET)]
     if SET not in found.dims:

@@ -50,7 +50,7 @@ class Records:
 
     def look(self) -> Records:
         """Find what has been written by now, since the last look."""
-        for path in sorted(self.folder.glob("*.jsonl")):
+        for path in self._files():
             for key, place in _lines(path, self._seen.get(path.name, 0)):
                 self._places[key] = place
                 self._seen[path.name] = place.start + place.size
@@ -87,8 +87,12 @@ class Records:
         """Start over."""
         self._places.clear()
         self._seen.clear()
-        for path in self.folder.glob("*.jsonl"):
+        for path in self._files():
             path.unlink()
+
+    def _files(self) -> list[Path]:
+        """The files of records; folders and pipes are none, whatever they are called."""
+        return sorted(path for path in self.folder.glob("*.jsonl") if path.is_file())
 
 
 class Results(Sequence[CurveResult]):

@@ -96,8 +96,7 @@ def run(
     Args:
         case: a case file, or what `load_case` made of it.
         out: folder for the results.
-        jobs: how many processes solve; None for one on each processor. A script that asks for several needs
-            `if __name__ == "__main__":` around what it does.
+        jobs: how many processes solve; None for one on each processor.
         scheduler: the address of a Dask scheduler whose workers solve instead, such as "tcp://host:8786".
         fresh: whether to solve all sets anew.
         progress: called once for each moment of each curve; where there are several curves, as each is finished.
@@ -107,8 +106,8 @@ def run(
         OutputError: the folder cannot be made or written to, or another run writes into it; nothing is solved.
         NotConverged: some p or indices failed; everything else is written, and `partial` holds it.
     """
-    pool = cluster(scheduler) if scheduler else several(jobs)
     read = case if isinstance(case, Case) else load_case(case)
+    pool = cluster(scheduler) if scheduler else several(jobs, read.planned)
     outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=Watch(bar=lambda *_: nullcontext(progress)))
     results = tuple(outcome.results)
     if outcome.failures:

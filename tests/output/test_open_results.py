@@ -1,0 +1,68 @@
+"""Results of several runs as one dataset."""
+
+import numpy as np
+import pytest
+
+from fpsolve import FpsolveError, load_case, open_results, run
+
+CASE = """
+title = "A curve"
+[oscillator]
+epsilon = 0.1
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 0.5
+tau0 = 0.5
+r0 = 0.95
+[moments]
+p = [2.0]
+[output]
+quantities = ["moment"]
+"""
+
+
+@pytest.fixture
+def place(tmp_path):
+    """Runs over different keys, one of them without moments."""
+    for name, texts in {
+        "single": (),
+        "frequencies": ("vary={'oscillator.omega' = [1.0, 2.0]}", "moments.p=[1.0]"),
+        "noises": ("vary={'noise.treatment' = ['exact', 'ou-reduction']}", "output.quantities=['lyapunov_exponent']"),
+    }.items():
+        path = tmp_path / f"{name}.toml"
+        path.write_text(CASE, encoding="utf-8")
+        run(load_case(path, texts), tmp_path)
+    return tmp_path
+
+
+def test_runs_over_different_keys_are_one_dataset(place):
+    found = open_results(place / "*")
+    assert found.sizes == {"set": 5, "p": 2}
+    assert found.run.values.tolist() == ["frequencies"] * 2 + ["noises"] * 2 + ["single"]
+    assert found["oscillator.omega"].values.tolist() == [1.0, 2.0, 1.0, 1.0, 1.0]
+    assert found["noise.treatment"].values.tolist() == [*["ou-reduction"] * 2, "exact", *["ou-reduction"] * 2]
+    assert np.isnan(found.moment.sel(p=2.0)).values.tolist() == [True, True, True, True, False]
+    assert np.isnan(found.lyapunov_exponent).values.tolist() == [True, True, False, False, True]
+    assert len(found.to_dataframe()) == 10
+
+
+def test_runs_without_moments_have_no_p(place):
+    found = open_results(place / "noises")
+    assert dict(found.sizes) == {"set": 2}
+    assert len(found.to_dataframe()) == 2
+
+
+def test_where_there_are_no_results(place):
+    with pytest.raises(FpsolveError, match=r"no results.nc in .*nowhere; run a case first"):
+        open_results(place / "nowhere")
+
+
+@pytest.mark.parametrize("damage", ["short", "changed"])
+def test_damaged_results_are_named(place, damage):
+    path = place / "single" / "results.nc"
+    content = path.read_bytes()
+    path.write_bytes(content[:3000] if damage == "short" else b"????".join(content.rsplit(b"OHDR", 1)))
+    with pytest.raises(FpsolveError, match=r"single.results\.nc cannot be read: .*; run its case again"):
+        open_results(place / "single")
