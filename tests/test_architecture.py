@@ -29,7 +29,7 @@ ROOMS = {
     ],
     "simulation": ["setup", "kernels", "step", "batches", "monte_carlo", "estimators", "response"],
     "exponent": [
-        *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
+        *("rounding", "fields", "nodes", "eigen", "bordered", "error", "rival", "refine", "adapt", "branch", "solver"),
         *("impacts", "function", "moments", "quantities"),
     ],
     "analysis": [

@@ -13,7 +13,7 @@ from fpsolve.output.datasets import write_dataset
 from fpsolve.output.provenance import Run
 from fpsolve.output.records import Place, Records, Results, append
 from fpsolve.output.tables import write_results
-from fpsolve.output.vtk import write_functions
+from fpsolve.output.vtk import write_curves, write_functions
 from fpsolve.pool import Pool, here
 from fpsolve.study.records import key_of, record_of
 from fpsolve.study.results import CurveResult, Solved
@@ -91,8 +91,9 @@ class Sweep:
         write_results(self.case, self.results, self.folder, self.run.facts())
 
     def write_all(self) -> None:
-        """The tables, and results.nc."""
+        """The tables, results.nc, and the series over the curves."""
         self.write_tables()
+        write_curves(self.case, self.folder)
         write_dataset(self.case, self.results, self.folder, self.run.facts())
 
     @property
