@@ -150,7 +150,7 @@ def write_title(reader: Any, view: Any, field: str) -> None:
         head = f"varied.GetValue(0) + {chr(10)!r} + {head}"
     annotate(reader, view, head, "Upper Center", 36)
     if facts.GetAbstractArray("held"):
-        annotate(reader, view, "held.GetValue(0)", "Lower Center", 24)
+        annotate(reader, view, "held.GetValue(0)", "Lower Center", 28)
 
 
 def annotate(reader: Any, view: Any, expression: str, place: str, size: int) -> None:
