@@ -36,8 +36,8 @@ BOX = (1.0, 0.75, 0.4)
 LENGTH = 2.0
 """Length of the cylinder, whose radius is 1."""
 CAMERA = {False: (-1.2, -2, 1.6), True: (-1.5, -1.5, 1.3)}
-ANGLE = {False: 25, True: 26}
-"""From where the plane (False) and the cylinder (True) are seen, and the viewing angle in degrees."""
+ANGLE = 26
+"""From where the plane (False) and the cylinder (True) are seen, and the viewing angle of both in degrees."""
 USUAL = 2.0
 """The p that is drawn when none is asked for."""
 SAME = 1e-9
@@ -63,7 +63,7 @@ def main(arguments: list[str]) -> None:
     simple.Render(view)  # the first time it turns the camera
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA[chosen.cylinder], [0, 0, 0], [0, 0, 1]
     view.ResetCamera(True)
-    view.CameraViewAngle = ANGLE[chosen.cylinder]
+    view.CameraViewAngle = ANGLE
     simple.SaveScreenshot(str(chosen.output), view, OverrideColorPalette="WhiteBackground")
     known = servermanager.Fetch(reader).GetFieldData()
     words = [f"p = {known.GetArray('p').GetValue(0):g}"]
@@ -150,7 +150,7 @@ def write_title(reader: Any, view: Any, field: str) -> None:
         head = f"varied.GetValue(0) + {chr(10)!r} + {head}"
     annotate(reader, view, head, "Upper Center", 36)
     if facts.GetAbstractArray("held"):
-        annotate(reader, view, "held.GetValue(0)", "Lower Center", 28)
+        annotate(reader, view, "held.GetValue(0)", "Lower Center", 26)
 
 
 def annotate(reader: Any, view: Any, expression: str, place: str, size: int) -> None:
