@@ -20,6 +20,14 @@ class Pair(Protocol):
     """What the functions are made of, see `PrincipalPair`."""
 
     @property
+    def p(self) -> float:
+        """The moment."""
+
+    @property
+    def value(self) -> float:
+        """Λ(p)."""
+
+    @property
     def right(self) -> FloatArray:
         """Coefficients of T."""
 

@@ -8,7 +8,7 @@ repeated, as everything in Eq. (19) is π-periodic, and its cells are cut at φ 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,8 @@ from fpsolve.model.noise import has_algebraic_tails
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals; elements of a higher degree are cut into several of them."""
 FAINT = 1e-6
+NEGLIGIBLE = 1e-3
+"""A picture shows the ξ at which a density exceeds this share of its maximum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +45,8 @@ class Nodes:
     order: int
 
     @classmethod
-    def of(cls, pair: Pair) -> Nodes:
-        """Nodes that show a pair; P_s in the adjoint also asks for low quadrilaterals.
+    def of(cls, pair: Pair, finer: int = 1) -> Nodes:
+        """Nodes that show a pair, or so many times more either way; P_s in the adjoint asks for low quadrilaterals.
 
         Raises:
             OutputError: the noise has states.
@@ -53,14 +55,23 @@ class Nodes:
         degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
         order = min(MAX_ORDER, max(degrees))
         tall = math.ceil(np.max(np.diff(lines) / _resolution(pair, lines)) - 1e-9)
-        phi = _nodes(_phi_breaks(space.phi), order, _parts(degrees[0], order))
-        z = _nodes(lines, order, max(tall, _parts(pair.generator.chosen.xi_degree, order)))
+        phi = _nodes(_phi_breaks(space.phi), order, finer * _parts(degrees[0], order))
+        z = _nodes(lines, order, finer * max(tall, _parts(pair.generator.chosen.xi_degree, order)))
         return cls(phi, z, pair.generator.problem.noise.standard_deviation, order)
 
     @property
     def z(self) -> FloatArray:
         """z of the nodes, each once."""
         return np.append(self.z_cells[:, :-1], self.z_cells[-1, -1])
+
+    def seen(self, pair: Pair) -> Nodes:
+        """The same where the tilted density, or that of the noise, is not negligible."""
+        noise = pair.generator.problem.noise
+        if isinstance(noise, MarkovChain):  # of which there are no nodes
+            return self
+        densities = self.fields(pair).product.max(axis=0), noise.density(self.unit * self.z)
+        living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
+        return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
 
     def fields(self, pair: Pair) -> Fields:
         """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
