@@ -58,6 +58,7 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
+    from fpsolve.case.case import MOST_DRAWN
     from fpsolve.exponent.quantities import STABILITY_INDEX
     from fpsolve.output.terminal import print_remark
     from fpsolve.workflow.cases import run_case
@@ -72,6 +73,9 @@ def run(
         if monte_carlo and case.figure.y == STABILITY_INDEX.name:
             note = "note: a simulation gives no stability index, so that the figure has no dots"
             print_remark(note, "cyan")
+        if case.leaves_out_eigenfunctions:
+            note = f"note: {case.name}: no eigenfunctions are written, as there are more than {MOST_DRAWN} curves; "
+            print_remark(f"{note}name the p that you want, as in [output] eigenfunctions = [{case.usual_p!r}]", "cyan")
         print(_in_one_line(out / case.name / "summary.json") if json else f"written: {out / case.name}")
         if outcome.interruption:
             return INTERRUPTED

@@ -9,7 +9,7 @@ import pytest
 import fpsolve
 
 ROOMS = {
-    "": ["errors", "arrays", "files", "process", "pool", "pictures", "data"],
+    "": ["errors", "arrays", "files", "process", "pool", "pictures", "scenes", "data"],
     "model": [
         "parameters",
         "words",
@@ -29,7 +29,20 @@ ROOMS = {
     ],
     "simulation": ["setup", "kernels", "step", "batches", "monte_carlo", "estimators", "response"],
     "exponent": [
-        *("rounding", "eigen", "bordered", "fields", "error", "rival", "refine", "adapt", "branch", "solver"),
+        *(
+            "rounding",
+            "fields",
+            "nodes",
+            "pictured",
+            "eigen",
+            "bordered",
+            "error",
+            "rival",
+            "refine",
+            "adapt",
+            "branch",
+            "solver",
+        ),
         *("impacts", "function", "moments", "quantities"),
     ],
     "analysis": [

@@ -50,6 +50,18 @@ def test_run_prints_a_table_and_writes_the_results(case, tmp_path, capsys):
     assert "summary.json" in files(tmp_path / "results/test")
 
 
+def test_eigenfunctions_that_are_left_out_are_told_once_with_the_remedy(case, tmp_path, capsys):
+    many = ["--set", 'vary."noise.D0"={start=0.1, stop=1.0, num=11}', "--set", "moments.p=[-1.0, 1.5]"]
+    Path(case).write_text(TEXT.replace("eigenfunctions = [2.0]", ""), encoding="utf-8")
+    assert main(["run", case, *many]) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert said.count("no eigenfunctions are written, as there are more than 10 curves") == 1
+    assert "[output] eigenfunctions = [1.5]" in said
+    for asked in ("output.eigenfunctions=[1.5]", 'output.quantities=["moment"]'):
+        assert main(["run", case, *many, "--set", asked]) == 0
+        assert "no eigenfunctions" not in capsys.readouterr().err
+
+
 def test_out_and_set(case, tmp_path, capsys):
     assert (
         main(["run", case, "--out", "elsewhere", "--set", "moments.p=[1.0]", "--set", "output.eigenfunctions=[]"]) == 0

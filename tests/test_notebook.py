@@ -23,7 +23,7 @@ SHOWN = {
     "sensitivities(oscillator, noise, 2.0)": "moment_by_theta",
 }
 """Cells, and what is in their HTML."""
-DRAWN = ("result.plot()", "tilted_density(result.pairs[2]).plot()")
+DRAWN = ("result.plot()", "result.pairs[2].plot()", "tilted_density(result.pairs[2]).plot()")
 
 
 @pytest.fixture(scope="module")

@@ -164,6 +164,17 @@ def test_no_eigenfunctions_where_none_are_asked_for(tmp_path):
     assert not [name for name in files(tmp_path / "out") if "eigenfunctions" in name]
 
 
+MANY = 'vary."noise.D0"={start=0.1, stop=1.0, num=11}'
+
+
+def test_of_many_curves_only_the_first_density_is_written(tmp_path):
+    case, calls = write(tmp_path, TEXT.replace("eigenfunctions = [2.0]", ""), [MANY]), []
+    for count in (33, 66):
+        fpsolve.run(case, tmp_path / "out", progress=lambda: calls.append(1))
+        assert len(calls) == count
+        assert {name for name in files(tmp_path / "out/test") if "vt" in name or "pv" in name} == {"density.vtu"}
+
+
 def test_without_vary_there_is_one_curve(tmp_path):
     case = write(tmp_path, TEXT.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', ""))
     (result,) = fpsolve.run(case, tmp_path / "out")

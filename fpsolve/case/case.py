@@ -13,7 +13,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartSection
 from fpsolve.case.curves import Curve, make_curve
 from fpsolve.case.messages import explain, refuse, shortened
-from fpsolve.case.output import OutputSection
+from fpsolve.case.output import EIGENFUNCTIONS, OutputSection
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
     Expectation,
@@ -42,6 +42,9 @@ def _from_table(kind: Any) -> BeforeValidator:
 
 COMPUTED = ("oscillator", "noise", "moments", "vary", "mesh")
 """The sections that say what is computed."""
+MOST_DRAWN = 10
+"""Of so many curves at most eigenfunctions are written unasked."""
+USUAL_P = 2.0
 
 
 class Case(Section):
@@ -103,11 +106,25 @@ class Case(Section):
 
     @property
     def shown(self) -> FloatArray:
-        """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread."""
+        """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread, or none."""
+        if EIGENFUNCTIONS not in self.output.quantities or self.leaves_out_eigenfunctions:
+            return np.zeros(0)
         if self.output.eigenfunctions is not None:
             wanted = np.array(self.output.eigenfunctions)
             return self.p[[int(np.argmin(np.abs(self.p - each))) for each in wanted]] if wanted.size else wanted
         return _spread(self.p)
+
+    @property
+    def usual_p(self) -> float:
+        """The p at which curves are compared by their eigenfunctions: of those that are shown, or of all, next to 2."""
+        p = self.shown if self.shown.size else self.p
+        return float(p[np.argmin(np.abs(p - USUAL_P))])
+
+    @property
+    def leaves_out_eigenfunctions(self) -> bool:
+        """Whether no eigenfunctions are written, as there are too many curves and nobody asks for them."""
+        is_wanted = EIGENFUNCTIONS in self.output.quantities
+        return is_wanted and self.planned > MOST_DRAWN and not self.output.asks_for_eigenfunctions
 
     @property
     def differentiated(self) -> FloatArray:

@@ -49,6 +49,13 @@ class OutputSection(Section):
     ] = None
     sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
 
+    @property
+    def asks_for_eigenfunctions(self) -> bool:
+        """Whether the file itself says that they are written, and not the defaults alone."""
+        return EIGENFUNCTIONS in self.quantities and (
+            self.eigenfunctions is not None or "quantities" in self.model_fields_set
+        )
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         refuse([*self._repeated(), *self._not_asked_for()])

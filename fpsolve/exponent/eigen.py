@@ -22,6 +22,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 from fpsolve.arrays import FloatArray, dense, one
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged
+from fpsolve.exponent.pictured import Pictured
 from fpsolve.exponent.rounding import rounding_of_entries
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.generator import Generator
@@ -47,7 +48,7 @@ SURVEYED_UNKNOWNS = 600
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PrincipalPair:
+class PrincipalPair(Pictured):
     """Λ(p) with its eigenfunctions on a mesh.
 
     Attributes:

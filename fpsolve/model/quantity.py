@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
+from textwrap import wrap
 from typing import Any
 
 from pydantic.fields import FieldInfo
@@ -76,6 +77,8 @@ def _over(unit: str, other: str) -> str:
     return f"{unit}/{other if other.isidentifier() else f'({other})'}"
 
 
+LINE = 90
+"""Letters of a line of parameters at most."""
 UNNAMED = Quantity("value", "value", "number", "", "unknown")
 """Of a number of which nothing more is known."""
 P = Quantity("p", "p", "order of the moment", "$p$")
@@ -135,6 +138,29 @@ def parameter_values(problem: Problem, original: NonGaussianNoise | None = None)
     if original is not None:
         found["noise.treatment"] = "exact" if problem.noise == original else "ou-reduction"
     return found
+
+
+def parameter_words(parameters: Mapping[str, float | str], keys: Collection[str]) -> str:
+    """Some of the parameters with their units, by dotted keys: "noise.D0 = 0.1 (1/time), noise.r0 = 0.9"."""
+    return ", ".join(f"{key} = {_valued(key, parameters[key])}" for key in keys)
+
+
+def parameter_lines(parameters: Mapping[str, float | str], besides: Collection[str] = ()) -> list[str]:
+    """The same of all parameters besides some, in lines for the oscillator and for the noise, none of them long."""
+    lines: list[str] = []
+    for half in ("oscillator", "noise"):
+        keys = [key for key in parameters if key.startswith(f"{half}.") and key not in besides]
+        words = [f"{key.partition('.')[2]} = {_valued(key, parameters[key])}" for key in keys]
+        lines += wrap(f"{half}: {', '.join(each.replace(' ', chr(160)) for each in words)}", LINE) if words else []
+    return [line.replace(chr(160), " ") for line in lines]
+
+
+def _valued(key: str, value: float | str) -> str:
+    """The value of a parameter with its unit."""
+    unit = parameter_of(key).unit
+    if isinstance(value, str) or unit in ("1", "unknown"):
+        return value if isinstance(value, str) else f"{value:g}"
+    return f"{value:g} ({unit})"
 
 
 def density_unit(noise: Quantity) -> str:

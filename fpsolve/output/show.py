@@ -3,9 +3,11 @@
     pvpython show.py                          T(phi, xi) at p = 2 as a surface, saved to eigenfunctions.png
     pvpython show.py --cylinder --p 1         wrapped on a cylinder: phi around it, xi along it
     pvpython show.py --field tilted_density   another field, saved to eigenfunctions-tilted_density.png
+    pvpython show.py --collection curves.pvd --time 3     the third curve of several, all at one p
 
 Where there is no display: xvfb-run -a -s -noreset pvpython show.py
-In ParaView itself: Run Script of the Python Shell, or Macros > Import new macro; the time is then p.
+In ParaView itself: Run Script of the Python Shell, or Macros > Import new macro. The time of eigenfunctions.pvd is p,
+that of curves.pvd the number of the curve, or the varied value where one number is varied; the title follows it.
 The red lines are the impacts, where T jumps.
 """
 
@@ -34,8 +36,8 @@ BOX = (1.0, 0.75, 0.4)
 LENGTH = 2.0
 """Length of the cylinder, whose radius is 1."""
 CAMERA = {False: (-1.2, -2, 1.6), True: (-1.5, -1.5, 1.3)}
-ANGLE = {False: 25, True: 26}
-"""From where the plane (False) and the cylinder (True) are seen, and the viewing angle in degrees."""
+ANGLE = 26
+"""From where the plane (False) and the cylinder (True) are seen, and the viewing angle of both in degrees."""
 USUAL = 2.0
 """The p that is drawn when none is asked for."""
 SAME = 1e-9
@@ -56,14 +58,18 @@ def main(arguments: list[str]) -> None:
     view = simple.GetActiveViewOrCreate("RenderView")
     simple.HideAll(view)
     view.ViewSize, view.OrientationAxesVisibility = [1600, 1000], 0
-    reader, p = load(chosen.collection, chosen.p)
-    draw(reader, view, p, chosen)
+    reader, time = load(chosen)
+    draw(reader, view, time, chosen)
     simple.Render(view)  # the first time it turns the camera
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA[chosen.cylinder], [0, 0, 0], [0, 0, 1]
     view.ResetCamera(True)
-    view.CameraViewAngle = ANGLE[chosen.cylinder]
+    view.CameraViewAngle = ANGLE
     simple.SaveScreenshot(str(chosen.output), view, OverrideColorPalette="WhiteBackground")
-    print(f"p = {p:g}: {chosen.output}")
+    known = servermanager.Fetch(reader).GetFieldData()
+    words = [f"p = {known.GetArray('p').GetValue(0):g}"]
+    if known.GetAbstractArray("varied"):
+        words.insert(0, known.GetAbstractArray("varied").GetValue(0))
+    print(f"{', '.join(words)}: {chosen.output}")
 
 
 def options(arguments: list[str]) -> argparse.Namespace:
@@ -72,6 +78,7 @@ def options(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--cylinder", action="store_true", help="wrap (phi, xi) on a cylinder")
     parser.add_argument("--field", default="T", choices=SYMBOLS, help="what to draw (default: T)")
     parser.add_argument("--p", type=float, help=f"the moment (default: {USUAL:g}, or the nearest one there is)")
+    parser.add_argument("--time", type=float, help="the time of the collection, for curves.pvd the curve")
     named = "the picture, .png or .jpg (default: named after the collection, the field and the shape)"
     parser.add_argument("--output", type=Path, help=named)
     parser.add_argument("--collection", type=Path, help="default: eigenfunctions.pvd beside this file")
@@ -79,6 +86,8 @@ def options(arguments: list[str]) -> argparse.Namespace:
     chosen.collection = chosen.collection or beside_this_file("eigenfunctions.pvd")
     field, shape = "" if chosen.field == "T" else f"-{chosen.field}", "-cylinder" if chosen.cylinder else ""
     chosen.output = chosen.output or chosen.collection.with_name(f"{chosen.collection.stem}{field}{shape}.png")
+    if chosen.p is not None and chosen.time is not None:
+        raise SystemExit("--p and --time say the same of the eigenfunctions of a curve; leave one out")
     if not chosen.collection.is_file():
         raise SystemExit(f"there is no {chosen.collection}; name the collection with --collection FILE.pvd")
     if chosen.output.suffix not in (".png", ".jpg"):
@@ -95,19 +104,23 @@ def beside_this_file(name: str) -> Path:
     return next((folder / name for folder in folders if (folder / name).is_file()), folders[-1] / name)
 
 
-def load(collection: Path, asked: float | None) -> tuple[Any, float]:
-    """The collection at the p asked for, or else at the one nearest to the usual one, and that p."""
-    reader = simple.PVDReader(FileName=str(collection))
-    known = list(reader.TimestepValues)
-    p = min(known, key=lambda each: abs(each - (USUAL if asked is None else asked)))
-    if asked is not None and not abs(p - asked) <= SAME * max(1, abs(p)):
-        there = ", ".join(f"{each:.10g}" for each in known)
-        raise SystemExit(f"--p {asked:g}: {collection} has no such p; choose one of {there}")
+def load(chosen: argparse.Namespace) -> tuple[Any, float]:
+    """The collection and the time asked for, or else the usual p, or of several curves the first."""
+    reader = simple.PVDReader(FileName=str(chosen.collection))
+    known, is_over_curves = list(reader.TimestepValues), ' name="' in chosen.collection.read_text(encoding="utf-8")
+    if chosen.p is not None and is_over_curves:
+        raise SystemExit(f"--p {chosen.p:g}: {chosen.collection} is a series over curves; choose one with --time")
+    asked = chosen.time if chosen.p is None else chosen.p
+    usual = known[0] if is_over_curves else USUAL
+    time = min(known, key=lambda each: abs(each - (usual if asked is None else asked)))
+    if asked is not None and not abs(time - asked) <= SAME * max(1, abs(time)):
+        there, option = ", ".join(f"{each:.10g}" for each in known), "time" if chosen.p is None else "p"
+        raise SystemExit(f"--{option} {asked:g}: {chosen.collection} has no such {option}; choose one of {there}")
     scene = simple.GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
-    scene.AnimationTime = p
-    reader.UpdatePipeline(p)
-    return reader, p
+    scene.AnimationTime = time
+    reader.UpdatePipeline(time)
+    return reader, time
 
 
 def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
@@ -129,22 +142,22 @@ def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
 
 
 def write_title(reader: Any, view: Any, field: str) -> None:
-    """p, Lambda(p), and a line of parameters for the oscillator and for the noise; of what has no p, its name."""
-    sections: dict[str, list[str]] = {}
+    """What tells the curve from others, p and Lambda(p), or of what has no p its name; below the other parameters."""
     facts = servermanager.Fetch(reader).GetFieldData()
-    for i in range(facts.GetNumberOfArrays()):
-        section, dot, name = facts.GetAbstractArray(i).GetName().partition(".")
-        if dot:
-            value = facts.GetAbstractArray(i).GetVariantValue(0)
-            words = f"{value.ToDouble():g}" if value.IsNumeric() else value.ToString()
-            sections.setdefault(section, []).append(f"{name} = {words}")
-    lines = "".join(f"\n{section}: {', '.join(parts)}" for section, parts in sections.items())
-    title = simple.PythonAnnotation(Input=reader, ArrayAssociation="Field Data")
     of_p = '"p = %g     Lambda(p) = %.6g (1/time)" % (p[0], round(float(Lambda[0]), 14) + 0.0)'
     head = repr("stationary density (p = 0)") if field == "stationary_density" else of_p
-    title.Expression = f"{head} + {lines!r}"
-    text = simple.Show(title, view)
-    text.FontSize, text.WindowLocation, text.Justification = 28, "Upper Center", "Center"
+    if facts.GetAbstractArray("varied"):
+        head = f"varied.GetValue(0) + {chr(10)!r} + {head}"
+    annotate(reader, view, head, "Upper Center", 36)
+    if facts.GetAbstractArray("held"):
+        annotate(reader, view, "held.GetValue(0)", "Lower Center", 26)
+
+
+def annotate(reader: Any, view: Any, expression: str, place: str, size: int) -> None:
+    """A text from the field data, which follows the time."""
+    source = simple.PythonAnnotation(Input=reader, ArrayAssociation="Field Data", Expression=expression)
+    text = simple.Show(source, view)
+    text.FontSize, text.WindowLocation, text.Justification = size, place, "Center"
 
 
 def between(source: Any, name: str, low: float, high: float, p: float, every: bool = True) -> Any:

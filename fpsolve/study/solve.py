@@ -73,16 +73,16 @@ class Numerics:
         return cls(case.rtol, case.budget, case.cylinder_mesh())
 
 
-def everything(case: Case) -> Wanted:
-    """What [output] names as `quantities`, the eigenfunctions to be drawn among them."""
+def everything(case: Case, number: int = 1) -> Wanted:
+    """What [output] names as `quantities`, of the curve with a number; the density goes with what is drawn of it."""
     names = set(case.output.quantities)
     draws, has_moments = EIGENFUNCTIONS in names, MOMENT.name in names
     slopes = tuple(case.differentiated) if has_moments else ()
     return Wanted(
         case.p if has_moments else np.zeros(0),
         tuple(name for name in INDICES if name in names),
-        shown=tuple(case.shown) if draws else (),
-        density=draws,
+        shown=tuple(case.shown),
+        density=draws and (number == 1 or case.shown.size > 0),
         differentiated=slopes if SENSITIVITIES in names else None,
     )
 

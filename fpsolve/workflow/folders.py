@@ -14,7 +14,7 @@ from fpsolve.files import TEMPORARY, alone, writable
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
 SOLVED, SIMULATED = (
-    r"summary\.json|(moments|curves)\.csv|results\.nc|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu|show\.py"
+    r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu|show\.py"
     r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)",
     r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)",
 )

@@ -13,11 +13,11 @@ from fpsolve.output.datasets import write_dataset
 from fpsolve.output.provenance import Run
 from fpsolve.output.records import Place, Records, Results, append
 from fpsolve.output.tables import write_results
-from fpsolve.output.vtk import write_functions
+from fpsolve.output.vtk import write_curves, write_functions
 from fpsolve.pool import Pool, here
 from fpsolve.study.records import key_of, record_of
 from fpsolve.study.results import CurveResult, Solved
-from fpsolve.study.solve import Numerics, everything, without_failed
+from fpsolve.study.solve import Numerics, Wanted, everything, without_failed
 from fpsolve.study.sweep import Batch, Order, SolveBatch, batches, lost
 
 Found = tuple[int, Place | CurveResult | None]
@@ -51,19 +51,20 @@ class Sweep:
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
         self.case, self.folder, self.run = case, folder.resolve(), Run(case)
-        self.numerics, self.wanted = Numerics.of(case), everything(case)
+        self.numerics, self.first, self.further = Numerics.of(case), everything(case, 1), everything(case, 2)
         self.records = Records(self.folder / SOLVED_RECORDS)
         self.results = Results(case, self.records)
+        self._tabled = self._settled = 0
         if is_fresh:
             self.records.remove()
         self.find()
-        self._tabled = 0
 
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished and not told of."""
         for curve in self.case.curves() if self.records.look().are_there else ():
             if place := self.records.place(self._key(curve)):
                 self.results.add(curve.number, place)
+                self._settled += not self._wanted(curve).draws
 
     @property
     def steps(self) -> int:
@@ -74,7 +75,7 @@ class Sweep:
         """Solve what is not known yet; tables are written at the beginning, and as they grow."""
         self.write_tables()
         is_alone = self.case.planned == 1 and not self.results and not pool.is_elsewhere
-        for _ in range(0 if self.wanted.draws else len(self.results) * self._steps_each):
+        for _ in range(self._settled * self._steps_each):
             progress()
         queue = _Queue(batches(self.case, self._order, self.numerics))
         with here() if is_alone else pool as workers:
@@ -95,23 +96,27 @@ class Sweep:
         write_results(self.case, self.results, self.folder, self.run.facts())
 
     def write_all(self) -> None:
-        """The tables, and results.nc."""
+        """The tables, results.nc, and the series over the curves."""
         self.write_tables()
+        write_curves(self.case, self.folder)
         write_dataset(self.case, self.results, self.folder, self.run.facts())
 
     @property
     def _steps_each(self) -> int:
-        return max(self.wanted.p.size, 1)
+        return max(self.first.p.size, 1)
+
+    def _wanted(self, curve: Curve) -> Wanted:
+        return self.first if curve.number == 1 else self.further
 
     def _key(self, curve: Curve) -> str:
-        return key_of(curve, self.wanted, self.numerics)
+        return key_of(curve, self._wanted(curve), self.numerics)
 
     def _order(self, curve: Curve) -> Order | None:
         """What is to be done for a curve, or None."""
-        order, known = Order(curve, self.wanted, self._key(curve)), self.results.of(curve)
+        order, known = Order(curve, self._wanted(curve), self._key(curve)), self.results.of(curve)
         if known is None:
             return order
-        if not self.wanted.draws:
+        if not order.wanted.draws:
             return None
         return replace(order, wanted=without_failed(order.wanted, known.failures), is_known=True)
 

@@ -181,6 +181,25 @@ def test_defaults_and_integers(write: Write) -> None:
     assert case.cylinder_mesh() is None
 
 
+@pytest.mark.parametrize(
+    ("curves", "override", "shown"),
+    [
+        (10, "moments.rtol=1e-8", [-1.0, 2.0]),
+        (11, "moments.rtol=1e-8", []),
+        (11, "output.eigenfunctions=[2.0]", [2.0]),
+        (11, "output.eigenfunctions=[]", []),
+        (11, 'output.quantities=["eigenfunctions"]', [-1.0, 2.0]),
+        (11, 'output.quantities=["moment"]', []),
+    ],
+)
+def test_eigenfunctions_of_many_curves_are_written_if_asked_for(
+    write: Write, curves: int, override: str, shown: list[float]
+) -> None:
+    case = load_case(write(SMALL), [override, f'vary."noise.D0"={{start=0.1, stop=1.0, num={curves}}}'])
+    assert case.shown.tolist() == shown
+    assert case.leaves_out_eigenfunctions == (curves == 11 and "rtol" in override)
+
+
 def test_a_case_cannot_be_changed(write: Write) -> None:
     case = load_case(write(SMALL))
     with pytest.raises(ValidationError, match="frozen"):

@@ -26,6 +26,7 @@ from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.output.vtk import copy_show_script, write_density, write_eigenfunctions, write_response
+from fpsolve.study import sweep
 from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE
 from tests.oracles.perturbation import first_order_eigenfunction
@@ -160,6 +161,74 @@ def test_files_of_a_curve_hold_its_parameters(tmp_path):
         assert data["noise.D0"][0] == (0.75 if file.parent.name == "eigenfunctions-2" else 0.5)
         assert data["oscillator.omega"][0] == 1.25
         assert data["noise.treatment"][0] == "ou-reduction"
+        assert data["curve"][0] == (2 if file.parent.name == "eigenfunctions-2" else 1)
+        assert data["varied"][0] == f"noise.D0 = {data['noise.D0'][0]:g} (1/time)"
+        assert data["held"][0].splitlines() == [
+            "oscillator: omega = 1.25 (rad/time), restitution = 0.8, c1 = 0.1 (1/time), epsilon = 0.1,",
+            "c2 = 0 (1/(time length^2)), c3 = 0 (time/length^2), impact = delta",
+            "noise: tau0 = 0.5 (time), r0 = 0.95, treatment = ou-reduction",
+        ]
+        assert float(file.stem.removeprefix("p") if file.stem != "density" else 0) == data["p"][0]
+
+
+TWO = 'vary."noise.D0"=[0.75, 0.5]'
+
+
+@pytest.mark.parametrize(
+    ("overrides", "times", "names"),
+    [
+        ([TWO], [0.5, 0.75], ["noise.D0 = 0.5, p = 1.5", "noise.D0 = 0.75, p = 1.5"]),
+        (
+            [TWO, 'vary."noise.treatment"=["ou-reduction"]'],
+            [0.5, 0.75],
+            [f"noise.D0 = {D0}, noise.treatment = ou-reduction, p = 1.5" for D0 in (0.5, 0.75)],
+        ),
+        (
+            ['vary."noise.treatment"=["exact", "ou-reduction"]'],
+            [1, 2],
+            [f"curve {k}: noise.treatment = {name}, p = 1.5" for k, name in ((1, "exact"), (2, "ou-reduction"))],
+        ),
+    ],
+)
+def test_series_over_the_curves(tmp_path, overrides, times, names):
+    """At the p next to 2; the time is the one number that is varied, or else the number of the curve."""
+    case = load_case(ROOT / "cases/minimal.toml", ["moments.p=[-1.0, 1.5, 4.0]", "expect=[]", *overrides])
+    run(case, tmp_path)
+    series = tmp_path / case.name / "curves.pvd"
+    sets = ElementTree.parse(series).findall("Collection/DataSet")
+    assert [float(each.get("timestep")) for each in sets] == times
+    assert [each.get("name") for each in sets] == names
+    for time, each in zip(times, sets, strict=True):
+        data = pyvista.read(series.parent / each.get("file")).field_data
+        assert data["p"][0] == 1.5
+        assert time in (data["noise.D0"][0], data["curve"][0])
+    reader = pyvista.PVDReader(series)
+    assert list(reader.time_values) == times
+    for time in times:
+        reader.set_active_time_value(time)
+        [grid] = reader.read()
+        assert time in (grid.field_data["noise.D0"][0], grid.field_data["curve"][0])
+
+
+def test_a_run_that_ends_early_lists_the_curves_that_are_there(tmp_path, monkeypatch):
+    case = load_case(ROOT / "cases/minimal.toml", ["expect=[]", 'vary."noise.D0"=[0.5, 0.75, 1.0]'])
+    run(case, tmp_path)
+    series = tmp_path / case.name / "curves.pvd"
+    assert len(pyvista.PVDReader(series).time_values) == 3
+    solve = sweep.solve_curve
+
+    def interrupted(curve, *arguments):
+        if curve.number == 3:
+            raise KeyboardInterrupt
+        return solve(curve, *arguments)
+
+    monkeypatch.setattr(sweep, "solve_curve", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run(case, tmp_path, fresh=True)
+    assert list(pyvista.PVDReader(series).time_values) == [0.5, 0.75]
+    monkeypatch.undo()
+    run(load_case(case.path, ["output.eigenfunctions=[]", "expect=[]"]), tmp_path)
+    assert not series.exists()
 
 
 def test_what_is_shown_first(tmp_path, fig1_solver):
@@ -280,7 +349,8 @@ def test_files_are_small(tmp_path, fig1_solver):
 def test_density_file(tmp_path, solver):
     grid = pyvista.read(write_density(tmp_path / "density.vtu", solver.pair(0.0)))
     assert set(grid.point_data) == {"stationary_density", "phi_marginal", "xi_marginal", "z"}
-    assert grid.field_data["lyapunov_exponent"][0] == solver.pair(0.0).derivative
+    found = {name: float(values[0]) for name, values in grid.field_data.items()}
+    assert found == {"p": 0, "Lambda": 0, "lyapunov_exponent": solver.pair(0.0).derivative}
     assert integral(grid, "stationary_density") == pytest.approx(1, abs=1e-6)
     width = 16 * UNIT_NOISE.standard_deviation
     assert integral(grid, "phi_marginal") == pytest.approx(width, rel=1e-8)
@@ -292,7 +362,10 @@ def simulated():
     """A simulated curve with a joint density of x and v."""
     edges, density = np.linspace(0, 3, 101), np.random.default_rng(0).random((100, 80))
     response = SimpleNamespace(x_edges=edges, v_edges=np.linspace(-2, 2, 81), density=density)
-    return SimpleNamespace(response=response, curve=SimpleNamespace(suffix="-2"))
+    case = load_case(ROOT / "cases/minimal.toml", ["expect=[]", 'vary."noise.D0"=[0.5, 0.75]', "oscillator.c2=0.1"])
+    _, curve = case.curves()
+    found = SimpleNamespace(lyapunov_exponent=-0.001, lyapunov_exponent_error=1e-5)
+    return SimpleNamespace(response=response, curve=curve, result=found)
 
 
 def test_response_file(tmp_path, simulated):
@@ -300,6 +373,10 @@ def test_response_file(tmp_path, simulated):
     grid = pyvista.read(tmp_path / "response-2.vti")
     assert grid.bounds == pytest.approx((0, 3, -2, 2, 0, 0))
     np.testing.assert_array_equal(grid.cell_data["density"].reshape(80, 100).T, simulated.response.density)
+    known = {name: values[0] for name, values in grid.field_data.items()}
+    assert known.items() >= simulated.curve.parameters.items()
+    assert (known["varied"], known["curve"]) == ("noise.D0 = 0.75 (1/time)", 2)
+    assert (known["lyapunov_exponent"], known["lyapunov_exponent_error"]) == (-0.001, 1e-5)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="limits of POSIX")
@@ -472,7 +549,10 @@ import json, sys
 sys.argv = [{script!r}, *{arguments!r}]
 exec(open({script!r}).read(), {{"__name__": "__main__", "__file__": {script!r}}})
 from paraview import servermanager, simple
-view, captions, title = simple.GetActiveView(), [], ""
+view, captions, titles = simple.GetActiveView(), [], []
+scene = simple.GetAnimationScene()
+scene.AnimationTime = {time} or scene.AnimationTime
+simple.Render(view)
 for source in simple.GetSources().values():
     display, kind = simple.GetDisplayProperties(source, view), source.GetXMLName()
     if kind == "TextSource":
@@ -480,16 +560,17 @@ for source in simple.GetSources().values():
     elif kind == "PythonCalculator":
         lowest = simple.GetColorTransferFunction("scaled").RGBPoints[0]
     elif kind == "PythonAnnotation":
-        title = servermanager.Fetch(source).GetRowData().GetAbstractArray(0).GetVariantValue(0).ToString()
-print(json.dumps([title, captions, [view.AxesGrid.XTitle, view.AxesGrid.YTitle], lowest]))
+        titles.append(servermanager.Fetch(source).GetRowData().GetAbstractArray(0).GetVariantValue(0).ToString())
+print(json.dumps([titles, captions, [view.AxesGrid.XTitle, view.AxesGrid.YTitle], lowest]))
 """
 
 
-def words(paraview, folder, *arguments):
-    """What show.py writes into a picture: its title, its captions with their places, the titles of the axes grid, and
-    the lowest value of the colours."""
+def words(paraview, folder, *arguments, time=0):
+    """What show.py writes into a picture, if need be at another time: above and below it, its captions with their
+    places, the titles of the axes grid, and the lowest value of the colours."""
     script = folder / "words.py"
-    script.write_text(WORDS.format(script=str(folder / "show.py"), arguments=[*arguments, "--output", "words.png"]))
+    arguments = [*arguments, "--output", "words.png"]
+    script.write_text(WORDS.format(script=str(folder / "show.py"), arguments=arguments, time=time))
     done = paraview(folder, script)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
@@ -500,18 +581,17 @@ def named_results(tmp_path_factory):
     """One p only, with parameters."""
     folder, solver = tmp_path_factory.mktemp("named"), ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
     parameters = {"oscillator.omega": 1.0, "oscillator.impact": "delta", "noise.D0": 0.5}
-    written(folder, solver, [1.0], parameters=parameters)
+    written(folder, solver, [1.0], parameters=parameters, varied=["noise.D0"])
     copy_show_script(folder)
     return folder
 
 
 def test_words_of_the_picture(paraview, named_results):
-    title, captions, grid, lowest = words(paraview, named_results)
-    first, *parameters = title.splitlines()
-    assert first.startswith("p = 1 ")
-    assert first.endswith(" (1/time)")
+    (title, parameters), captions, grid, lowest = words(paraview, named_results)
+    assert title.startswith("noise.D0 = 0.5 (1/time)\np = 1 ")
+    assert title.endswith(" (1/time)")
     assert 0 < lowest < 1
-    assert parameters == ["oscillator: omega = 1, impact = delta", "noise: D0 = 0.5"]
+    assert parameters.splitlines() == ["oscillator: omega = 1 (rad/time), impact = delta"]
     assert [text for text, _ in captions].count("impact") == 2
     at = {text: place[0] for text, place in captions}
     ticks = [at[text] for text in ("0", "pi/2", "pi", "3 pi/2", "2 pi")]
@@ -521,9 +601,41 @@ def test_words_of_the_picture(paraview, named_results):
 
 
 def test_the_stationary_density_is_that_at_p_0(paraview, named_results):
-    title, *_, lowest = words(paraview, named_results, "--field", "stationary_density")
-    assert title.splitlines()[0] == "stationary density (p = 0)"
+    (title, _), *_, lowest = words(paraview, named_results, "--field", "stationary_density")
+    assert title.splitlines() == ["noise.D0 = 0.5 (1/time)", "stationary density (p = 0)"]
     assert lowest == 0
+
+
+@pytest.fixture(scope="module")
+def several_curves(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("several")
+    run(load_case(ROOT / "cases/minimal.toml", ["expect=[]", 'vary."noise.D0"=[0.5, 0.75]']), folder)
+    return folder / "minimal"
+
+
+def test_the_title_follows_the_curves(paraview, several_curves):
+    titles = [
+        words(paraview, several_curves, "--collection", "curves.pvd", *options, time=time)[0]
+        for options, time in (([], 0), ([], 0.75), (["--time", "0.75"], 0))
+    ]
+    assert [title.splitlines()[0] for title, _ in titles] == [f"noise.D0 = {D0} (1/time)" for D0 in (0.5, 0.75, 0.75)]
+    assert titles[1] == titles[2]
+    assert titles[0][0] != titles[1][0]
+
+
+@pytest.mark.parametrize(
+    ("option", "remedy"),
+    [
+        (["--p", "2"], "choose one with --time"),
+        (["--time", "0.6"], "choose one of 0.5, 0.75"),
+        (["--time", "0.5", "--p", "2"], "leave one out"),
+    ],
+)
+def test_show_script_refuses_a_curve_that_is_not_there(paraview, several_curves, option, remedy):
+    done = paraview(several_curves, "show.py", "--collection", "curves.pvd", *option, "--output", "refused.png")
+    assert done.returncode != 0
+    assert remedy in done.stderr
+    assert not (several_curves / "refused.png").exists()
 
 
 def test_words_around_the_cylinder(paraview, named_results):

@@ -1,0 +1,267 @@
+"""Pictures of a function of (φ, ξ): in space by pyvista where this machine can render, in the plane by matplotlib."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.pictures import SIZE, STYLE, title_of
+from fpsolve.process import signals_held
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PROBE = """
+import pyvista
+plotter = pyvista.Plotter(off_screen=True)
+plotter.add_mesh(pyvista.Sphere())
+raise SystemExit(not plotter.screenshot(return_img=True).std())
+"""
+PATIENCE = 60.0
+"""Seconds that a first picture may take."""
+WINDOW = [1200, 800]
+BOX = (1.0, 0.75, 0.4)
+"""Edges of the surface's box along φ, ξ and the values."""
+LENGTH, SWELL = 2.0, 0.5
+"""Length of the cylinder, whose radius is 1, and by how much the largest value adds to that."""
+CAMERA = {False: (-1.2, -2.0, 1.6), True: (-1.5, -1.5, 1.3)}
+ZOOM = {False: 0.85, True: 0.95}
+"""From where the plane (False) and the cylinder (True) are seen, and how large, so that words fit around them."""
+FLOOR = (0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)
+WALLS = ((0, 1, 0), (0, 1, 1), (1, 1, 1), (1, 0, 1), (1, 0, 0)), ((1, 1, 0), (1, 1, 1))
+"""Lines of the box that stand behind the surface, in its edges."""
+SIDES = ("left", "right", "right", "left")
+"""How the words at the quarters of the rim are justified."""
+QUARTERS = ("0", "pi/2", "pi", "3 pi/2", "2 pi")
+RED = "#C8102E"
+NEXT_TO_ZERO = 0.05
+"""A least value below this share of the maximum is drawn as 0, which rounding and small errors miss."""
+Label = tuple[str, FloatArray, str]
+"""Words, their place, and on which side of them this is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture that notebooks show.
+
+    Attributes:
+        png: the content of its file.
+    """
+
+    png: bytes
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as a PNG file."""
+        Path(path).write_bytes(self.png)
+        return Path(path)
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A function on the full circle and an interval of the noise, with its words.
+
+    Attributes:
+        phi: φ of the nodes, shape (blocks, nodes of a block); neighbours share their ends, each with its own values.
+        xi: ξ of the nodes, shape (n,).
+        values: shape (blocks · nodes, n).
+        about: long_name, symbol and units of the function and of "phi" and "xi", as for xarray.
+        name: of the function, in ASCII.
+        title: in which p and Λ(p) are.
+        lines: of parameters.
+        impacts: the phases at which the function jumps.
+    """
+
+    phi: FloatArray
+    xi: FloatArray
+    values: FloatArray
+    about: Mapping[str, Mapping[str, str]]
+    name: str
+    title: str
+    lines: Sequence[str]
+    impacts: Sequence[float]
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The range of the values; it begins at 0 where the least is next to it, or all are the same."""
+        low, high = float(self.values.min()), float(self.values.max())
+        return (0.0 if abs(low) < NEXT_TO_ZERO * high or high - low < 1e-6 * high else low, high)
+
+    def placed(self, phi: Any, xi: Any, values: Any, *, cylinder: bool) -> FloatArray:
+        """Points of space for φ, ξ and values, which broadcast: in a box, or with φ around an axis and ξ along it."""
+        low, high = self.limits
+        along, up = (xi - self.xi[0]) / (self.xi[-1] - self.xi[0]), (values - low) / (high - low)
+        radius = 1 + SWELL * up
+        wrapped = radius * np.cos(phi), radius * np.sin(phi), LENGTH * along
+        flat = BOX[0] * phi / (2 * math.pi), BOX[1] * along, BOX[2] * up
+        return np.stack(np.broadcast_arrays(*(wrapped if cylinder else flat)), axis=-1)
+
+    def label(self, of: str) -> str:
+        """A coordinate or the function, with its unit, in ASCII."""
+        unit = self.about[of]["units"]
+        words = self.name if of == "values" else f"{self.about[of]['long_name']} {of}"
+        return words if unit == "1" else f"{words} ({unit})"
+
+
+@lru_cache(maxsize=1)
+def can_render() -> bool:
+    """Whether this machine can render; a child process finds out, as without OpenGL that ends in a crash."""
+    command = [sys.executable or "python", "-c", PROBE]
+    try:
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0
+
+
+def flat_picture(surface: Surface, cmap: str) -> Picture:
+    """The function in colours over the plane, by matplotlib."""
+    content = BytesIO()
+    flat_figure(surface, cmap).savefig(content, format="png", dpi=150)
+    return Picture(content.getvalue())
+
+
+def flat_figure(surface: Surface, cmap: str) -> Figure:
+    """The same as a figure that belongs to no window."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    low, high = surface.limits
+    style: dict[str, Any] = {"shading": "gouraud", "rasterized": True, "cmap": cmap, "vmin": low, "vmax": high}
+    with rc_context(STYLE):
+        figure = Figure(figsize=SIZE, layout="constrained")
+        axes = figure.add_subplot()
+        colours = axes.pcolormesh(surface.phi.ravel(), surface.xi, surface.values.T, **style)
+        figure.colorbar(colours, ax=axes, label=title_of(surface.about["values"]))
+        for impact in surface.impacts:
+            axes.axvline(impact, color=RED, linewidth=1.2)
+        axes.set_xticks(np.pi * np.arange(5) / 2, ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
+        axes.set(xlabel=title_of(surface.about["phi"]), ylabel=title_of(surface.about["xi"]))
+        figure.suptitle(surface.title, parse_math=False)
+        axes.set_title("\n".join(surface.lines), fontsize=9, parse_math=False)
+    return figure
+
+
+def picture_in_space(surface: Surface, cmap: str, *, cylinder: bool) -> Picture:
+    """The function as a surface over the plane or around a cylinder, by pyvista; only where `can_render` says so."""
+    from matplotlib.image import imsave
+
+    content = BytesIO()
+    with _plotter() as plotter:
+        _add_surface(plotter, surface, cmap, cylinder=cylinder)
+        _add_labels(plotter, _labels_of_cylinder(surface) if cylinder else _labels_of_box(surface))
+        title = surface.title.replace("Λ", "Lambda")  # VTK's letters are Latin
+        plotter.add_text(title, position="upper_edge", font_size=12, color="black")
+        plotter.add_text("\n".join(surface.lines), position="lower_edge", font_size=8, color="black")
+        plotter.camera_position = [CAMERA[cylinder], (0, 0, 0), (0, 0, 1)]
+        plotter.reset_camera()
+        plotter.camera.zoom(ZOOM[cylinder])
+        imsave(content, plotter.screenshot(return_img=True), format="png")
+    return Picture(content.getvalue())
+
+
+@contextmanager
+def _plotter() -> Iterator[Any]:
+    """A canvas of pyvista that nobody sees; of a display that is not there VTK says nothing."""
+    with signals_held():
+        import pyvista
+        from vtkmodules.vtkCommonCore import vtkLogger
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    plotter: Any = pyvista.Plotter(off_screen=True, notebook=False, window_size=WINDOW)
+    try:
+        plotter.set_background("white")
+        plotter.enable_anti_aliasing("ssaa")
+        yield plotter
+    finally:
+        plotter.close()
+        vtkLogger.SetStderrVerbosity(before)
+
+
+def _add_surface(plotter: Any, surface: Surface, cmap: str, *, cylinder: bool) -> None:
+    """The surface in colours, and both its edges at each impact."""
+    import pyvista
+
+    phi, rows = surface.phi.ravel(), np.arange(surface.phi.size).reshape(surface.phi.shape)
+    points = surface.placed(phi[:, None], surface.xi, surface.values, cylinder=cylinder)
+    corners = rows[:, :-1].reshape(-1, 1) * surface.xi.size + np.arange(surface.xi.size - 1)
+    sides = [corners, corners + surface.xi.size, corners + surface.xi.size + 1, corners + 1]
+    faces = np.stack([np.full_like(corners, 4), *sides], axis=-1)
+    mesh = pyvista.PolyData(points.reshape(-1, 3), faces.ravel())
+    mesh.point_data["values"] = surface.values.ravel()
+    bar: dict[str, Any] = {"title": f"{surface.label('values')}\n", "vertical": True, "color": "black", "fmt": "%.3g"}
+    bar |= {"position_x": 0.88, "position_y": 0.25, "height": 0.5, "width": 0.06, "n_labels": 5}
+    bar |= {"title_font_size": 20, "label_font_size": 20}
+    plotter.add_mesh(mesh, cmap=cmap, clim=surface.limits, smooth_shading=True, ambient=0.45, scalar_bar_args=bar)
+    for impact in surface.impacts:
+        for row in np.flatnonzero(np.abs(phi - impact) < 1e-9):
+            edge = pyvista.lines_from_points(points[row])
+            plotter.add_mesh(edge, color=RED, line_width=4, render_lines_as_tubes=True, lighting=False)
+    if not cylinder:
+        for edges in (FLOOR, *WALLS):
+            plotter.add_lines(np.multiply(edges, BOX), color="black", width=1, connected=True)
+
+
+def _add_labels(plotter: Any, labels: Iterable[Label]) -> None:
+    """Words at points of space, those about impacts in red."""
+    for words, place, side in labels:
+        style: dict[str, Any] = {
+            "shape": None,
+            "show_points": False,
+            "always_visible": True,
+            "bold": False,
+            "font_size": 22,
+        }
+        style |= {"text_color": RED if "impact" in words else "black", "justification_horizontal": side}
+        plotter.add_point_labels([place], [words], **style)
+
+
+def _labels_of_box(surface: Surface) -> Iterator[Label]:
+    """Ticks and names of φ along the front and of ξ along the left side, and the impacts at the back."""
+    (low, high), start, end = surface.limits, float(surface.xi[0]), float(surface.xi[-1])
+
+    def at(phi: float, xi: float, value: float, *shift: float) -> FloatArray:
+        return surface.placed(phi, xi, value, cylinder=False) + shift
+
+    for k, words in enumerate(QUARTERS):
+        yield words, at(k * math.pi / 2, start, low, 0, -0.05, 0), "left"
+    yield surface.label("phi"), at(1.1 * math.pi, start, low, 0, -0.17, 0), "left"
+    for xi in _ticks(start, end):
+        yield f"{xi:g}", at(0, xi, low, -0.03, 0, 0), "right"
+    yield surface.label("xi"), at(0, (start + end) / 2, low, -0.12, 0, 0), "right"
+    for impact in surface.impacts:
+        yield "impact", at(impact, end, high, 0, 0, 0.03), "center"
+
+
+def _labels_of_cylinder(surface: Surface) -> Iterator[Label]:
+    """φ around the upper rim, and ξ at both ends, on the side that has no colour bar."""
+    high, phi, start, end = surface.limits[1], surface.phi.ravel(), float(surface.xi[0]), float(surface.xi[-1])
+    impacts = {round(impact / (math.pi / 2), 9) for impact in surface.impacts}
+    for k, words in enumerate(QUARTERS[:4]):
+        rim = surface.values[np.argmin(np.abs(phi - k * math.pi / 2)), -1] if k < 2 else high
+        place = surface.placed(k * math.pi / 2, end, rim, cylinder=True) * (1.1, 1.1, 1)
+        text = f"{words}: impact" if k in impacts else words
+        yield surface.label("phi").replace("phi", f"phi = {text}") if k == 0 else text, place, SIDES[k]
+    for xi in (start, end):
+        words = surface.label("xi").replace("xi", f"xi = {xi:.3g}")
+        yield words, surface.placed(0.75 * math.pi, xi, high, cylinder=True) * (1.1, 1.1, 1), "right"
+
+
+def _ticks(start: float, end: float) -> list[float]:
+    """Some round numbers between two."""
+    from matplotlib.ticker import MaxNLocator
+
+    return [float(tick) for tick in np.asarray(MaxNLocator(4).tick_values(start, end)) if start < tick < end]
