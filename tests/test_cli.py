@@ -16,7 +16,7 @@ from fpsolve.case.vary import PARAMETERS
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.model.parameters import unit_of
-from fpsolve.output.terminal import digits
+from fpsolve.output.summary import digits
 from fpsolve.study import sweep
 from tests.conftest import heed_signals
 from tests.test_workflow import HOPELESS, TABLES, TEXT, files

@@ -1,11 +1,13 @@
 """What is printed fits the terminal, and no number is broken."""
 
 import re
+import sys
 
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.output.terminal import print_remark, print_results, print_simulation
+from fpsolve.output.remarks import print_remark
+from fpsolve.output.terminal import print_results, print_simulation
 from fpsolve.study.simulate import simulate_curves
 from tests.solving import solve_case
 from tests.test_workflow import TEXT
@@ -21,11 +23,23 @@ def case(tmp_path_factory):
     return load_case(path, NONLINEAR)
 
 
+@pytest.fixture
+def terminal(monkeypatch):
+    """Makes the standard streams a terminal of a width."""
+
+    def begin(width):
+        monkeypatch.setenv("COLUMNS", str(width))
+        monkeypatch.setenv("TERM", "dumb")
+        for stream in (sys.stdout, sys.stderr):
+            monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)
+
+    return begin
+
+
 @pytest.mark.parametrize("width", [60, 80, 200])
-def test_quantities_are_whole(case, width, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", str(width))
+def test_quantities_are_whole(case, width, capsys, terminal):
     results, simulated = solve_case(case), tuple(simulate_curves(case))
-    capsys.readouterr()
+    terminal(width)
     for show, names in (
         (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)", "N", "R_c"}),
         (lambda: print_simulation(case, simulated), {"λ", "Λ″(0)", *simulated[0].response.means}),
@@ -38,14 +52,20 @@ def test_quantities_are_whole(case, width, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("width", [50, 80, 120])
-def test_remarks_are_wrapped(width, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", str(width))
-    text = "warning: case: " + "Λ(2) may be 1e-10 or [less] than " * 10 + "a_word_as_long_as_a_path/" * 6
-    print_remark(text, "yellow")
+def test_remarks_are_wrapped_on_a_terminal(width, capsys, terminal):
+    terminal(width)
+    text = "case: " + "Λ(2) may be 1e-10 or [less] than " * 10 + "a_word_as_long_as_a_path/" * 6
+    print_remark(text)
     first, *others = capsys.readouterr().err.splitlines()
     assert all(line.startswith("  ") for line in others)
-    assert " ".join([first, *(line.strip() for line in others)]) == text
+    assert " ".join([first, *(line.strip() for line in others)]) == f"note: {text}"
     assert all(len(line) < width for line in [first, *others[:-1]])
+
+
+def test_remarks_are_whole_in_a_file(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    print_remark("case: " + "a word " * 50)
+    assert capsys.readouterr().err.splitlines() == [("note: case: " + "a word " * 50).rstrip()]
 
 
 @pytest.mark.parametrize(
