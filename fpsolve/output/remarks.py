@@ -102,7 +102,7 @@ class Remarks:
         return "".join([self._who(group), ": ", group.text, *self._rest(group)])
 
     def _who(self, group: _Group) -> str:
-        named = " and ".join(filter(None, group.labels))
+        named = _listed(group.labels)
         if group.curves > MOST_NAMED:
             return f"{self.case.name}: {group.curves} of {self._curves} curves"
         return f"{self.case.name}, {named}" if named else self.case.name
@@ -121,6 +121,14 @@ class Remarks:
 def print_remark(text: str, kind: str = NOTE) -> None:
     """A sentence on the standard error, in lines that fit, indented from the second on."""
     Screen.of(errors=True).say(f"{kind}: {text}", STYLES[kind])
+
+
+def _listed(labels: Sequence[str]) -> str:
+    """Some labels, which may hold commas, as one text: "noise.D0 = 1, noise.D0 = 2 and noise.D0 = 3"."""
+    if len(labels) == 1:
+        return labels[0]
+    comma = "; " if any("," in label for label in labels) else ", "
+    return f"{comma.join(labels[:-1])} and {labels[-1]}"
 
 
 def _pattern(text: str) -> str:

@@ -5,6 +5,7 @@ Nothing is cut, and no word and no number is broken.
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -28,7 +29,8 @@ class Column:
 
     Attributes:
         heading: above it.
-        rank: where there is no room, columns are left out, that of the largest rank first; with 0 never.
+        rank: where there is no room, columns are left out, that of the largest rank first, of equal ones that on the
+            right; with 0 never.
         is_text: whether its entries are sentences, which may take several lines, and not numbers.
     """
 
@@ -74,7 +76,8 @@ class Screen:
         if not console.file.isatty():
             console = Console(stderr=errors, width=ENDLESS)
         elif console.is_dumb_terminal:
-            console = Console(stderr=errors, width=shutil.get_terminal_size().columns)
+            size = shutil.get_terminal_size()  # rich takes 80 columns
+            console = Console(stderr=errors, width=size.columns, height=size.lines)
         return cls(console, console.width)
 
     def lines(self, texts: Sequence[str], style: str = "") -> None:
@@ -87,17 +90,18 @@ class Screen:
         for line in text.split("\n"):
             self.lines(wrapped(spelt(line, self.console.encoding), self.width - 1), style)
 
-    def packed(self, parts: Sequence[str], indent: str = "") -> None:
-        """Texts in as few lines as hold them whole."""
-        room = (80 if self.width == ENDLESS else self.width) - 1 - len(indent)
+    def packed(self, parts: Sequence[str], indent: str = "", hang: str = "") -> None:
+        """Texts in as few lines as hold them whole; those from the second on are indented by `hang` more."""
+        room = (80 if self.width == ENDLESS else self.width) - 1 - len(indent + hang)
         lines: list[str] = []
         for part in (spelt(each, self.console.encoding) for each in parts):
             if lines and cell_len(lines[-1]) + 3 + cell_len(part) <= room:
                 lines[-1] += f"   {part}"
             else:
                 lines.append(part)
-        for line in lines:
-            self.lines(wrapped(indent + line, self.width - 1, indent + "  "))
+        for number, line in enumerate(lines):
+            start = indent + hang if number else indent
+            self.lines(wrapped(start + line, self.width - 1, start + "  "))
 
     def show(self, grid: Grid) -> None:
         """A table in as many columns as there is room for; in lines of "heading = number" where there is too little."""
@@ -127,11 +131,25 @@ class Screen:
             for column, cell in zip(grid.columns, row, strict=True):
                 first, *others = str(cell).split("\n")
                 parts += [f"{column.heading} = {first}" if first and column.heading else first, *others]
-            self.packed(list(filter(None, parts)))
+            self.packed(list(filter(None, parts)), hang="  ")
 
 
 def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
-    """A text in lines of at most this width, but for longer words; those from the second on are indented."""
+    """A text in lines of at most this width, but for longer words; those from the second on are indented.
+
+    "D0 = 0.1" and "0.1 ± 1e-3" stay together where they fit.
+    """
+    tied = _TIE.sub(lambda found: found[0].replace(" ", _TIED), text)
+    lines = _lines(tied, width, indent)
+    if max(map(len, lines)) > width:
+        lines = _lines(text, width, indent)
+    return [line.replace(_TIED, " ") for line in lines]
+
+
+_TIE, _TIED = re.compile(r"(?<=\S) (=|±|<=|<|>) (?=\S)"), "\0"
+
+
+def _lines(text: str, width: int, indent: str) -> list[str]:
     start = text[: len(text) - len(text.lstrip())]
     lines = wrap(
         text.strip(),
@@ -146,13 +164,17 @@ def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
 
 def _layouts(grid: Grid, width: int) -> Iterator[tuple[list[int], bool]]:
     """The columns that may be shown, and whether their headings are in several lines, the best first."""
-    ranks = sorted({column.rank for column in grid.columns if column.rank}, reverse=True)
-    for most in [ENDLESS, *(rank - 1 for rank in ranks)]:
-        kept = [i for i, column in enumerate(grid.columns) if column.rank <= most]
+    leaving = sorted((column.rank, i) for i, column in enumerate(grid.columns) if column.rank)
+    kept = list(range(len(grid.columns)))
+    while True:
         for is_folded in (False, True):
             needed = sum(_width(grid, i, is_folded=is_folded) for i in kept) + 3 * len(kept) + 1
             if needed <= width:
                 yield kept, is_folded
+        if not leaving:
+            return
+        kept = [i for i in kept if i != leaving[-1][1]]
+        leaving.pop()
 
 
 def _width(grid: Grid, i: int, *, is_folded: bool) -> int:

@@ -121,7 +121,7 @@ def _index(index: Index, rank: int) -> Shown:
     def of(result: CurveResult) -> float | None:
         return _value(result.estimates[index.name])
 
-    return Shown(index.symbol, of, lambda result: index_text(index.name, result, DIGITS), rank if rank > 1 else 0)
+    return Shown(index.symbol, of, lambda result: index_text(index.name, result, DIGITS), rank + 1 if rank > 1 else 0)
 
 
 def _theory(index: Index, *, is_exact: bool) -> Shown:
@@ -141,7 +141,7 @@ def _moments(case: Case, *, is_alone: bool) -> list[Shown]:
     p = [float(each) for each in case.p if each]
     if len(p) > MOST_MOMENTS:
         p = [p[0], p[-1]] if is_alone else []
-    return [_moment(each, 0 if is_alone else 1) for each in p]
+    return [_moment(each, 0 if is_alone else 2) for each in p]
 
 
 def _moment(p: float, rank: int) -> Shown:

@@ -28,7 +28,7 @@ from fpsolve.output.tables import asked
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 
-SUMMARY = "summary.json"
+SUMMARY, MONTE_CARLO = "summary.json", "monte_carlo*.json"
 
 
 def print_results(case: Case, results: Sequence[CurveResult]) -> None:
@@ -120,13 +120,13 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
     else:
         screen.show(_exponent_grid(case, pairs))
         if not is_short:
-            screen.say(f"{len(simulated)} curves; all numbers are in monte_carlo.json and its like, one for each curve")
+            screen.say(f"{len(simulated)} curves; all numbers are in {MONTE_CARLO}, one for each curve")
     for each in simulated if is_short else ():
         if each.response:
             screen.say(f"{case.place(each.curve)}: stationary means")
             screen.packed([f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items()], "  ")
             screen.lines([""])
-    remarks = Remarks(case, "monte_carlo.json and its like")
+    remarks = Remarks(case, MONTE_CARLO)
     for each in simulated:
         remarks.add_simulated(each)
     remarks.tell()
@@ -260,7 +260,8 @@ def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
         return
     shown = comparisons if len(comparisons) <= MOST_ROWS else [each for each in comparisons if not each.met]
     if shown:
-        screen.show(_comparison_grid(case, shown[:MOST_ROWS]))
+        grid = _comparison_grid if len(comparisons) <= MOST_TABLES else _short_comparison_grid
+        screen.show(grid(case, shown[:MOST_ROWS]))
     if len(shown) > MOST_ROWS:
         screen.say(f"{case.name}: {len(shown) - MOST_ROWS} more differ")
     screen.say(agreement(comparisons) if shown else f"{case.name}: {agreement(comparisons)}")
@@ -271,20 +272,44 @@ def agreement(comparisons: Sequence[Comparison]) -> str:
     return f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok"
 
 
+def _short_comparison_grid(case: Case, comparisons: Sequence[Comparison]) -> Grid:
+    """A line for each, with two digits more than the tolerance has."""
+    columns = [Column("quantity"), *varied_columns(case), Column("expected"), Column("±", 2), Column("computed")]
+    grid = Grid(f"{case.name}: {case.headline}", [*columns, Column("difference", 1), Column("")])
+    for item in comparisons:
+        expectation, value = item.expectation, item.value
+        expected = digits(expectation.value, item.tolerance / 100, 12)
+        computed = "none" if value is None else digits(value, item.tolerance / 100, 12)
+        difference = "" if value is None else f"{value - expectation.value:.1e}"
+        varied = map(written, item.varied.values())
+        numbers = [expected, f"{item.tolerance:.0e}", computed, difference]
+        grid.rows.append([_expected(item), *varied, *numbers, _verdict(item)])
+    return grid
+
+
+def _expected(item: Comparison) -> str:
+    """What is compared: "moment, p = 2"."""
+    expectation = item.expectation
+    return expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
+
+
+def _verdict(item: Comparison) -> Text:
+    return Text("ok", "green") if item.met else Text("differs", "bold red")
+
+
 def _comparison_grid(case: Case, comparisons: Sequence[Comparison]) -> Grid:
     numbers = [Column("expected"), Column("computed"), Column("difference", 1), Column("")]
     grid = Grid(f"{case.name}: {case.headline}", [Column("quantity", is_text=True), *numbers])
     for item in comparisons:
         expectation = item.expectation
-        name = expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
         where = "".join(f"\n{key} = {written(value)}" for key, value in item.varied.items())
         difference = "" if item.value is None else f"{item.value - expectation.value:.1e}"
         row: list[Cell] = [
-            Text.assemble(f"{name}{where}\n", (expectation.source, "dim")),
+            Text.assemble(f"{_expected(item)}{where}\n", (expectation.source, "dim")),
             f"{expectation.value:.12g}\n± {item.tolerance:.0e}",
             "none" if item.value is None else f"{item.value:.12g}",
             difference,
-            Text("ok", "green") if item.met else Text("differs", "bold red"),
+            _verdict(item),
         ]
         grid.rows.append(row)
         grid.ends.add(len(grid.rows) - 1)
