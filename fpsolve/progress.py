@@ -10,12 +10,15 @@ from typing import TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task
+from rich.table import Column
 from rich.text import Text
 
 from fpsolve.workflow.watch import PERCENT, Advance, Phase, unheeded
 
 LINE_SECONDS, LINE_SHARE = 10.0, 0.1
 """A line in a file comes after as long at least, and as far."""
+ROOMY = 80
+"""Columns of a terminal from which on there is room for the name of the case."""
 Clock = Callable[[], float]
 
 
@@ -97,7 +100,13 @@ class Bars:
     def __init__(self, console: Console | None = None, clock: Clock = time.monotonic) -> None:
         self.console, self.clock = console or Console(stderr=True), clock
         self.is_live = self.console.is_terminal and not self.console.is_dumb_terminal
-        columns = (_Name(), BarColumn(bar_width=20), _Count(), _Left(clock))
+        room = self.console.width
+        columns = (
+            _Name(is_short=room < ROOMY),
+            BarColumn(bar_width=20 if room >= ROOMY else 4),
+            _Count(),
+            _Left(clock),
+        )
         self._display = Progress(
             *columns, console=self.console, transient=True, redirect_stdout=False, refresh_per_second=4
         )
@@ -147,15 +156,22 @@ def hidden(_: Phase) -> Iterator[Advance]:
 
 
 class _Name(ProgressColumn):
-    """The case and the phase."""
+    """The case and the phase, or that alone."""
+
+    def __init__(self, *, is_short: bool) -> None:
+        super().__init__(Column(no_wrap=True))
+        self.is_short = is_short
 
     def render(self, task: Task) -> Text:
         phase: Phase = task.fields["stretch"].phase
-        return Text(f"{phase.case}, {phase.name}")
+        return Text(phase.name if self.is_short else f"{phase.case}, {phase.name}")
 
 
 class _Count(ProgressColumn):
     """How far it is."""
+
+    def __init__(self) -> None:
+        super().__init__(Column(no_wrap=True))
 
     def render(self, task: Task) -> Text:
         return Text(task.fields["stretch"].count)
@@ -165,7 +181,7 @@ class _Left(ProgressColumn):
     """The time to go, or, once it is over or nobody knows, that it has taken."""
 
     def __init__(self, clock: Clock) -> None:
-        super().__init__()
+        super().__init__(Column(no_wrap=True))
         self.clock = clock
 
     def render(self, task: Task) -> Text:

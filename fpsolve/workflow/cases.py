@@ -127,7 +127,7 @@ def run_case(
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
     with own_folder(case, out, replaced) as folder:
         sweep = _solve(case, folder, pool or here(), watch, is_fresh=is_fresh)
-        with saying_if_interrupted(lambda: f"; what was solved is kept in {folder}"):
+        with saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}"):
             try:
                 watch.solved(case, sweep.results)
                 if monte_carlo:
@@ -214,7 +214,11 @@ def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = NOBODY) -
     """Solve what a case expects, and compare it; nothing is written."""
     numerics = Numerics.of(case)
     found: list[CurveResult] = []
-    with watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress, pool or here() as workers:
+    with (
+        saying_if_interrupted(lambda: kept(case, len(found)), ANEW),
+        watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
+        pool or here() as workers,
+    ):
         tasks = batches(case, lambda curve: Order(curve, expected(case, curve), ""), numerics)
         for done in workers.run(SolveBatch(result_alone), tasks):
             results = done.result or [lost(order.curve) for order in done.item.orders]
@@ -227,7 +231,7 @@ def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = NOBODY) -
 
 def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Sweep:
     """Solve the sets of a case that are not known, and write all tables."""
-    with writable(folder):
+    with saying_if_interrupted(lambda: " before the first curve"), writable(folder):
         sweep = Sweep(case, folder, is_fresh=is_fresh)
     with (
         saying_if_interrupted(lambda: kept(case, len(sweep.results), folder)),
