@@ -65,10 +65,13 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
 
 
 def counted(results: Sequence[CurveResult]) -> str:
-    """How many curves have become what, and where all numbers are."""
+    """How many curves have become what, which of them have a row, and where all numbers are."""
     counts = Counter(result.status for result in results)
     states = ", ".join(f"{count} {status.name.lower()}" for status, count in sorted(counts.items()))
-    return f"{len(results)} curves: {states}; all numbers are in curves.csv and results.nc"
+    lacking = len(results) - counts[Status.CONVERGED]
+    is_short = len(results) > MOST_ROWS and lacking > MOST_FAILED
+    shown = f"; of those that are not converged the first {MOST_FAILED} are shown" if is_short else ""
+    return f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc"
 
 
 def varied_columns(case: Case) -> list[Column]:
@@ -82,12 +85,10 @@ def theory_heading(equation: str, *, is_exact: bool) -> str:
 
 
 def index_text(name: str, result: CurveResult, most: int) -> str:
-    """An index of a curve with its digits, or that there is none; nothing where all failed."""
+    """An index of a curve with its digits, or that there is none."""
     estimate = result.estimates[name]
     if estimate is not None:
         return digits(estimate.value, estimate.error_estimate, most)
-    if result.status == Status.FAILED:
-        return ""
     return "none" if name == CRITICAL_RESTITUTION.name or grows_far_out(result.curve.problem) else "none found"
 
 
@@ -121,7 +122,11 @@ def _index(index: Index, rank: int) -> Shown:
     def of(result: CurveResult) -> float | None:
         return _value(result.estimates[index.name])
 
-    return Shown(index.symbol, of, lambda result: index_text(index.name, result, DIGITS), rank + 1 if rank > 1 else 0)
+    def text(result: CurveResult) -> str:
+        is_lost = of(result) is None and result.status != Status.CONVERGED
+        return "" if is_lost else index_text(index.name, result, DIGITS)
+
+    return Shown(index.symbol, of, text, rank + 1 if rank > 1 else 0)
 
 
 def _theory(index: Index, *, is_exact: bool) -> Shown:

@@ -177,6 +177,18 @@ def test_of_more_curves_the_extreme_and_the_failed_ones_have_a_row(tmp_path, cap
     assert f"not converged: many, noise.D0 = {D0[7]} and noise.D0 = {D0[40]}: Λ(2) did not converge at 7" in err
 
 
+def test_of_many_failed_curves_the_first_are_shown(tmp_path, capsys):
+    case, results = many(tmp_path, 60, failures=lambda i: (Failure(2.0, "Λ(2) did not converge"),) if i % 2 else ())
+    for each in results[1::2]:
+        each.estimates.update(dict.fromkeys(INDICES))
+    print_results(case, results)
+    out = capsys.readouterr().out
+    rows = [line.split("│")[1:-1] for line in out.splitlines() if "partly │" in line]
+    assert [row[0].strip() for row in rows] == [f"{each.curve.varied['noise.D0']:g}" for each in results[1:40:2]]
+    assert {cell.strip() for row in rows for cell in row[1:7]} == {""}  # not "none", which nobody knows
+    assert "30 converged, 30 partly; of those that are not converged the first 20 are shown" in out
+
+
 def test_a_file_has_all_columns_whatever_the_terminal_is(tmp_path, capsys, monkeypatch):
     case, results = many(tmp_path, 12)
     texts = []
@@ -262,6 +274,23 @@ def test_of_many_values_that_are_expected_those_that_differ_are_shown(tmp_path, 
     assert "1 of 60 ok" in out
     print_comparisons(case, made[:1] * 60)
     assert capsys.readouterr().out == "many: 60 of 60 ok\n"
+
+
+@pytest.mark.parametrize("count", [3, 12])
+@pytest.mark.parametrize("width", [60, 80])
+def test_a_narrow_terminal_breaks_no_comparison(tmp_path, capsys, terminal, count, width):
+    case, _ = many(tmp_path, count, SECTIONS[-1])
+    source = "an independent Fourier-Hermite computation [of the same]"
+    expectation = Expectation(quantity="critical_impact_factor", value=-0.123456789012, rtol=1e-9, source=source)
+    made = [Comparison(expectation, each.varied, -0.12345678901, 1e-10, met=True) for each in case.curves()]
+    print_comparisons(case, made)
+    whole = capsys.readouterr().out
+    terminal(width)
+    print_comparisons(case, made)
+    narrow = capsys.readouterr().out
+    assert tokens(narrow) - tokens(whole) <= {"no", "room", "for:", "=", "±,"}
+    assert max(map(len, narrow.splitlines())) <= width
+    assert "…" not in narrow
 
 
 @pytest.mark.parametrize(
