@@ -42,6 +42,14 @@ Scheduler = Annotated[
     str, Parameter(help="Address of a Dask scheduler whose workers do the work, e.g. tcp://host:8786.")
 ]
 Fresh = Annotated[bool, Parameter(help="Begin anew, also what an earlier run has finished.", negative="")]
+Quiet = Annotated[
+    bool,
+    Parameter(
+        help='Print the last line only, and on the standard error what is wrong or "not converged": no tables, notes, '
+        "warnings or progress; all of that is in the files.",
+        negative="",
+    ),
+]
 
 
 def load(paths: Sequence[Path], overrides: Sequence[str] | None, options: Mapping[str, str]) -> list[Case]:

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from io import TextIOWrapper
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
 
-from fpsolve import __version__
-from fpsolve.arguments import Cases, Count, Fresh, Jobs, Overrides, Scheduler, load, load_to_write, pool_of
+from fpsolve import __version__, letters
+from fpsolve.arguments import Cases, Count, Fresh, Jobs, Overrides, Quiet, Scheduler, load, load_to_write, pool_of
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.process import drop_blocked_output, ended_by_signals, flush_output
 
 if TYPE_CHECKING:
-    from fpsolve.workflow.cases import Watch
+    from fpsolve.case.case import Case
+    from fpsolve.workflow.watch import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
 
@@ -50,6 +51,7 @@ def run(
     json: Annotated[
         bool, Parameter(help="Print the summaries, one line of JSON for each case, instead of tables.", negative="")
     ] = False,
+    quiet: Quiet = False,
     overrides: Overrides = None,
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
@@ -58,25 +60,25 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
-    from fpsolve.case.case import MOST_DRAWN
-    from fpsolve.exponent.quantities import STABILITY_INDEX
-    from fpsolve.output.terminal import print_remark
+    from fpsolve.output.terminal import done_of, known_of, print_written
     from fpsolve.workflow.cases import run_case
 
     code, loaded = 0, load_to_write(cases, overrides, {}, monte_carlo=monte_carlo)
     pool = pool_of(jobs, scheduler, loaded)
     for case in loaded:
-        watch = _watch(is_silent=json)
+        begun, watch = monotonic(), _watch(is_json=json, is_quiet=quiet)
         outcome = run_case(case, out, monte_carlo=monte_carlo, pool=pool, is_fresh=fresh, watch=watch)
         if outcome.interruption:
             _print_error(outcome.interruption)
-        if monte_carlo and case.figure.y == STABILITY_INDEX.name:
-            note = "note: a simulation gives no stability index, so that the figure has no dots"
-            print_remark(note, "cyan")
-        if case.leaves_out_eigenfunctions:
-            note = f"note: {case.name}: no eigenfunctions are written, as there are more than {MOST_DRAWN} curves; "
-            print_remark(f"{note}name the p that you want, as in [output] eigenfunctions = [{case.usual_p!r}]", "cyan")
-        print(_in_one_line(out / case.name / "summary.json") if json else f"written: {out / case.name}")
+        if monte_carlo and not quiet:
+            _note_missing_dots(case)
+        if case.leaves_out_eigenfunctions and not quiet:
+            _note_missing_eigenfunctions(case)
+        if json:
+            print(_in_one_line(out / case.name / "summary.json"))
+        else:
+            what = done_of(case, len(outcome.results), sum(bool(each.failures) for each in outcome.results))
+            print_written(out / case.name, what, monotonic() - begun, known_of(case, outcome.known))
         if outcome.interruption:
             return INTERRUPTED
         if outcome.failures:
@@ -99,6 +101,7 @@ def simulate(
     jobs: Annotated[Count | None, Parameter(help="How many processors; all if omitted.")] = None,
     scheduler: Scheduler = "",
     fresh: Fresh = False,
+    quiet: Quiet = False,
     overrides: Overrides = None,
 ) -> int:
     """Simulate the system with its impacts and estimate the exponents; write monte_carlo.json into OUT/<case>/.
@@ -107,6 +110,7 @@ def simulate(
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
+    from fpsolve.output.terminal import done_of, known_of, print_written
     from fpsolve.workflow.cases import simulate_case
 
     stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
@@ -118,30 +122,43 @@ def simulate(
     loaded = load_to_write(cases, overrides, options, monte_carlo=True)
     pool = pool_of(jobs, scheduler)
     for case in loaded:
-        outcome = simulate_case(case, out, pool=pool if scheduler else None, is_fresh=fresh, watch=_watch())
+        begun, watch = monotonic(), _watch(is_quiet=quiet)
+        outcome = simulate_case(case, out, pool=pool if scheduler else None, is_fresh=fresh, watch=watch)
         if outcome.interruption:
             _print_error(outcome.interruption)
-        print(f"written: {out / case.name}")
+        what = done_of(case, sum(not each.interrupted for each in outcome.simulated))
+        print_written(out / case.name, what, monotonic() - begun, known_of(case, outcome.known))
         if outcome.interruption:
             return INTERRUPTED
     return 0
 
 
 @app.command
-def check(cases: Cases, *, jobs: Jobs = None, scheduler: Scheduler = "", overrides: Overrides = None) -> int:
+def check(
+    cases: Cases,
+    *,
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
     """Solve case files and compare with the values that they expect; write nothing.
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
-    from fpsolve.output.terminal import print_comparisons, print_warnings
+    from fpsolve.output.terminal import agreement, print_comparisons, print_failures, print_warnings
     from fpsolve.workflow.cases import check_case
 
     code, loaded = 0, load(cases, overrides, {})
     pool = pool_of(jobs, scheduler, loaded)
     for case in loaded:
-        outcome = check_case(case, pool=pool, watch=_watch())
-        print_comparisons(case, outcome.comparisons)
-        print_warnings(case, outcome.results)
+        outcome = check_case(case, pool=pool, watch=_watch(is_quiet=quiet))
+        if quiet:
+            print(f"{case.name}: {agreement(outcome.comparisons)}")
+            print_failures(case, outcome.results, file="")
+        else:
+            print_comparisons(case, outcome.comparisons)
+            print_warnings(case, outcome.results, file="")
         if outcome.failures:
             code = NOT_CONVERGED
         elif not all(comparison.met for comparison in outcome.comparisons):
@@ -156,13 +173,15 @@ def chart(
     out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("results"),
     jobs: Jobs = None,
     scheduler: Scheduler = "",
+    quiet: Quiet = False,
     overrides: Overrides = None,
 ) -> int:
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """
-    from fpsolve.output.terminal import print_chart
+    from fpsolve.output.remarks import FAILURE, print_remark
+    from fpsolve.output.terminal import print_chart, print_written, traced
     from fpsolve.study.chart import refuse_no_chart
     from fpsolve.workflow.cases import chart_case
 
@@ -171,9 +190,14 @@ def chart(
         refuse_no_chart(case)
     pool = pool_of(jobs, scheduler)
     for case in loaded:
-        found = chart_case(case, out, pool=pool, watch=_watch())
-        print_chart(case, found)
-        print(f"written: {out / case.name}")
+        begun = monotonic()
+        found = chart_case(case, out, pool=pool, watch=_watch(is_quiet=quiet))
+        if quiet:
+            for text in dict.fromkeys(found.failures):
+                print_remark(f"{case.name}: {in_words_of_a_case(text)}", FAILURE)
+        else:
+            print_chart(case, found)
+        print_written(out / case.name, traced(found), monotonic() - begun)
         if found.failures:
             code = NOT_CONVERGED
     return code
@@ -230,9 +254,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     """Run a command, and say what went wrong."""
-    for stream in (sys.stdout, sys.stderr):  # a terminal that has no Greek shows "?" for it
+    for stream in (sys.stdout, sys.stderr):  # a terminal that has no Greek shows its names
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="replace")
+            stream.reconfigure(errors=letters.HANDLER)
     try:
         _refuse_lost_folder()
         code = app(argv, result_action="return_value", exit_on_error=False, error_console=Console(stderr=True))
@@ -281,23 +305,32 @@ def _in_one_line(summary: Path) -> str:
     return "".join(line.strip() + " " for line in summary.read_text(encoding="utf-8").splitlines()).rstrip()
 
 
-def _watch(*, is_silent: bool = False) -> Watch:
-    """Shows bars, and prints what is found, or only what limits it."""
-    from fpsolve.output.terminal import print_results, print_simulation, print_warnings
-    from fpsolve.workflow.cases import Watch
+def _note_missing_dots(case: Case) -> None:
+    from fpsolve.exponent.quantities import STABILITY_INDEX
+    from fpsolve.output.remarks import print_remark
 
-    return Watch(_bar, print_warnings) if is_silent else Watch(_bar, print_results, print_simulation)
+    if case.figure.y == STABILITY_INDEX.name:
+        print_remark(f"{case.name}: a simulation gives no stability index, so that the figure has no dots")
 
 
-@contextmanager
-def _bar(name: str, total: int | None) -> Iterator[Callable[[], None]]:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+def _note_missing_eigenfunctions(case: Case) -> None:
+    from fpsolve.case.case import MOST_DRAWN
+    from fpsolve.output.remarks import print_remark
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task(name, total=total)
-        yield lambda: progress.advance(task)
+    why = f"no eigenfunctions are written, as there are more than {MOST_DRAWN} curves"
+    print_remark(f"{case.name}: {why}; name the p that you want, as in [output] eigenfunctions = [{case.usual_p!r}]")
+
+
+def _watch(*, is_json: bool = False, is_quiet: bool = False) -> Watch:
+    """Shows progress, and prints what is found, or only what limits it; or only what failed."""
+    from fpsolve.output.terminal import print_failures, print_results, print_simulation, print_warnings
+    from fpsolve.progress import Bars, hidden
+    from fpsolve.workflow.watch import Watch
+
+    if is_quiet:
+        return Watch(hidden, print_failures)
+    bar = Bars().phase
+    return Watch(bar, print_warnings) if is_json else Watch(bar, print_results, print_simulation)
 
 
 if __name__ == "__main__":

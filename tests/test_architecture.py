@@ -9,7 +9,7 @@ import pytest
 import fpsolve
 
 ROOMS = {
-    "": ["errors", "arrays", "files", "process", "pool", "pictures", "scenes", "data"],
+    "": ["errors", "letters", "arrays", "files", "process", "pool", "pictures", "scenes", "data"],
     "model": [
         "parameters",
         "words",
@@ -55,9 +55,11 @@ ROOMS = {
     ],
     "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart"],
     "output": [
-        *("vtk", "provenance", "records", "tables", "datasets", "plots", "figures", "charts", "terminal"),
+        *("vtk", "provenance", "records", "tables", "datasets", "plots", "figures", "charts"),
+        *("screen", "remarks", "summary", "terminal"),
     ],
-    "workflow": ["folders", "sets", "simulations", "cases"],
+    "workflow": ["watch", "folders", "sets", "simulations", "cases"],
+    "progress": [],
     "arguments": [],
     "cli": [],
 }

@@ -16,7 +16,7 @@ from fpsolve.case.vary import PARAMETERS
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.model.parameters import unit_of
-from fpsolve.output.terminal import digits
+from fpsolve.output.summary import digits
 from fpsolve.study import sweep
 from tests.conftest import heed_signals
 from tests.test_workflow import HOPELESS, TABLES, TEXT, files
@@ -273,7 +273,7 @@ def test_an_interrupted_run_says_what_is_kept(case, tmp_path, capsys, monkeypatc
 
 
 def raising(failure):
-    def fail(*_):
+    def fail(*_, **__):
         raise failure
 
     return fail
@@ -594,3 +594,82 @@ def test_bad_workers(case, tmp_path, capsys, command, options, message):
     assert main([command, case, *options]) == BAD_INPUT
     assert message in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "results").exists()
+
+
+BARE = ["--set", "output.eigenfunctions=[]"]
+LAST = re.compile(r"written: results/test \(2 curves, [\d.]+ s(; \d of 2 known from an earlier run)?\)")
+
+
+def test_the_last_line_tells_the_folder_the_time_and_what_was_known(case, capsys):
+    known = []
+    for arguments in ([], [], ["--fresh"]):
+        assert main(["run", case, *BARE, *arguments]) == 0
+        last = capsys.readouterr().out.splitlines()[-1]
+        known.append(LAST.fullmatch(last)[1])
+    assert known == [None, "; 2 of 2 known from an earlier run", None]
+
+
+@pytest.mark.parametrize(
+    ("command", "last"),
+    [
+        (["run"], "written: results/test (2 curves, "),
+        (["simulate", "--paths", "32", "--time", "60"], "written: results/test (2 curves, "),
+        (["check"], "test: 0 of 0 ok"),
+    ],
+)
+def test_quiet_prints_the_last_line_alone(case, capsys, command, last):
+    sets = ["--set", "oscillator.epsilon=1.0", *BARE]  # which gives notes
+    assert main([command[0], case, *command[1:], *sets, "--quiet"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith(last)
+    assert (out.count("\n"), err) == (1, "")
+
+
+def test_quiet_tells_what_is_not_converged(case, capsys):
+    assert main(["run", case, "--quiet", "--set", "oscillator.epsilon=1.5", "--set", HOPELESS]) == NOT_CONVERGED
+    out, err = capsys.readouterr()
+    assert re.fullmatch(r"written: results/test \(2 curves, \d not converged, [\d.]+ s\)\n", out)
+    assert err
+    assert all(line.startswith("not converged: test") for line in err.splitlines())
+
+
+def test_quiet_with_json_prints_json_alone(case, capsys):
+    assert main(["run", case, "--quiet", "--json", "--set", "oscillator.epsilon=1.0", *BARE]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["done"] == 2
+    assert err == ""
+
+
+def test_an_output_in_ascii_has_words_for_greek(case):
+    environment = os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
+    command = [sys.executable, "-m", "fpsolve.cli", "run", case, *BARE]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert "lambda = 0.00108756975 +- " in done.stdout
+    assert "Lambda(p)" in done.stdout
+    assert "?" not in done.stdout
+    assert done.stdout.isascii()
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "message"),
+    [
+        ("fpsolve.workflow.cases", "Sweep", "interrupted before the first curve"),
+        (
+            "fpsolve.workflow.sets",
+            "write_dataset",
+            "interrupted after 2 of 2 curves; what was done is kept in results/test",
+        ),
+        ("fpsolve.output.terminal", "print_results", "interrupted; what was solved is kept in results/test"),
+        ("fpsolve.workflow.cases", "draw", "interrupted; what was solved is kept in results/test"),
+    ],
+)
+def test_an_interrupt_says_what_is_kept_in_every_phase(case, capsys, monkeypatch, module, name, message):
+    monkeypatch.setattr(f"{module}.{name}", raising(KeyboardInterrupt))
+    assert main(["run", case, "--jobs", "1", *BARE]) == INTERRUPTED
+    assert capsys.readouterr().err.splitlines()[-1] == f"{message}; run it again to go on"
+
+
+def test_an_interrupted_check_starts_over(case, capsys, monkeypatch):
+    monkeypatch.setattr(sweep, "solve_curve", raising(KeyboardInterrupt))
+    assert main(["check", case, "--jobs", "1"]) == INTERRUPTED
+    assert capsys.readouterr().err == "interrupted after 0 of 2 curves; run it again to start over\n"

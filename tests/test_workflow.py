@@ -532,10 +532,16 @@ def test_a_folder_that_another_run_writes_into_is_refused(case, tmp_path, start)
     assert files(tmp_path / "test") == {"summary.json", "monte_carlo.json"}
 
 
-def test_progress_is_called_once_for_each_moment(case, tmp_path):
+@pytest.mark.parametrize(("overrides", "count"), [([], 2), (["vary={}"], 3)])
+def test_progress_is_called_once_for_each_set_or_for_each_p_of_one(tmp_path, overrides, count):
     calls = []
-    fpsolve.run(case, tmp_path, progress=lambda: calls.append(1))
-    assert len(calls) == 6
+    for _ in range(2):  # also of what is known
+        fpsolve.run(
+            write(tmp_path, TEXT, [*overrides, "output.eigenfunctions=[]"]),
+            tmp_path / "out",
+            progress=lambda: calls.append(1),
+        )
+    assert len(calls) == 2 * count
 
 
 @pytest.mark.parametrize(

@@ -1,127 +1,134 @@
-"""Results as tables on the terminal; what limits them goes to the standard error."""
+"""Results as tables on the terminal, for up to ten curves one each, for more a row each."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
-from textwrap import wrap
+from pathlib import Path
 
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Column, Table
 from rich.text import Text
 
 from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
-from fpsolve.case.vary import WORDS, written
-from fpsolve.exponent.quantities import (
-    CRITICAL_RESTITUTION,
-    IMPACT_RATE,
-    INDICES,
-    LYAPUNOV_EXPONENT,
-    MOMENT,
-    STABILITY_INDEX,
-    VARIANCE_RATE,
-    Quantity,
+from fpsolve.case.vary import written
+from fpsolve.exponent.quantities import IMPACT_RATE, INDICES, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE
+from fpsolve.output.remarks import FAILURE, Remarks, print_remark
+from fpsolve.output.screen import Cell, Column, Grid, Screen
+from fpsolve.output.summary import (
+    MOST_ROWS,
+    MOST_TABLES,
+    STAR,
+    counted,
+    curve_grid,
+    digits,
+    index_text,
+    theory_heading,
+    varied_columns,
 )
 from fpsolve.output.tables import asked
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
-from fpsolve.theory.far import grows_far_out
 
-MOST_TABLES, MOST_REMARKS = 50, 20
-"""Curves whose tables are printed, and remarks on them."""
+SUMMARY, MONTE_CARLO = "summary.json", "monte_carlo*.json"
 
 
 def print_results(case: Case, results: Sequence[CurveResult]) -> None:
     """Λ(p), or λ and δ_p over a parameter, beside perturbation theory."""
-    console = Console()
-    if len(results) > MOST_TABLES:
-        _print_lines(console, [case.headline, _count(results), ""])
-    elif case.figure.x == "p":
+    screen = Screen.of()
+    if len(results) > MOST_TABLES or case.figure.x != "p":
+        screen.show(curve_grid(case, results))
+        if len(results) > MOST_TABLES:
+            screen.say(counted(results))
+    else:
         for result in results:
             if result.moments.p.size:
-                console.print(_moment_table(case, result))
-            groups = _indices(case, result) if any(result.estimates.values()) else []
-            _print_lines(console, [*(line for group in groups for line in _packed(group, console.width)), ""])
-    else:
-        console.print(_curve_table(case, results))
+                screen.show(_moment_grid(case, result))
+            for group in _indices(case, result) if any(result.estimates.values()) else ():
+                screen.packed(group)
+            screen.lines([""])
     print_warnings(case, results)
 
 
-def print_warnings(case: Case, results: Sequence[CurveResult]) -> None:
-    """Why some numbers of some curves are missing, then what limits the others, then which theory is not valid."""
-    remarks = [
-        *(("not converged", "bold red", each.curve, fault.reason) for each in results for fault in each.failures),
-        *(("warning", "yellow", each.curve, text) for each in results for text in each.warnings),
-        *(("note", "cyan", each.curve, text) for each in results for text in each.notes),
-    ]
-    for kind, style, curve, text in remarks[:MOST_REMARKS]:
-        _remark(case, curve, kind, style, [text])
-    untold = Counter(kind for kind, *_ in remarks[MOST_REMARKS:])
-    if untold:
-        plural = {"warning": "warnings", "note": "notes"}
-        counts = ", ".join(f"{count} {plural.get(kind, kind)}" for kind, count in untold.items())
-        print_remark(f"note: {case.name}: more remarks are in summary.json: {counts}", "cyan")
+def print_warnings(case: Case, results: Sequence[CurveResult], file: str = SUMMARY) -> None:
+    """What limits the numbers of the curves, why some are missing, and which theory is not valid.
+
+    Args:
+        file: that holds all of it; none where nothing is written.
+    """
+    remarks = Remarks(case, file)
+    for result in results:
+        remarks.add_result(result)
+    remarks.tell()
 
 
-def _count(results: Sequence[CurveResult]) -> str:
-    """How many curves have become what."""
-    counts = Counter(result.status for result in results)
-    states = ", ".join(f"{count} {status.name.lower()}" for status, count in sorted(counts.items()))
-    return f"{len(results)} curves: {states}; their numbers are in curves.csv and results.nc"
+def print_failures(case: Case, results: Sequence[CurveResult], file: str = SUMMARY) -> None:
+    """Why some numbers are missing, and nothing else."""
+    remarks = Remarks(case, file, [FAILURE])
+    for result in results:
+        remarks.add_result(result)
+    remarks.tell()
 
 
-def _remark(case: Case, curve: Curve, kind: str, style: str, texts: Sequence[str]) -> None:
-    for text in texts:
-        print_remark(f"{kind}: {case.place(curve)}: {text}", style)
+def print_written(folder: Path, what: str, seconds: float, known: str = "") -> None:
+    """The last line: where the results are, what they are, how long they took, and what an earlier run had done."""
+    Screen.of().say(f"written: {folder} ({what}, {duration(seconds)}{f'; {known}' if known else ''})")
 
 
-def print_remark(text: str, style: str) -> None:
-    """A sentence on the standard error, in lines that fit, indented from the second on."""
-    console = Console(stderr=True)
-    width = max(console.width - 1, 20)
-    lines = wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    _print_lines(console, lines, style)
+def done_of(case: Case, done: int, failed: int = 0) -> str:
+    """How many curves of a case are done: "3 curves", "2 of 3 curves, 1 not converged"."""
+    count = f"{done} of {case.planned}" if done < case.planned else f"{done}"
+    return f"{count} {plural('curve', case.planned)}{f', {failed} not converged' if failed else ''}"
 
 
-def _print_lines(console: Console, lines: Sequence[str], style: str = "") -> None:
-    """Lines as they are."""
-    for line in lines:
-        console.print(Text(line), style=style, soft_wrap=True)
+def known_of(case: Case, known: int) -> str:
+    """How many of its curves an earlier run had done, if it had."""
+    return f"{known} of {case.planned} known from an earlier run" if known else ""
 
 
-def _packed(parts: Sequence[str], width: int) -> list[str]:
-    """Texts in as few lines as hold them whole."""
-    lines: list[str] = []
-    for part in parts:
-        if lines and len(lines[-1]) + 3 + len(part) < width:
-            lines[-1] += f"   {part}"
-        else:
-            lines.append(part)
-    return lines
+def traced(chart: Chart) -> str:
+    """How many lines a chart has: "3 lines, 4 branches"."""
+    branches = sum(len(line.branches) for line in chart.lines)
+    return f"{len(chart.lines)} {plural('line', len(chart.lines))}, {branches} {plural('branch', branches)}"
+
+
+def plural(word: str, count: int) -> str:
+    """A word for so many."""
+    return word if count == 1 else f"{word}{'es' if word.endswith('ch') else 's'}"
+
+
+def duration(seconds: float) -> str:
+    """A time for the eye: "4.2 s", "12 min 30 s", "2 h 5 min"."""
+    if seconds < 99.95:
+        return f"{seconds:.1f} s"
+    minutes, hours = divmod(round(seconds), 60), divmod(round(seconds / 60), 60)
+    return f"{minutes[0]} min {minutes[1]} s" if minutes[0] < 100 else f"{hours[0]} h {hours[1]} min"
 
 
 def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:
     """Λ(p) and λ by simulation, with the finite elements beside them where these have been solved."""
-    console = Console()
+    screen = Screen.of()
+    is_short = len(simulated) <= MOST_TABLES
     solved = {result.curve.key: result for result in results}
     pairs = [(each, solved.get(each.curve.key)) for each in simulated]
-    if case.figure.x == "p":
+    if is_short and case.figure.x == "p":
         for each, result in pairs:
-            console.print(_simulation_table(case, each, result))
+            screen.show(_simulation_grid(case, each, result))
             found = each.result
-            size = f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}"
-            _print_lines(console, [*_packed(_simulated_indices(each, result), console.width), size, ""])
+            screen.packed(_simulated_indices(each, result))
+            screen.say(f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}")
+            screen.lines([""])
     else:
-        console.print(_exponent_table(case, pairs))
-    for each in simulated:
+        screen.show(_exponent_grid(case, pairs))
+        if not is_short:
+            screen.say(f"{len(simulated)} curves; all numbers are in {MONTE_CARLO}, one for each curve")
+    for each in simulated if is_short else ():
         if each.response:
-            means = [f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items()]
-            lines = [f"  {line}" for line in _packed(means, console.width - 2)]
-            _print_lines(console, [f"{case.place(each.curve)}: stationary means", *lines, ""])
-        _remark(case, each.curve, "warning", "yellow", each.warnings)
+            screen.say(f"{case.place(each.curve)}: stationary means")
+            screen.packed([f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items()], "  ")
+            screen.lines([""])
+    remarks = Remarks(case, MONTE_CARLO)
+    for each in simulated:
+        remarks.add_simulated(each)
+    remarks.tell()
 
 
 def _simulated_indices(simulated: SimulatedCurve, result: CurveResult | None) -> list[str]:
@@ -135,10 +142,11 @@ def _simulated_indices(simulated: SimulatedCurve, result: CurveResult | None) ->
     return [text, f"{VARIANCE_RATE.symbol} = {_with_error(found.variance_rate, found.variance_rate_error)}"]
 
 
-def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Table:
+def _simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
     """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
-    compared = ("finite elements", "s.e. away") if result else ()
-    table = _table(case.heading(simulated.curve), "p", MOMENT.symbol, "± s.e.", *compared, "effective paths")
+    compared = [Column("finite elements", 2), Column("s.e. away", 1)] if result else []
+    columns = [Column("p"), Column(MOMENT.symbol), Column("± s.e."), *compared, Column("effective paths", 3)]
+    grid = Grid(case.heading(simulated.curve), columns)
     exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
     for estimate in simulated.result.estimates:
         value, error = estimate.value, estimate.standard_error
@@ -147,22 +155,34 @@ def _simulation_table(case: Case, simulated: SimulatedCurve, result: CurveResult
             known = exact.get(estimate.p) if estimate.p else 0.0
             row += ["" if known is None else f"{known:.6g}"]
             row += ["" if known is None or value is None or not error else _deviation(value, error, known)]
-        table.add_row(f"{estimate.p:g}", *row, f"{estimate.effective_paths:.0f}")
-    return table
+        grid.rows.append([f"{estimate.p:g}", *row, f"{estimate.effective_paths:.0f}"])
+    return grid
 
 
-def _exponent_table(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Table:
-    """One row for each parameter set: λ by simulation and by finite elements."""
-    table = _table(
-        case.headline, *_varied_columns(case), LYAPUNOV_EXPONENT.symbol, "± s.e.", "finite elements", "s.e. away"
-    )
-    for each, result in pairs:
+def _exponent_grid(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Grid:
+    """A row for each curve: λ by simulation and by finite elements; of many the first ones and the extremes."""
+    compared = [Column("finite elements", 2), Column("s.e. away", 1)] if any(result for _, result in pairs) else []
+    is_digest = len(pairs) > MOST_ROWS
+    which = [Column("which", is_text=True)] * is_digest
+    columns = [*varied_columns(case), Column(LYAPUNOV_EXPONENT.symbol), Column("± s.e."), *compared, *which]
+    grid = Grid(case.headline, columns)
+    for word, (each, result) in _extremes(pairs) if is_digest else [("", pair) for pair in pairs]:
         value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
         known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
         exact = ("", "") if known is None else (f"{known:.6g}", _deviation(value, error, known))
         varied = map(written, each.curve.varied.values())
-        table.add_row(*varied, sampled(value, error), f"{error:.1e}", *exact)
-    return table
+        row = [*varied, sampled(value, error), f"{error:.1e}", *(exact if compared else ())]
+        grid.rows.append([*row, *[word] * is_digest])
+    return grid
+
+
+def _extremes(
+    pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]],
+) -> list[tuple[str, tuple[SimulatedCurve, CurveResult | None]]]:
+    """The curves with the least and the largest λ."""
+    ordered = sorted(pairs, key=lambda pair: pair[0].result.lyapunov_exponent)
+    symbol = LYAPUNOV_EXPONENT.symbol
+    return [(f"least {symbol}", ordered[0]), (f"largest {symbol}", ordered[-1])]
 
 
 def _with_error(value: float, error: float) -> str:
@@ -181,18 +201,20 @@ def _deviation(value: float, error: float, exact: float) -> str:
     return f"{(value - exact) / error:+.1f}"
 
 
-def _moment_table(case: Case, result: CurveResult) -> Table:
+def _moment_grid(case: Case, result: CurveResult) -> Grid:
     """p, Λ(p), Eq. (37) and the difference."""
     is_exact = result.curve.is_exact
-    table = _table(case.heading(result.curve), "p", MOMENT.symbol, "± error", _theory(MOMENT, is_exact), "difference")
-    _explain_star(table, is_exact)
+    theory = Column(theory_heading(MOMENT.equation, is_exact=is_exact), 1)
+    columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
+    grid = Grid(case.heading(result.curve), columns, remark=STAR if is_exact else "")
     moments = result.moments
-    for p, value, error, theory in zip(
+    for p, value, error, closed in zip(
         moments.p, moments.value, moments.error_estimate, moments.perturbation, strict=True
     ):
         shown = f"{error:.0e}" if error else "0"
-        table.add_row(f"{p + 0.0:g}", digits(value, error), shown, f"{theory + 0.0:.6g}", f"{value - theory + 0.0:.2e}")
-    return table
+        numbers = [digits(value, error), shown, f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"]
+        grid.rows.append([f"{p + 0.0:g}", *numbers])
+    return grid
 
 
 def _indices(case: Case, result: CurveResult) -> list[list[str]]:
@@ -203,103 +225,91 @@ def _indices(case: Case, result: CurveResult) -> list[list[str]]:
         error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
         if name == IMPACT_RATE.name:
             groups.append([])
-        groups[-1].append(f"{INDICES[name].symbol} = {_digits_of(name, result, most=9)}{error}")
+        groups[-1].append(f"{INDICES[name].symbol} = {index_text(name, result, most=9)}{error}")
     return groups
-
-
-def _curve_table(case: Case, results: Sequence[CurveResult]) -> Table:
-    """One row for each parameter set: λ, Eq. (39), δ_p and Eq. (38)."""
-    indices = [INDICES[name] for name in (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name) if name in asked(case)]
-    is_exact = any(result.curve.is_exact for result in results)
-    headings = (text for index in indices for text in (index.symbol, _theory(index, is_exact)))
-    table = _table(case.headline, *_varied_columns(case), *headings)
-    _explain_star(table, is_exact)
-    for result in results:
-        row = list(map(written, result.curve.varied.values()))
-        for index in indices:
-            row += [_digits_of(index.name, result, most=7), f"{index.theory(result.curve.problem):.6g}"]
-        table.add_row(*row)
-    return table
-
-
-def _varied_columns(case: Case) -> list[str | Column]:
-    """A column for each varied key; those of texts give way to numbers where the terminal is narrow."""
-    names = {key: key.partition(".")[2] for key in case.vary.keys}
-    return [Column(name, overflow="fold") if key in WORDS else name for key, name in names.items()]
-
-
-def _theory(quantity: Quantity, is_exact: bool) -> str:
-    """Heading of a column of perturbation theory, starred where it has another noise than some solution."""
-    return f"Eq. {quantity.equation}{'*' if is_exact else ''}"
 
 
 def print_chart(case: Case, chart: Chart) -> None:
     """The special points of every line, and what the regions are."""
-    names = (axis.key.partition(".")[2] for axis in (charted(case).x, charted(case).y))
-    table = _table(case.headline, Column("line"), "branch", "points", *names, Column("special point"))
+    screen = Screen.of()
+    names = [axis.key.partition(".")[2] for axis in (charted(case).x, charted(case).y)]
+    columns = [Column("line"), Column("branch", 1), Column("points", 2), *map(Column, names)]
+    grid = Grid(case.headline, [*columns, Column("special point", is_text=True)])
     for line in chart.lines:
         for number, branch in enumerate(line.branches, start=1):
             special = [i for i, label in enumerate(branch.labels) if label]
             count = f"{branch.x.size}{', closed' if branch.closed else ''}"
-            table.add_row(line.zero.equation, str(number), count, "", "", "", end_section=not special)
+            grid.rows.append([line.zero.equation, str(number), count, "", "", ""])
             for i in special:
-                place = f"{branch.x[i]:.7g}", f"{branch.y[i]:.7g}"
                 label = branch.labels[i].replace("oscillator.", "").replace("noise.", "")
-                table.add_row("", "", "", *place, label, end_section=i == special[-1])
-    console = Console()
-    console.print(table)
+                grid.rows.append(["", "", "", f"{branch.x[i]:.7g}", f"{branch.y[i]:.7g}", label])
+            grid.ends.add(len(grid.rows) - 1)
+    screen.show(grid)
     for region in () if chart.regions is None else chart.regions.each:
-        console.print(f"{region.share:5.1%}  {region.name}", highlight=False)
+        screen.say(f"{region.share:5.1%}  {region.name}")
     for text in chart.remarks:
-        print_remark(f"note: {case.name}: {text}", "cyan")
+        print_remark(f"{case.name}: {text}")
 
 
 def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
-    """What a case expects beside what was computed."""
-    console = Console()
+    """What a case expects beside what was computed; of many what differs."""
+    screen = Screen.of()
     if not comparisons:
-        console.print(f"{case.name}: nothing is expected; add [[expect]] to the case", markup=False)
+        screen.say(f"{case.name}: nothing is expected; add [[expect]] to the case")
         return
-    table = _table(
-        f"{case.name}: {case.headline}", Column("quantity", overflow="fold"), "expected", "computed", "difference", ""
-    )
+    shown = comparisons if len(comparisons) <= MOST_ROWS else [each for each in comparisons if not each.met]
+    if shown:
+        grid = _comparison_grid if len(comparisons) <= MOST_TABLES else _short_comparison_grid
+        screen.show(grid(case, shown[:MOST_ROWS]))
+    if len(shown) > MOST_ROWS:
+        screen.say(f"{case.name}: {len(shown) - MOST_ROWS} more differ")
+    screen.say(agreement(comparisons) if shown else f"{case.name}: {agreement(comparisons)}")
+
+
+def agreement(comparisons: Sequence[Comparison]) -> str:
+    """How many values are as expected."""
+    return f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok"
+
+
+def _short_comparison_grid(case: Case, comparisons: Sequence[Comparison]) -> Grid:
+    """A line for each, with two digits more than the tolerance has."""
+    columns = [Column("quantity"), *varied_columns(case), Column("expected"), Column("±", 2), Column("computed")]
+    grid = Grid(f"{case.name}: {case.headline}", [*columns, Column("difference", 1), Column("")])
+    for item in comparisons:
+        expectation, value = item.expectation, item.value
+        expected = digits(expectation.value, item.tolerance / 100, 12)
+        computed = "none" if value is None else digits(value, item.tolerance / 100, 12)
+        difference = "" if value is None else f"{value - expectation.value:.1e}"
+        varied = map(written, item.varied.values())
+        numbers = [expected, f"{item.tolerance:.0e}", computed, difference]
+        grid.rows.append([_expected(item), *varied, *numbers, _verdict(item)])
+    return grid
+
+
+def _expected(item: Comparison) -> str:
+    """What is compared: "moment, p = 2"."""
+    expectation = item.expectation
+    return expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
+
+
+def _verdict(item: Comparison) -> Text:
+    return Text("ok", "green") if item.met else Text("differs", "bold red")
+
+
+def _comparison_grid(case: Case, comparisons: Sequence[Comparison]) -> Grid:
+    numbers = [Column("expected"), Column("computed"), Column("difference", 1), Column("")]
+    grid = Grid(f"{case.name}: {case.headline}", [Column("quantity", is_text=True), *numbers])
     for item in comparisons:
         expectation = item.expectation
-        name = expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
         where = "".join(f"\n{key} = {written(value)}" for key, value in item.varied.items())
-        table.add_row(
-            f"{name}{where}\n[dim]{escape(expectation.source)}[/dim]",
+        difference = "" if item.value is None else f"{item.value - expectation.value:.1e}"
+        row: list[Cell] = [
+            Text.assemble(f"{_expected(item)}{where}\n", (expectation.source, "dim")),
             f"{expectation.value:.12g}\n± {item.tolerance:.0e}",
             "none" if item.value is None else f"{item.value:.12g}",
-            "" if item.value is None else f"{item.value - expectation.value:.1e}",
-            "[green]ok[/green]" if item.met else "[bold red]differs[/bold red]",
-        )
-    console.print(table)
-    console.print(f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok")
-
-
-def _table(title: str, *columns: str | Column) -> Table:
-    """An empty table; of a column with its heading alone the entries stand on the right."""
-    aligned = (Column(each, justify="right", no_wrap=True) if isinstance(each, str) else each for each in columns)
-    return Table(*aligned, title=Text(title), title_justify="left")
-
-
-def _explain_star(table: Table, is_exact: bool) -> None:
-    if is_exact:
-        table.caption, table.caption_justify = "* for the noise reduced by Eqs. (12)-(14)", "left"
-
-
-def _digits_of(name: str, result: CurveResult, most: int) -> str:
-    estimate = result.estimates[name]
-    if estimate is None:
-        is_told = name == CRITICAL_RESTITUTION.name or grows_far_out(result.curve.problem)
-        return "none" if is_told else "none found"
-    return digits(estimate.value, estimate.error_estimate, most)
-
-
-def digits(value: float, error: float, most: int = 13) -> str:
-    """A number with the digits that its error leaves, at most so many significant ones; 0 where it leaves none."""
-    if abs(value) <= error:
-        return "0"
-    count = most if error <= 0 else math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
-    return f"{value:#.{min(max(count, 1), most)}g}".rstrip(".")
+            difference,
+            _verdict(item),
+        ]
+        grid.rows.append(row)
+        grid.ends.add(len(grid.rows) - 1)
+    return grid

@@ -76,7 +76,7 @@ def simulate_curves(
     """Simulate the curves of a case one after the other; an interrupt (Ctrl-C) ends it with what is done.
 
     Args:
-        progress: called as often as `simulation_work` counts.
+        progress: called as often as `simulation_work` counts, but not for what is known.
         known: the simulation of a curve, if that is done already.
 
     Raises:
@@ -85,8 +85,6 @@ def simulate_curves(
     task = SimulateCurve.of(case)
     for curve in case.curves():
         if found := known(curve):
-            for _ in range(simulation_steps(curve)):
-                progress()
             yield found
             continue
         try:

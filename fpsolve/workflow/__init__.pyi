@@ -1,7 +1,8 @@
 from .cases import Outcome as Outcome
-from .cases import Watch as Watch
 from .cases import chart_case as chart_case
 from .cases import check_case as check_case
 from .cases import run as run
 from .cases import run_case as run_case
 from .cases import simulate_case as simulate_case
+from .watch import Phase as Phase
+from .watch import Watch as Watch

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,28 +31,8 @@ from fpsolve.workflow.folders import (
     saying_if_interrupted,
 )
 from fpsolve.workflow.sets import Sweep
-from fpsolve.workflow.simulations import simulated_curves
-
-Progress = Callable[[], None]
-
-
-@dataclass(frozen=True)
-class Watch:
-    """Whom to tell how it goes; by default nobody.
-
-    Attributes:
-        bar: gives a stretch of work, from its name and how often it reports progress, None where nobody knows, what it
-            shall call for that; a chart has two at a time.
-        solved: takes a case and its curves once they are solved.
-        simulated: takes a case, its simulated curves, and those that are solved too.
-    """
-
-    bar: Callable[[str, int | None], AbstractContextManager[Progress]] = lambda *_: nullcontext(lambda: None)
-    solved: Callable[[Case, Sequence[CurveResult]], None] = lambda *_: None
-    simulated: Callable[[Case, Sequence[SimulatedCurve], Sequence[CurveResult]], None] = lambda *_: None
-
-
-NOBODY = Watch()
+from fpsolve.workflow.simulations import Simulations
+from fpsolve.workflow.watch import NOBODY, NODES, PERCENT, POINTS, SETS, Advance, Phase, Watch, unheeded
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +45,7 @@ class Outcome:
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty where none came.
         comparisons: what it expects beside what was computed.
         sweep: what solved it, if that was done.
+        known: how many of its curves an earlier run had done.
     """
 
     results: Sequence[CurveResult] = ()
@@ -72,6 +53,7 @@ class Outcome:
     interruption: str = ""
     comparisons: tuple[Comparison, ...] = ()
     sweep: Sweep | None = None
+    known: int = 0
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -86,7 +68,7 @@ def run(
     jobs: int | None = 1,
     scheduler: str = "",
     fresh: bool = False,
-    progress: Progress = lambda: None,
+    progress: Callable[[], None] = lambda: None,
 ) -> tuple[CurveResult, ...]:
     """Solve a case and write `out`/<name of the case>/.
 
@@ -99,7 +81,7 @@ def run(
         jobs: how many processes solve; None for one on each processor.
         scheduler: the address of a Dask scheduler whose workers solve instead, such as "tcp://host:8786".
         fresh: whether to solve all sets anew.
-        progress: called once for each moment of each curve; where there are several curves, as each is finished.
+        progress: called for each curve that is done, of a single one for each p.
 
     Raises:
         CaseError: with every fault of the file; nothing is solved.
@@ -108,7 +90,8 @@ def run(
     """
     read = case if isinstance(case, Case) else load_case(case)
     pool = cluster(scheduler) if scheduler else several(jobs, read.planned)
-    outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=Watch(bar=lambda *_: nullcontext(progress)))
+    watch = Watch(bar=lambda phase: nullcontext(_each(progress) if phase.unit else unheeded))
+    outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=watch)
     results = tuple(outcome.results)
     if outcome.failures:
         raise NotConverged("\n".join(outcome.failures), results)
@@ -145,17 +128,18 @@ def run_case(
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
     with own_folder(case, out, replaced) as folder:
         sweep = _solve(case, folder, pool or here(), watch, is_fresh=is_fresh)
-        with saying_if_interrupted(lambda: f"; what was solved is kept in {folder}"):
+        with saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}"):
             try:
                 watch.solved(case, sweep.results)
                 if monte_carlo:
-                    interruption = _simulate(case, folder, watch, simulated, simulators, is_fresh=is_fresh)
+                    simulations = Simulations(case, folder, is_fresh=is_fresh)
+                    interruption = _simulate(simulations, watch, simulated, simulators)
                     watch.simulated(case, simulated, sweep.results)
             finally:
-                with writable(folder):
+                with watch.bar(Phase(case.name, "figures")), writable(folder):
                     draw(case, sweep.results, simulated, folder)
                     draw_sensitivities(case, sweep.results, folder)
-    return Outcome(sweep.results, tuple(simulated), interruption, sweep=sweep)
+    return Outcome(sweep.results, tuple(simulated), interruption, sweep=sweep, known=sweep.known)
 
 
 def simulate_case(
@@ -188,9 +172,10 @@ def simulate_case(
         own_folder(case, out, (SIMULATED,)) as folder,
         saying_if_interrupted(lambda: kept(case, len(simulated), folder)),
     ):
-        interruption = _simulate(case, folder, watch, simulated, pool, is_fresh=is_fresh)
+        simulations = Simulations(case, folder, is_fresh=is_fresh)
+        interruption = _simulate(simulations, watch, simulated, pool)
         watch.simulated(case, simulated, ())
-    return Outcome((), tuple(simulated), interruption)
+    return Outcome((), tuple(simulated), interruption, known=simulations.known)
 
 
 def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = None, watch: Watch = NOBODY) -> Chart:
@@ -212,8 +197,8 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
     with (
         own_folder(case, out, (CHART,)) as folder,
         saying_if_interrupted(lambda: _kept_lines(case, chart, folder), ANEW),
-        watch.bar(f"{case.name}, scan", chart_work(case)) as progress,
-        watch.bar(f"{case.name}, points", None) as stepped,
+        watch.bar(Phase(case.name, "scan", chart_work(case), NODES)) as progress,
+        watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
         writable(folder),
         pool or here() as workers,
     ):
@@ -230,42 +215,46 @@ def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = NOBODY) -
     """Solve what a case expects, and compare it; nothing is written."""
     numerics = Numerics.of(case)
     found: list[CurveResult] = []
-    with watch.bar(case.name, case.planned) as progress, pool or here() as workers:
+    with (
+        saying_if_interrupted(lambda: kept(case, len(found)), ANEW),
+        watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
+        pool or here() as workers,
+    ):
         tasks = batches(case, lambda curve: Order(curve, expected(case, curve), ""), numerics)
         for done in workers.run(SolveBatch(result_alone), tasks):
             results = done.result or [lost(order.curve) for order in done.item.orders]
             for result in filter(None, results):
                 found.append(result)
-                progress()
+                progress(failed=bool(result.failures))
     found.sort(key=lambda result: result.curve.number)
     return Outcome(found, comparisons=tuple(compare(case, found)))
 
 
 def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Sweep:
     """Solve the sets of a case that are not known, and write all tables."""
-    with writable(folder):
+    with saying_if_interrupted(lambda: " before the first curve"), writable(folder):
         sweep = Sweep(case, folder, is_fresh=is_fresh)
     with (
         saying_if_interrupted(lambda: kept(case, len(sweep.results), folder)),
-        watch.bar(case.name, sweep.steps) as progress,
         writable(folder),
     ):
         try:
-            sweep.solve(pool, progress)
+            with watch.bar(sweep.phase) as progress:
+                sweep.solve(pool, progress)
         except KeyboardInterrupt:
             sweep.find()
             sweep.write_all()
             raise
-        sweep.write_all()
+        with watch.bar(Phase(case.name, "tables")):
+            sweep.write_all()
     return sweep
 
 
-def _simulate(
-    case: Case, folder: Path, watch: Watch, simulated: list[SimulatedCurve], pool: Pool | None, *, is_fresh: bool
-) -> str:
+def _simulate(simulations: Simulations, watch: Watch, simulated: list[SimulatedCurve], pool: Pool | None) -> str:
     """Simulate the curves of a case into a list, and write each; what to say where an interrupt ended it."""
-    with watch.bar(f"{case.name}, simulation", simulation_work(case)) as progress, writable(folder):
-        for each in simulated_curves(case, folder, progress, pool=pool, is_fresh=is_fresh):
+    case, folder = simulations.case, simulations.folder
+    with watch.bar(Phase(case.name, "simulation", simulation_work(case), PERCENT)) as progress, writable(folder):
+        for each in simulations.curves(progress, pool):
             simulated.append(each)
             write_simulation(case, each, folder)
             write_response(each, folder)
@@ -282,3 +271,13 @@ def _kept_lines(case: Case, chart: Chart, folder: Path) -> str:
     count = sum(len(line.traces) for line in chart.lines)
     text = f" after {count} branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines"
     return f"{text}; what was done is kept in {folder}" if count else text
+
+
+def _each(progress: Callable[[], None]) -> Advance:
+    """Calls it for each step."""
+
+    def advance(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
+        for _ in range(count):
+            progress()
+
+    return advance

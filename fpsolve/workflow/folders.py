@@ -47,10 +47,10 @@ def saying_if_interrupted(what_is_kept: Callable[[], str], again: str = AGAIN) -
         raise KeyboardInterrupt(f"interrupted{what_is_kept()}; {again}") from None
 
 
-def kept(case: Case, done: int, folder: Path) -> str:
-    """How many curves of a case are done, and where these are."""
+def kept(case: Case, done: int, folder: Path | None = None) -> str:
+    """How many curves of a case are done, and where these are, if they are kept."""
     count = f" after {done} of {case.planned} curve{'s' if case.planned > 1 else ''}"
-    return f"{count}; what was done is kept in {folder}" if done else count
+    return f"{count}; what was done is kept in {folder}" if done and folder else count
 
 
 def _agrees(case: Case, folder: Path) -> bool:

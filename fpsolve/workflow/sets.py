@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,9 +19,10 @@ from fpsolve.study.records import key_of, record_of
 from fpsolve.study.results import CurveResult, Solved
 from fpsolve.study.solve import Numerics, Wanted, everything, without_failed
 from fpsolve.study.sweep import Batch, Order, SolveBatch, batches, lost
+from fpsolve.workflow.watch import MOMENTS, SETS, Advance, Phase
 
-Found = tuple[int, Place | CurveResult | None]
-"""The number of a curve, and its numbers where they are new."""
+Found = tuple[int, Place | CurveResult | None, bool]
+"""The number of a curve, its numbers where they are new, and whether some of these are missing."""
 SOLVED_RECORDS = "records/solved"
 GROWTH = 2
 """Tables are written anew when they have grown by that factor, so that all of it costs as little as the last ones."""
@@ -36,9 +37,10 @@ class Keep:
     def __call__(self, order: Order, solved: Solved) -> Found:
         curve, result = order.curve, solved.result
         write_functions(solved, curve, self.folder)
+        is_failed = result is not None and bool(result.failures)
         if result is None or solved.is_passing:
-            return curve.number, result
-        return curve.number, append(self.folder / SOLVED_RECORDS, order.key, record_of(result))
+            return curve.number, result, is_failed
+        return curve.number, append(self.folder / SOLVED_RECORDS, order.key, record_of(result)), is_failed
 
 
 class Sweep:
@@ -58,6 +60,7 @@ class Sweep:
         if is_fresh:
             self.records.remove()
         self.find()
+        self.known = len(self.results)
 
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished and not told of."""
@@ -67,26 +70,28 @@ class Sweep:
                 self._settled += not self._wanted(curve).draws
 
     @property
-    def steps(self) -> int:
-        """How often `solve` reports progress."""
-        return self.case.planned * self._steps_each
+    def phase(self) -> Phase:
+        """How often `solve` reports progress: once for each set, of a single one for each p."""
+        if self.case.planned > 1:
+            return Phase(self.case.name, "solving", self.case.planned, SETS)
+        return Phase(self.case.name, "solving", self._steps_each, MOMENTS)
 
-    def solve(self, pool: Pool, progress: Callable[[], None]) -> None:
+    def solve(self, pool: Pool, progress: Advance) -> None:
         """Solve what is not known yet; tables are written at the beginning, and as they grow."""
         self.write_tables()
-        is_alone = self.case.planned == 1 and not self.results and not pool.is_elsewhere
-        for _ in range(self._settled * self._steps_each):
-            progress()
+        is_alone = self.case.planned == 1 and not pool.is_elsewhere
+        if self._settled:
+            progress(self._settled * self._steps_each, known=True)
         queue = _Queue(batches(self.case, self._order, self.numerics))
         with here() if is_alone else pool as workers:
             for done in workers.run(SolveBatch(Keep(self.folder), progress if is_alone else None), queue):
-                for number, found in self._lost(done.item, queue) if done.result is None else done.result:
+                for number, found, is_failed in self._lost(done.item, queue) if done.result is None else done.result:
                     if isinstance(found, Place):
                         self.records.expect(found)
                     if found is not None:
                         self.results.add(number, found)
-                    for _ in range(0 if is_alone else self._steps_each):
-                        progress()
+                    is_reported = is_alone and not self.known  # p by p
+                    progress(0 if is_reported else self._steps_each, failed=int(is_failed))
                 if len(self.results) >= GROWTH * self._tabled + 1:
                     self.write_tables()
 
@@ -103,7 +108,7 @@ class Sweep:
 
     @property
     def _steps_each(self) -> int:
-        return max(self.first.p.size, 1)
+        return max(self.first.p.size, 1) if self.case.planned == 1 else 1
 
     def _wanted(self, curve: Curve) -> Wanted:
         return self.first if curve.number == 1 else self.further
@@ -127,8 +132,8 @@ class Sweep:
         left = [order for order, place in places.items() if place is None or order.is_known]
         if len(batch.orders) > 1:
             queue.again += [Batch((order,), batch.numerics) for order in left]
-            return [(order.curve.number, place) for order, place in places.items() if order not in left]
-        return [(order.curve.number, None if order.is_known else lost(order.curve)) for order in left]
+            return [(order.curve.number, place, False) for order, place in places.items() if order not in left]
+        return [(order.curve.number, None if order.is_known else lost(order.curve), True) for order in left]
 
 
 class _Queue(Iterator[Batch]):

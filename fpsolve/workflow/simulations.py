@@ -7,64 +7,82 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.output.records import Records, append
+from fpsolve.output.records import Place, Records, append
 from fpsolve.pool import Pool
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.study.simulate import SimulateCurve, simulate_curves, simulation_steps
 from fpsolve.study.simulated import simulated_of, simulation_key, to_record
+from fpsolve.workflow.watch import Advance
 
 SIMULATED_RECORDS = "records/simulated"
 
 
-def simulated_curves(
-    case: Case, folder: Path, progress: Callable[[], None], *, pool: Pool | None, is_fresh: bool
-) -> Iterator[SimulatedCurve]:
-    """The simulations of all curves, in their order; those that are done already are taken from their records.
+class Simulations:
+    """The simulations of the curves of a case; those that are done already are taken from their records.
 
     Args:
-        pool: who simulates; None for all processors of this machine.
+        case: whose curves these are.
+        folder: where they are kept.
         is_fresh: whether to simulate all of them anew.
     """
-    records, task = Records(folder / SIMULATED_RECORDS), SimulateCurve.of(case)
-    if is_fresh:
-        records.remove()
-    records.look()
 
-    def key(curve: Curve) -> str:
-        return simulation_key(curve, task.orders, task.setting)
+    def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
+        self.case, self.folder, self.task = case, folder, SimulateCurve.of(case)
+        self.records = Records(folder / SIMULATED_RECORDS)
+        if is_fresh:
+            self.records.remove()
+        are_there = self.records.look().are_there
+        self._known = {curve.number for curve in case.curves() if self._place(curve)} if are_there else set[int]()
 
-    def known(curve: Curve) -> SimulatedCurve | None:
-        place = records.place(key(curve))
-        return None if place is None else simulated_of(records.read(place), curve)
+    @property
+    def known(self) -> int:
+        """How many were done at the beginning."""
+        return len(self._known)
 
-    if pool is None:
-        found = simulate_curves(case, progress=progress, known=known)
-    else:
-        found = _by_pool(case, pool, task, known, progress)
-    for simulated in found:
-        if not simulated.interrupted and records.place(key(simulated.curve)) is None:
-            append(records.folder, key(simulated.curve), to_record(simulated))
-        yield simulated
+    def curves(self, progress: Advance, pool: Pool | None) -> Iterator[SimulatedCurve]:
+        """All of them, in their order.
 
+        Args:
+            progress: called as often as `simulation_work` counts.
+            pool: who simulates; None for all processors of this machine.
+        """
+        if self._known:
+            progress(sum(simulation_steps(curve) for curve in self.case.curves() if self._is_known(curve)), known=True)
+        if pool is None:
+            found = simulate_curves(self.case, progress=progress, known=self._found)
+        else:
+            found = self._by_pool(pool, progress)
+        for simulated in found:
+            if not simulated.interrupted and not self._is_known(simulated.curve):
+                append(self.records.folder, self._key(simulated.curve), to_record(simulated))
+            yield simulated
 
-def _by_pool(
-    case: Case,
-    pool: Pool,
-    task: SimulateCurve,
-    known: Callable[[Curve], SimulatedCurve | None],
-    progress: Callable[[], None],
-) -> Iterator[SimulatedCurve]:
-    """The same, by the workers of a pool; an interrupt ends it with what is done."""
-    done = 0
-    with pool:
-        simulated = pool.map(task, (curve for curve in case.curves() if known(curve) is None))
-        try:
-            for curve in case.curves():
-                found = known(curve) or next(simulated)
-                for _ in range(simulation_steps(curve)):
-                    progress()
-                yield found
-                done += 1
-        except KeyboardInterrupt:
-            if not done:
-                raise
+    def _by_pool(self, pool: Pool, progress: Callable[[int], None]) -> Iterator[SimulatedCurve]:
+        """The same, by the workers of a pool; an interrupt ends it with what is done."""
+        done = 0
+        with pool:
+            simulated = pool.map(self.task, (curve for curve in self.case.curves() if not self._is_known(curve)))
+            try:
+                for curve in self.case.curves():
+                    found = self._found(curve)
+                    if found is None:
+                        found = next(simulated)
+                        progress(simulation_steps(curve))
+                    yield found
+                    done += 1
+            except KeyboardInterrupt:
+                if not done:
+                    raise
+
+    def _is_known(self, curve: Curve) -> bool:
+        return curve.number in self._known
+
+    def _found(self, curve: Curve) -> SimulatedCurve | None:
+        place = self._place(curve) if self._is_known(curve) else None
+        return None if place is None else simulated_of(self.records.read(place), curve)
+
+    def _place(self, curve: Curve) -> Place | None:
+        return self.records.place(self._key(curve))
+
+    def _key(self, curve: Curve) -> str:
+        return simulation_key(curve, self.task.orders, self.task.setting)

@@ -1,13 +1,21 @@
 """What is printed fits the terminal, and no number is broken."""
 
 import re
+import sys
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.exponent.error import Failure
-from fpsolve.output.terminal import print_remark, print_results, print_simulation, print_warnings
+from fpsolve.case.sections import Expectation
+from fpsolve.exponent.error import Estimate, Failure
+from fpsolve.exponent.quantities import INDICES
+from fpsolve.letters import spelt
+from fpsolve.output.remarks import print_remark
+from fpsolve.output.screen import Column, Grid, Screen
+from fpsolve.output.terminal import duration, print_comparisons, print_results, print_simulation, print_warnings
+from fpsolve.study.results import Comparison, CurveResult, Moments
 from fpsolve.study.simulate import simulate_curves
 from tests.solving import solve_case
 from tests.test_workflow import TEXT
@@ -23,11 +31,23 @@ def case(tmp_path_factory):
     return load_case(path, NONLINEAR)
 
 
+@pytest.fixture
+def terminal(monkeypatch):
+    """Makes the standard streams a terminal of a width."""
+
+    def begin(width):
+        monkeypatch.setenv("COLUMNS", str(width))
+        monkeypatch.setenv("TERM", "dumb")
+        for stream in (sys.stdout, sys.stderr):
+            monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)
+
+    return begin
+
+
 @pytest.mark.parametrize("width", [60, 80, 200])
-def test_quantities_are_whole(case, width, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", str(width))
+def test_quantities_are_whole(case, width, capsys, terminal):
     results, simulated = solve_case(case), tuple(simulate_curves(case))
-    capsys.readouterr()
+    terminal(width)
     for show, names in (
         (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)", "N", "R_c"}),
         (lambda: print_simulation(case, simulated), {"λ", "Λ″(0)", *simulated[0].response.means}),
@@ -40,14 +60,20 @@ def test_quantities_are_whole(case, width, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("width", [50, 80, 120])
-def test_remarks_are_wrapped(width, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", str(width))
-    text = "warning: case: " + "Λ(2) may be 1e-10 or [less] than " * 10 + "a_word_as_long_as_a_path/" * 6
-    print_remark(text, "yellow")
+def test_remarks_are_wrapped_on_a_terminal(width, capsys, terminal):
+    terminal(width)
+    text = "case: " + "Λ(2) may be 1e-10 or [less] than " * 10 + "a_word_as_long_as_a_path/" * 6
+    print_remark(text)
     first, *others = capsys.readouterr().err.splitlines()
     assert all(line.startswith("  ") for line in others)
-    assert " ".join([first, *(line.strip() for line in others)]) == text
+    assert " ".join([first, *(line.strip() for line in others)]) == f"note: {text}"
     assert all(len(line) < width for line in [first, *others[:-1]])
+
+
+def test_remarks_are_whole_in_a_file(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    print_remark("case: " + "a word " * 50)
+    assert capsys.readouterr().err.splitlines() == [("note: case: " + "a word " * 50).rstrip()]
 
 
 @pytest.mark.parametrize(
@@ -91,3 +117,214 @@ def test_what_is_missing_is_told_before_what_is_only_remarkable(case, capsys, mo
     assert re.fullmatch("not converged: .*: a reason", first)
     assert re.fullmatch("warning: .*: a warning", second)
     assert last.endswith("more remarks are in summary.json: 8 notes")
+
+
+def result(curve, D0, **more):
+    """A made-up result of a curve."""
+    numbers = np.array([D0, 2 * D0])
+    theory = 0 * numbers
+    moments = Moments(np.array([-1.0, 2.0]), numbers, theory, 1e-9 * numbers, theory, theory, np.zeros(0))
+    estimates = {name: Estimate(D0 * (-1) ** i, 1e-12, 1.0) for i, name in enumerate(INDICES)}
+    return CurveResult(curve, moments, estimates, **more)
+
+
+def many(tmp_path, count, overrides=(), **remarks):
+    """A case with many curves and made-up results; `remarks` make warnings, notes and failures from a number."""
+    path = tmp_path / "many.toml"
+    path.write_text(
+        TEXT.replace("[0.1, 1.0]", str([round(0.125 + 0.0625 * i, 4) for i in range(count)])), encoding="utf-8"
+    )
+    case = load_case(path, overrides)
+    return case, [
+        result(curve, (curve.number + 0.2) * 1.0123456789e-3, **{kind: make(i) for kind, make in remarks.items()})
+        for i, curve in enumerate(case.curves())
+    ]
+
+
+def tokens(text):
+    return {token for token in re.split(r"[\s│┃┏┳━┓┡╇┩├┼┤└┴┘─]+", text) if token}
+
+
+KINDS = {
+    "warnings": lambda i: (f"rtol = 1e-08 is not met by λ: {i} has an estimated error of {(i * 7) % 11}e-6; use more",),
+    "notes": lambda i: (f"Eq. (37) is for weak noise: from |p| = {i} on, most at p = 6, where it is 0.{i}, {i % 90}%",),
+}
+SECTIONS = [
+    [],
+    ['figure={ x = "noise.D0", y = "lyapunov_exponent" }'],
+    ["vary.oscillator.omega=[1.0, 2.0]", "vary.noise.treatment=['ou-reduction', 'exact']"],
+]
+
+
+@pytest.mark.parametrize("count", [1, 3, 12, 60])
+@pytest.mark.parametrize("overrides", SECTIONS)
+@pytest.mark.parametrize("width", [60, 80])
+def test_a_narrow_terminal_breaks_and_cuts_nothing(tmp_path, capsys, terminal, count, overrides, width):
+    case, results = many(tmp_path, count, overrides, **KINDS)
+    print_results(case, results)
+    whole = capsys.readouterr()
+    terminal(width)
+    print_results(case, results)
+    narrow = capsys.readouterr()
+    allowed = {"no", "room", "for:", "=", "Eq.", *(f"{each}," for each in tokens(whole.out))}
+    assert tokens(narrow.out) - tokens(whole.out) <= allowed
+    assert tokens(narrow.err) == tokens(whole.err)
+    for text in (narrow.out, narrow.err):
+        assert max(map(len, text.splitlines())) <= width
+        assert "…" not in text
+
+
+@pytest.mark.parametrize(("count", "rows"), [(11, 11), (50, 50)])
+def test_many_curves_have_a_row_each(tmp_path, capsys, count, rows):
+    case, results = many(tmp_path, count)
+    print_results(case, results)
+    out = capsys.readouterr().out
+    assert out.count("│ converged │") == rows
+    assert f"{count} curves: {count} converged" in out
+    for each in results:
+        assert f"{each.lyapunov_exponent.value:#.7g}" in out
+
+
+def test_of_more_curves_the_extreme_and_the_failed_ones_have_a_row(tmp_path, capsys):
+    def failures(i):
+        return (Failure(2.0, f"Λ(2) did not converge at {i}"),) if i in (7, 40) else ()
+
+    case, results = many(tmp_path, 60, failures=failures)
+    print_results(case, results)
+    out, err = capsys.readouterr()
+    rows = [line.split("│")[1:-1] for line in out.splitlines() if line.startswith("│")]
+    D0 = [f"{each.curve.varied['noise.D0']:g}" for each in results]
+    assert [row[0].strip() for row in rows] == [D0[0], D0[7], D0[40], D0[59]]
+    assert [row[-1].strip() for row in rows] == ["least λ, largest δ_p", "", "", "largest λ, least δ_p"]
+    assert [row[-2].strip() for row in rows] == ["converged", "partly", "partly", "converged"]
+    assert "60 curves: 58 converged, 2 partly; all numbers are in curves.csv and results.nc" in out
+    assert f"not converged: many, noise.D0 = {D0[7]} and noise.D0 = {D0[40]}: Λ(2) did not converge at 7" in err
+
+
+def test_of_many_failed_curves_the_first_are_shown(tmp_path, capsys):
+    case, results = many(tmp_path, 60, failures=lambda i: (Failure(2.0, "Λ(2) did not converge"),) if i % 2 else ())
+    for each in results[1::2]:
+        each.estimates.update(dict.fromkeys(INDICES))
+    print_results(case, results)
+    out = capsys.readouterr().out
+    rows = [line.split("│")[1:-1] for line in out.splitlines() if "partly │" in line]
+    assert [row[0].strip() for row in rows] == [f"{each.curve.varied['noise.D0']:g}" for each in results[1:40:2]]
+    assert {cell.strip() for row in rows for cell in row[1:7]} == {""}  # not "none", which nobody knows
+    assert "30 converged, 30 partly; of those that are not converged the first 20 are shown" in out
+
+
+def test_a_file_has_all_columns_whatever_the_terminal_is(tmp_path, capsys, monkeypatch):
+    case, results = many(tmp_path, 12)
+    texts = []
+    for width in ("20", "200"):
+        monkeypatch.setenv("COLUMNS", width)
+        print_results(case, results)
+        texts.append(capsys.readouterr().out)
+    assert texts[0] == texts[1]
+    assert "no room for" not in texts[0]
+    heading = texts[0].splitlines()[2]
+    assert all(
+        symbol in heading for symbol in ("D0", "λ", "δ_p", "Λ″(0)", "N", "R_c", "r_c", "Λ(-1)", "Λ(2)", "status")
+    )
+
+
+@pytest.mark.parametrize(
+    ("width", "headings"),
+    [(36, "a ┃ rank one ┃ rank two"), (29, "a ┃ one ┃ two"), (25, "a ┃ rank one"), (22, "a ┃ one"), (14, "a")],
+)
+def test_headings_are_folded_and_columns_left_out_in_their_order(capsys, terminal, width, headings):
+    terminal(width)
+    Screen.of().show(
+        Grid("", [Column("a"), Column("rank one", 1), Column("rank two", 2)], [["1234567890", "12345", "1"]])
+    )
+    out = capsys.readouterr().out
+    *_, last = [line for line in out.splitlines() if line.startswith("┃")]
+    assert " ┃ ".join(part.strip() for part in last.strip("┃").split("┃")) == headings
+    left_out = ["rank one"] * ("one" not in headings) + ["rank two"] * ("two" not in headings)
+    assert " ".join(out.partition("no room for: ")[2].split()) == ", ".join(left_out)
+
+
+def test_where_no_table_fits_rows_are_lists(capsys, terminal):
+    terminal(13)
+    Screen.of().show(Grid("", [Column("a"), Column("b", 1)], [["1234567890", "12345"]]))
+    assert capsys.readouterr().out.split() == ["a", "=", "1234567890", "b", "=", "12345"]
+
+
+def test_sentences_that_differ_in_numbers_are_one(tmp_path, capsys):
+    case, results = many(tmp_path, 200, **KINDS)
+    print_warnings(case, results)
+    warning, note = capsys.readouterr().err.splitlines()
+    worst = results[89].curve.label
+    assert note.startswith("note: many: 200 of 200 curves: Eq. (37) is for weak noise: from |p| = 89 on")
+    assert note.endswith(f"0.89, 89%; most for {worst} (all in summary.json)")
+    largest = results[3].curve.label  # 3 * 7 % 11 = 10
+    assert "λ: 3 has an estimated error of 10e-6" in warning
+    assert warning.endswith(f"most for {largest} (all in summary.json)")
+
+
+def test_curves_that_share_a_sentence_are_named_if_they_are_few(tmp_path, capsys):
+    case, results = many(tmp_path, 5, notes=lambda i: ("the same",) if i < 3 else (f"other {'x' * i} {i}",))
+    print_warnings(case, results)
+    labels = [each.curve.label for each in results]
+    assert capsys.readouterr().err.splitlines() == [
+        f"note: many, {labels[0]}, {labels[1]} and {labels[2]}: the same",
+        f"note: many, {labels[3]}: other xxx 3",
+        f"note: many, {labels[4]}: other xxxx 4",
+    ]
+
+
+def test_several_sentences_of_one_curve_are_counted(tmp_path, capsys):
+    case, results = many(
+        tmp_path, 1, ["vary={}"], failures=lambda _: tuple(Failure(p, f"no Λ({p})") for p in (2, 3, 4))
+    )
+    print_warnings(case, results, file="")
+    assert capsys.readouterr().err == "not converged: many: no Λ(2); and 2 more like this one\n"
+
+
+def test_equations_and_names_with_numbers_keep_sentences_apart(tmp_path, capsys):
+    case, results = many(tmp_path, 4, notes=lambda i: (f"Eq. (3{i}) fails for tau{i}",))
+    print_warnings(case, results)
+    assert capsys.readouterr().err.count("note:") == 4
+
+
+def test_of_many_values_that_are_expected_those_that_differ_are_shown(tmp_path, capsys):
+    case, _ = many(tmp_path, 60)
+    expectation = Expectation(quantity="moment", p=2.0, value=1.0, rtol=1e-3, source="here")
+    made = [Comparison(expectation, curve.varied, 1.0 + i / 59, 1e-3, i == 0) for i, curve in enumerate(case.curves())]
+    print_comparisons(case, made)
+    out = capsys.readouterr().out
+    assert out.count("differs") == 50
+    assert "9 more differ" in out
+    assert "1 of 60 ok" in out
+    print_comparisons(case, made[:1] * 60)
+    assert capsys.readouterr().out == "many: 60 of 60 ok\n"
+
+
+@pytest.mark.parametrize("count", [3, 12])
+@pytest.mark.parametrize("width", [60, 80])
+def test_a_narrow_terminal_breaks_no_comparison(tmp_path, capsys, terminal, count, width):
+    case, _ = many(tmp_path, count, SECTIONS[-1])
+    source = "an independent Fourier-Hermite computation [of the same]"
+    expectation = Expectation(quantity="critical_impact_factor", value=-0.123456789012, rtol=1e-9, source=source)
+    made = [Comparison(expectation, each.varied, -0.12345678901, 1e-10, met=True) for each in case.curves()]
+    print_comparisons(case, made)
+    whole = capsys.readouterr().out
+    terminal(width)
+    print_comparisons(case, made)
+    narrow = capsys.readouterr().out
+    assert tokens(narrow) - tokens(whole) <= {"no", "room", "for:", "=", "±,"}
+    assert max(map(len, narrow.splitlines())) <= width
+    assert "…" not in narrow
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(4.23, "4.2 s"), (99.94, "99.9 s"), (750.0, "12 min 30 s"), (7500.0, "2 h 5 min")]
+)
+def test_durations(seconds, text):
+    assert duration(seconds) == text
+
+
+def test_greek_is_spelt_where_there_is_none():
+    assert spelt("λ = 1 ± 2, Λ″(0), δ_p ≤ ε²", "ascii") == "lambda = 1 +- 2, Lambda''(0), delta_p <= epsilon^2"
+    assert spelt("λ ± é", "latin-1") == "lambda ± é"
+    assert spelt("Λ ± …", "utf-8") == "Λ ± …"

@@ -3,14 +3,12 @@
 import csv
 import json
 from contextlib import nullcontext
-from io import StringIO
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from fpsolve import ExponentSolver, load_case
-from fpsolve.cli import _bar, main
+from fpsolve.cli import main
 from fpsolve.model.direction import Family
 from fpsolve.study.chart import chart_work, solve_chart
 from fpsolve.workflow import Watch, chart_case
@@ -139,11 +137,11 @@ def test_a_line_that_does_not_cross_the_frame_is_said_so(path, tmp_path, capsys)
 def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
     calls = iter(range(200))
 
-    def progress():
+    def progress(**_):
         if next(calls) == 180:  # in the scan for the second line
             raise KeyboardInterrupt
 
-    watch = Watch(bar=lambda _, total: nullcontext(progress if total else lambda: None))
+    watch = Watch(bar=lambda phase: nullcontext(progress if phase.total else lambda: None))
     with pytest.raises(KeyboardInterrupt, match="after 1 branch of 3 lines; what was done is kept in"):
         chart_case(load_case(path), tmp_path, watch=watch)
     summary = json.loads((tmp_path / "plane" / "chart.json").read_text(encoding="utf-8"))
@@ -152,26 +150,17 @@ def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
     assert (tmp_path / "plane" / "chart.png").exists()
 
 
-def test_a_bar_for_the_scans_and_one_for_the_points(path, tmp_path):
-    bars = {}
+def test_a_phase_for_the_scans_and_one_for_the_points(path, tmp_path):
+    counts, totals = {}, {}
 
-    def bar(name, total):
-        bars[name] = [total, 0]
-        return nullcontext(lambda: bars.__setitem__(name, [total, bars[name][1] + 1]))
+    def bar(phase):
+        counts[phase.name], totals[phase.name] = 0, phase.total
+        return nullcontext(lambda: counts.__setitem__(phase.name, counts[phase.name] + 1))
 
     override = ["chart.zero=['lyapunov_exponent']", "chart.x.at=[]"]
     chart = chart_case(load_case(path, override), tmp_path, watch=Watch(bar=bar))
-    assert bars == {"plane, scan": [169, 169], "plane, points": [None, chart.lines[0].branches[0].x.size]}
-
-
-def test_two_bars_show_at_a_time(monkeypatch):
-    screen = StringIO()
-    monkeypatch.setattr("fpsolve.cli.Console", lambda **_: Console(file=screen, force_terminal=True, width=100))
-    with _bar("scan", 4) as progress, _bar("points", None) as stepped:
-        progress()
-        stepped()
-    assert "1/4" in screen.getvalue()
-    assert "1/?" in screen.getvalue()
+    assert totals == {"scan": 169, "lines": None}
+    assert counts == {"scan": 169, "lines": chart.lines[0].branches[0].x.size}
 
 
 def test_each_step_has_all_that_was_before(path):

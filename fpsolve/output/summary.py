@@ -1,0 +1,193 @@
+"""Many curves in one table, a row each; of more than fit the eye, those with the extreme values and the failed ones."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fpsolve.case.case import Case
+from fpsolve.case.sections import Value
+from fpsolve.case.vary import written
+from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.quantities import CRITICAL_RESTITUTION, INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
+from fpsolve.output.screen import Column, Grid
+from fpsolve.output.tables import asked
+from fpsolve.study.results import CurveResult, Status
+from fpsolve.theory.far import grows_far_out
+
+MOST_TABLES, MOST_ROWS = 10, 50
+"""Curves that have a table each, and that have a row each."""
+MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
+"""Failed curves that are named among more, p whose Λ has a column, and quantities whose extremes are shown."""
+DIGITS = 7
+STAR = "* for the noise reduced by Eqs. (12)-(14)"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A number of a curve that has a column.
+
+    Attributes:
+        heading: of the column.
+        of: gives it, None where it is not there; of perturbation theory no extremes are sought.
+        text: of it, also where it is not there.
+        rank: as of a `Column`.
+    """
+
+    heading: str
+    of: Callable[[CurveResult], float | None] | None
+    text: Callable[[CurveResult], str]
+    rank: int = 0
+
+
+def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
+    """A row for each curve: what varies, λ, δ_p, and what else is asked for, or over a parameter the closed forms.
+
+    Of more than `MOST_ROWS` curves the extreme and the failed ones have one.
+    """
+    quantities = _quantities(case, is_exact="exact" in _treatments(case))
+    is_digest = len(results) > MOST_ROWS
+    chosen = _chosen(results, quantities) if is_digest else [("", result) for result in results]
+    has_status = len(results) > MOST_TABLES or any(result.status for _, result in chosen)
+    columns = [*varied_columns(case), *(Column(each.heading, each.rank) for each in quantities)]
+    is_whole = all(result.status == Status.CONVERGED for _, result in chosen)
+    columns += [Column("status", 1 if is_whole else 0)] * has_status + [Column("which", is_text=True)] * is_digest
+    is_starred = any("*" in each.heading for each in quantities)
+    grid = Grid(case.headline, columns, remark=STAR if is_starred else "")
+    for which, result in chosen:
+        varied, numbers = map(written, result.curve.varied.values()), (each.text(result) for each in quantities)
+        grid.rows.append([*varied, *numbers, *[result.status.name.lower()] * has_status, *[which] * is_digest])
+    return grid
+
+
+def counted(results: Sequence[CurveResult]) -> str:
+    """How many curves have become what, which of them have a row, and where all numbers are."""
+    counts = Counter(result.status for result in results)
+    states = ", ".join(f"{count} {status.name.lower()}" for status, count in sorted(counts.items()))
+    lacking = len(results) - counts[Status.CONVERGED]
+    is_short = len(results) > MOST_ROWS and lacking > MOST_FAILED
+    shown = f"; of those that are not converged the first {MOST_FAILED} are shown" if is_short else ""
+    return f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc"
+
+
+def varied_columns(case: Case) -> list[Column]:
+    """A column for each varied key, without its section."""
+    return [Column(key.partition(".")[2]) for key in case.vary.keys]
+
+
+def theory_heading(equation: str, *, is_exact: bool) -> str:
+    """Heading of a column of perturbation theory, starred where it has another noise than some solution."""
+    return f"Eq. {equation}{'*' if is_exact else ''}"
+
+
+def index_text(name: str, result: CurveResult, most: int) -> str:
+    """An index of a curve with its digits, or that there is none."""
+    estimate = result.estimates[name]
+    if estimate is not None:
+        return digits(estimate.value, estimate.error_estimate, most)
+    return "none" if name == CRITICAL_RESTITUTION.name or grows_far_out(result.curve.problem) else "none found"
+
+
+def digits(value: float, error: float, most: int = 13) -> str:
+    """A number with the digits that its error leaves, at most so many significant ones; 0 where it leaves none."""
+    if abs(value) <= error:
+        return "0"
+    count = most if error <= 0 else math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
+    return f"{value:#.{min(max(count, 1), most)}g}".rstrip(".")
+
+
+def _quantities(case: Case, *, is_exact: bool) -> list[Shown]:
+    """What has a column, the most important first."""
+    first = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
+    names = asked(case)
+    if case.figure.x != "p":
+        pairs = ((_index(each, 0), _theory(each, is_exact=is_exact)) for each in first if each.name in names)
+        return [each for pair in pairs for each in pair]
+    ordered = [*(each for each in first if each.name in names)]
+    ordered += [INDICES[name] for name in names if INDICES[name] not in first]
+    return [*(_index(each, rank) for rank, each in enumerate(ordered)), *_moments(case, is_alone=not ordered)]
+
+
+def _treatments(case: Case) -> Sequence[Value]:
+    """Those of the noise of all curves."""
+    key = "noise.treatment"
+    return case.vary.values(key) if key in case.vary.keys else (case.noise.treatment,)
+
+
+def _index(index: Index, rank: int) -> Shown:
+    def of(result: CurveResult) -> float | None:
+        return _value(result.estimates[index.name])
+
+    def text(result: CurveResult) -> str:
+        is_lost = of(result) is None and result.status != Status.CONVERGED
+        return "" if is_lost else index_text(index.name, result, DIGITS)
+
+    return Shown(index.symbol, of, text, rank + 1 if rank > 1 else 0)
+
+
+def _theory(index: Index, *, is_exact: bool) -> Shown:
+    """Its closed form."""
+    return Shown(
+        theory_heading(index.equation, is_exact=is_exact),
+        None,
+        lambda result: f"{index.theory(result.curve.problem):.6g}",
+        rank=1,
+    )
+
+
+def _moments(case: Case, *, is_alone: bool) -> list[Shown]:
+    """Λ at the p of a case if these are few; otherwise at the ends, if nothing else is there."""
+    if MOMENT.name not in case.output.quantities:
+        return []
+    p = [float(each) for each in case.p if each]
+    if len(p) > MOST_MOMENTS:
+        p = [p[0], p[-1]] if is_alone else []
+    return [_moment(each, 0 if is_alone else 2) for each in p]
+
+
+def _moment(p: float, rank: int) -> Shown:
+    def found(result: CurveResult) -> tuple[float, float] | None:
+        [places] = np.nonzero(result.moments.p == p)
+        moments = result.moments
+        return (float(moments.value[places[0]]), float(moments.error_estimate[places[0]])) if places.size else None
+
+    def of(result: CurveResult) -> float | None:
+        pair = found(result)
+        return pair and pair[0]
+
+    def text(result: CurveResult) -> str:
+        pair = found(result)
+        return "" if pair is None else digits(*pair, most=DIGITS)
+
+    return Shown(f"Λ({p:g})", of, text, rank)
+
+
+def _value(estimate: Estimate | None) -> float | None:
+    return None if estimate is None else estimate.value
+
+
+def _chosen(results: Sequence[CurveResult], quantities: Sequence[Shown]) -> list[tuple[str, CurveResult]]:
+    """The curves with the extreme values of the first quantities, and some that failed, each with the reason."""
+    shown = [(each.heading, each.of) for each in quantities if each.of is not None]
+    extremes: dict[tuple[str, str], tuple[float, CurveResult]] = {}
+    failed: list[CurveResult] = []
+    for result in results:
+        if result.status and len(failed) < MOST_FAILED:
+            failed.append(result)
+        for heading, of in shown[:MOST_EXTREMES]:
+            if (value := of(result)) is None:
+                continue
+            for word, sign in (("least", 1), ("largest", -1)):
+                known = extremes.get((word, heading))
+                if known is None or sign * value < sign * known[0]:
+                    extremes[word, heading] = value, result
+    reasons: dict[int, list[str]] = {}
+    curves = {result.curve.number: result for result in failed}
+    for (word, heading), (_, result) in extremes.items():
+        curves[result.curve.number] = result
+        reasons.setdefault(result.curve.number, []).append(f"{word} {heading}")
+    return [(", ".join(reasons.get(number, [])), curves[number]) for number in sorted(curves)]

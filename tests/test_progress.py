@@ -1,0 +1,130 @@
+"""Progress by phases: what is counted, the time to go, and what a file and a terminal see of it."""
+
+import io
+import re
+
+import pytest
+from rich.console import Console
+
+from fpsolve.progress import Bars, Stretch, hidden
+from fpsolve.workflow.watch import MOMENTS, PERCENT, POINTS, SETS, Phase
+
+SOLVING = Phase("case", "solving", 400, SETS)
+
+
+class Clock:
+    """A time that passes as it is told."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+def console(width=80, **options):
+    return Console(file=io.StringIO(), width=width, **options)
+
+
+def test_the_time_to_go_follows_from_the_sets_of_this_run_alone():
+    stretch = Stretch(SOLVING, begun=0.0)
+    stretch.advance(300, 0, known=True)
+    assert stretch.left(60.0) is None
+    stretch.advance(20, 0, known=False)
+    assert stretch.left(60.0) == pytest.approx(80 * 60.0 / 20)
+    assert stretch.count == "320 of 400 sets"
+
+
+@pytest.mark.parametrize(
+    ("phase", "done", "failed", "told"),
+    [
+        (SOLVING, 12, 3, "12 of 400 sets, 3 failed"),
+        (Phase("case", "solving", 33, MOMENTS), 5, 0, "5 of 33 p"),
+        (Phase("case", "simulation", 300, PERCENT), 60, 0, "20%"),
+        (Phase("case", "lines", None, POINTS), 17, 0, "17 points"),
+        (Phase("case", "figures"), 0, 0, ""),
+    ],
+)
+def test_what_is_counted(phase, done, failed, told):
+    stretch = Stretch(phase, begun=0.0)
+    stretch.advance(done, failed, known=False)
+    assert stretch.count == told
+    if phase.total is None:
+        assert stretch.left(10.0) is None
+
+
+def test_a_file_gets_a_line_each_tenth_of_a_long_phase(clock):
+    screen = console()
+    with Bars(screen, clock).phase(SOLVING) as advance:
+        advance(200, known=True)
+        for number in range(200):
+            clock.now += 1.0
+            advance(failed=number == 3)
+    lines = screen.file.getvalue().splitlines()
+    assert lines == [
+        f"case, solving: {n} of 400 sets, 1 failed, 0:0{(400 - n) // 60}:{(400 - n) % 60:02} left"
+        for n in (240, 280, 320, 360)
+    ]
+
+
+def test_a_file_gets_no_line_of_a_short_phase(clock):
+    screen = console()
+    with Bars(screen, clock).phase(SOLVING) as advance:
+        for _ in range(400):
+            clock.now += 0.02
+            advance()
+    assert screen.file.getvalue() == ""
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_a_terminal_shows_all_phases_in_lines_that_fit(clock, width, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    screen = console(width, force_terminal=True, color_system=None, legacy_windows=False)
+    bars = Bars(screen, clock)
+    with bars.phase(SOLVING) as advance:
+        advance(100, known=True)
+        clock.now += 60.0
+        advance(30, failed=3)
+        bars._display.refresh()
+    with bars.phase(Phase("case", "figures")):
+        bars._display.refresh()
+    lines = re.split(r"[\r\n]+", re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.file.getvalue()))
+    assert any("130 of 400 sets, 3 failed" in line and "0:09:00 left" in line for line in lines)
+    assert any("figures" in line for line in lines)
+    assert max(map(len, lines)) <= width
+    assert not any("…" in line for line in lines)
+    assert "solving" in lines[-2] or "solving" in lines[-3]  # shown beside the figures
+
+
+def test_two_phases_show_at_a_time(clock, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    screen = console(100, force_terminal=True)
+    bars = Bars(screen, clock)
+    with (
+        bars.phase(Phase("case", "scan", 4, "nodes")) as progress,
+        bars.phase(Phase("case", "lines", unit=POINTS)) as stepped,
+    ):
+        progress()
+        stepped()
+    assert "1 of 4 nodes" in screen.file.getvalue()
+    assert "1 points" in screen.file.getvalue()
+
+
+def test_a_dumb_terminal_is_like_a_file(clock, monkeypatch):
+    monkeypatch.setenv("TERM", "dumb")
+    screen = console(force_terminal=True)
+    with Bars(screen, clock).phase(SOLVING) as advance:
+        clock.now += 100.0
+        advance(40)
+    assert screen.file.getvalue() == "case, solving: 40 of 400 sets, 0:15:00 left\n"
+
+
+def test_nothing_is_seen_of_hidden_phases(capsys):
+    with hidden(SOLVING) as advance:
+        advance(400, failed=3, known=True)
+    assert capsys.readouterr() == ("", "")
