@@ -154,7 +154,7 @@ class Pool:
             return broken
         except OSError as failure:
             reason = failure.strerror or failure
-            raise FpsolveError(f"the processes cannot be started: {reason}; use fewer --jobs") from failure
+            raise FpsolveError(f"the processes cannot be started: {reason}; use fewer jobs") from failure
 
     def _one_by_one(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
         """The items that were under way as a worker died, again, so that it shows which one was the reason."""
@@ -189,7 +189,7 @@ def several(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
     """
     if count is not None and (isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_JOBS):
         known = f"must be a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
-        raise FpsolveError(f"--jobs (in Python jobs): got {count!r}; {known}")
+        raise FpsolveError(f"jobs: got {count!r}; {known}")
     size = min(count or processors(), tasks)
     if size == 1:
         return here()

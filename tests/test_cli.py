@@ -450,8 +450,9 @@ def test_a_lost_working_folder_exits_2(case, tmp_path):
 
 
 def test_a_short_interval_gives_a_warning(case, capsys):
-    assert main(["run", case, "--set", "mesh={ xi_min = -4.0, xi_max = 4.0 }"]) == 0
+    assert main(["run", case, "--set", "mesh={ xi_min = -4.0, xi_max = 4.0 }"]) == NOT_CONVERGED
     err = capsys.readouterr().err
+    assert "not converged: test, noise.D0 = 0.1: no δ_p" in err  # whose error leaves it no digit
     assert "warning: test, noise.D0 = 1: rtol = 1e-08 is not met" in err
     assert "[mesh] phi_cells, xi_cells" in err
 
@@ -582,8 +583,8 @@ def test_json_of_several_cases_is_a_line_each_and_warnings_are_apart(case, tmp_p
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--jobs", "0"], "--jobs: got 0; must be at least 1"),
-        (["--jobs", "-3"], "--jobs: got -3; must be at least 1"),
+        (["--jobs", "0"], "jobs: got 0; must be a whole number from 1 to 1000"),
+        (["--jobs", "-3"], "jobs: got -3; must be a whole number from 1 to 1000"),
         (["--jobs", "2", "--scheduler", "tcp://host:8786"], "name one of them"),
         (["--scheduler", "host"], 'got "host" as the address of a scheduler; must be one such as tcp://host:8786'),
         (["--jobs", "2.5"], 'got "2.5"; must be a whole number'),

@@ -222,7 +222,7 @@ def test_processes_that_cannot_be_started():
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (len(list(Path("/dev/fd").iterdir())) + 12, before[1]))
     try:
-        with several(100) as workers, pytest.raises(FpsolveError, match=r"cannot be started: .*; use fewer --jobs"):
+        with several(100) as workers, pytest.raises(FpsolveError, match=r"cannot be started: .*; use fewer jobs"):
             list(workers.map(square, range(300)))
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, before)

@@ -169,7 +169,7 @@ MANY = 'vary."noise.D0"={start=0.1, stop=1.0, num=11}'
 
 def test_of_many_curves_only_the_first_density_is_written(tmp_path):
     case, calls = write(tmp_path, TEXT.replace("eigenfunctions = [2.0]", ""), [MANY]), []
-    for count in (33, 66):
+    for count in (11, 22):
         fpsolve.run(case, tmp_path / "out", progress=lambda: calls.append(1))
         assert len(calls) == count
         assert {name for name in files(tmp_path / "out/test") if "vt" in name or "pv" in name} == {"density.vtu"}
@@ -553,7 +553,7 @@ def test_progress_counts_what_is_known(tmp_path, sets):
     for _ in range(2):
         calls = []
         fpsolve.run(case, tmp_path, progress=lambda calls=calls: calls.append(1))
-        assert len(calls) == 3 * case.planned
+        assert len(calls) == (case.planned if case.planned > 1 else 3)
 
 
 def test_expectations_are_compared_where_they_select(tmp_path):
