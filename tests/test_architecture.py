@@ -37,12 +37,13 @@ ROOMS = {
         "regions",
     ],
     "case": [
-        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "chart", "output", "curves"),
-        *("remedies", "refusals", "case"),
+        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "figure", "chart", "output"),
+        *("curves", "remedies", "refusals", "case"),
     ],
     "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart"],
     "output": [
-        *("vtk", "provenance", "records", "tables", "datasets", "plots", "figures", "charts", "terminal"),
+        *("vtk", "provenance", "records", "tables", "datasets", "frame", "series", "many", "plots", "maps"),
+        *("charts", "figures", "terminal"),
     ],
     "workflow": ["folders", "sets", "simulations", "cases"],
     "arguments": [],

@@ -230,7 +230,7 @@ LINES = [  # key, a good line, what stands there instead, what the message says
         "figure.y",
         'x = "p"',
         'x = "noise.D0"',
-        'got "moment"|"lyapunov_exponent" or "stability_index"|write one',
+        'got "moment"|{ moment = 2.0 }, "lyapunov_exponent" or "stability_index"|write one',
     ),
     (
         "figure.x",
