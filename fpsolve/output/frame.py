@@ -109,13 +109,13 @@ def add_legend(figure: Any, entries: Sequence[tuple[str, Any]]) -> None:
     """A legend below the axes, in as many columns as fit; the figure grows by it."""
     if not entries:
         return
-    room = 0.97 * figure.get_figwidth()
-    wide = room - 4 * _font("legend.fontsize") / 72
-    labels = [in_lines(figure, label.split(", "), wide, _font("legend.fontsize"), ", ") for label, _ in entries]
+    room, letters = 0.98 * figure.get_figwidth(), _font("legend.fontsize")
+    labels = [in_lines(figure, label.split(", "), room - letters / 18, letters, ", ") for label, _ in entries]
     handles = [handle for _, handle in entries]
-    for columns in range(min(4, len(entries)), 0, -1):
-        style = {"loc": "outside lower center", "ncols": columns, "columnspacing": 1.4, "handlelength": 1.8}
-        legend = figure.legend(handles, labels, **style)
+    several = [(columns, share) for columns in (4, 3, 2) for share in (1.0, 0.9) if columns <= len(entries)]
+    for columns, share in [*several, (1, 1.0)]:
+        style = {"ncols": columns, "columnspacing": 1.2, "handlelength": 1.8, "fontsize": share * letters}
+        legend = figure.legend(handles, labels, loc="outside lower center", **style)
         box = legend.get_window_extent(figure.canvas.get_renderer())
         if box.width <= room * figure.dpi or columns == 1:
             break

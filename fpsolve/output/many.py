@@ -53,7 +53,7 @@ def draw_roots(axes: Any, series: Sequence[Series]) -> None:
     share = share_of(axes.figure)
     axes.scatter(
         [series[i].root for i in chosen], np.zeros(len(chosen)), marker="|", s=150 * share**2, linewidths=1.2 * share,
-        color=rgba[chosen], zorder=4,
+        color=rgba[chosen], zorder=4, rasterized=len(series) > MOST_VECTORS,
     )  # fmt: skip
 
 

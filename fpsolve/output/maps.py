@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,8 +57,6 @@ def write_map(
     setting: FigureSection,
 ) -> None:
     """Draw a map, and write it to files whose endings tell the format."""
-    from matplotlib.ticker import ScalarFormatter
-
     with canvas(paths, SIZES[setting.width]) as figure:
         x, y = (parameter_of(key).timed(setting.time_unit) for key in plane.keys)
         axes = axes_of(figure, x, y)
@@ -69,9 +68,7 @@ def write_map(
         entries = _gaps(axes, plane, edges, quantity) + _zeros(axes, plane)
         bar = figure.colorbar(picture, ax=axes, pad=0.02)
         bar.set_label(named(figure, quantity.timed(setting.time_unit), 0.75 * figure.get_figheight()))
-        if isinstance(bar.formatter, ScalarFormatter):
-            bar.formatter.set_powerlimits((-2, 3))
-            bar.formatter.set_useMathText(True)
+        _tick(bar, share_of(figure))
         add_legend(figure, entries)
         add_heading(figure, title, parameters)
 
@@ -84,6 +81,25 @@ def _norm(values: FloatArray) -> Any:
     limit = float(np.max(sizes, initial=0.0)) or 1.0
     middle = float(np.median(sizes)) if sizes.size else limit
     return Normalize(-limit, limit) if limit < 4 * middle else AsinhNorm(middle, -limit, limit)
+
+
+def _tick(bar: Any, share: float) -> None:
+    """Numbers beside the colour bar, with room between them."""
+    from matplotlib.colors import AsinhNorm
+    from matplotlib.ticker import FixedLocator, StrMethodFormatter
+
+    if not isinstance(bar.norm, AsinhNorm):
+        bar.formatter.set_powerlimits((-2, 3))
+        bar.formatter.set_useMathText(True)
+        return
+    size, apart = bar.norm.vmax, 0.06 if share > 0.8 else 0.08
+    chosen = [0.0]
+    for decade in range(math.ceil(math.log10(size)) - 8, math.floor(math.log10(size)) + 1):
+        if bar.norm(10.0**decade) - bar.norm(chosen[-1]) >= apart:
+            chosen.append(10.0**decade)
+    chosen = chosen if len(chosen) > 1 else [0.0, float(f"{0.8 * size:.0e}")]
+    bar.ax.yaxis.set_major_locator(FixedLocator([*(-value for value in chosen[:0:-1]), *chosen]))
+    bar.ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
 def _edges(values: FloatArray) -> FloatArray:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _DOT: dict[str, Any] = {"fmt": ".", "color": "black", "zorder": 5}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
-_LENGTH = 0.16
+_LENGTH = 0.2
 """Of a tangent, as a share of the width of the axes."""
 _GREY = {"color": "0.35"}
 
@@ -170,7 +170,7 @@ def _mark(axes: Any, series: Sequence[Series]) -> Entries:
         handle = axes.plot([], [], **tick, **_GREY)[0]
         entries.append((f"{STABILITY_INDEX.words} {STABILITY_INDEX.latex}", handle))
     if any(item.slope is not None for item in series):
-        _tangents(axes, series, colours, 1.0 * share if is_many else 3.0 * share)
+        _tangents(axes, series, colours, 1.0 * share if is_many else 2.6 * share)
         line = axes.plot([], [], linewidth=3 * share, solid_capstyle="butt", **_GREY)[0]
         entries.append((f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$", line))
     return entries
@@ -190,7 +190,8 @@ def _tangents(axes: Any, series: Sequence[Series], colours: Any, width: float) -
         rise = slope * (right - left) / (high - low) * box.height / box.width  # on paper
         half = 0.5 * _LENGTH * (right - left) / np.hypot(1, rise)
         paths.append([(-half, -half * slope), (half, half * slope)])
-    lines = LineCollection(
-        paths, colors=[colours[i] for _, i in slopes], linewidths=width, capstyle="butt", zorder=3.5, alpha=0.9
-    )
-    axes.add_collection(lines, autolim=False)
+    style: dict[str, Any] = {"capstyle": "butt", "zorder": 3.5}
+    edge = LineCollection(paths, colors="black", linewidths=1.5 * width, **style)
+    inner = LineCollection(paths, colors=[colours[i] for _, i in slopes], linewidths=width, **style)
+    for lines in (edge, inner):
+        axes.add_collection(lines, autolim=False)

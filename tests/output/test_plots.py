@@ -80,7 +80,7 @@ def marks(figure):
 def test_stability_index_is_marked_on_the_zero_line(drawn, tmp_path):
     others = [series(root=1.0), series(), series(root=-0.5)]
     write_figure(others, "p", MOMENT, "Title", [tmp_path / "figure.png"])
-    lines = [line for line in drawn[0].axes[0].lines if line.get_xdata().size]
+    lines = [line for line in drawn[0].axes[0].lines if np.size(line.get_xdata())]
     curves = [line.get_color() for line in lines if line.get_marker() in ("o", "s", "D")]
     assert marks(drawn[0]) == [(1.0, 0.0, curves[0]), (-0.5, 0.0, curves[2])]
     assert legend(drawn[0]).count(r"stability index $\delta_p$") == 1
