@@ -6,6 +6,7 @@ What keys of the oscillator, the noise and the budget mean stands where these do
 from __future__ import annotations
 
 import math
+import sys
 from bisect import bisect_left
 from collections.abc import Container, Iterator, Mapping
 from functools import cached_property
@@ -236,7 +237,7 @@ def _where(value: Any) -> Any:
 
 def is_number(value: Any) -> bool:
     """Whether a value of TOML is a finite number."""
-    return type(value) in (int, float) and abs(value) < math.inf
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
 class Expectation(Section):

@@ -16,6 +16,8 @@ from fpsolve.pictures import plain_numbers
 
 MOST_VECTORS = 1000
 """Curves up to which a PDF holds each as a line, not all as a picture."""
+MOST_TALL = 50
+"""Curves up to which the ticks of stability indices are tall; more of them would cover what is near zero."""
 Entries = list[tuple[str, Any]]
 
 
@@ -23,19 +25,14 @@ def draw_many(figure: Any, axes: Any, series: Sequence[Series], equation: str, t
     """Draw curves and their colour bar; what the legend says."""
     told, share = Telling.of([item.varied for item in series]), share_of(figure)
     colours = _scale(told.colours)
-    look = {"rasterized": len(series) > MOST_VECTORS, "alpha": 1.0 if len(series) <= 100 else 0.7}
-    widths = share * (1.2 if len(series) <= 50 else 0.8 if len(series) <= MOST_VECTORS else 0.5)
+    look = {
+        "rasterized": len(series) > MOST_VECTORS,
+        "alpha": 1.0 if len(series) <= 100 else 0.7,
+        "linewidths": share * (1.2 if len(series) <= 50 else 0.8 if len(series) <= MOST_VECTORS else 0.5),
+    }
     entries: Entries = []
     for style, places in _by_style(told).items():
-        _lines(
-            axes,
-            [series[i] for i in places],
-            told.colours[places],
-            colours,
-            linestyles=[style],
-            linewidths=widths,
-            **look,
-        )
+        _lines(axes, [series[i] for i in places], told.colours[places], colours, linestyles=[style], **look)
     _points(axes, series, told.colours, colours)
     entries += _styles(axes, told, time_unit)
     entries += _theory(axes, _outermost(series, told), equation)
@@ -51,10 +48,9 @@ def draw_roots(axes: Any, series: Sequence[Series]) -> None:
     rgba = _scale(told.colours).to_rgba(told.colours)
     chosen = [i for i, item in enumerate(series) if item.root is not None]
     share = share_of(axes.figure)
-    axes.scatter(
-        [series[i].root for i in chosen], np.zeros(len(chosen)), marker="|", s=150 * share**2, linewidths=1.2 * share,
-        color=rgba[chosen], zorder=4, rasterized=len(series) > MOST_VECTORS,
-    )  # fmt: skip
+    size = (150 if len(series) <= MOST_TALL else 40) * share**2
+    style = {"marker": "|", "linewidths": 1.2 * share, "zorder": 4, "rasterized": len(series) > MOST_VECTORS}
+    axes.scatter([series[i].root for i in chosen], np.zeros(len(chosen)), s=size, color=rgba[chosen], **style)
 
 
 def colours_of(series: Sequence[Series]) -> Any:

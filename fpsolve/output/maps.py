@@ -13,6 +13,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.figure import FigureSection
 from fpsolve.case.vary import Vary
+from fpsolve.exponent.quantities import Index
 from fpsolve.model.quantity import Quantity, parameter_of
 from fpsolve.output.frame import SIZES, add_heading, add_legend, axes_of, bounded, canvas, named, share_of
 from fpsolve.output.many import Entries
@@ -92,7 +93,7 @@ def _tick(bar: Any, share: float) -> None:
         bar.formatter.set_powerlimits((-2, 3))
         bar.formatter.set_useMathText(True)
         return
-    size, apart = bar.norm.vmax, 0.06 if share > 0.8 else 0.08
+    size, apart = float(bar.norm.vmax or 1.0), 0.06 if share > 0.8 else 0.08
     chosen = [0.0]
     for decade in range(math.ceil(math.log10(size)) - 8, math.floor(math.log10(size)) + 1):
         if bar.norm(10.0**decade) - bar.norm(chosen[-1]) >= apart:
@@ -121,13 +122,19 @@ def _gaps(axes: Any, plane: Plane, edges: tuple[FloatArray, FloatArray], quantit
     plain: dict[str, Any] = {"facecolor": "0.8", "edgecolor": "none", "linewidth": 0}
     for where, style, words in (
         (plane.failed, hatched, "failed or not solved"),
-        (absent, plain, f"no {quantity.words} where it is looked for"),
+        (absent, plain, _none(quantity)),
     ):
         cells = [_cell(edges, i, j) for i, j in np.argwhere(where)]
         if cells:
             axes.add_collection(PatchCollection([Rectangle(*cell) for cell in cells], **style))
             entries.append((words, Patch(**style)))
     return entries
+
+
+def _none(quantity: Quantity) -> str:
+    """That there is none where it is sought."""
+    where = " from {:g} to {:g}".format(*quantity.interval) if isinstance(quantity, Index) else ""
+    return f"no {quantity.words}{where}"
 
 
 def _cell(edges: tuple[FloatArray, FloatArray], row: int, column: int) -> tuple[tuple[float, float], float, float]:

@@ -46,10 +46,9 @@ def _result(case, curve, *, has_failed):
     theory = second_order(curve.problem)
     p = case.p[:0] if has_failed else case.p
     value, nothing = theory.moment_exponent(p), np.zeros(p.size)
-    found = {name: index.theory(curve.problem) for name, index in INDICES.items()}
-    estimates = {
-        name: None if has_failed or not abs(each) <= 20 else Estimate(each, 0.0, 1.0) for name, each in found.items()
-    }
+    found = {name: getattr(theory, name) for name in ("lyapunov_exponent", "stability_index")}
+    known = {name: Estimate(each, 0.0, 1.0) for name, each in found.items() if not has_failed and abs(each) <= 20}
+    estimates = {**dict.fromkeys(INDICES), **known}
     failures = (Failure(None, "it was too hard"),) if has_failed else ()
     return CurveResult(curve, Moments(p, value, nothing, nothing, nothing, value, p[:0]), estimates, failures=failures)
 

@@ -238,7 +238,7 @@ def test_what_failed_is_hatched_and_what_is_not_there_is_grey(drawn, tmp_path):
     assert (len(failed.get_paths()), failed.get_hatch()) == (3, "/////")
     assert len(absent.get_paths()) > 0
     assert absent.get_hatch() is None
-    assert words(drawn[0])[:2] == ["failed or not solved", "no stability index where it is looked for"]
+    assert words(drawn[0])[:2] == ["failed or not solved", "no stability index from -20 to 20"]
 
 
 def chart(folder, x, y, *, r0=0.95, complete=True):
