@@ -77,7 +77,7 @@ def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
     if simulated.response is None:
         return
     pictures = [folder / f"response{simulated.curve.suffix}.{ending}" for ending in ("png", "pdf")]
-    held = held_in_words(simulated.curve, (), case.figure.time_unit)
+    held = held_in_words(simulated.curve, (), "time")
     write_response_figure(simulated.response, case.headline, pictures, held)
 
 

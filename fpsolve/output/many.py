@@ -132,6 +132,7 @@ def _simulated(axes: Any, series: Sequence[Series]) -> Entries:
         "fmt": ".",
         "color": "black",
         "markersize": 3 * share,
+        "markeredgewidth": share,
         "elinewidth": 0.8 * share,
         "zorder": 5,
     }

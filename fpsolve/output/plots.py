@@ -137,7 +137,7 @@ def _draw(axes: Any, item: Series, color: str, marker: str, linestyle: Any) -> A
 
 def _dots(axes: Any) -> dict[str, Any]:
     share = share_of(axes.figure)
-    return {**_DOT, "markersize": 5 * share, "elinewidth": 1.1 * share, "capsize": 4 * share}
+    return {**_DOT, "markersize": 5 * share, "markeredgewidth": share, "elinewidth": 1.1 * share, "capsize": 4 * share}
 
 
 def _methods(axes: Any, series: Sequence[Series], equation: str) -> Entries:

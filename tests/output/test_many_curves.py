@@ -8,9 +8,11 @@ import matplotlib.figure
 import numpy as np
 import pytest
 
+from fpsolve.output.datasets import dataset_of
 from fpsolve.output.figures import draw
 from fpsolve.output.maps import Plane
 from fpsolve.output.series import Telling
+from fpsolve.pictures import label_of
 from fpsolve.theory.perturbation import second_order
 from tests.output.drawing import assert_sound, case_of, drawn_case, results_of, texts, tick_labels, words
 
@@ -216,6 +218,19 @@ def test_a_moment_over_a_parameter(drawn, tmp_path):
     points = next(line for line in axes.lines if line.get_marker() == "o" and np.size(line.get_xdata()) == 9)
     theory = next(line for line in axes.lines if np.size(line.get_xdata()) > 100)
     np.testing.assert_allclose(np.interp(points.get_xdata(), *theory.get_data()), points.get_ydata(), rtol=1e-3)
+
+
+def test_a_parameter_is_called_alike_in_all_figures(drawn, tmp_path):
+    """In figures over it, beside their colours, and in plots of results.nc."""
+    case = drawn_case(tmp_path, PLANE)
+    drawn_case(tmp_path, [intensities(9), over("noise.D0")])
+    drawn_case(tmp_path, [intensities(9)])
+    along, over_it, bar = (
+        drawn[0].axes[0].get_ylabel(), drawn[1].axes[0].get_xlabel(), drawn[2].axes[1].get_ylabel(),
+    )  # fmt: skip
+    found = dataset_of(case, results_of(case), {})
+    assert {along, over_it, bar, label_of(found["noise.D0"])} == {"noise intensity $D_0$ (1/time)"}
+    assert drawn[2].axes[0].get_xlabel() == label_of(found["p"]) == "order of the moment $p$"
 
 
 def test_a_map_is_centred_at_zero_and_has_its_line(drawn, tmp_path):
