@@ -325,3 +325,12 @@ def test_ten_thousand_curves_take_seconds(tmp_path):
     draw(case, results, [], tmp_path)
     assert time.process_time() - started < 20  # some 4 where nothing else runs
     assert (tmp_path / "figure.pdf").stat().st_size < 2_000_000
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", ["one", "two", "nine", "over a parameter", "fifty over a parameter", "map"])
+@pytest.mark.parametrize("most", [0, 1])
+def test_what_failed_leaves_a_figure(sound, tmp_path, name, most):
+    """Also where nothing is solved, or one set alone."""
+    drawn_case(tmp_path, FIGURES[name], fails=lambda number: number > most)
+    assert len(sound) == 2
