@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from decimal import Decimal
 from numbers import Real
@@ -24,6 +24,15 @@ def one(x: Any) -> Any:
 def identity(x: Any) -> Any:
     """The coefficient x."""
     return x
+
+
+def is_log_spaced(values: Iterable[Any]) -> bool:
+    """Whether several positive numbers lie more evenly by their ratios than by their differences, and far apart."""
+    distinct = np.unique(np.array([value for value in values if not isinstance(value, str)], dtype=float))
+    if distinct.size < 3 or distinct[0] <= 0 or distinct[-1] < 4 * distinct[0]:
+        return False
+    steps, factors = np.diff(distinct), np.diff(np.log(distinct))
+    return bool(np.std(factors) * np.mean(steps) < np.std(steps) * np.mean(factors))
 
 
 def real_number(value: Any, name: str) -> float:

@@ -124,13 +124,19 @@ def draw_bars(
     axes.invert_yaxis()
 
 
-def plain_numbers(side: Any, start: float, stop: float) -> None:
-    """Numbers such as 0.5, 1, 2 on a logarithmic axis of a few decades."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+def plain_numbers(side: Any, start: float, stop: float, share: float = 1.0) -> None:
+    """Numbers such as 0.5, 1, 2 on a logarithmic axis of a few decades; fewer of them where letters take more room.
+
+    Args:
+        share: of letters, see `Size`; those of a small figure are large for it.
+    """
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
     decades = math.log10(stop / start)
     if decades < 4:
-        side.set_major_locator(LogLocator(subs=(1, 2, 5) if decades < 2.5 else (1,)))
+        few = MaxNLocator(5 if share > 0.8 else 4)
+        many = LogLocator(subs=(1, 2, 5) if decades < (2.5 if share > 0.8 else 1.8) else (1,))
+        side.set_major_locator(few if decades < 0.7 else many)
         side.set_major_formatter(StrMethodFormatter("{x:g}"))
         side.set_minor_formatter(NullFormatter())
 

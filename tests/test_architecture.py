@@ -50,13 +50,13 @@ ROOMS = {
         "regions",
     ],
     "case": [
-        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "chart", "output", "curves"),
-        *("remedies", "refusals", "case"),
+        *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "figure", "chart", "output"),
+        *("curves", "remedies", "refusals", "case"),
     ],
     "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart"],
     "output": [
-        *("vtk", "provenance", "records", "tables", "datasets", "plots", "figures", "charts"),
-        *("screen", "remarks", "summary", "terminal"),
+        *("vtk", "provenance", "records", "tables", "datasets", "frame", "series", "many", "plots", "maps"),
+        *("charts", "figures", "screen", "remarks", "summary", "terminal"),
     ],
     "workflow": ["watch", "folders", "sets", "simulations", "cases"],
     "progress": [],

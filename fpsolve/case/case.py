@@ -12,12 +12,12 @@ from pydantic import BeforeValidator, InstanceOf, PrivateAttr, ValidationError, 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartSection
 from fpsolve.case.curves import Curve, make_curve
+from fpsolve.case.figure import FigureSection
 from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.output import EIGENFUNCTIONS, OutputSection
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
     Expectation,
-    FigureSection,
     MeshSection,
     Moments,
     MonteCarloSection,
@@ -159,6 +159,11 @@ class Case(Section):
     def headline(self) -> str:
         """The title, and in a second line what the command line has changed of what is computed."""
         return self._with_changes(self.title)
+
+    @property
+    def caption(self) -> str:
+        """The same above its figure, which may have a title of its own."""
+        return self._with_changes(self.figure.title or self.title)
 
     def heading(self, curve: Curve) -> str:
         """The headline, with which of the curves."""

@@ -20,12 +20,12 @@ from pydantic import ValidationError
 from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartAxis, ChartSection
 from fpsolve.case.curves import make_curve
+from fpsolve.case.figure import FigureSection, figure_refusals
 from fpsolve.case.messages import Refusal, nearest, shown
 from fpsolve.case.output import OutputSection
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.case.sections import (
     Expectation,
-    FigureSection,
     MeshSection,
     Moments,
     MonteCarloSection,
@@ -33,7 +33,7 @@ from fpsolve.case.sections import (
     same,
 )
 from fpsolve.case.set_file import FileVary
-from fpsolve.case.vary import ABSCISSAE, WORDS, Vary, assignments
+from fpsolve.case.vary import WORDS, Vary, assignments
 from fpsolve.errors import MeshError, NoSuchExponent
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Discretisation, noise_space
@@ -170,17 +170,8 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
 
 
 def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """An abscissa that is not varied, or is no number."""
-    if "vary" not in valid:
-        return
-    known = [key for key in ("p", *valid["vary"].keys) if key in ABSCISSAE]
-    if figure.x in valid["vary"].keys and figure.x not in ABSCISSAE:
-        text = f"got {shown(figure.x)}, whose values are texts; must be one of {', '.join(known)}; choose one of them"
-        yield ("x",), figure.x, text
-    elif figure.x not in known:
-        guess = nearest(figure.x, known)
-        text = f"got {shown(figure.x)};{guess} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
-        yield ("x",), figure.x, text
+    """What the other sections do not allow."""
+    return figure_refusals(figure, valid)
 
 
 def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -188,9 +179,15 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
     yield from _of_orders(valid, wanted, "output.eigenfunctions")
     figure: FigureSection | None = valid.get("figure")
-    if figure is not None and figure.model_fields_set and figure.y not in output.quantities:
-        text = f"has no {shown(figure.y)}, which figure.y draws; add it, or let figure.y be one of the names here"
+    if figure is None:
+        return
+    if figure.model_fields_set & {"x", "y"} and figure.needed not in output.quantities:
+        text = f"has no {shown(figure.needed)}, which figure.y draws; add it, or let figure.y be one of the names here"
         yield ("quantities",), output.quantities, text
+    for name in figure.mark if "mark" in figure.model_fields_set else ():
+        if name not in output.quantities:
+            text = f"has no {shown(name)}, which figure.mark marks; add it, or remove it from figure.mark"
+            yield ("quantities",), output.quantities, text
 
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:

@@ -6,6 +6,7 @@ What keys of the oscillator, the noise and the budget mean stands where these do
 from __future__ import annotations
 
 import math
+import sys
 from bisect import bisect_left
 from collections.abc import Container, Iterator, Mapping
 from functools import cached_property
@@ -18,7 +19,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Fiel
 from fpsolve.arrays import FloatArray
 from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
 from fpsolve.errors import MeshError
-from fpsolve.exponent.quantities import DrawnName, QuantityName
+from fpsolve.exponent.quantities import QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, vertices_at
 from fpsolve.fem.mesh_file import read_mesh
 from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
@@ -226,34 +227,17 @@ class MonteCarloSection(Section):
     p: Annotated[NonEmpty | None, parameter("orders of the moments that are simulated", "p = [1.0, 2.0]")] = None
 
 
-class FigureSection(Section):
-    """[figure]: the axes; x is "p" or a varied key."""
-
-    x: Annotated[Text, parameter("the abscissa", 'x = "p"')] = "p"
-    y: Annotated[DrawnName, parameter("the ordinate", 'y = "moment"')] = "moment"
-
-    @model_validator(mode="after")
-    def _y_fits_x(self) -> Self:
-        if self.x == "p" and self.y != "moment":
-            remedy = 'must be "moment" where x = "p"; write y = "moment", or set x to a key of [vary]'
-        elif self.x != "p" and self.y == "moment":
-            remedy = 'must be "lyapunov_exponent" or "stability_index" where x is not "p"; write one of these'
-        else:
-            return self
-        refuse([(("y",), self.y, f'got "{self.y}"; {remedy}')])
-        return self
-
-
 def _where(value: Any) -> Any:
     """The flat table of a `where`, every entry a finite number or a text."""
     table = flat(value)
     if isinstance(table, dict):
-        refuse(((key,), item, "") for key, item in table.items() if not _is_number(item) and not isinstance(item, str))
+        refuse(((key,), item, "") for key, item in table.items() if not is_number(item) and not isinstance(item, str))
     return table
 
 
-def _is_number(value: Any) -> bool:
-    return type(value) in (int, float) and abs(value) < math.inf
+def is_number(value: Any) -> bool:
+    """Whether a value of TOML is a finite number."""
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
 class Expectation(Section):

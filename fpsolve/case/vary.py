@@ -11,7 +11,8 @@ from pydantic import Field, TypeAdapter
 from pydantic.fields import FieldInfo
 
 from fpsolve.case.sections import MAX_MOMENTS, Moments, NoiseSection, Value, Values, same
-from fpsolve.model.parameters import STRICT, symbol_of
+from fpsolve.model.parameters import STRICT
+from fpsolve.model.quantity import parameter_of
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.model.words import choices
 
@@ -107,10 +108,9 @@ def assignments(varied: Mapping[str, Value], style: str = "") -> str:
     return ", ".join(f"{key} = {written(value, style)}" for key, value in varied.items())
 
 
-def legend(varied: Mapping[str, Value]) -> str:
-    r"""The same for a figure: "$D_0$ = 0.1, treatment = exact"."""
-    names = {key: symbol_of(RECORDS[key]) or key.partition(".")[2] for key in varied}
-    return ", ".join(f"{names[key]} = {written(value)}" for key, value in varied.items())
+def legend(varied: Mapping[str, Value], time_unit: str = "time") -> str:
+    r"""The same for a figure: "$D_0$ = 0.1/time, treatment = exact"."""
+    return ", ".join(parameter_of(key).timed(time_unit).stated(value) for key, value in varied.items())
 
 
 def groups(values: Sequence[Value]) -> list[int]:

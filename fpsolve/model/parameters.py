@@ -58,12 +58,6 @@ def meaning_of(field: FieldInfo) -> str:
     return f"{meaning}, in {unit}" if unit else meaning
 
 
-def axis_title(field: FieldInfo) -> str:
-    r"""A `parameter` on an axis: "natural frequency $\omega$ (rad/time)"."""
-    unit = unit_of(field)
-    return f"{field.title} {symbol_of(field)}" + (f" ({unit})" if unit else "")
-
-
 def _extra(field: FieldInfo, name: str) -> str:
     extra = field.json_schema_extra
     return str(extra[name]) if isinstance(extra, dict) else ""

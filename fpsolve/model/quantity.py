@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from textwrap import wrap
-from typing import Any
+from typing import Any, Self
 
 from pydantic.fields import FieldInfo
 
@@ -47,6 +48,18 @@ class Quantity:
     def title(self) -> str:
         """Of an axis, in LaTeX, with the unit."""
         return title_of(self.attributes)
+
+    def timed(self, unit: str) -> Self:
+        """The same with a unit of time: "1/s" instead of "1/time"."""
+        return replace(self, unit=re.sub(r"\btime\b", unit, self.unit))
+
+    def stated(self, value: float | str) -> str:
+        r"""A value of it in a figure: "$D_0$ = 0.1/time", "impact = delta"."""
+        name = self.latex or self.name.rpartition(".")[2]
+        if isinstance(value, str):
+            return f"{name} = {value}"
+        unit = "" if self.unit in ("1", "unknown") else f" {self.unit}"
+        return f"{name} = {value:g}{unit.removeprefix(' 1')}"
 
     def variable(self, values: Any, *dims: str) -> Mapping[str, Variable]:
         """A variable of xarray, by its name."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import csv
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
@@ -12,11 +15,14 @@ import numpy as np
 from fpsolve.analysis.regions import P_BIFURCATIONS, Regions
 from fpsolve.analysis.stability import SCAN_RTOL, Boundary
 from fpsolve.analysis.zero import RTOL, Axis, Zero
+from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.case.vary import PARAMETERS
+from fpsolve.case.curves import Curve
+from fpsolve.case.figure import fixed
+from fpsolve.case.sections import Varied
 from fpsolve.files import write_csv, write_json
-from fpsolve.model.parameters import axis_title
-from fpsolve.output.plots import canvas, filled
+from fpsolve.model.quantity import parameter_of
+from fpsolve.output.frame import Size, add_heading, add_legend, canvas
 from fpsolve.output.tables import head
 from fpsolve.pictures import COLOURS, plain_numbers
 from fpsolve.study.chart import Chart, charted
@@ -40,13 +46,14 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
 def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
     """chart.png and chart.pdf: the lines, their closed forms dashed, and the regions with their names."""
     x, y = charted(case).x.axis, charted(case).y.axis
-    with canvas([folder / "chart.png", folder / "chart.pdf"], height=6.5) as figure:
-        axes = figure.add_subplot(xlabel=axis_title(PARAMETERS[x.key]), ylabel=axis_title(PARAMETERS[y.key]))
+    unit = case.figure.time_unit
+    with canvas([folder / "chart.png", folder / "chart.pdf"], Size(height=4.7)) as figure:
+        names = (parameter_of(key).timed(unit).title for key in (x.key, y.key))
+        axes = figure.add_subplot(**dict(zip(("xlabel", "ylabel"), names, strict=True)))
         axes.set(xscale=x.scale, yscale=y.scale, xlim=(x.start, x.stop), ylim=(y.start, y.stop))
         for side, frame in ((axes.xaxis, x), (axes.yaxis, y)):
             if frame.scale == "log":
                 plain_numbers(side, frame.start, frame.stop)
-        axes.set_title(filled(case.headline, 80), parse_math=False)
         small = {} if chart.regions is None else _shade(axes, chart.regions, (x, y))
         entries = {}
         for i, line in enumerate(chart.lines):
@@ -59,9 +66,51 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
             if any(start in label for label in labels):
                 entries[name] = axes.plot([], [], marker, color="0.35", markersize=7, markerfacecolor="none")[0]
         entries |= small
-        columns = 1 if small else 2  # names of regions are long
-        style = {"loc": "outside lower center", "frameon": False, "fontsize": 11, "ncols": columns}
-        figure.legend(entries.values(), entries.keys(), **style)
+        add_legend(figure, list(entries.items()))
+        add_heading(figure, case.headline, held_in_words(case.curve({}), (x.key, y.key), unit))
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """A line of a chart that was written.
+
+    Attributes:
+        branches: its points, each of shape (2, n).
+        is_whole: whether the chart was finished.
+    """
+
+    branches: tuple[FloatArray, ...] = ()
+    is_whole: bool = True
+
+
+def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varied) -> Traced:
+    """A line of the chart in a folder over two keys, if it has such a line and is of these parameters.
+
+    Args:
+        keys: of the abscissa and of the ordinate, in whichever order the chart has them.
+        parameters: those of which the chart must hold all but the two keys.
+    """
+    try:
+        summary = json.loads((folder / "chart.json").read_text(encoding="utf-8"))
+        found = summary["x"]["key"], summary["y"]["key"]
+        if set(found) != set(keys) or not summary["parameters"].items() <= parameters.items():
+            return Traced()
+        closed = [each["closed"] for line in summary["lines"] if line["line"] == zero.name for each in line["branches"]]
+        with (folder / "chart.csv").open(encoding="utf-8", newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row["line"] == zero.name]
+        branches = []
+        for number, is_closed in enumerate(closed, start=1):
+            points = [(float(row["x"]), float(row["y"])) for row in rows if row["branch"] == str(number)]
+            path = np.array(points + points[:1] if is_closed else points).T
+            branches.append(path if found == keys else path[::-1])
+        return Traced(tuple(branches), bool(summary["complete"]))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):  # there is none, or it is no chart of ours
+        return Traced()
+
+
+def held_in_words(curve: Curve, varied: Iterable[str], time_unit: str) -> list[str]:
+    """The parameters of a curve that are not varied, for below a title."""
+    return [parameter_of(key).timed(time_unit).stated(value) for key, value in fixed(curve.parameters, varied).items()]
 
 
 def _rows(chart: Chart) -> Iterator[list[Any]]:
@@ -77,8 +126,7 @@ def _rows(chart: Chart) -> Iterator[list[Any]]:
 def _summary(case: Case, chart: Chart) -> dict[str, Any]:
     x, y = charted(case).x.axis, charted(case).y.axis
     regions = () if chart.regions is None else chart.regions.each
-    [curve] = case.curves()
-    held = {key: value for key, value in curve.parameters.items() if key not in (x.key, y.key)}
+    held = {key: value for key, value in case.curve({}).parameters.items() if key not in (x.key, y.key)}
     return {
         "complete": chart.complete,
         "planned": len(charted(case).zero),

@@ -16,7 +16,7 @@ from fpsolve.case.vary import PARAMETERS
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.files import atomic
-from fpsolve.model.parameters import unit_of
+from fpsolve.model.quantity import DERIVATIVE, P, parameter_of
 from fpsolve.output.tables import asked
 from fpsolve.study.results import CurveResult, Status
 
@@ -28,7 +28,6 @@ SET = "set"
 RESULTS = "results.nc"
 _COLUMNS = {"value": "", "error_estimate": "_error", "derivative": "_derivative", "perturbation": "_perturbation"}
 """Of Λ(p), and the endings of the names of their variables."""
-_DERIVATIVE = {"long_name": "derivative of the moment Lyapunov exponent", "units": "1/time", "equation": "(2)"}
 _STATUS = {
     "long_name": "what became of the parameter set",
     "flag_values": np.array([int(each) for each in Status], dtype=np.int8),
@@ -89,7 +88,7 @@ class _Columns:
         shape = tuple(len(self.case.vary.values(key)) for key in over) if over != (SET,) else (self.case.planned,)
         if self.places:
             for ending, values in zip(_COLUMNS.values(), self.moments.values(), strict=True):
-                attributes = _DERIVATIVE if ending == "_derivative" else _described(MOMENT.attributes, ending)
+                attributes = DERIVATIVE.attributes if ending == "_derivative" else _described(MOMENT.attributes, ending)
                 yield f"moment{ending}", (*over, "p"), values.reshape(*shape, -1), attributes
         for name, values in self.estimates.items():
             for ending, column in zip(("", "_error", "_perturbation"), values, strict=True):
@@ -118,14 +117,13 @@ def _coordinates(case: Case) -> dict[str, Any]:
         values = case.vary.values(key) if over != (SET,) else case.vary.columns[key]
         found[key] = ((key,) if over != (SET,) else over, list(values), _parameter(key))
     if MOMENT.name in case.output.quantities:
-        found["p"] = (("p",), case.p, {"long_name": "order of the moment", "units": "1"})
+        found["p"] = (("p",), case.p, P.attributes)
     return found
 
 
 def _parameter(key: str) -> dict[str, Any]:
     """What a varied key is; a text has no unit."""
-    field = PARAMETERS.get(key)
-    return {} if field is None else {"long_name": field.title or "", "units": unit_of(field) or "1"}
+    return parameter_of(key).attributes if key in PARAMETERS else {}
 
 
 def _attributes(case: Case, facts: Mapping[str, Any]) -> dict[str, Any]:

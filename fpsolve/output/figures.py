@@ -1,42 +1,55 @@
-"""What the figures of a case show: solved curves beside perturbation theory and simulated ones; responses."""
+"""What the figures of a case show: solved curves beside perturbation theory and simulated ones; maps; responses."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.case.sections import Value, Varied
-from fpsolve.case.vary import PARAMETERS
+from fpsolve.case.figure import MOST_NAMED, MomentAt, map_key
+from fpsolve.case.sections import Value, Varied, same
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import INDICES, QUANTITIES, Index
-from fpsolve.model.parameters import symbol_of
-from fpsolve.output.plots import MOST_LABELLED, Series, write_bars, write_figure, write_response_figure
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
+from fpsolve.model.problem import Problem
+from fpsolve.model.quantity import parameter_of
+from fpsolve.output.charts import held_in_words, read_line
+from fpsolve.output.maps import Plane, write_map
+from fpsolve.output.plots import write_bars, write_figure, write_response_figure
+from fpsolve.output.series import Series
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory.perturbation import scale_of, second_order
 
 Pair = tuple[CurveResult, SimulatedCurve | None]
+_NOTHING = np.zeros(0)
 
 
 def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path) -> None:
     """Draw figure.png and figure.pdf: finite elements, perturbation theory, and what is simulated as dots.
 
-    Without a [figure] there is none of a case that does not ask for Λ(p).
+    Over two keys with many values it is a map. Without a [figure] there is none of a case that does not ask for Λ(p).
     """
-    if case.figure.y not in case.output.quantities:
+    setting = case.figure
+    if setting.needed not in case.output.quantities or not results:
+        return
+    pictures = [folder / "figure.png", folder / "figure.pdf"]
+    held = held_in_words(results[0].curve, case.vary.keys, setting.time_unit)
+    if other := map_key(setting, case.vary):
+        plane = _plane(case, results, (setting.x, other), folder)
+        write_map(plane, setting.quantity, case.caption, pictures, parameters=held, setting=setting)
         return
     samples = {each.curve.key: each for each in simulated}
     pairs = [(result, samples.get(result.curve.key)) for result in results]
-    is_many = len(pairs) > MOST_LABELLED
-    of_moments = _plain_series if is_many else _moment_series
-    series = [of_moments(*pair) for pair in pairs] if case.figure.x == "p" else _over_parameter(case, pairs)
-    pictures = [folder / "figure.png", folder / "figure.pdf"]
-    quantity = QUANTITIES[case.figure.y]
+    series = _over_p(case, pairs) if setting.x == "p" else _over_parameter(case, pairs)
     is_exact = any(result.curve.is_exact for result in results)
-    write_figure(series, case.figure.x, quantity, case.headline, pictures, is_reduced=is_exact)
+    write_figure(
+        series, setting.x, setting.quantity, case.caption, pictures,
+        parameters=held, setting=setting, is_reduced=is_exact,
+    )  # fmt: skip
 
 
 def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path) -> None:
@@ -55,7 +68,8 @@ def _draw_sensitivities(case: Case, result: CurveResult, folder: Path) -> None:
         size = float(scale.moment(p)) if p else scale.linear
         bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
     pictures = [folder / f"sensitivities{result.curve.suffix}.{ending}" for ending in ("png", "pdf")]
-    write_bars(bars, [symbol_of(PARAMETERS[key]) for key in found.theta], case.heading(result.curve), pictures)
+    held = held_in_words(result.curve, (), case.figure.time_unit)
+    write_bars(bars, [parameter_of(key).latex for key in found.theta], case.headline, pictures, held)
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
@@ -63,29 +77,46 @@ def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
     if simulated.response is None:
         return
     pictures = [folder / f"response{simulated.curve.suffix}.{ending}" for ending in ("png", "pdf")]
-    write_response_figure(simulated.response, case.heading(simulated.curve), pictures)
+    held = held_in_words(simulated.curve, (), "time")
+    write_response_figure(simulated.response, case.headline, pictures, held)
 
 
-def _moment_series(result: CurveResult, sample: SimulatedCurve | None) -> Series:
-    moments = result.moments
-    line = np.linspace(moments.p.min(), moments.p.max(), 200) if moments.p.size else moments.p
-    theory = second_order(result.curve.problem).moment_exponent(line)
+def _over_p(case: Case, pairs: Sequence[Pair]) -> list[Series]:
+    """Λ(p) of each curve; of many without the perturbation theory of all but some."""
+    shown = set(_some(len(pairs)))
+    return [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
+
+
+def _some(count: int) -> Sequence[int]:
+    """Places among so many curves: all that a legend can name, or of more some, evenly spread."""
+    return (
+        range(count) if count <= MOST_NAMED else np.linspace(0, count - 1, 3 * MOST_NAMED).round().astype(int).tolist()
+    )
+
+
+def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | None, *, with_theory: bool) -> Series:
+    moments, marked = result.moments, case.figure.mark
+    ends = (float(moments.p.min()), float(moments.p.max())) if moments.p.size else (math.nan, math.nan)
+    line = np.linspace(*ends, 200) if with_theory and moments.p.size else _NOTHING
     estimates = sample.result.estimates if sample else ()
     dots = [(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]
-    rare = np.isin(moments.p, moments.rare)
-    root = _root_in(result.stability_index, line)
-    return Series(dict(result.curve.varied), moments.p, moments.value, line, theory, _columns(dots), rare, root)
+    root = _value(result.stability_index) if STABILITY_INDEX.name in marked else None
+    slope = _value(result.lyapunov_exponent) if LYAPUNOV_EXPONENT.name in marked else None
+    return Series(
+        dict(result.curve.varied),
+        moments.p,
+        moments.value,
+        line,
+        second_order(result.curve.problem).moment_exponent(line) if line.size else _NOTHING,
+        _columns(dots),
+        np.isin(moments.p, moments.rare) if moments.rare.size else False,
+        root=root if root is not None and ends[0] <= root <= ends[1] else None,
+        slope=slope if ends[0] <= 0 <= ends[1] else None,
+    )
 
 
-def _plain_series(result: CurveResult, _: SimulatedCurve | None) -> Series:
-    """Λ(p) alone, of one of many curves."""
-    nothing = np.zeros(0)
-    return Series(dict(result.curve.varied), result.moments.p, result.moments.value, nothing, nothing)
-
-
-def _root_in(index: Estimate | None, line: FloatArray) -> float | None:
-    """The stability index, if it lies where the curve is drawn."""
-    return index.value if index is not None and line.size and line[0] <= index.value <= line[-1] else None
+def _value(estimate: Estimate | None) -> float | None:
+    return None if estimate is None else estimate.value
 
 
 def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
@@ -94,21 +125,72 @@ def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
     for pair in pairs:
         others = tuple((key, value) for key, value in pair[0].curve.key if key != case.figure.x)
         groups.setdefault(others, []).append(pair)
-    count = 200 if len(groups) <= MOST_LABELLED else 0
-    return [_index_series(case, INDICES[case.figure.y], dict(others), group, count) for others, group in groups.items()]
+    shown = set(_some(len(groups)))
+    return [
+        _parameter_series(case, dict(others), group, with_theory=i in shown)
+        for i, (others, group) in enumerate(groups.items())
+    ]
 
 
-def _index_series(case: Case, index: Index, others: Varied, group: Sequence[Pair], count: int) -> Series:
-    """λ or δ_p over the parameter; its perturbation theory, which has poles, at `count` points where it is sought."""
-    x = np.array([result.curve.varied[case.figure.x] for result, _ in group])
-    found = [result.estimates[index.name] for result, _ in group]
-    y = np.array([np.nan if estimate is None else estimate.value for estimate in found])
-    line = np.linspace(x.min(), x.max(), count)
-    curves = [case.curve({**others, case.figure.x: float(value)}) for value in line]
-    line_y = np.array([index.theory(curve.problem) for curve in curves])
-    line_y[(line_y < index.interval[0]) | (line_y > index.interval[1])] = np.nan
-    samples = [(each, sample.estimates.get(index.name)) for each, (_, sample) in zip(x, group, strict=True) if sample]
-    return Series(others, x, y, line, line_y, _columns([(each, *sample) for each, sample in samples if sample]))
+def _parameter_series(case: Case, others: Varied, group: Sequence[Pair], *, with_theory: bool) -> Series:
+    """A number over the parameter; its perturbation theory, which has poles, where it is sought."""
+    key = case.figure.x
+    x = np.array([float(result.curve.varied[key]) for result, _ in group])
+    y = np.array([_number(case, result) for result, _ in group])
+    line = np.linspace(x.min(), x.max(), 200) if with_theory else _NOTHING
+    if with_theory and x.min() > 0:
+        line = np.unique(np.concatenate([line, np.geomspace(x.min(), x.max(), 200)]))
+    line_y = np.array([_theory(case, case.curve({**others, key: float(value)}).problem) for value in line])
+    dots = [(each, _sample(case, sample)) for each, (_, sample) in zip(x, group, strict=True) if sample]
+    found = _columns([(each, *dot) for each, dot in dots if dot])
+    rare = np.array(
+        [isinstance(case.figure.y, MomentAt) and case.figure.y.moment in result.moments.rare for result, _ in group]
+    )
+    return Series(others, x, y, line, line_y, found, rare)
+
+
+def _number(case: Case, result: CurveResult) -> float:
+    """What a figure over parameters shows of a curve; NaN where there is none."""
+    if isinstance(case.figure.y, MomentAt):
+        at = np.flatnonzero(np.isclose(result.moments.p, case.figure.y.moment, rtol=0, atol=1e-12))
+        return float(result.moments.value[at[0]]) if at.size else math.nan
+    found = _value(result.estimates[case.figure.y])
+    return math.nan if found is None else found
+
+
+def _theory(case: Case, problem: Problem) -> float:
+    """Its perturbation theory, NaN beyond where it is sought."""
+    if isinstance(case.figure.y, MomentAt):
+        return float(second_order(problem).moment_exponent(case.figure.y.moment))
+    index = INDICES[case.figure.y]
+    value = index.theory(problem)
+    return value if index.interval[0] <= value <= index.interval[1] else math.nan
+
+
+def _sample(case: Case, sample: SimulatedCurve) -> tuple[float, float] | None:
+    """The same from a simulation, with its standard error."""
+    if not isinstance(case.figure.y, MomentAt):
+        return sample.estimates.get(case.figure.y)
+    p = case.figure.y.moment
+    for each in sample.result.estimates:
+        if same(each.p, p) and each.value is not None and each.standard_error is not None:
+            return each.value, each.standard_error
+    return None
+
+
+def _plane(case: Case, results: Sequence[CurveResult], keys: tuple[str, str], folder: Path) -> Plane:
+    """What a map shows, and the line of zeros that a chart has traced in the same folder."""
+    x, y = (np.sort(np.array(case.vary.values(key), dtype=float)) for key in keys)
+    values, failed = np.full((y.size, x.size), math.nan), np.ones((y.size, x.size), dtype=bool)
+    columns, rows = ({value: i for i, value in enumerate(axis.tolist())} for axis in (x, y))
+    for result in results:
+        at = rows[float(result.curve.varied[keys[1]])], columns[float(result.curve.varied[keys[0]])]
+        values[at] = _number(case, result)
+        failed[at] = math.isnan(values[at]) and bool(result.failures)
+    at_p = case.figure.y.moment if isinstance(case.figure.y, MomentAt) else 0.0
+    zero = Zero("moment", at_p) if at_p else Zero("lyapunov_exponent")
+    traced = read_line(folder, keys, zero, results[0].curve.parameters)
+    return Plane(keys, x, y, values, failed, traced.branches, zero.latex, is_partial=not traced.is_whole)
 
 
 def _columns(dots: Sequence[tuple[float | None, ...]]) -> FloatArray | None:

@@ -2,180 +2,196 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
-from fpsolve.case.sections import Varied
-from fpsolve.case.vary import ABSCISSAE, legend
-from fpsolve.exponent.quantities import Quantity
-from fpsolve.files import atomic
-from fpsolve.model.parameters import axis_title
-from fpsolve.pictures import COLOURS, SIZE, STYLE, draw_bars
+from fpsolve.case.figure import MOST_NAMED, FigureSection
+from fpsolve.case.vary import Vary, legend
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, STABILITY_INDEX, P, Quantity, parameter_of
+from fpsolve.output.frame import SIZES, Size, add_heading, add_legend, axes_of, bounded, canvas, share_of
+from fpsolve.output.many import Entries, colours_of, draw_many, draw_roots
+from fpsolve.output.series import STYLES, Series, numbers_of, texts_of
+from fpsolve.pictures import COLOURS, draw_bars
 
 if TYPE_CHECKING:
     from fpsolve.simulation.response import Response
 
-MOST_LABELLED, MOST_INSIDE = 20, 6
-"""Curves that a legend can tell apart, and those whose legend finds room among them."""
-_DOT: dict[str, Any] = {"fmt": ".", "color": "black", "markersize": 5, "elinewidth": 1.1, "capsize": 4, "zorder": 5}
-_ROOT: dict[str, Any] = {"marker": "|", "linestyle": "none", "markersize": 16, "markeredgewidth": 2.2, "zorder": 4}
+_DOT: dict[str, Any] = {"fmt": ".", "color": "black", "zorder": 5}
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
-
-
-@dataclass(frozen=True, eq=False)
-class Series:
-    """One curve of a figure: markers at (x, y), a line through (line_x, line_y).
-
-    Attributes:
-        varied: the parameters that tell it from the others, for the legend.
-        simulated: x, y and the standard errors of y from a simulation, shape (3, n).
-        rare: which of the x have moments that rare paths carry, shape (n,).
-        root: the stability index, which is marked on the zero line; None where there is none among the x.
-    """
-
-    varied: Varied
-    x: FloatArray
-    y: FloatArray
-    line_x: FloatArray
-    line_y: FloatArray
-    simulated: FloatArray | None = None
-    rare: Any = False
-    root: float | None = None
-
-    @property
-    def every(self) -> int:
-        """Of so many x one has a marker."""
-        return max(1, self.x.size // 25)
+_LENGTH = 0.2
+"""Of a tangent, as a share of the width of the axes."""
+_GREY = {"color": "0.35"}
 
 
 def write_figure(
-    series: Sequence[Series], x: str, y: Quantity, title: str, paths: Sequence[Path], *, is_reduced: bool = False
+    series: Sequence[Series],
+    x: str,
+    y: Quantity,
+    title: str,
+    paths: Sequence[Path],
+    *,
+    parameters: Sequence[str] = (),
+    setting: FigureSection | None = None,
+    is_reduced: bool = False,
 ) -> None:
     """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
 
     Args:
         x: "p" or the dotted key of a parameter.
         paths: .png, .pdf or what else matplotlib writes.
+        parameters: what holds for all curves, for below the title.
+        setting: how the figure is set; None as without a [figure].
         is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
-    is_beside = MOST_INSIDE < len(series) <= MOST_LABELLED
-    with canvas(paths, width=SIZE[0] * (1.4 if is_beside else 1)) as figure:
-        axes = figure.add_subplot(xlabel=axis_title(ABSCISSAE[x]), ylabel=y.title)
-        axes.set_title(filled(title, 80), parse_math=False, pad=12)  # clear of the power of ten of the axis
-        axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
-        if len(series) > MOST_LABELLED:
-            _draw_many(figure, axes, series)
-        else:
-            for i, item in enumerate(series):
-                _draw(axes, item, i)
-            handles = _legend_handles(axes, series, y.equation + (", reduced noise" if is_reduced else ""))
-            place = {"loc": "upper left", "bbox_to_anchor": (1.01, 1), "fontsize": 9} if is_beside else {"fontsize": 11}
-            axes.legend(handles.values(), handles.keys(), frameon=False, **place)
-        axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+    setting = setting or FigureSection()
+    with canvas(paths, SIZES[setting.width]) as figure:
+        over = P if x == "p" else parameter_of(x)
+        axes = axes_of(figure, over.timed(setting.time_unit), y.timed(setting.time_unit))
+        axes.axhline(0, color="0.6", linewidth=0.8 * share_of(figure), zorder=0)
+        equation = y.equation + (", reduced noise" if is_reduced else "")
+        draw = draw_many if len(series) > MOST_NAMED else _draw_few
+        entries = draw(figure, axes, series, equation, setting.time_unit)
         axes.margins(x=0.03)
+        bounded(axes, setting, (x, ""), Vary({x: tuple(np.concatenate([item.x for item in series]).tolist())}))
+        axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+        entries += _mark(axes, series)
+        add_legend(figure, entries)
+        add_heading(figure, title, parameters)
 
 
-def write_bars(bars: Mapping[str, Sequence[float]], names: Sequence[str], title: str, paths: Sequence[Path]) -> None:
+def write_bars(
+    bars: Mapping[str, Sequence[float]],
+    names: Sequence[str],
+    title: str,
+    paths: Sequence[Path],
+    parameters: Sequence[str] = (),
+) -> None:
     """Draw groups of bars, one group for each name, and in it one bar for each label."""
-    with canvas(paths) as figure:
-        axes = figure.add_subplot(xlabel=r"$\theta\,\partial/\partial\theta$ over the scale")
-        axes.set_title(filled(title, 80), parse_math=False)
+    with canvas(paths, Size()) as figure:
+        axes = figure.add_subplot(
+            xlabel=r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
+        )
         draw_bars(axes, bars, names)
-        figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=11)
+        handles, labels = axes.get_legend_handles_labels()
+        add_legend(figure, list(zip(labels, handles, strict=True)))
+        add_heading(figure, title, parameters)
 
 
-def write_response_figure(response: Response, title: str, paths: Sequence[Path]) -> None:
+def write_response_figure(
+    response: Response, title: str, paths: Sequence[Path], parameters: Sequence[str] = ()
+) -> None:
     """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors."""
-    with canvas(paths, width=10.5) as figure:
-        figure.suptitle(filled(title, 100), fontsize=12, parse_math=False)
+    with canvas(paths, Size(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
         response.plot(plane)
         figure.get_layout_engine().set(wspace=0.1)
         response.plot_amplitude(radial)
+        add_heading(figure, title, parameters)
 
 
-def filled(text: str, width: int) -> str:
-    """A text in lines that fit, each of its own lines for itself."""
-    return "\n".join(fill(line, width) for line in text.splitlines())
+def _draw_few(figure: Any, axes: Any, series: Sequence[Series], equation: str, time_unit: str) -> Entries:
+    """A colour and a marker for each curve, named in the legend; what that says."""
+    entries: Entries = []
+    for item, style in zip(series, _styles(series), strict=True):
+        name = legend(item.varied, time_unit)
+        line = _draw(axes, item, **style)
+        entries += [(name, line)] if name else []
+    return entries + _methods(axes, series, equation)
 
 
-@contextmanager
-def canvas(paths: Sequence[Path], width: float = SIZE[0], height: float = SIZE[1]) -> Iterator[Any]:
-    """An empty figure in the house style, which is written to the paths in the end."""
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+def _styles(series: Sequence[Series]) -> list[dict[str, Any]]:
+    """How each curve is drawn: where numbers and texts vary, colours tell the former, markers and lines the latter."""
+    varied = [item.varied for item in series]
+    texts = texts_of(varied) if varied else []
+    kinds = [tuple(each[key] for key in texts) for each in varied]
+    rest = [tuple(value for key, value in each.items() if key not in texts) for each in varied]
+    is_mixed = bool(texts) and bool(numbers_of(varied))
+    places = {value: i for i, value in enumerate(dict.fromkeys(rest))}
+    lines = {value: i for i, value in enumerate(dict.fromkeys(kinds))}
+    return [
+        {
+            "color": COLOURS[(places[rest[i]] if is_mixed else i) % len(COLOURS)],
+            "marker": _MARKERS[(lines[kinds[i]] if is_mixed else i) % len(_MARKERS)],
+            "linestyle": STYLES[lines[kinds[i]] % len(STYLES)],
+        }
+        for i in range(len(series))
+    ]
 
-    logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
-    with rc_context({**STYLE, "pdf.fonttype": 42}):
-        figure = Figure(figsize=(width, height), dpi=160, layout="constrained")
-        FigureCanvasAgg(figure)
-        yield figure
-        figure.draw_without_rendering()  # lays it out, once for all formats
-        figure.set_layout_engine("none")
-        for path in paths:
-            with atomic(path) as temporary:
-                figure.savefig(temporary, metadata={"CreationDate": None} if path.suffix == ".pdf" else None)
 
-
-def _draw(axes: Any, item: Series, i: int) -> None:
-    colour, marker = COLOURS[i % len(COLOURS)], _MARKERS[i % len(_MARKERS)]
-    axes.plot(item.line_x, item.line_y, color=colour, linewidth=1.6)
-    axes.plot(
-        item.x, item.y, marker, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.6,
-        markevery=item.every, label=legend(item.varied) or None,
-    )  # fmt: skip
-    if _has_rare(item):
-        filled = item.rare & (np.arange(item.x.size) % item.every == 0)
-        axes.plot(item.x[filled], item.y[filled], marker, color=colour, markersize=7)
+def _draw(axes: Any, item: Series, color: str, marker: str, linestyle: Any) -> Any:
+    """One curve; what the legend shows of it."""
+    axes.plot(item.line_x, item.line_y, color=color, linestyle=linestyle)
+    open_marker = {"marker": marker, "color": color, "markerfacecolor": "none"}
+    axes.plot(item.x, item.y, linestyle="none", markevery=item.every, **open_marker)
+    if np.any(item.rare):
+        chosen = np.broadcast_to(item.rare, item.x.shape) & (np.arange(item.x.size) % item.every == 0)
+        axes.plot(item.x[chosen], item.y[chosen], marker, color=color)
     if item.simulated is not None:
         x, y, error = item.simulated
-        axes.errorbar(x, y, 2 * error, **_DOT)
-    if item.root is not None:
-        axes.plot(item.root, 0, color=colour, **_ROOT)
+        axes.errorbar(x, y, 2 * error, **_dots(axes))
+    return axes.plot([], [], linestyle=linestyle, **open_marker)[0]
 
 
-def _draw_many(figure: Any, axes: Any, series: Sequence[Series]) -> None:
-    """Many curves as thin lines, or points where they have but one, coloured in their order."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.collections import LineCollection
-    from matplotlib.colors import Normalize
-
-    order = ScalarMappable(Normalize(1, len(series)), "viridis")
-    colours = order.to_rgba(np.arange(1, len(series) + 1))
-    lines = LineCollection([np.stack([item.x, item.y], axis=1) for item in series], colors=colours, linewidths=0.8)
-    axes.add_collection(lines, autolim=True)
-    alone = [i for i, item in enumerate(series) if item.x.size == 1]
-    axes.scatter([series[i].x[0] for i in alone], [series[i].y[0] for i in alone], s=8, color=colours[alone])
-    axes.autoscale_view()
-    figure.colorbar(order, ax=axes, label="number of the curve")
+def _dots(axes: Any) -> dict[str, Any]:
+    share = share_of(axes.figure)
+    return {**_DOT, "markersize": 5 * share, "markeredgewidth": share, "elinewidth": 1.1 * share, "capsize": 4 * share}
 
 
-def _has_rare(item: Series) -> bool:
-    return bool(np.any(item.rare))
-
-
-def _legend_handles(axes: Any, series: Sequence[Series], equation: str) -> dict[str, Any]:
-    """Colours tell the curves apart; two to five grey entries tell what is drawn."""
-    handles, labels = axes.get_legend_handles_labels()
-    grey = {"color": "0.35"}
-    elements = "finite elements" + (", not all marked" if any(item.every > 1 for item in series) else "")
-    methods = {
-        elements: axes.plot([], [], "o", markersize=7, markerfacecolor="none", markeredgewidth=1.6, **grey)[0],
-        f"perturbation, Eq. {equation}": axes.plot([], [], "-", linewidth=1.6, **grey)[0],
-    }
-    if any(map(_has_rare, series)):
-        methods["carried by rare paths"] = axes.plot([], [], "o", markersize=7, **grey)[0]
-    if any(item.root is not None for item in series):
-        methods[r"stability index $\delta_p$"] = axes.plot([], [], **_ROOT, **grey)[0]
+def _methods(axes: Any, series: Sequence[Series], equation: str) -> Entries:
+    """Grey entries that tell what is drawn."""
+    elements = "finite elements (not all marked)" if any(item.every > 1 for item in series) else "finite elements"
+    entries: Entries = [
+        (elements, axes.plot([], [], "o", markerfacecolor="none", **_GREY)[0]),
+        (f"perturbation, Eq. {equation}", axes.plot([], [], "-", **_GREY)[0]),
+    ]
+    if any(np.any(item.rare) for item in series):
+        entries.append(("carried by rare paths", axes.plot([], [], "o", **_GREY)[0]))
     if any(item.simulated is not None for item in series):
-        methods["Monte Carlo ± 2 standard errors"] = axes.errorbar([], [], [], **_DOT)
-    return dict(zip(labels, handles, strict=True)) | methods
+        entries.append(("Monte Carlo ± 2 standard errors", axes.errorbar([], [], [], **_dots(axes))))
+    return entries
+
+
+def _mark(axes: Any, series: Sequence[Series]) -> Entries:
+    """Stability indices as ticks on the zero line, λ as tangents at 0, in the ends that the axes have now."""
+    share, entries = share_of(axes.figure), Entries()
+    is_many = len(series) > MOST_NAMED
+    colours = colours_of(series) if is_many else [style["color"] for style in _styles(series)]
+    tick = {"marker": "|", "linestyle": "none", "markersize": 16 * share, "markeredgewidth": 2.2 * share, "zorder": 4}
+    if any(item.root is not None for item in series):
+        if is_many:
+            draw_roots(axes, series)
+        else:
+            for item, colour in zip(series, colours, strict=True):
+                if item.root is not None:
+                    axes.plot(item.root, 0, color=colour, **tick)
+        handle = axes.plot([], [], **tick, **_GREY)[0]
+        entries.append((f"{STABILITY_INDEX.words} {STABILITY_INDEX.latex}", handle))
+    if any(item.slope is not None for item in series):
+        _tangents(axes, series, colours, 1.0 * share if is_many else 2.6 * share)
+        line = axes.plot([], [], linewidth=3 * share, solid_capstyle="butt", **_GREY)[0]
+        entries.append((f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$", line))
+    return entries
+
+
+def _tangents(axes: Any, series: Sequence[Series], colours: Any, width: float) -> None:
+    """The tangents at 0, all of one length on paper."""
+    from matplotlib.collections import LineCollection
+
+    left, right = axes.get_xlim()
+    low, high = axes.get_ylim()
+    axes.set(xlim=(left, right), ylim=(low, high))
+    slopes = [(item.slope, i) for i, item in enumerate(series) if item.slope is not None]
+    box = axes.bbox
+    paths = []
+    for slope, _ in slopes:
+        rise = slope * (right - left) / (high - low) * box.height / box.width  # on paper
+        half = 0.5 * _LENGTH * (right - left) / np.hypot(1, rise)
+        paths.append([(-half, -half * slope), (half, half * slope)])
+    style: dict[str, Any] = {"capstyle": "butt", "zorder": 3.5}
+    edge = LineCollection(paths, colors="black", linewidths=1.5 * width, **style)
+    inner = LineCollection(paths, colors=[colours[i] for _, i in slopes], linewidths=width, **style)
+    for lines in (edge, inner):
+        axes.add_collection(lines, autolim=False)

@@ -68,9 +68,9 @@ def charted(case: Case) -> ChartSection:
 
 
 def refuse_no_chart(case: Case) -> None:
-    """Refuse a case without a chart, or with several curves. Raises `FpsolveError`."""
-    charted(case)
-    if case.vary:
+    """Refuse a case without a chart, or that varies another key than its two. Raises `FpsolveError`."""
+    frame = charted(case)
+    if set(case.vary.keys) - {frame.x.key, frame.y.key}:
         raise FpsolveError(
             f"{case.path}: vary: a chart has one set of the other parameters; remove [vary], or write --set vary={{}}"
         )
@@ -98,7 +98,7 @@ def solve_chart(
     """
     frame = charted(case)
     x, y = frame.x.axis, frame.y.axis
-    [curve] = case.curves()
+    curve = case.curve({})
     family = Family(curve.problem, curve.original_noise)
     chart = Chart((), _closed_forms(family, frame.zero, (x, y)))
     begun = [Boundary(zero, x, y, family, budget=case.budget) for zero in frame.zero]

@@ -171,6 +171,11 @@ VALUES = [  # key, its bad line, what the message says
     ("figure.x", "x = 1", "got 1 (a number)|non-empty string"),
     ("figure.y", 'y = "moments"', 'got "moments"|one of "moment", "lyapunov_exponent"|you mean "moment"'),
     ("figure.y", 'y = "stability_index"', 'got "stability_index"|"moment" where x = "p"|key of [vary]'),
+    ("figure.y", "y = 3", "got 3 (a number)|must be one of|{ moment = p } with a finite p|y = { moment = 2.0 }"),
+    ("figure.y", "y = { moment = inf }", "got {moment = inf} (a table)|{ moment = p } with a finite p"),
+    ("figure.y", f"y = {{ moment = {BIG} }}", "got |(a table)|{ moment = p } with a finite p"),
+    ("figure.y", "y = { moment = true }", "got {moment = true} (a table)|{ moment = p } with a finite p"),
+    ("figure.y", "y = { moment = 2.0 }", 'got {moment = 2.0}; must be "moment" where x = "p"|set x to a key of [vary]'),
     ("output.eigenfunctions", 'eigenfunctions = "all"', 'got "all" (a string)|list of finite'),
     ("output.eigenfunctions[1]", "eigenfunctions = [1, 3]", "got 3.0|among moments.p (3|add it"),
     ("output.eigenfunctions[2]", "eigenfunctions = [1, 2, 1]", "got 1.0 twice|distinct|remove one"),
@@ -230,7 +235,7 @@ LINES = [  # key, a good line, what stands there instead, what the message says
         "figure.y",
         'x = "p"',
         'x = "noise.D0"',
-        'got "moment"|"lyapunov_exponent" or "stability_index"|write one',
+        'got "moment"|{ moment = 2.0 }, "lyapunov_exponent" or "stability_index"|write one',
     ),
     (
         "figure.x",
@@ -284,6 +289,79 @@ def assert_message(path: Path, key: str, words: str) -> None:
     assert message.startswith(f"{path}:{line_of(path.read_text(encoding='utf-8'), key)}: {key}: ")
     for word in words.split("|"):
         assert word in message
+
+
+FIGURES = [  # a line beside x = "p", what is at fault, what the message says
+    ("title = 3", "title", "got 3 (a number)|non-empty string"),
+    ('width = "single"', "width", 'one of "single column", "double column"|did you mean "single column"?'),
+    ("xlim = [2.0, 1.0]", "xlim", "got [2.0, 1.0] (a list); must be a list of two numbers, the smaller one first"),
+    ("xlim = [1.0]", "xlim", "got [1.0] (a list)|two numbers|write, for example, [0.0, 4.0]"),
+    ("xlim = 4.0", "xlim", "got 4.0 (a number)|two numbers"),
+    ("xlim = [0.0, nan]", "xlim", "got [0.0, nan] (a list)|two numbers"),
+    ("ylim = [0.0, 1e31]", "ylim", "got [0.0, 1e+31] (a list)|from -1e30 to 1e30"),
+    (f"ylim = [0, {BIG}]", "ylim", "(a list)|from -1e30 to 1e30"),
+    ("ylim = [1.0, 1.0000000000001]", "ylim", "not equal to 9 digits"),
+    ("ylim = [false, true]", "ylim", "got [false, true] (a list)|two numbers"),
+    (
+        'mark = "stability_index"',
+        "mark",
+        'got "stability_index" (a string); must be a list of some of "stability_index"',
+    ),
+    ('mark = ["lambda"]', "mark[0]", 'got "lambda" (a string); must be one of "stability_index", "lyapunov_exponent"'),
+    ('mark = ["stability_indx"]', "mark[0]", 'did you mean "stability_index"?'),
+    ('mark = ["stability_index", "stability_index"]', "mark[1]", 'got "stability_index" twice|remove one'),
+    ('time_unit = "1/s"', "time_unit", 'got "1/s" (a string); must be a unit of 1 to 12 letters|time_unit = "s"'),
+    ('time_unit = ""', "time_unit", 'got ""|1 to 12 letters'),
+    ("time_unit = 1", "time_unit", "got 1 (a number)|1 to 12 letters"),
+    ("map = 1", "map", "got 1 (a number)|map = true"),
+    ("map = true", "map", "got true; a map is drawn over two keys of [vary]; set x to one of them, or remove it"),
+    ("colour = 1", "colour", "unknown key|known keys: x, y, map, title, width, xlim, ylim, mark, time_unit"),
+]
+
+
+@pytest.mark.parametrize(("line", "key", "words"), FIGURES, ids=[f"{line:.30}" for line, _, _ in FIGURES])
+def test_bad_figure(tmp_path: Path, line: str, key: str, words: str) -> None:
+    path = write(tmp_path, edited('y = "moment"', f'y = "moment"\n{line}'))
+    assert_message(path, f"figure.{key}", words)
+
+
+OVER_A_KEY = [  # lines of [figure], of [vary], what is at fault, what the message says
+    ("y = { moment = 3.0 }", "", "y.moment", "got 3.0; must be among moments.p (3 values, -1 to 2); add it there"),
+    ('y = "stability_index"\nmark = ["stability_index"]', "", "mark", "only Λ(p) over p has marks"),
+    (
+        'y = "stability_index"\nmap = true',
+        '"noise.treatment" = ["exact", "ou-reduction"]',
+        "map",
+        "two keys of numbers",
+    ),
+    ('y = "stability_index"\nmap = true', '"noise.tau0" = [1.0, 2.0]', "map", "two keys of numbers and no others"),
+    ('y = "stability_index"\nmap = true', 'mode = "zip"', "map", "all combinations of two keys"),
+    (
+        'y = "stability_index"\nxlim = [0.0, 2.0]',
+        "",
+        "xlim",
+        "must be > 0|noise.D0 are spread by factors|raise the smaller",
+    ),
+]
+
+
+@pytest.mark.parametrize(("lines", "vary", "key", "words"), OVER_A_KEY)
+def test_bad_figure_over_a_key(tmp_path: Path, lines: str, vary: str, key: str, words: str) -> None:
+    text = GOOD.replace('x = "p"\ny = "moment"', f'x = "noise.D0"\n{lines}')
+    text = text.replace("[0.1, 0.5]\n", "[0.1, 1.0, 10.0]\n").replace("[1.0, 2.0]\n", f"[1.0, 2.0, 3.0]\n{vary}\n")
+    assert_message(write(tmp_path, text), f"figure.{key}", words)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        'title = "Mine"\nwidth = "single column"\nxlim = [-1, 2.5]\nylim = [-1e-3, 1e-3]\nmark = []\ntime_unit = "µs"',
+        'mark = ["lyapunov_exponent", "stability_index"]\nmap = false',
+    ],
+)
+def test_a_good_figure(tmp_path: Path, lines: str) -> None:
+    figure = load_case(write(tmp_path, edited('y = "moment"', f'y = "moment"\n{lines}'))).figure
+    assert set(figure.model_fields_set) == {"x", "y", *re.findall(r"^(\w+) = ", lines, re.MULTILINE)}
 
 
 SECTIONS = ["oscillator", "noise", "moments", "vary", "mesh", "figure", "output", "expect"]

@@ -13,7 +13,8 @@ from pydantic.fields import FieldInfo
 from fpsolve.case.case import Case
 from fpsolve.case.vary import ABSCISSAE, PARAMETERS, VARIABLE
 from fpsolve.exponent.adapt import Budget
-from fpsolve.model.parameters import STRICT, axis_title, example_of, symbol_of
+from fpsolve.model.parameters import STRICT, example_of, symbol_of
+from fpsolve.model.quantity import P, parameter_of
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 
 
@@ -57,7 +58,9 @@ def test_examples_of_sections_are_their_headers(key: str) -> None:
 
 
 def test_figures_name_what_they_are_drawn_over() -> None:
-    assert {key: (symbol_of(field), axis_title(field)) for key, field in ABSCISSAE.items()} == {
+    assert {
+        key: (symbol_of(field), (P if key == "p" else parameter_of(key)).title) for key, field in ABSCISSAE.items()
+    } == {
         "p": ("$p$", "order of the moment $p$"),
         "oscillator.omega": (r"$\omega$", r"natural frequency $\omega$ (rad/time)"),
         "oscillator.restitution": ("$r$", "coefficient of restitution $r$"),

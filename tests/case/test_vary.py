@@ -248,7 +248,7 @@ def test_texts_and_numbers_are_written_for_the_eye() -> None:
     varied = {"noise.D0": 0.1234567890123, "noise.treatment": "exact", "oscillator.impact": "delta"}
     assert assignments(varied, "g") == "noise.D0 = 0.123457, noise.treatment = exact, oscillator.impact = delta"
     assert assignments(varied).startswith("noise.D0 = 0.1234567890123, ")
-    assert legend(varied) == "$D_0$ = 0.123457, treatment = exact, impact = delta"
+    assert legend(varied) == "$D_0$ = 0.123457/time, treatment = exact, impact = delta"
 
 
 def test_a_simulation_that_is_not_right_names_the_row(write: Write, tmp_path: Path) -> None:
@@ -428,7 +428,14 @@ QUANTITIES = [
     ('["moment", "moment"]', 'output.quantities[1]: got "moment" twice; names must be distinct; remove one'),
     ("[]", 'output.quantities: got [] (a list); must be a non-empty list of some of "moment", "lyapunov_exponent", '),
     ('"moment"', 'output.quantities: got "moment" (a string); must be a non-empty list of some of '),
-    ('["lyapunov_exponent"]', 'output.quantities: has no "moment", which figure.y draws; add it, or let figure.y be'),
+    (
+        '["lyapunov_exponent"]\n[figure]\nx = "p"',
+        'output.quantities: has no "moment", which figure.y draws; add it, or let figure.y be',
+    ),
+    (
+        '["moment"]\n[figure]\nmark = ["lyapunov_exponent"]',
+        'output.quantities: has no "lyapunov_exponent", which figure.mark marks; add it, or remove it from figure.mark',
+    ),
     (
         '["moment"]\nsensitivities = true',
         'output.sensitivities: got true, but output.quantities has no "sensitivities"',

@@ -67,7 +67,7 @@ def test_a_product_has_a_dimension_for_each_key(tmp_path):
         assert variable.attrs["long_name"], name
         assert variable.attrs["units"], name
     assert found.moment.attrs["equation"] == "(37)"
-    assert found["noise.D0"].attrs == {"long_name": "noise intensity", "units": "1/time"}
+    assert found["noise.D0"].attrs == {"long_name": "noise intensity", "symbol": "$D_0$", "units": "1/time"}
 
 
 def test_sets_side_by_side_have_one_dimension(tmp_path):

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from fpsolve import ExponentSolver, load_case
+from fpsolve.analysis.zero import Zero
 from fpsolve.cli import main
 from fpsolve.model.direction import Family
+from fpsolve.output.charts import read_line
 from fpsolve.study.chart import chart_work, solve_chart
-from fpsolve.workflow import Watch, chart_case
+from fpsolve.workflow import Watch, chart_case, run
 
 CASE = """
 title = "Stability"
@@ -199,6 +201,29 @@ def test_without_a_chart_nothing_is_written(path, tmp_path, capsys, overrides, m
     assert main(["chart", str(path), "--out", str(tmp_path / "out"), *words]) == 2
     assert message in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_map_and_its_chart_share_a_folder(path, tmp_path):
+    """What varies are the two keys of the chart, so that neither removes the other, whichever comes first."""
+    sets = ["vary.oscillator.omega=[1.0, 2.0]", "vary.noise.D0=[0.1, 0.2]", "chart.zero=[{moment=2.0}]"]
+    sets += [
+        "figure={x='oscillator.omega', y={moment=2.0}, map=true}",
+        "output={quantities=['moment'], eigenfunctions=[]}",
+    ]
+    case = load_case(path, sets)
+    for what in (run, chart_case, run):
+        what(case, tmp_path)
+    assert {"summary.json", "figure.png", "chart.csv", "chart.png"} <= {
+        each.name for each in (tmp_path / "plane").iterdir()
+    }
+    held = json.loads((tmp_path / "plane" / "chart.json").read_text(encoding="utf-8"))["parameters"]
+    assert not {"oscillator.omega", "noise.D0"} & held.keys()
+    traced = read_line(
+        tmp_path / "plane", ("noise.D0", "oscillator.omega"), Zero("moment", 2.0), case.curve({}).parameters
+    )
+    assert traced.is_whole
+    [branch] = traced.branches
+    assert np.all((branch[0] >= 0.01) & (branch[0] <= 1.0) & (branch[1] >= 0.5) & (branch[1] <= 3.0))
 
 
 def test_a_case_without_a_chart_is_refused(tmp_path, capsys):

@@ -1,0 +1,207 @@
+"""[figure]: what figure.png shows over what, and how it is set."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, Literal, Self, get_args
+
+from pydantic import BeforeValidator, model_validator
+
+from fpsolve.arrays import is_log_spaced
+from fpsolve.case.messages import Refusal, nearest, refuse, shown, shown_with_kind
+from fpsolve.case.sections import Section, Text, Value, Varied, is_number
+from fpsolve.case.vary import ABSCISSAE, WORDS, Vary
+from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName
+from fpsolve.model.parameters import parameter
+from fpsolve.model.quantity import Quantity, moment_at
+
+MOST_NAMED = 8
+"""Curves that a legend can tell apart; of more, and of a map, colours tell the value of a key."""
+MarkedName = Literal["stability_index", "lyapunov_exponent"]
+Width = Literal["single column", "double column"]
+_LARGEST = 1e30
+_APART = 1e-9
+"""How far the ends of an axis are from each other at least, relative to their size."""
+_EXAMPLE = "y = { moment = 2.0 }"
+
+
+class MomentAt(Section):
+    """{ moment = p }: Λ at one p."""
+
+    moment: Annotated[float, parameter("order of the moment", "moment = 2.0")]
+
+
+def _ordinate(value: Any) -> Any:
+    """The name of a quantity, or Λ at one p."""
+    names = get_args(DrawnName)
+    if isinstance(value, MomentAt) or (isinstance(value, str) and value in names):
+        return value
+    if isinstance(value, dict) and value.keys() == {"moment"} and is_number(value["moment"]):
+        return MomentAt(moment=float(value["moment"]))
+    known = ", ".join(f'"{name}"' for name in names)
+    guess = nearest(value, names) if isinstance(value, str) else ""
+    got = shown(value) if isinstance(value, str) else shown_with_kind(value)
+    text = (
+        f"got {got}; must be one of {known}, or {{ moment = p }} with a finite p;{guess} write, for example, {_EXAMPLE}"
+    )
+    refuse([((), value, text)])
+    return value
+
+
+def _limits(value: Any) -> Any:
+    """The two ends of an axis."""
+    if value is None:
+        return value
+    if isinstance(value, list | tuple) and len(value) == 2 and all(map(is_number, value)):
+        start, stop = value
+        if max(abs(start), abs(stop)) <= _LARGEST and stop - start > _APART * max(abs(start), abs(stop)):
+            return float(start), float(stop)
+    text = (
+        f"got {shown_with_kind(value)}; must be a list of two numbers, the smaller one first, from -1e30 to 1e30 and "
+        "not equal to 9 digits; write, for example, [0.0, 4.0]"
+    )
+    refuse([((), value, text)])
+    return value
+
+
+def _marks(value: Any) -> Any:
+    """Names of what is marked, each known and there once."""
+    names = get_args(MarkedName)
+    known = ", ".join(f'"{name}"' for name in names)
+    if not isinstance(value, list | tuple):
+        text = f"got {shown_with_kind(value)}; must be a list of some of {known}; write, for example, [{known}]"
+        refuse([((), value, text)])
+    refusals = list[Refusal]()
+    for i, name in enumerate(value):
+        if name not in names:
+            guess = nearest(name, names) if isinstance(name, str) else ""
+            text = f"got {shown_with_kind(name)}; must be one of {known};{guess} rename or remove it"
+            refusals.append(((i,), name, text))
+        elif name in value[:i]:
+            refusals.append(((i,), name, f"got {shown(name)} twice; names must be distinct; remove one"))
+    refuse(refusals)
+    return tuple(value)
+
+
+def _time_unit(value: Any) -> Any:
+    """Letters that stand for a unit of time."""
+    if not isinstance(value, str) or not re.fullmatch(r"[^\W\d_]{1,12}", value):
+        text = f'got {shown_with_kind(value)}; must be a unit of 1 to 12 letters; write, for example, time_unit = "s"'
+        refuse([((), value, text)])
+    return value
+
+
+class FigureSection(Section):
+    """[figure]: the axes, what is marked, and how it is set; x is "p" or a varied key."""
+
+    x: Annotated[Text, parameter("the abscissa", 'x = "p"')] = "p"
+    y: Annotated[DrawnName | MomentAt, BeforeValidator(_ordinate), parameter("the ordinate", 'y = "moment"')] = "moment"
+    map: Annotated[bool | None, parameter("whether colours show it over two keys", "map = true")] = None
+    title: Annotated[Text | None, parameter("the heading instead of that of the case", 'title = "Stability"')] = None
+    width: Annotated[Width, parameter("how wide it is printed", 'width = "single column"')] = "double column"
+    xlim: Annotated[
+        tuple[float, float] | None, BeforeValidator(_limits), parameter("ends of the abscissa", "xlim = [0.0, 4.0]")
+    ] = None
+    ylim: Annotated[
+        tuple[float, float] | None, BeforeValidator(_limits), parameter("ends of the ordinate", "ylim = [-0.1, 0.1]")
+    ] = None
+    mark: Annotated[
+        tuple[MarkedName, ...], BeforeValidator(_marks), parameter("what is marked", 'mark = ["stability_index"]')
+    ] = ("stability_index",)
+    time_unit: Annotated[
+        str, BeforeValidator(_time_unit), parameter("what the unit of time is called", 'time_unit = "s"')
+    ] = "time"
+
+    @property
+    def quantity(self) -> Quantity:
+        """What is drawn."""
+        return moment_at(self.y.moment) if isinstance(self.y, MomentAt) else QUANTITIES[self.y]
+
+    @property
+    def needed(self) -> str:
+        """What must be computed for it."""
+        return MOMENT.name if isinstance(self.y, MomentAt) else self.y
+
+    @model_validator(mode="after")
+    def _fits_x(self) -> Self:
+        got = f"got {shown(self._written)}"
+        names = '{ moment = 2.0 }, "lyapunov_exponent" or "stability_index"'
+        if self.x == "p" and self.y != "moment":
+            remedy = 'must be "moment" where x = "p"; write y = "moment", or set x to a key of [vary]'
+            refuse([(("y",), self._written, f"{got}; {remedy}")])
+        if self.x != "p" and self.y == "moment":
+            refuse([(("y",), self.y, f'{got}; must be {names} where x is not "p"; write one of these')])
+        if self.x == "p" and self.map:
+            text = "got true; a map is drawn over two keys of [vary]; set x to one of them, or remove it"
+            refuse([(("map",), self.map, text)])
+        if self.x != "p" and self.mark and "mark" in self.model_fields_set:
+            text = f'got {shown(self.mark)}; only Λ(p) over p has marks; write x = "p", or remove it'
+            refuse([(("mark",), self.mark, text)])
+        return self
+
+    @property
+    def _written(self) -> Any:
+        """The ordinate as the file has it."""
+        return self.y.model_dump() if isinstance(self.y, MomentAt) else self.y
+
+
+def other_key(x: str, vary: Vary) -> str | None:
+    """The second key of a map over x: of a product over two keys of numbers the other one."""
+    several = [key for key in vary.keys if len(vary.values(key)) > 1]
+    is_plane = vary.mode == "product" and len(several) == 2 and x in several and not set(several) & set(WORDS)
+    return next((key for key in several if key != x), None) if is_plane else None
+
+
+def map_key(figure: FigureSection, vary: Vary) -> str | None:
+    """The second key of the map that is drawn; None where curves are."""
+    key = other_key(figure.x, vary)
+    if key is None or figure.map is False:
+        return None
+    return key if figure.map or len(vary.values(key)) > MOST_NAMED else None
+
+
+def is_logarithmic(key: str, vary: Vary) -> bool:
+    """Whether the axis of a varied key is."""
+    return key in vary.keys and is_log_spaced(vary.values(key))
+
+
+def figure_refusals(figure: FigureSection, valid: Mapping[str, Any]) -> Iterator[Refusal]:
+    """What of a figure the other sections do not allow."""
+    if isinstance(figure.y, MomentAt) and "moments" in valid and not valid["moments"].has(figure.y.moment):
+        values = valid["moments"].values
+        known = f"moments.p ({values.size} values, {values[0]:g} to {values[-1]:g})"
+        text = f"got {figure.y.moment}; must be among {known}; add it there, or choose one of them"
+        yield ("y", "moment"), figure.y.moment, text
+    if "vary" in valid:
+        yield from _of_keys(figure, valid["vary"])
+
+
+def _of_keys(figure: FigureSection, vary: Vary) -> Iterator[Refusal]:
+    """An abscissa that is not varied, or is no number; a map where there is none; an end that is not on an axis."""
+    known = [key for key in ("p", *vary.keys) if key in ABSCISSAE]
+    if figure.x in vary.keys and figure.x not in ABSCISSAE:
+        text = f"got {shown(figure.x)}, whose values are texts; must be one of {', '.join(known)}; choose one of them"
+        yield ("x",), figure.x, text
+        return
+    if figure.x not in known:
+        guess = nearest(figure.x, known)
+        text = f"got {shown(figure.x)};{guess} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
+        yield ("x",), figure.x, text
+        return
+    if figure.map and other_key(figure.x, vary) is None:
+        text = (
+            "got true; a map needs a [vary] of all combinations of two keys of numbers and no others, each with two "
+            "values or more; vary these, or remove it"
+        )
+        yield ("map",), figure.map, text
+    for name, key, limits in (("xlim", figure.x, figure.xlim), ("ylim", map_key(figure, vary), figure.ylim)):
+        if key and limits and limits[0] <= 0 and is_logarithmic(key, vary):
+            text = f"got {shown(limits)}; must be > 0, as the values of {key} are spread by factors, on a "
+            yield (name,), limits, f"{text}logarithmic axis; raise the smaller one"
+
+
+def fixed(parameters: Varied, varied: Iterable[str]) -> dict[str, Value]:
+    """The parameters that a figure holds: those that are not varied, without the nonlinear ones that are 0."""
+    left = {*varied, *(key for key in ("oscillator.c2", "oscillator.c3") if parameters[key] == 0)}
+    return {key: value for key, value in parameters.items() if key not in left}

@@ -1,0 +1,135 @@
+"""Figures of cases whose curves are those of perturbation theory, and what matplotlib says of where all is in them."""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from fpsolve.case.case import load_case
+from fpsolve.exponent.error import Estimate, Failure
+from fpsolve.exponent.quantities import INDICES
+from fpsolve.output.figures import draw
+from fpsolve.study.results import CurveResult, Moments
+from fpsolve.theory.perturbation import second_order
+
+CASE = """
+title = "Moment Lyapunov exponents of a vibro-impact oscillator"
+[oscillator]
+epsilon = 0.1
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 0.1
+tau0 = 0.5
+r0 = 0.95
+[moments]
+p = { start = -2.0, stop = 4.0, num = 13 }
+"""
+
+
+def case_of(folder: Path, sets=()):
+    path = folder / "drawn.toml"
+    path.write_text(CASE, encoding="utf-8")
+    return load_case(path, sets)
+
+
+def results_of(case, fails=lambda number: False):
+    """As if perturbation theory were exact; without any p for the numbers that fail."""
+    return [_result(case, curve, has_failed=fails(curve.number)) for curve in case.curves()]
+
+
+def _result(case, curve, *, has_failed):
+    theory = second_order(curve.problem)
+    p = case.p[:0] if has_failed else case.p
+    value, nothing = theory.moment_exponent(p), np.zeros(p.size)
+    found = {name: getattr(theory, name) for name in ("lyapunov_exponent", "stability_index")}
+    known = {name: Estimate(each, 0.0, 1.0) for name, each in found.items() if not has_failed and abs(each) <= 20}
+    estimates = {**dict.fromkeys(INDICES), **known}
+    failures = (Failure(None, "it was too hard"),) if has_failed else ()
+    return CurveResult(curve, Moments(p, value, nothing, nothing, nothing, value, p[:0]), estimates, failures=failures)
+
+
+def drawn_case(folder: Path, sets=(), *, fails=lambda number: False):
+    case = case_of(folder, sets)
+    draw(case, results_of(case, fails), [], folder)
+    return case
+
+
+def legends(figure):
+    return [*figure.legends, *(each for axes in figure.axes if (each := axes.get_legend()))]
+
+
+def words(figure):
+    return [text.get_text() for legend in legends(figure) for text in legend.get_texts()]
+
+
+def tick_labels(figure):
+    """The labels of each axis that are seen."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+            room = 1e-9 * (high - low)
+            seen = [tick for tick in ticks if low - room <= tick.get_loc() <= high + room]
+            labels = [label for tick in seen for label in (tick.label1, tick.label2)]
+            yield [label for label in labels if label.get_visible() and label.get_text()]
+
+
+def texts(figure):
+    """All that is written."""
+    yield from figure.texts
+    yield from (text for legend in legends(figure) for text in legend.get_texts())
+    yield from (label for labels in tick_labels(figure) for label in labels)
+    for axes in figure.axes:
+        yield from (axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts)
+        yield from (axis.get_offset_text() for axis in (axes.xaxis, axes.yaxis) if axis.get_offset_text().get_text())
+
+
+def data_paths(figure):
+    """What is drawn of the curves, as paths in pixels inside of their axes."""
+    for axes in figure.axes:
+        for line in axes.lines:
+            if np.size(line.get_xdata()) and line.get_gid() is None:
+                yield axes, line.get_transform().transform_path(line.get_path())
+        for collection in axes.collections:
+            for path in collection.get_paths():
+                yield axes, collection.get_transform().transform_path(path)
+
+
+def assert_sound(figure):
+    """Legends cover no data, all that is written is on the canvas, and no two numbers of an axis overlap."""
+    figure.canvas.draw()
+    canvas = figure.bbox
+    for text in texts(figure):
+        if text.get_text() and text.get_visible():
+            box = text.get_window_extent()
+            inside = (
+                canvas.x0 - 1 <= box.x0 <= box.x1 <= canvas.x1 + 1
+                and canvas.y0 - 1 <= box.y0 <= box.y1 <= canvas.y1 + 1
+            )
+            assert inside, (text.get_text(), box)
+            assert text.get_fontsize() >= 6, text.get_text()
+    for legend in legends(figure):
+        box = legend.get_window_extent()
+        assert canvas.x0 - 1 <= box.x0 <= box.x1 <= canvas.x1 + 1
+        assert canvas.y0 - 1 <= box.y0 <= box.y1 <= canvas.y1 + 1
+        for axes, path in data_paths(figure):
+            if box.overlaps(axes.bbox):
+                assert not path.intersects_bbox(box, filled=False), "the legend covers a curve"
+                assert not any(box.contains(*vertex) for vertex in path.vertices), "the legend covers a point"
+    for labels in tick_labels(figure):
+        for one, other in combinations(labels, 2):
+            assert not one.get_window_extent().overlaps(other.get_window_extent()), (one, other)
+    for one, other in combinations([text for text in texts(figure) if text.get_text() and text.get_visible()], 2):
+        assert not _overlap(one.get_window_extent(), other.get_window_extent()), (one, other)
+
+
+def _overlap(one, other):
+    """Whether two boxes share more than their rims."""
+    across = min(one.x1, other.x1) - max(one.x0, other.x0)
+    along = min(one.y1, other.y1) - max(one.y0, other.y0)
+    return across > 1 and along > 1 and not math.isclose(across, 0)

@@ -1,0 +1,336 @@
+"""Figures of few and of many curves, of maps and of narrow columns: read from where matplotlib has put all."""
+
+import csv
+import json
+import time
+
+import matplotlib.figure
+import numpy as np
+import pytest
+
+from fpsolve.output.datasets import dataset_of
+from fpsolve.output.figures import draw
+from fpsolve.output.maps import Plane
+from fpsolve.output.series import Telling
+from fpsolve.pictures import label_of
+from fpsolve.theory.perturbation import second_order
+from tests.output.drawing import assert_sound, case_of, drawn_case, results_of, texts, tick_labels, words
+
+NARROW = "figure.width='single column'"
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures that are drawn while a test runs."""
+    figures = []
+
+    class Recorded(matplotlib.figure.Figure):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options)
+            figures.append(self)
+
+    monkeypatch.setattr(matplotlib.figure, "Figure", Recorded)
+    return figures
+
+
+@pytest.fixture
+def sound(monkeypatch):
+    """Figures that are looked at as they are written, in the style that they are drawn in."""
+    figures = []
+
+    class Checked(matplotlib.figure.Figure):
+        def savefig(self, *arguments, **options):
+            super().savefig(*arguments, **options)
+            assert_sound(self)
+            figures.append(self)
+
+    monkeypatch.setattr(matplotlib.figure, "Figure", Checked)
+    return figures
+
+
+def intensities(count):
+    return f"vary.noise.D0={{start=0.1, stop=3.0, num={count}, scale='log'}}"
+
+
+def over(x, y='"lyapunov_exponent"'):
+    return f"figure={{x='{x}', y={y}}}"
+
+
+PLANE = [
+    "vary.oscillator.omega={start=0.4, stop=4.0, num=20, scale='log'}",
+    "vary.noise.D0={start=0.02, stop=2.0, num=20, scale='log'}",
+    over("oscillator.omega", "{moment=2.0}"),
+]
+BOTH = "vary.noise.treatment=['exact', 'ou-reduction']"
+FIGURES = {
+    "one": [],
+    "two": [intensities(2)],
+    "eight": [intensities(8), "figure.mark=['stability_index', 'lyapunov_exponent']"],
+    "nine": [intensities(9)],
+    "twenty": [intensities(20)],
+    "fifty, marked": [intensities(50), "figure.mark=['stability_index', 'lyapunov_exponent']"],
+    "exact and reduced": ["vary.noise.D0=[0.5, 1.0]", BOTH],
+    "exact and reduced, many": [intensities(20), BOTH],
+    "four keys": [
+        "vary={mode='zip', noise.D0=[0.1, 0.2, 0.3], noise.tau0=[0.5, 0.6, 0.7], oscillator.omega=[1.0, 2.0, 3.0], "
+        "oscillator.restitution=[0.7, 0.8, 0.9]}"
+    ],
+    "over a parameter": [intensities(9), "vary.oscillator.omega=[1.0, 2.0]", over("noise.D0")],
+    "fifty over a parameter": [
+        intensities(50), "vary.oscillator.omega=[0.5, 1.0, 2.0, 4.0]", over("oscillator.omega"), "figure.map=false"
+    ],
+    "map": PLANE,
+    "map of the index": [*PLANE[:2], over("noise.D0", '"stability_index"')],
+    "long title": [
+        intensities(3), "oscillator.omega=2.0", "oscillator.restitution=0.75", "moments.p=[-1.0, 0.5, 1.0, 2.0, 3.0]",
+        f"title='{'A title of many words ' * 12}'",
+    ],
+    "small numbers": [intensities(2), "oscillator.epsilon=0.001"],
+    "near numbers": ["vary.noise.D0={start=1.0, stop=1.0001, num=12}", over("noise.D0")],
+    "seconds": [intensities(9), "figure.time_unit='s'"],
+    "one decade": ["vary.noise.D0={start=0.3, stop=2.9, num=40, scale='log'}", over("noise.D0")],
+    "six decades": ["vary.noise.D0={start=1e-5, stop=10.0, num=40, scale='log'}", over("noise.D0")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("narrow", [[], [NARROW]], ids=["wide", "narrow"])
+@pytest.mark.parametrize("name", FIGURES)
+def test_all_has_its_place(sound, tmp_path, name, narrow):
+    """Legends cover no data, all that is written is on the canvas and readable, and no two texts overlap."""
+    drawn_case(tmp_path, [*FIGURES[name], *narrow])
+    assert len(sound) == 2  # as .png and as .pdf
+
+
+@pytest.mark.parametrize("count", [1, 2, 8])
+def test_up_to_eight_curves_are_named(drawn, tmp_path, count):
+    drawn_case(tmp_path, ["vary={}"] if count == 1 else [intensities(count)])
+    [figure] = drawn
+    assert len([text for text in words(figure) if text.startswith("$D_0$ = ")]) == (count if count > 1 else 0)
+    assert len(figure.axes) == 1
+
+
+def test_more_have_a_colour_for_the_value_of_the_key(drawn, tmp_path):
+    drawn_case(tmp_path, [intensities(9)])
+    axes, bar = drawn[0].axes
+    assert bar.get_ylabel() == "noise intensity $D_0$ (1/time)"
+    assert bar.get_yscale() == "log"
+    np.testing.assert_allclose(bar.get_ylim(), (0.1, 3.0))
+    assert [label.get_text() for label in list(tick_labels(drawn[0]))[3]] == ["0.1", "0.2", "0.5", "1", "2"]
+    [lines] = [each for each in axes.collections if len(each.get_paths()) == 9]
+    assert len({tuple(colour) for colour in lines.get_colors()}) == 9
+    assert words(drawn[0]) == ["finite elements", "perturbation, Eq. (37), of 3 curves", "stability index $\\delta_p$"]
+    assert not any(line.get_marker() == "o" for line in axes.lines)
+
+
+def test_line_styles_tell_texts(drawn, tmp_path):
+    drawn_case(tmp_path, [intensities(9), BOTH])
+    axes, bar = drawn[0].axes
+    styles = [each.get_linestyles()[0] for each in axes.collections if len(each.get_paths()) == 9]
+    assert len(styles) == 2
+    assert styles[0] != styles[1]
+    assert {"finite elements, treatment = exact", "finite elements, treatment = ou-reduction"} <= set(words(drawn[0]))
+    assert bar.get_ylabel().startswith("noise intensity")
+
+
+VARIED = [{"a": a, "b": b, "c": c} for a in (1.0, 2.0) for b in (1.0, 2.0, 3.0) for c in ("x", "y")]
+
+
+@pytest.mark.parametrize(
+    ("varied", "key", "styles", "untold"),
+    [
+        ([{"a": 1.0, "b": 5.0}, {"a": 2.0, "b": 5.0}], "a", 1, ()),
+        (VARIED, "b", 4, ()),
+        ([each | {"a": each["a"] + i} for i in range(0, 8, 2) for each in VARIED], "a", 2, (("b", 3),)),
+        ([{"a": 1.0, "b": 1.0}, {"a": 2.0, "b": 1.0}, {"a": 2.0, "b": 2.0}], None, 1, ()),
+        ([{"a": 1.0, "b": 3.0}, {"a": 2.0, "b": 1.0}, {"a": 3.0, "b": 1.0}], "a", 1, ()),
+        ([{"c": "x"}, {"c": "y"}], None, 2, ()),
+    ],
+)
+def test_what_tells_curves_from_each_other(varied, key, styles, untold):
+    told = Telling.of(varied)
+    assert (told.key, len(set(told.styles)), told.untold) == (key, styles, untold)
+    assert told.colours.tolist() == ([each[key] for each in varied] if key else [*range(1, len(varied) + 1)])
+
+
+def test_many_values_side_by_side_are_numbered(drawn, tmp_path):
+    numbers = "[0.1, 0.2, 0.3, 0.1, 0.2, 0.3, 0.1, 0.2, 0.3, 0.4]", "[1, 2, 3, 2, 3, 1, 3, 1, 2, 1]"
+    drawn_case(tmp_path, [f"vary={{mode='zip', noise.D0={numbers[0]}, oscillator.omega={numbers[1]}}}"])
+    assert drawn[0].axes[1].get_ylabel() == "number of the curve"
+
+
+def test_the_parameters_that_are_held_stand_below_the_title(drawn, tmp_path):
+    drawn_case(tmp_path, [intensities(9), "oscillator.omega=2.0", "figure.time_unit='s'", "figure.title='Mine'"])
+    title, told = (text.get_text() for text in drawn[0].texts)
+    assert title.startswith("Mine\nwith vary.noise.D0 = ")
+    assert "oscillator.omega = 2.0" in " ".join(title.split())
+    shown = [
+        "$\\omega$ = 2 rad/s",
+        "$r$ = 0.8",
+        "$c_1$ = 0.1/s",
+        "$\\varepsilon$ = 0.1",
+        "$\\tau_0$ = 0.5 s",
+        "$r_0$ = 0.95",
+    ]
+    assert [text for text in shown if text not in told] == []
+    assert "D_0" not in told
+    assert len(told.splitlines()) <= 2
+    assert [each.get_fontsize() for each in drawn[0].texts][1] >= 11
+    assert not [text.get_text() for text in texts(drawn[0]) if "/time" in text.get_text()]
+
+
+def test_a_narrow_column_is_as_wide_as_it(drawn, tmp_path):
+    drawn_case(tmp_path, [intensities(2)])
+    drawn_case(tmp_path, [intensities(2), NARROW])
+    assert [figure.get_figwidth() for figure in drawn] == [7.2, 3.5]
+
+
+def test_ends_of_axes(drawn, tmp_path):
+    drawn_case(tmp_path, [intensities(2), "figure.xlim=[-1.0, 2.5]", "figure.ylim=[-0.001, 0.02]"])
+    axes = drawn[0].axes[0]
+    assert (axes.get_xlim(), axes.get_ylim()) == ((-1.0, 2.5), (-0.001, 0.02))
+
+
+@pytest.mark.parametrize("count", [2, 12])
+def test_what_is_marked(drawn, tmp_path, count):
+    """The tangent at 0 has the slope λ, and is long enough to be seen."""
+    drawn_case(tmp_path, [intensities(count), "figure.mark=['lyapunov_exponent']", "oscillator.omega=0.5"])
+    case = drawn_case(tmp_path, [intensities(count), "figure.mark=[]", "oscillator.omega=0.5"])
+    marked, plain = drawn
+    assert "slope $\\lambda$ at $p = 0$" in words(marked)
+    assert not any("$\\delta_p$" in text or "lambda" in text for text in words(plain))
+    axes = marked.axes[0]
+    tangents = [
+        path for each in axes.collections for path in each.get_paths() if len(path) == 2 and path.vertices[0, 0] < 0
+    ]
+    slopes = [np.subtract(*path.vertices[:, 1]) / np.subtract(*path.vertices[:, 0]) for path in tangents[-count:]]
+    expected = [curve.problem for curve in case.curves()]
+    np.testing.assert_allclose(slopes, [second_order(each).lyapunov_exponent for each in expected])
+    for path in tangents:
+        start, stop = axes.transData.transform(path.vertices)
+        assert np.hypot(*(stop - start)) > 0.12 * axes.bbox.width
+
+
+def test_a_moment_over_a_parameter(drawn, tmp_path):
+    drawn_case(tmp_path, [intensities(9), over("noise.D0", "{moment=2.0}")])
+    [axes] = drawn[0].axes
+    assert axes.get_ylabel() == "moment Lyapunov exponent $\\Lambda(2)$ (1/time)"
+    assert axes.get_xscale() == "log"
+    points = next(line for line in axes.lines if line.get_marker() == "o" and np.size(line.get_xdata()) == 9)
+    theory = next(line for line in axes.lines if np.size(line.get_xdata()) > 100)
+    np.testing.assert_allclose(np.interp(points.get_xdata(), *theory.get_data()), points.get_ydata(), rtol=1e-3)
+
+
+def test_a_parameter_is_called_alike_in_all_figures(drawn, tmp_path):
+    """In figures over it, beside their colours, and in plots of results.nc."""
+    case = drawn_case(tmp_path, PLANE)
+    drawn_case(tmp_path, [intensities(9), over("noise.D0")])
+    drawn_case(tmp_path, [intensities(9)])
+    along, over_it, bar = (
+        drawn[0].axes[0].get_ylabel(), drawn[1].axes[0].get_xlabel(), drawn[2].axes[1].get_ylabel(),
+    )  # fmt: skip
+    found = dataset_of(case, results_of(case), {})
+    assert {along, over_it, bar, label_of(found["noise.D0"])} == {"noise intensity $D_0$ (1/time)"}
+    assert drawn[2].axes[0].get_xlabel() == label_of(found["p"]) == "order of the moment $p$"
+
+
+def test_a_map_is_centred_at_zero_and_has_its_line(drawn, tmp_path):
+    drawn_case(tmp_path, PLANE)
+    axes, bar = drawn[0].axes
+    [mesh] = [each for each in axes.collections if type(each).__name__ == "QuadMesh"]
+    assert mesh.norm.vmin == -mesh.norm.vmax
+    assert mesh.norm(0.0) == pytest.approx(0.5)
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert bar.get_ylabel().split("\n") == ["moment Lyapunov exponent", "$\\Lambda(2)$ (1/time)"]
+    assert words(drawn[0]) == ["zero, interpolated between the values"]
+    assert len([label for label in list(tick_labels(drawn[0]))[3] if label.get_text()]) >= 3
+
+
+def test_what_failed_is_hatched_and_what_is_not_there_is_grey(drawn, tmp_path):
+    sets = [*PLANE[:2], over("noise.D0", '"stability_index"')]
+    drawn_case(tmp_path, sets, fails=lambda number: number in (7, 8, 9))
+    axes = drawn[0].axes[0]
+    failed, absent = (each for each in axes.collections if type(each).__name__ == "PatchCollection")
+    assert (len(failed.get_paths()), failed.get_hatch()) == (3, "/////")
+    assert len(absent.get_paths()) > 0
+    assert absent.get_hatch() is None
+    assert words(drawn[0])[:2] == ["failed or not solved", "no stability index from -20 to 20"]
+
+
+def chart(folder, x, y, *, r0=0.95, complete=True):
+    """A chart as `fpsolve chart` writes it, with a line for Λ(2)."""
+    held = {"oscillator.epsilon": 0.1, "noise.r0": r0}
+    lines = [{"line": "moment 2", "branches": [{"points": 3, "closed": False, "obstacles": []}]}]
+    summary = {"complete": complete, "parameters": held, "x": {"key": x}, "y": {"key": y}, "lines": lines}
+    (folder / "chart.json").write_text(json.dumps(summary), encoding="utf-8")
+    with (folder / "chart.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["line", "branch", "x", "y", "width", "label"])
+        writer.writerows([["moment 2", 1, place, 2 * place, 0.0, ""] for place in (0.5, 0.7, 0.9)])
+
+
+@pytest.mark.parametrize(
+    ("keys", "more", "words_of_it", "points"),
+    [
+        (
+            ("oscillator.omega", "noise.D0"),
+            {},
+            ["$\\Lambda(2) = 0$, traced by a chart"],
+            [[0.5, 0.7, 0.9], [1.0, 1.4, 1.8]],
+        ),
+        (
+            ("noise.D0", "oscillator.omega"),
+            {},
+            ["$\\Lambda(2) = 0$, traced by a chart"],
+            [[1.0, 1.4, 1.8], [0.5, 0.7, 0.9]],
+        ),
+        (
+            ("oscillator.omega", "noise.D0"),
+            {"complete": False},
+            ["$\\Lambda(2) = 0$, traced by a chart, not finished"],
+            [[0.5, 0.7, 0.9], [1.0, 1.4, 1.8]],
+        ),
+        (("oscillator.omega", "noise.D0"), {"r0": 0.9}, [], None),
+        (("oscillator.omega", "noise.tau0"), {}, [], None),
+    ],
+)
+def test_the_line_of_a_chart_is_on_the_map(drawn, tmp_path, keys, more, words_of_it, points):
+    chart(tmp_path, *keys, **more)
+    drawn_case(tmp_path, PLANE)
+    assert words(drawn[0])[1:] == words_of_it
+    found = [line.get_data() for line in drawn[0].axes[0].lines if np.size(line.get_xdata())]
+    assert [np.array(each).tolist() for each in found] == ([] if points is None else [points])
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"x": 1}', '{"x": {"key": "noise.D0"}, "y": 3}'])
+def test_a_chart_that_is_none_is_left(drawn, tmp_path, text):
+    (tmp_path / "chart.json").write_text(text, encoding="utf-8")
+    drawn_case(tmp_path, PLANE)
+    assert words(drawn[0]) == ["zero, interpolated between the values"]
+
+
+@pytest.mark.parametrize(("count", "more", "is_map"), [(8, "", False), (9, "", True), (8, "figure.map=true", True)])
+def test_when_it_is_a_map(drawn, tmp_path, monkeypatch, count, more, is_map):
+    planes = []
+    monkeypatch.setattr("fpsolve.output.figures.write_map", lambda plane, *_, **__: planes.append(plane))
+    sets = [intensities(count), "vary.oscillator.omega=[1.0, 2.0, 4.0]", over("oscillator.omega"), more]
+    drawn_case(tmp_path, list(filter(None, sets)))
+    assert len(planes) == is_map
+    assert all(isinstance(plane, Plane) and plane.values.shape == (count, 3) for plane in planes)
+
+
+def test_ten_thousand_curves_take_seconds(tmp_path):
+    case = case_of(tmp_path, ["vary.noise.D0={start=0.1, stop=3.0, num=10000}"])
+    results = results_of(case)
+    started = time.process_time()
+    draw(case, results, [], tmp_path)
+    assert time.process_time() - started < 20  # some 4 where nothing else runs
+    assert (tmp_path / "figure.pdf").stat().st_size < 2_000_000
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", ["one", "two", "nine", "over a parameter", "fifty over a parameter", "map"])
+@pytest.mark.parametrize("most", [0, 1])
+def test_what_failed_leaves_a_figure(sound, tmp_path, name, most):
+    """Also where nothing is solved, or one set alone."""
+    drawn_case(tmp_path, FIGURES[name], fails=lambda number: number > most)
+    assert len(sound) == 2
