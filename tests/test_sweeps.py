@@ -330,7 +330,7 @@ def test_a_cluster_works_for_one_case_after_the_other(place):
     """Its client ends with each."""
     pytest.importorskip("distributed")
     case = load_case(place / "sweep.toml", ["vary={}"])
-    with dask_cluster(1) as (address, _):
+    with dask_cluster(1) as (address, *_):
         pool = cluster(address)
         numbers = [run_case(case, place / out, pool=pool).results[0].moments.value for out in ("first", "second")]
     np.testing.assert_array_equal(*numbers)

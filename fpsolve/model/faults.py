@@ -38,8 +38,10 @@ def told_in_words(kind: type[Kind]) -> type[Kind]:
     def __init__(self: Any, *arguments: Any, **named: Any) -> None:
         try:
             made(self, *arguments, **named)
+            return
         except ValidationError as error:
-            raise _in_words(error, kind) from None
+            told = _in_words(error, kind)
+        raise told  # out here, where it has no context: that does not pickle, and Dask pickles it
 
     changed.__init__ = __init__
     return kind

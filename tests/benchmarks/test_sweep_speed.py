@@ -58,7 +58,7 @@ def test_two_processes_beside_one(tmp_path):
     text = CASE.format(size=20).replace("num = 4", "num = 33").replace("epsilon = 0.5", "epsilon = 0.7")
     (tmp_path / "sweep.toml").write_text(text, encoding="utf-8")
     one, two = seconds(tmp_path, "--jobs", "1"), seconds(tmp_path, "--jobs", "2")
-    with dask_cluster() as (address, _):
+    with dask_cluster() as (address, *_):
         cluster = seconds(tmp_path, "--scheduler", address)
     print(f"\n{one:.1f} s by one, {two:.1f} s by two ({one / two:.2f} times), {cluster:.1f} s by a cluster")
     assert one > 60

@@ -124,4 +124,5 @@ def test_each_fault_has_a_sentence_with_its_unit():
         with pytest.raises(ValidationError) as refused:
             NonGaussianNoise(*arguments, **named)
         assert str(refused.value).splitlines() == [f"NonGaussianNoise: {sentence}" for sentence in said]
+        assert refused.value.__context__ is None
         assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)
