@@ -1,6 +1,7 @@
 """The cases of the paper's figures: their own expectations, and every trend that the paper's text states."""
 
 import math
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -9,9 +10,8 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.study.solve import compare
+from fpsolve.study.solve import Numerics, compare, everything, solve_curve
 from tests.oracles import perturbation
-from tests.solving import solve_case
 
 CASES = Path(__file__).parents[2] / "cases"
 NAMES = sorted(path.stem for path in CASES.glob("*.toml"))
@@ -20,7 +20,8 @@ NAMES = sorted(path.stem for path in CASES.glob("*.toml"))
 @cache
 def solved(name):
     case = load_case(CASES / f"{name}.toml")
-    return case, solve_case(case)
+    numerics, wanted = Numerics.of(case), replace(everything(case), differentiated=None, shown=(), density=False)
+    return case, [solve_curve(curve, wanted, numerics).result for curve in case.curves()]
 
 
 def index(result):
