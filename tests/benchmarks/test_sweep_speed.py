@@ -34,7 +34,16 @@ quantities = ["moment"]
 def seconds(folder, *options):
     """How long a whole run takes, start-up included."""
     begun = time.monotonic()
-    command = [sys.executable, "-c", MAIN, "run", "sweep.toml", "--out", "-".join(options) or "out", *options]
+    command = [
+        sys.executable,
+        "-c",
+        MAIN,
+        "run",
+        "sweep.toml",
+        "--out",
+        f"out{len(options)}{options[-1][-1]}",
+        *options,
+    ]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     return time.monotonic() - begun
 
