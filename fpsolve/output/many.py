@@ -91,11 +91,13 @@ def _points(axes: Any, series: Sequence[Series], values: FloatArray, colours: An
     """Curves that have but one point, and the points that rare paths carry."""
     size, rgba = 16 * share_of(axes.figure) ** 2, colours.to_rgba(values)
     alone = [i for i, item in enumerate(series) if np.count_nonzero(np.isfinite(item.y)) == 1]
-    for i in alone:
-        axes.scatter(series[i].x, series[i].y, s=size, color=rgba[i])
-    far = [(item.far, rgba[i]) for i, item in enumerate(series) if np.any(item.rare)]
-    for (x, y), colour in far:
-        axes.scatter(x, y, s=size, color=[colour])
+    seen = [np.isfinite(series[i].y) for i in alone]
+    shown = [(series[i].x[is_seen], series[i].y[is_seen], i) for i, is_seen in zip(alone, seen, strict=True)]
+    shown += [(*item.far, i) for i, item in enumerate(series) if np.any(item.rare)]
+    if shown:
+        x, y = (np.concatenate([np.ravel(each[k]) for each in shown]) for k in (0, 1))
+        colour = np.repeat(rgba[[i for *_, i in shown]], [np.size(each[0]) for each in shown], axis=0)
+        axes.scatter(x, y, s=size, color=colour, rasterized=len(series) > MOST_VECTORS)
 
 
 def _styles(axes: Any, told: Telling, time_unit: str) -> Entries:

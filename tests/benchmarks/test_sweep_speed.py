@@ -64,7 +64,7 @@ def test_a_sweep_beside_a_loop(tmp_path):
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one processor")
 def test_two_processes_beside_one(tmp_path):
     """A minute of work by one process, by two, and by two workers of a Dask cluster on this machine."""
-    text = CASE.format(size=20).replace("num = 4", "num = 33").replace("epsilon = 0.5", "epsilon = 0.7")
+    text = CASE.format(size=20).replace("num = 4", "num = 33").replace("epsilon = 0.5", "epsilon = 0.85")
     (tmp_path / "sweep.toml").write_text(text, encoding="utf-8")
     one, two = seconds(tmp_path, "--jobs", "1"), seconds(tmp_path, "--jobs", "2")
     with dask_cluster() as (address, *_):
