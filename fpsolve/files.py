@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from fpsolve.errors import OutputError, Remedy
 
@@ -117,9 +117,16 @@ def write_json(path: Path, data: Any) -> None:
     write_text(path, json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
+@contextmanager
+def draft(path: Path) -> Iterator[TextIO]:
+    """A file that is open for writing text as UTF-8, line ends as they are, and takes its place when it is whole."""
+    with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        yield file
+
+
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
     """A table with its headings."""
-    with atomic(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+    with draft(path) as file:
         table = csv.writer(file)
         table.writerow(columns)
         table.writerows(rows)

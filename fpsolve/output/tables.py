@@ -5,11 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 from fpsolve import __version__
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
@@ -18,7 +18,7 @@ from fpsolve.case.curves import Curve
 from fpsolve.case.output import SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.exponent.quantities import INDICES, MOMENT, Index
-from fpsolve.files import atomic, write_csv, write_json
+from fpsolve.files import draft, write_csv, write_json
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
     """
     with ExitStack() as stack:
         summary, moments, curves = (
-            stack.enter_context(_draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
+            stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
         )
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
         by_moment.writerow([*case.vary.keys, *MOMENT_COLUMNS])
@@ -49,13 +49,6 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
             by_moment.writerows([*varied, *row.values()] for row in rows)
             by_curve.writerow([*varied, *_curve_row(case, result)])
         summary.write("\n ]\n}\n")
-
-
-@contextmanager
-def _draft(path: Path) -> Iterator[TextIO]:
-    """A file that is open for writing, and takes its place when it is whole."""
-    with atomic(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        yield file
 
 
 def _begin(case: Case, done: int, facts: Mapping[str, Any]) -> str:
