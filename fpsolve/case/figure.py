@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import BeforeValidator, model_validator
 
 from fpsolve.arrays import is_log_spaced
-from fpsolve.case.messages import Refusal, nearest, refuse, shown, shown_with_kind
+from fpsolve.case.messages import Refusal, nearest, refuse, repeated_or_unknown, shown, shown_with_kind
 from fpsolve.case.sections import Section, Text, Value, Varied, is_number
 from fpsolve.case.vary import ABSCISSAE, WORDS, Vary
 from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName
@@ -72,15 +72,11 @@ def _marks(value: Any) -> Any:
     if not isinstance(value, list | tuple):
         text = f"got {shown_with_kind(value)}; must be a list of some of {known}; write, for example, [{known}]"
         refuse([((), value, text)])
-    refusals = list[Refusal]()
-    for i, name in enumerate(value):
-        if name not in names:
-            guess = nearest(name, names) if isinstance(name, str) else ""
-            text = f"got {shown_with_kind(name)}; must be one of {known};{guess} rename or remove it"
-            refusals.append(((i,), name, text))
-        elif name in value[:i]:
-            refusals.append(((i,), name, f"got {shown(name)} twice; names must be distinct; remove one"))
-    refuse(refusals)
+    refuse(
+        repeated_or_unknown(
+            value, names, lambda name, guess: f"got {name}; must be one of {known};{guess} rename or remove it"
+        )
+    )
     return tuple(value)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, get_args
 
@@ -34,6 +34,22 @@ def refuse(refusals: Iterable[Refusal]) -> None:
     ]
     if details:
         raise ValidationError.from_exception_data("case", details)
+
+
+def repeated_or_unknown(
+    names: Sequence[Any], known: Sequence[str], unknown: Callable[[str, str], str]
+) -> Iterator[Refusal]:
+    """Each name of a list that is not known, or stands there already.
+
+    Args:
+        unknown: makes the sentence on an unknown name, from how that is shown and from the guess what was meant.
+    """
+    for i, name in enumerate(names):
+        if name not in known:
+            guess = nearest(name, known) if isinstance(name, str) else ""
+            yield (i,), name, unknown(shown_with_kind(name), guess)
+        elif name in names[:i]:
+            yield (i,), name, f"got {shown(name)} twice; names must be distinct; remove one"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

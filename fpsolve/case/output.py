@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, model_validator
 
-from fpsolve.case.messages import Refusal, nearest, refuse, shown, shown_with_kind
+from fpsolve.case.messages import Refusal, refuse, repeated_or_unknown, shown, shown_with_kind
 from fpsolve.case.sections import MAX_MOMENTS, Section, Values
 from fpsolve.exponent.quantities import QUANTITIES
 from fpsolve.model.parameters import parameter
@@ -23,15 +23,13 @@ def _quantities(value: Any) -> Any:
     if not isinstance(value, list | tuple) or not value:
         text = f"got {shown_with_kind(value)}; must be a non-empty list of some of {known}; name one"
         refuse([((), value, text)])
-    refusals = list[Refusal]()
-    for i, name in enumerate(value):
-        if name not in QUANTITY_NAMES:
-            guess = nearest(name, QUANTITY_NAMES) if isinstance(name, str) else ""
-            text = f"got {shown_with_kind(name)};{guess} known names: {known}; rename or remove it"
-            refusals.append(((i,), name, text))
-        elif name in value[:i]:
-            refusals.append(((i,), name, f"got {shown(name)} twice; names must be distinct; remove one"))
-    refuse(refusals)
+    refuse(
+        repeated_or_unknown(
+            value,
+            QUANTITY_NAMES,
+            lambda name, guess: f"got {name};{guess} known names: {known}; rename or remove it",
+        )
+    )
     return tuple(value)
 
 
@@ -69,9 +67,9 @@ class OutputSection(Section):
                 yield ("eigenfunctions", i), p, f"got {p} twice; values must be distinct; remove one"
 
     def _not_asked_for(self) -> Iterator[Refusal]:
-        if self.sensitivities and "sensitivities" not in self.quantities:
+        if self.sensitivities and SENSITIVITIES not in self.quantities:
             text = 'got true, but output.quantities has no "sensitivities"; add it there, or write false'
             yield ("sensitivities",), True, text
-        if self.eigenfunctions and "eigenfunctions" not in self.quantities:
+        if self.eigenfunctions and EIGENFUNCTIONS not in self.quantities:
             text = f'got {shown(self.eigenfunctions)}, but output.quantities has no "eigenfunctions"'
             yield ("eigenfunctions",), self.eigenfunctions, f"{text}; add it there, or write eigenfunctions = []"
