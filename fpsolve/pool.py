@@ -47,13 +47,17 @@ class Done(Generic[Item, Result]):
 
     Attributes:
         item: what the task was given.
-        result: what it returned; None where its worker died.
-        is_lost: whether its worker died on it, with no other task under way that may have been the reason.
+        result: what it returned; None where its worker died on it, with no other task under way that may have been the
+            reason.
     """
 
     item: Item
     result: Result | None
-    is_lost: bool = False
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether its worker died on it."""
+        return self.result is None
 
 
 @dataclass
@@ -110,7 +114,7 @@ class Pool:
                     except Exception as failure:
                         if not _is_killed_worker(failure):
                             raise
-                        yield Done(item, None, is_lost=True)
+                        yield Done(item, None)
                     if not suspects:
                         waiting |= {self._submit(task, each): each for each in islice(source, 1)}
             if suspects:
@@ -133,13 +137,13 @@ class Pool:
 
     def _own(self, task: Callable[[Item], Result], source: Iterator[Item]) -> Iterator[Done[Item, Result]]:
         """What this process does itself, as long as others need to start."""
-        begun = time.monotonic()
-        while self._executor is None and time.monotonic() - begun < self.own_seconds:
-            for item in islice(source, 1):
-                yield Done(item, task(item))
-                break
-            else:
+        until = time.monotonic() + self.own_seconds
+        while self._executor is None and time.monotonic() < until:
+            try:
+                item = next(source)
+            except StopIteration:
                 return
+            yield Done(item, task(item))
 
     def _submit(self, task: Callable[[Item], Result], item: Item) -> Future[Result]:
         if self._executor is None:
@@ -163,7 +167,7 @@ class Pool:
             try:
                 yield Done(item, self._submit(task, item).result())
             except BrokenProcessPool:
-                yield Done(item, None, is_lost=True)
+                yield Done(item, None)
                 self._end()
 
     def _end(self) -> None:

@@ -44,7 +44,6 @@ class Outcome:
         simulated: its curves, simulated.
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty where none came.
         comparisons: what it expects beside what was computed.
-        sweep: what solved it, if that was done.
         known: how many of its curves an earlier run had done.
     """
 
@@ -52,7 +51,6 @@ class Outcome:
     simulated: tuple[SimulatedCurve, ...] = ()
     interruption: str = ""
     comparisons: tuple[Comparison, ...] = ()
-    sweep: Sweep | None = None
     known: int = 0
 
     @property
@@ -139,7 +137,7 @@ def run_case(
                 with watch.bar(Phase(case.name, "figures")), writable(folder):
                     draw(case, sweep.results, simulated, folder)
                     draw_sensitivities(case, sweep.results, folder)
-    return Outcome(sweep.results, tuple(simulated), interruption, sweep=sweep, known=sweep.known)
+    return Outcome(sweep.results, tuple(simulated), interruption, known=sweep.known)
 
 
 def simulate_case(
@@ -222,7 +220,7 @@ def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = NOBODY) -
     ):
         tasks = batches(case, lambda curve: Order(curve, expected(case, curve), ""), numerics)
         for done in workers.run(SolveBatch(result_alone), tasks):
-            results = done.result or [lost(order.curve) for order in done.item.orders]
+            results = [lost(order.curve) for order in done.item.orders] if done.result is None else done.result
             for result in filter(None, results):
                 found.append(result)
                 progress(failed=bool(result.failures))
