@@ -114,9 +114,13 @@ class Results(Sequence[CurveResult]):
             insort(self._order, number)
         self._found[number] = found
 
+    def has(self, curve: Curve) -> bool:
+        """Whether there is a result of a curve; it is not read."""
+        return curve.number in self._found
+
     def of(self, curve: Curve) -> CurveResult | None:
         """The result of a curve, if there is one."""
-        return self._result(curve) if curve.number in self._found else None
+        return self._result(curve) if self.has(curve) else None
 
     def __len__(self) -> int:
         return len(self._order)

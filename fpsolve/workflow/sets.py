@@ -118,12 +118,13 @@ class Sweep:
 
     def _order(self, curve: Curve) -> Order | None:
         """What is to be done for a curve, or None."""
-        order, known = Order(curve, self._wanted(curve), self._key(curve)), self.results.of(curve)
+        wanted = self._wanted(curve)
+        if self.results.has(curve) and not wanted.draws:
+            return None
+        order, known = Order(curve, wanted, self._key(curve)), self.results.of(curve)
         if known is None:
             return order
-        if not order.wanted.draws:
-            return None
-        return replace(order, wanted=without_failed(order.wanted, known.failures), is_known=True)
+        return replace(order, wanted=without_failed(wanted, known.failures), is_known=True)
 
     def _lost(self, batch: Batch, queue: _Queue) -> list[Found]:
         """What is known of a batch whose worker died; the rest is tried again, set by set, which shows the reason."""
