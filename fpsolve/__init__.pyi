@@ -6,7 +6,6 @@ from .case.case import load_case as load_case
 from .errors import CaseError as CaseError
 from .errors import FpsolveError as FpsolveError
 from .errors import NotConverged as NotConverged
-from .exponent.eigen import principal_pair as principal_pair
 from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
 from .exponent.moments import moment_lyapunov as moment_lyapunov
 from .exponent.quantities import lyapunov_exponent as lyapunov_exponent
@@ -20,6 +19,7 @@ from .model.plane import PlaneSystem as PlaneSystem
 from .model.problem import Problem as Problem
 from .model.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
 from .output.datasets import open_results as open_results
+from .proofs.questions import prove as prove
 from .simulation.estimators import simulate as simulate
 from .workflow.cases import run as run
 

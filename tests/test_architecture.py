@@ -49,6 +49,10 @@ ROOMS = {
         *("density", "slopes", "sensitivity", "curve", "scan", "continuation", "special_points", "zero", "stability"),
         "regions",
     ],
+    "proofs": [
+        *("balls", "statement", "basis", "cells", "phases", "factor", "bounds", "galerkin", "certificate", "verify"),
+        *("enclosure", "search", "attempts", "questions"),
+    ],
     "case": [
         *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "figure", "chart", "output"),
         *("curves", "remedies", "refusals", "case"),

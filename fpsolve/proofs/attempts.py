@@ -1,0 +1,151 @@
+"""Bounds on Λ(p) and λ that hold with certainty: trial functions are enlarged until the bounds are close enough."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fpsolve.proofs.balls import ball, in_balls
+from fpsolve.proofs.basis import Basis, Core, Whole
+from fpsolve.proofs.bounds import Trial
+from fpsolve.proofs.certificate import BasisRecord, Certificate
+from fpsolve.proofs.enclosure import NOTHING, Enclosure, enclosure_of
+from fpsolve.proofs.galerkin import Galerkin, Pair
+from fpsolve.proofs.search import search
+from fpsolve.proofs.statement import Cylinder, Parameters, cylinder
+from fpsolve.proofs.verify import objection
+
+GROWTH = 1.35
+MOST_UNKNOWNS = 25_000
+PATIENCE = 2
+"""Enlargements that do not bring the bounds closer, after which no more are tried."""
+WHOLE_BELOW = 6.0
+"""End exponents a below which the ends of the support carry too much weight to be cut off."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """Modes −waves … waves and polynomials below degrees."""
+
+    waves: int
+    degrees: int
+
+    @property
+    def unknowns(self) -> int:
+        """Of the eigenproblem."""
+        return (2 * self.waves + 1) * self.degrees
+
+    def larger(self, edges: tuple[float, float]) -> Size:
+        """More of what is not yet small, by the coefficients of the highest mode and of the highest degree."""
+        sizes = zip((self.waves, self.degrees), edges, strict=True)
+        return Size(*(math.ceil(GROWTH * n) + 1 if edge > 0.1 * max(edges) else n for n, edge in sizes))
+
+
+SMALLEST = Size(5, 9)
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """Bounds, and the size of the trial that gave them."""
+
+    enclosure: Enclosure
+    size: Size
+
+    @property
+    def delta(self) -> float:
+        """Half of how far the bounds are apart."""
+        certificate = self.enclosure.certificate
+        return math.inf if certificate is None else certificate.delta
+
+
+@in_balls
+def enclose(stated: Parameters, p: str | None, guess: float, width: float, start: Size = SMALLEST) -> Attempt:
+    """Bounds on Λ(p), or on λ where p is None, that are at most `width` apart, if that can be done.
+
+    Args:
+        stated: parameters as decimals.
+        p: the moment as a decimal.
+        guess: Λ(p) or λ, about.
+        start: of the first trial.
+
+    Returns:
+        The closest bounds that were found.
+
+    Raises:
+        NoSuchExponent: the noise has algebraic tails, r₀ > 1.
+    """
+    noise, best, size, idle = cylinder(stated), Attempt(NOTHING, start), start, 0
+    basis = first_basis(noise, p)
+    while idle < PATIENCE and size.unknowns <= MOST_UNKNOWNS:
+        pair, basis = _solved(noise, basis, p, guess, size)
+        certificate = _certificate(stated, noise, basis, p, pair)
+        is_closer = certificate is not None and certificate.delta < 0.7 * best.delta
+        if certificate is not None and is_closer and not objection(certificate):
+            best, idle = Attempt(enclosure_of(certificate), size), 0
+            if best.enclosure.width <= width:
+                break
+        elif best.enclosure.is_proven:
+            idle += 1
+        size = size.larger(pair.edges)
+    return best
+
+
+def first_basis(noise: Cylinder, p: str | None) -> Basis:
+    """The whole support, or a core around the noise in the moment by perturbation theory, b(z) = β."""
+    if noise.is_bounded and float(noise.slope) < WHOLE_BELOW:
+        return Whole()
+    driven = 2 * float(noise.q[1].mean)
+    gauge = 0.0 if p is None else float(p) * driven / (2 * float(noise.nu) * float(noise.slope))
+    return _core(noise, _balance(noise, gauge))
+
+
+def _balance(noise: Cylinder, gauge: float) -> float:
+    """z with b(z) = β."""
+    slope = float(noise.slope)
+    if not noise.is_bounded:
+        return gauge / slope
+    return 2 * gauge / (slope + math.hypot(slope, 2 * gauge))
+
+
+def _core(noise: Cylinder, centre: float) -> Core:
+    """Polynomials about a centre, with the gauge that puts their weight there; none for λ, at 0."""
+    slope = float(noise.slope)
+    if not noise.is_bounded:
+        return Core(centre, 1.0, slope * centre)
+    return Core(centre, 1 / math.sqrt(2 * slope + 3), slope * centre / (1 - centre**2))
+
+
+def _solved(noise: Cylinder, basis: Basis, p: str | None, guess: float, size: Size) -> tuple[Pair, Basis]:
+    """A trial, about the place where the noise is in the moment."""
+    if p is None:
+        return Galerkin(noise, basis, None, size.waves, size.degrees).drift(), basis
+    pair = Galerkin(noise, basis, float(p), size.waves, size.degrees).pair(guess)
+    if isinstance(basis, Core) and 0.3 * basis.scale < abs(pair.centre - basis.centre) < 3 * basis.scale:
+        basis = _core(noise, pair.centre)
+        pair = Galerkin(noise, basis, float(p), size.waves, size.degrees).pair(guess)
+    return pair, basis
+
+
+def _certificate(stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, pair: Pair) -> Certificate | None:
+    """The closest bounds that a trial gives, before they are verified."""
+    if not math.isfinite(pair.value):
+        return None
+    trial = Trial(noise, None if p is None else ball(p), pair.value, basis, pair.cosine, pair.sine)
+    phases = max(128, 16 * len(pair.cosine))
+    found = search(trial, phases)
+    if found is None:
+        return None
+    return Certificate(
+        quantity="lyapunov_exponent" if p is None else "moment",
+        p=p,
+        parameters=dict(stated),
+        mu=pair.value,
+        delta=found.delta,
+        basis=BasisRecord.of(basis),
+        cosine=pair.cosine.tolist(),
+        sine=pair.sine.tolist(),
+        nodes=found.nodes.tolist(),
+        values=found.values.tolist(),
+        tails=None if found.tails is None else [float(each) for each in found.tails],
+        phases=phases,
+    )

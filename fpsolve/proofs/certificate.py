@@ -1,0 +1,136 @@
+"""Certificates: everything from which a bound follows, so that others can check it without the solver."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from fpsolve.errors import FpsolveError
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.vibro_impact import ImpactLaw, VibroImpactOscillator
+from fpsolve.proofs.basis import Basis, Core, Whole
+from fpsolve.proofs.statement import DIRECT, EXACT, IMPACT, NOISE, OSCILLATOR, REDUCED, TREATMENT
+
+MOMENT, DRIFT = "moment", "lyapunov_exponent"
+MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 16_384}
+"""Of what a certificate may hold, so that a file cannot ask for more than a machine has."""
+DECIMAL = re.compile(r"-?(\d{1,400}(\.\d{0,1100})?|\.\d{1,1100})([eE][-+]?\d{1,3})?")
+
+
+class MalformedProof(FpsolveError):
+    """A file that is no proof of this program."""
+
+
+def _decimal(text: str) -> str:
+    if not DECIMAL.fullmatch(text):
+        raise ValueError(f"got {text[:40]!r}; must be a decimal number such as '0.95'")
+    return text
+
+
+Decimal = Annotated[str, AfterValidator(_decimal)]
+Table = Annotated[list[Annotated[list[float], Field(min_length=1, max_length=MOST["columns"])]], Field(min_length=1)]
+
+
+class Record(BaseModel):
+    """A part of a proof; numbers are floats that are taken as exact."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class BasisRecord(Record):
+    """Which polynomials are used, `basis.Core` or `basis.Whole`."""
+
+    kind: Literal["core", "whole"]
+    centre: float = 0.0
+    scale: Annotated[float, Field(gt=0)] = 1.0
+    gauge: float = 0.0
+
+    @classmethod
+    def of(cls, basis: Basis) -> Self:
+        """The record of a basis."""
+        if isinstance(basis, Core):
+            return cls(kind="core", centre=basis.centre, scale=basis.scale, gauge=basis.gauge)
+        return cls(kind="whole")
+
+    @property
+    def basis(self) -> Basis:
+        """The basis."""
+        return Core(self.centre, self.scale, self.gauge) if self.kind == "core" else Whole()
+
+
+class Certificate(Record):
+    """That Λ(p), or λ, is within delta of mu.
+
+    Attributes:
+        quantity: "moment" or "lyapunov_exponent".
+        p: the moment as a decimal.
+        parameters: as decimals, and two words, by the keys of a case file.
+        cosine, sine: the trial function, as `bounds.Trial` has it.
+        nodes, values, tails: W of `factor`, linear between nodes, from left to right; its constants beyond.
+        phases: how many cells of φ suffice.
+    """
+
+    quantity: Literal["moment", "lyapunov_exponent"]
+    p: Decimal | None = None
+    parameters: Mapping[str, str]
+    mu: float
+    delta: Annotated[float, Field(ge=0)]
+    basis: BasisRecord
+    cosine: Annotated[Table, Field(max_length=MOST["rows"])]
+    sine: Annotated[Table, Field(max_length=MOST["rows"])]
+    nodes: Annotated[list[float], Field(min_length=2, max_length=MOST["cells"])]
+    values: Annotated[list[float], Field(min_length=2, max_length=MOST["cells"])]
+    tails: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    phases: Annotated[int, Field(ge=4, le=MOST["phases"])]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        shapes = {np.shape(row) for table in (self.cosine, self.sine) for row in table}
+        if len(shapes) != 1 or len(self.cosine) != len(self.sine):
+            raise ValueError("cosine and sine must be tables of one shape")
+        if len(self.nodes) != len(self.values) or np.any(np.diff(self.nodes) <= 0):
+            raise ValueError("nodes must increase, with one of values for each")
+        if (self.quantity == MOMENT) == (self.p is None) or (self.tails is None) == (self.basis.kind == "core"):
+            raise ValueError("a moment has its p, and a core its tails; nothing else has")
+        return self
+
+    @model_validator(mode="after")
+    def _is_of_an_oscillator(self) -> Self:
+        _check_parameters(self.parameters)
+        is_bounded = self.parameters.get(TREATMENT) == EXACT and float(self.parameters[NOISE[2]]) < 1
+        if self.basis.kind == "whole" and not is_bounded:
+            raise ValueError("only bounded noise has a whole support")
+        return self
+
+
+def _check_parameters(stated: Mapping[str, str]) -> None:
+    """Refuse what is no parameter set, by the ranges of the models."""
+    direct = DIRECT[0] in stated
+    expected = {*OSCILLATOR, IMPACT, *(DIRECT if direct else (*NOISE, TREATMENT))}
+    if set(stated) != expected:
+        raise ValueError(f"parameters must be {', '.join(sorted(expected))}")
+    numbers = {key: float(_decimal(text)) for key, text in stated.items() if key not in (IMPACT, TREATMENT)}
+    if not direct and stated[TREATMENT] not in (EXACT, REDUCED):
+        raise ValueError(f"got {TREATMENT} = {stated[TREATMENT]!r}; must be {EXACT!r} or {REDUCED!r}")
+    VibroImpactOscillator(
+        **{key.partition(".")[2]: numbers[key] for key in OSCILLATOR}, impact=ImpactLaw(stated[IMPACT])
+    )
+    (OrnsteinUhlenbeck if direct else NonGaussianNoise)(*(numbers[key] for key in (DIRECT if direct else NOISE)))
+
+
+def certificate_from(data: Any) -> Certificate:
+    """A certificate from parsed JSON.
+
+    Raises:
+        MalformedProof: it is none.
+    """
+    try:
+        return Certificate.model_validate(data)
+    except ValidationError as failure:
+        first = failure.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise MalformedProof(f"{place + ': ' if place else ''}{first['msg']}") from None

@@ -1,0 +1,157 @@
+"""What is asked of a problem: bounds on Λ(p), λ and δ_p that hold with certainty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fpsolve.errors import NotConverged
+from fpsolve.exponent.error import Absent
+from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.quantities import lyapunov_exponent
+from fpsolve.exponent.quantities import stability_index as estimated_index
+from fpsolve.model.problem import Problem, of_problem
+from fpsolve.proofs.attempts import enclose
+from fpsolve.proofs.balls import precision
+from fpsolve.proofs.enclosure import NOTHING, Enclosure, around, trivial
+from fpsolve.proofs.statement import Parameters, cylinder, parameters_of
+from fpsolve.theory.perturbation import scale_of
+
+SHARE = 1e-7
+"""The width that is sought if none is given, as a share of the scale of what is bounded."""
+INDEX_WIDTH, WIDENINGS = 1e-6, 4
+"""The width sought for δ_p, and how often it is tried again with one ten times as large."""
+
+
+@dataclass(frozen=True)
+class IndexEnclosure:
+    """Two p of one sign between which Λ changes its own, so that δ_p lies between them.
+
+    Λ is convex and Λ(0) = 0, so that there is one such place at most.
+
+    Attributes:
+        lower, upper: around δ_p; infinite where nothing is proven.
+        moments: the decimals of the two p, and Λ of each.
+    """
+
+    lower: float
+    upper: float
+    moments: tuple[tuple[str, Enclosure], ...] = ()
+
+    @property
+    def is_proven(self) -> bool:
+        """Whether there are bounds."""
+        return bool(self.moments)
+
+
+NO_INDEX = IndexEnclosure(-math.inf, math.inf)
+
+
+@of_problem
+def prove(problem: Problem, p: float, *, width: float | None = None) -> Enclosure:
+    """Bounds on Λ(p) that hold with certainty, for the paper's oscillator and its noise with r₀ ≤ 1.
+
+    They follow from a function T > 0 with λ₋ T ≤ L(p) T ≤ λ₊ T, Eq. (19), which is verified in ball arithmetic; neither
+    the finite elements nor the eigenvalue iteration are trusted. See `fpsolve.proofs.verify` for the theorem.
+
+    >>> oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.1, epsilon=0.1)
+    >>> found = prove(oscillator, NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95), 2.0)
+    >>> found.lower < 0.0142930811487 < found.upper  # the exact value, from the moment hierarchy
+    True
+
+    Args:
+        problem: an oscillator and its noise, in one argument or two; its numbers are the decimals they are printed as.
+        p: order of the moment, in the same sense.
+        width: wanted upper − lower, in 1/time; 1e-7 of the scale of Λ(p) if None.
+
+    Returns:
+        The closest bounds that were found, maybe farther apart than wanted; infinite where nothing could be proven.
+
+    Raises:
+        NoSuchExponent: r₀ > 1 for Eq. (7) as it stands.
+        TypeError: another motion or noise.
+        ValueError: p is not finite, or the width not positive.
+        MissingFlint: python-flint is not installed.
+    """
+    return prove_moment(problem, parameters_of(problem), repr(float(p)), width)
+
+
+@of_problem
+def prove_lyapunov_exponent(problem: Problem, *, width: float | None = None) -> Enclosure:
+    """Bounds on the largest Lyapunov exponent λ that hold for almost every path; as `prove`."""
+    return prove_exponent(problem, parameters_of(problem), width)
+
+
+@of_problem
+def prove_stability_index(problem: Problem) -> IndexEnclosure:
+    """Bounds on the stability index δ_p, from the signs of Λ beside it; as `prove`."""
+    return prove_index(problem, parameters_of(problem))
+
+
+def check_width(width: float | None) -> None:
+    """Refuse a width that is not a positive number."""
+    if width is not None and not (math.isfinite(width) and width > 0):
+        raise ValueError(f"got width = {width}; must be a positive number, such as 1e-9")
+
+
+def refuse_unprovable(stated: Parameters) -> None:
+    """Refuse parameters for which no bound can be proven. Raises `NoSuchExponent`, `MissingFlint`."""
+    with precision():
+        cylinder(stated)
+
+
+def prove_moment(problem: Problem, stated: Parameters, p: str, width: float | None) -> Enclosure:
+    """Bounds on Λ(p), with parameters and p as decimals."""
+    order = float(p)
+    if not math.isfinite(order):
+        raise ValueError(f"got p = {p}; must be finite")
+    check_width(width)
+    refuse_unprovable(stated)
+    if order == 0:
+        return trivial(stated)
+    guess = _guess(lambda rtol: float(moment_lyapunov(problem, [order], rtol=rtol).value[0]))
+    if guess is None:
+        return NOTHING
+    scale = max(abs(guess), float(scale_of(problem).moment(order)))
+    return enclose(stated, p, guess, SHARE * scale if width is None else width).enclosure
+
+
+def prove_exponent(problem: Problem, stated: Parameters, width: float | None) -> Enclosure:
+    """Bounds on λ, with parameters as decimals."""
+    check_width(width)
+    refuse_unprovable(stated)
+    guess = _guess(lambda rtol: lyapunov_exponent(problem, rtol=rtol).value)
+    scale = max(abs(guess or 0.0), float(scale_of(problem).linear))
+    return enclose(stated, None, guess or 0.0, SHARE * scale if width is None else width).enclosure
+
+
+def prove_index(problem: Problem, stated: Parameters) -> IndexEnclosure:
+    """Bounds on δ_p, with parameters as decimals; none where there is none, or where it is not found."""
+    refuse_unprovable(stated)
+    try:
+        found = estimated_index(problem)
+        if isinstance(found, Absent):
+            return NO_INDEX
+        slope = abs(float(moment_lyapunov(problem, [found.value]).derivative[0]))
+    except NotConverged:
+        return NO_INDEX
+    half = max(INDEX_WIDTH * max(1.0, abs(found.value)) / 2, 2 * found.error_estimate)
+    for _ in range(WIDENINGS):
+        if half < abs(found.value):
+            sides = [repr(float(f"{found.value + sign * half:.12g}")) for sign in (-1, 1)]
+            moments = tuple((p, prove_moment(problem, stated, p, slope * half / 2)) for p in sides)
+            if moments[0][1].sign * moments[1][1].sign < 0:
+                return IndexEnclosure(*around(*sides), moments)
+        half *= 10
+    return NO_INDEX
+
+
+def _guess(solve: Callable[[float], float]) -> float | None:
+    """What finite elements find, at a smaller accuracy if need be."""
+    for rtol in (1e-8, 1e-3):
+        try:
+            return solve(rtol)
+        except NotConverged:
+            continue
+    return None
