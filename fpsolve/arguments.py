@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 UNITS = "Units: omega in rad/time, c1 in 1/time, D0 in 1/time, tau0 in time"
 
 Cases = Annotated[list[Path], Parameter(help="Case files.", consume_multiple=True, negative="")]
+ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True, negative="")]
 Overrides = Annotated[
     list[str] | None,
     Parameter(

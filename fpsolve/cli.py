@@ -1,4 +1,4 @@
-"""The command line: fpsolve run | check | simulate | chart | mesh."""
+"""The command line: fpsolve run | check | simulate | chart | prove | mesh."""
 
 from __future__ import annotations
 
@@ -13,7 +13,19 @@ from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
 
 from fpsolve import __version__, letters
-from fpsolve.arguments import Cases, Count, Fresh, Jobs, Overrides, Quiet, Scheduler, load, load_to_write, pool_of
+from fpsolve.arguments import (
+    Cases,
+    Count,
+    Fresh,
+    Jobs,
+    Overrides,
+    ProvenCases,
+    Quiet,
+    Scheduler,
+    load,
+    load_to_write,
+    pool_of,
+)
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.process import drop_blocked_output, ended_by_signals, flush_output
@@ -201,6 +213,67 @@ def chart(
         if found.failures:
             code = NOT_CONVERGED
     return code
+
+
+@app.command
+def prove(
+    cases: ProvenCases = None,
+    *,
+    width: Annotated[
+        float | None, Parameter(help="Wanted upper - lower, in 1/time; 1e-7 of the scale of each number if omitted.")
+    ] = None,
+    check: Annotated[Path | None, Parameter(help="Verify a proof.json from its certificates alone instead.")] = None,
+    out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("results"),
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
+    """Prove bounds on the exponents that hold with certainty; write them with certificates, OUT/<case>/proof.json.
+
+    Needs python-flint: pip install 'fpsolve[proof]'. Exit codes: 0 proven, 3 a width is not met; of --check 0 accepted,
+    1 rejected, 2 malformed.
+
+    Example: fpsolve prove cases/fig1.toml --width 1e-9
+    """
+    from fpsolve.output.proofs import print_proofs
+    from fpsolve.output.terminal import done_of, print_written
+    from fpsolve.study.prove import refuse_unprovable_case
+    from fpsolve.workflow.proofs import prove_case
+
+    if (check is None) == (not cases):
+        raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
+    if check is not None:
+        return _verify(check, is_quiet=quiet)
+    code, loaded = 0, load_to_write(cases or [], overrides, {}, monte_carlo=False)
+    for case in loaded:
+        refuse_unprovable_case(case, width)
+    pool = pool_of(jobs, scheduler)
+    for case in loaded:
+        begun = monotonic()
+        proofs = prove_case(case, out, width=width, pool=pool, watch=_watch(is_quiet=quiet))
+        if not quiet:
+            print_proofs(case, proofs)
+        unmet = sum(not each.is_met for each in proofs)
+        print_written(out / case.name, done_of(case, len(proofs), unmet, "not as close as wanted"), monotonic() - begun)
+        if unmet:
+            code = NOT_CONVERGED
+    return code
+
+
+def _verify(path: Path, *, is_quiet: bool) -> int:
+    """Check a proof.json, and say which claims do not follow."""
+    from fpsolve.workflow.proofs import check_proof
+
+    checked = check_proof(path)
+    for text in checked.objections:
+        _print_error(f"{path}: {text}")
+    count = checked.claims.count
+    if checked.objections:
+        print(f"rejected: {path} ({len(checked.objections)} objections, {count} bounds)")
+        return CHECK_FAILED
+    print(f"accepted: {path} ({count} bounds follow from their certificates)")
+    return 0
 
 
 @app.command

@@ -51,18 +51,18 @@ ROOMS = {
     ],
     "proofs": [
         *("balls", "statement", "basis", "cells", "phases", "factor", "bounds", "galerkin", "certificate", "verify"),
-        *("enclosure", "search", "attempts", "questions"),
+        *("enclosure", "search", "attempts", "questions", "claims"),
     ],
     "case": [
         *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "figure", "chart", "output"),
         *("curves", "remedies", "refusals", "case"),
     ],
-    "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart"],
+    "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart", "prove"],
     "output": [
         *("vtk", "provenance", "records", "tables", "datasets", "frame", "series", "many", "plots", "maps"),
-        *("charts", "figures", "screen", "remarks", "summary", "terminal"),
+        *("charts", "figures", "screen", "remarks", "summary", "terminal", "proofs"),
     ],
-    "workflow": ["watch", "folders", "sets", "simulations", "cases"],
+    "workflow": ["watch", "folders", "sets", "simulations", "cases", "proofs"],
     "progress": [],
     "arguments": [],
     "cli": [],

@@ -73,10 +73,10 @@ def print_written(folder: Path, what: str, seconds: float, known: str = "") -> N
     Screen.of().say(f"written: {folder} ({what}, {duration(seconds)}{f'; {known}' if known else ''})")
 
 
-def done_of(case: Case, done: int, failed: int = 0) -> str:
+def done_of(case: Case, done: int, failed: int = 0, fault: str = "not converged") -> str:
     """How many curves of a case are done: "3 curves", "2 of 3 curves, 1 not converged"."""
     count = f"{done} of {case.planned}" if done < case.planned else f"{done}"
-    return f"{count} {plural('curve', case.planned)}{f', {failed} not converged' if failed else ''}"
+    return f"{count} {plural('curve', case.planned)}{f', {failed} {fault}' if failed else ''}"
 
 
 def known_of(case: Case, known: int) -> str:

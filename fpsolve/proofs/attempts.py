@@ -59,13 +59,13 @@ class Attempt:
 
 
 @in_balls
-def enclose(stated: Parameters, p: str | None, guess: float, width: float, start: Size = SMALLEST) -> Attempt:
+def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0, start: Size = SMALLEST) -> Attempt:
     """Bounds on Λ(p), or on λ where p is None, that are at most `width` apart, if that can be done.
 
     Args:
         stated: parameters as decimals.
         p: the moment as a decimal.
-        guess: Λ(p) or λ, about.
+        guess: Λ(p), about.
         start: of the first trial.
 
     Returns:

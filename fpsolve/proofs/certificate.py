@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -122,15 +122,8 @@ def _check_parameters(stated: Mapping[str, str]) -> None:
     (OrnsteinUhlenbeck if direct else NonGaussianNoise)(*(numbers[key] for key in (DIRECT if direct else NOISE)))
 
 
-def certificate_from(data: Any) -> Certificate:
-    """A certificate from parsed JSON.
-
-    Raises:
-        MalformedProof: it is none.
-    """
-    try:
-        return Certificate.model_validate(data)
-    except ValidationError as failure:
-        first = failure.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise MalformedProof(f"{place + ': ' if place else ''}{first['msg']}") from None
+def first_fault(failure: ValidationError) -> str:
+    """The first of the faults, with its place."""
+    first = failure.errors(include_url=False)[0]
+    place = ".".join(map(str, first["loc"]))
+    return f"{place + ': ' if place else ''}{first['msg']}"

@@ -19,16 +19,23 @@ class Enclosure:
 
     Attributes:
         certificate: from which they follow; None where nothing is proven and the bounds are infinite.
+        wanted: how far they may be apart.
     """
 
     lower: float
     upper: float
     certificate: Certificate | None = None
+    wanted: float = math.inf
 
     @property
     def width(self) -> float:
         """upper − lower, rounded up."""
         return math.nextafter(self.upper - self.lower, math.inf) if self.upper > self.lower else 0.0
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the bounds are as close as they are wanted."""
+        return self.is_proven and self.width <= self.wanted
 
     @property
     def is_proven(self) -> bool:

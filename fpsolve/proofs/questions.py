@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.error import Absent
@@ -111,10 +111,10 @@ def prove_moment(problem: Problem, stated: Parameters, p: str, width: float | No
     if order == 0:
         return trivial(stated)
     guess = _guess(lambda rtol: float(moment_lyapunov(problem, [order], rtol=rtol).value[0]))
-    if guess is None:
-        return NOTHING
-    scale = max(abs(guess), float(scale_of(problem).moment(order)))
-    return enclose(stated, p, guess, SHARE * scale if width is None else width).enclosure
+    scale = max(abs(guess or 0.0), float(scale_of(problem).moment(order)))
+    wanted = SHARE * scale if width is None else width
+    found = NOTHING if guess is None else enclose(stated, p, wanted, guess).enclosure
+    return replace(found, wanted=wanted)
 
 
 def prove_exponent(problem: Problem, stated: Parameters, width: float | None) -> Enclosure:
@@ -123,7 +123,8 @@ def prove_exponent(problem: Problem, stated: Parameters, width: float | None) ->
     refuse_unprovable(stated)
     guess = _guess(lambda rtol: lyapunov_exponent(problem, rtol=rtol).value)
     scale = max(abs(guess or 0.0), float(scale_of(problem).linear))
-    return enclose(stated, None, guess or 0.0, SHARE * scale if width is None else width).enclosure
+    wanted = SHARE * scale if width is None else width
+    return replace(enclose(stated, None, wanted).enclosure, wanted=wanted)
 
 
 def prove_index(problem: Problem, stated: Parameters) -> IndexEnclosure:

@@ -18,8 +18,8 @@ SOLVED, SIMULATED = (
     r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)",
     r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)",
 )
-"""The names of the files that a run writes, and of those of a simulation; and of a chart."""
-CHART = r"chart\.(csv|json|png|pdf)"
+"""The names of the files that a run writes, and of those of a simulation; of a chart, and of proofs."""
+CHART, PROVEN = r"chart\.(csv|json|png|pdf)", r"proof\.json"
 _UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
 
 
@@ -33,7 +33,7 @@ def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator
     folder = Path(out) / case.name
     with alone(folder):
         with writable(folder):
-            stale = replaced if _agrees(case, folder) else (SOLVED, SIMULATED, CHART)
+            stale = replaced if _agrees(case, folder) else (SOLVED, SIMULATED, CHART, PROVEN)
             _remove(folder, "|".join([*stale, _UNFINISHED]))
         yield folder
 
@@ -55,7 +55,12 @@ def kept(case: Case, done: int, folder: Path | None = None) -> str:
 
 def _agrees(case: Case, folder: Path) -> bool:
     """Whether the tables in a folder are all of parameters that the case has."""
-    tables = [*folder.glob("summary.json"), *folder.glob("monte_carlo*.json"), *folder.glob("chart.json")]
+    tables = [
+        *folder.glob("summary.json"),
+        *folder.glob("monte_carlo*.json"),
+        *folder.glob("chart.json"),
+        *folder.glob("proof.json"),
+    ]
     try:
         contents = [json.loads(table.read_text(encoding="utf-8")) for table in tables]
         found = [curve["parameters"] for content in contents for curve in content.get("curves", [content])]

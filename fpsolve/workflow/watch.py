@@ -10,7 +10,7 @@ from typing import Protocol
 from fpsolve.case.case import Case
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
-SETS, MOMENTS, NODES, POINTS, PERCENT = "sets", "p", "nodes", "points", "%"
+SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT = "sets", "p", "nodes", "points", "bounds", "%"
 """What a phase counts."""
 
 

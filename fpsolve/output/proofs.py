@@ -1,0 +1,128 @@
+"""Proven bounds as proof.json, and as tables on the terminal."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+from pathlib import Path
+from typing import Any
+
+from rich.text import Text
+
+from fpsolve import __version__
+from fpsolve.case.case import Case
+from fpsolve.case.vary import written
+from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
+from fpsolve.files import write_text
+from fpsolve.output.screen import Cell, Column, Grid, Screen
+from fpsolve.output.summary import MOST_ROWS, MOST_TABLES, varied_columns
+from fpsolve.proofs.enclosure import Enclosure
+from fpsolve.proofs.questions import IndexEnclosure
+from fpsolve.study.prove import CurveProof
+
+PROOF = "proof.json"
+WORDS = {1: "grows", -1: "decays", 0: "open"}
+
+
+def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_whole: bool) -> None:
+    """proof.json: for each curve its parameters, and every bound with the certificate from which it follows."""
+    head = {"fpsolve": __version__, "case": case.name, "complete": is_whole}
+    lines = [f" {json.dumps(key)}: {json.dumps(value)},\n" for key, value in head.items()]
+    curves = ",\n".join(map(_curve_text, proofs))
+    write_text(folder / PROOF, "".join(["{\n", *lines, ' "curves": [\n', curves, "\n ]\n}\n"]))
+
+
+def _curve_text(proof: CurveProof) -> str:
+    """A curve as JSON, a line for each bound."""
+    moments = ",\n".join(f"    {_line({'p': p} | _bound(found))}" for p, found in proof.moments)
+    index = proof.index
+    others = {
+        "lyapunov_exponent": None if proof.exponent is None else _bound(proof.exponent),
+        "stability_index": None if index is None else _index(index),
+        "verdicts": proof.verdicts,
+    }
+    rest = ",\n".join(f"   {json.dumps(key)}: {_line(value)}" for key, value in others.items())
+    parameters = f'   "parameters": {_line(dict(proof.curve.parameters))}'
+    return f'  {{\n{parameters},\n   "moments": [\n{moments}\n   ],\n{rest}\n  }}'
+
+
+def _bound(found: Enclosure | None) -> dict[str, Any]:
+    """lower, upper and the certificate; null where nothing is proven."""
+    if found is None or found.certificate is None:
+        return {"lower": None, "upper": None, "certificate": None}
+    return {"lower": found.lower, "upper": found.upper, "certificate": found.certificate.model_dump(mode="json")}
+
+
+def _index(found: IndexEnclosure) -> dict[str, Any]:
+    """Bounds on δ_p, and Λ at two p beside it."""
+    moments = [{"p": float(p)} | _bound(each) for p, each in found.moments]
+    ends = (found.lower, found.upper) if found.is_proven else (None, None)
+    return {"lower": ends[0], "upper": ends[1], "moments": moments}
+
+
+def _line(data: Any) -> str:
+    return json.dumps(data, allow_nan=False, ensure_ascii=False)
+
+
+def print_proofs(case: Case, proofs: Sequence[CurveProof]) -> None:
+    """The bounds and what follows from them: a table for each curve, or of many curves a row each."""
+    screen = Screen.of()
+    if len(proofs) > MOST_TABLES:
+        screen.show(_curve_grid(case, proofs))
+        return
+    for proof in proofs:
+        screen.show(_moment_grid(case, proof))
+        indices = [(LYAPUNOV_EXPONENT.symbol, proof.exponent), (STABILITY_INDEX.symbol, proof.index)]
+        screen.packed([f"{symbol} {_between(found)}" for symbol, found in indices if found is not None])
+        if proof.verdicts:
+            screen.say(f"Proven: {'; '.join(proof.verdicts)}.")
+        screen.lines([""])
+
+
+def _moment_grid(case: Case, proof: CurveProof) -> Grid:
+    """p, the bounds on Λ(p), how far they are apart, and what they say of the moment."""
+    symbol = MOMENT.symbol
+    columns = [Column("p"), Column(f"{symbol} ≥"), Column(f"{symbol} ≤"), Column("width", 2), Column("the moment", 1)]
+    grid = Grid(case.heading(proof.curve), columns)
+    for p, found in proof.moments:
+        row: list[Cell] = [f"{p + 0.0:g}", "", "", "", Text("not proven", "bold red")]
+        if found is not None and found.is_proven:
+            style = "" if found.is_met else "yellow"
+            row[1:] = [
+                *bounds_text(found),
+                Text(f"{found.width:.0e}", style),
+                WORDS[found.sign] if p else "is constant",
+            ]
+        elif found is None:
+            row[4] = "not tried"
+        grid.rows.append(row)
+    return grid
+
+
+def _curve_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
+    """What varies, how many Λ(p) are proven, the bounds on λ, and what follows."""
+    columns = [*varied_columns(case), Column("proven"), Column(LYAPUNOV_EXPONENT.symbol, 1)]
+    grid = Grid(case.headline, [*columns, Column("verdicts", 2, is_text=True)])
+    for proof in proofs[:MOST_ROWS]:
+        proven = sum(found is not None and found.is_proven for _, found in proof.moments)
+        exponent = "" if proof.exponent is None else _between(proof.exponent)
+        varied = map(written, proof.curve.varied.values())
+        grid.rows.append([*varied, f"{proven} of {len(proof.moments)}", exponent, "; ".join(proof.verdicts)])
+    return grid
+
+
+def _between(found: Enclosure | IndexEnclosure) -> str:
+    """ "in [0.0010257274, 0.0010257275]"."""
+    return f"in [{', '.join(bounds_text(found))}]" if found.is_proven else "not proven"
+
+
+def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:
+    """Both bounds with two digits of how far they are apart, rounded outward."""
+    if found.lower == found.upper:
+        return f"{found.lower:g}", f"{found.upper:g}"
+    step = Decimal(1).scaleb(math.floor(math.log10(found.upper - found.lower)) - 1)
+    ends = ((found.lower, ROUND_FLOOR), (found.upper, ROUND_CEILING))
+    low, high = (f"{Decimal(repr(end)).quantize(step, rounding)}" for end, rounding in ends)
+    return low, high

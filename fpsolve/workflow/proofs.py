@@ -1,0 +1,97 @@
+"""Proving the bounds of a case, and checking those of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fpsolve.case.case import Case
+from fpsolve.case.reading import Unreadable, Words, read_text
+from fpsolve.files import writable
+from fpsolve.output.proofs import write_proof
+from fpsolve.pool import Pool, here
+from fpsolve.proofs.certificate import MalformedProof
+from fpsolve.proofs.claims import Claims, claims_from
+from fpsolve.proofs.enclosure import Enclosure
+from fpsolve.proofs.questions import IndexEnclosure
+from fpsolve.study.prove import CurveProof, Plan, answer, refuse_unprovable_case
+from fpsolve.workflow.folders import ANEW, PROVEN, own_folder, saying_if_interrupted
+from fpsolve.workflow.watch import BOUNDS, NOBODY, Phase, Watch
+
+_WORDS = Words("the proof", "a proof", "proof.json", "JSON", "make one with `fpsolve prove`")
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What became of the claims of a file.
+
+    Attributes:
+        claims: all of them.
+        objections: which do not follow, and why.
+    """
+
+    claims: Claims
+    objections: Sequence[str]
+
+
+def prove_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    width: float | None = None,
+    pool: Pool | None = None,
+    watch: Watch = NOBODY,
+) -> list[CurveProof]:
+    """Prove bounds on Λ at every p of every curve of a case, and on λ and δ_p; write proof.json into `out`/<case>/.
+
+    Args:
+        width: wanted upper − lower; 1e-7 of the scale of each number if None.
+        pool: who proves; this process if none is given.
+
+    Raises:
+        FpsolveError: a curve cannot be proven, or the width is none; nothing is written.
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        KeyboardInterrupt: its text says what is kept.
+    """
+    refuse_unprovable_case(case, width)
+    plan = Plan(case, width)
+    answers: list[Enclosure | IndexEnclosure] = []
+    with (
+        own_folder(case, out, (PROVEN,)) as folder,
+        saying_if_interrupted(lambda: _kept(plan, len(answers), folder), ANEW),
+        watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
+        pool or here() as workers,
+    ):
+        try:
+            for found in workers.map(answer, plan.questions()):
+                answers.append(found)
+                progress(failed=not found.is_proven)
+        finally:
+            proofs = plan.gathered(answers)
+            if proofs:
+                with writable(folder):
+                    write_proof(case, proofs, folder, is_whole=len(answers) == plan.total)
+    return proofs
+
+
+def check_proof(path: Path) -> Checked:
+    """Verify all claims of a proof.json from their certificates alone.
+
+    Raises:
+        MalformedProof: it is none.
+        MissingFlint: python-flint is not installed.
+    """
+    try:
+        claims = claims_from(read_text(path, _WORDS))
+    except Unreadable as failure:
+        raise MalformedProof(f"{path}: {failure.sentence}") from None
+    except MalformedProof as failure:
+        raise MalformedProof(f"{path}: {failure}; make one with `fpsolve prove`") from None
+    return Checked(claims, tuple(claims.objections()))
+
+
+def _kept(plan: Plan, done: int, folder: Path) -> str:
+    """How much is proven, and where it is."""
+    text = f" after {done} of {plan.total} bounds"
+    return f"{text}; what was done is kept in {folder}" if done else text
