@@ -111,7 +111,8 @@ class Galerkin:
             value = float(np.real(np.vdot(adjoint, self.matrix @ u) / np.vdot(adjoint, self.mass @ u)))
         position = sp.kron(sp.identity(2 * self.waves + 1), self._noise.position)
         centre = np.real(np.vdot(adjoint, position @ u) / np.vdot(adjoint, self.mass @ u))
-        return Pair(value, self._table(u), float(centre))
+        mean = (self.mass @ u)[self.waves * self.degrees]
+        return Pair(value, self._table(u / mean), float(centre))
 
     def drift(self) -> Pair:
         """λ, and f of mean 0 with L(0) f = λ − q − κh."""
