@@ -50,10 +50,11 @@ def objection(certificate: Certificate) -> str:
     if certificate.p is not None and Fraction(certificate.p) == 0:  # Λ(0) = 0, as T = 1
         return "" if abs(certificate.mu) <= certificate.delta else "Λ(0) = 0"
     trial = trial_of(certificate)
+    misplaced = _misplaced(certificate, trial.noise)
+    if misplaced:
+        return misplaced
     bounder = Bounder(trial, certificate.phases)
-    nodes, values = np.array(certificate.nodes), np.array(certificate.values)
-    if not np.any([np.all(values[:j] <= 0) and np.all(values[j:] >= 0) for j in range(len(values) + 1)]):
-        return "W does not pass from W ≤ 0 to W ≥ 0"
+    nodes = np.array(certificate.nodes)
     found = bounder.bounds(nodes[:-1], nodes[1:])
     if not np.all(np.isfinite(found.mismatch)):
         return f"u > 0 is not certain near z = {nodes[np.argmax(~np.isfinite(found.mismatch))]:.6g}"
@@ -76,36 +77,44 @@ def trial_of(certificate: Certificate) -> Trial:
 
 
 def _holds(certificate: Certificate, noise: Cylinder, found: Bounds, j: int) -> bool:
-    """(*) of `factor` on a cell."""
+    """(*) of `factor` on a cell: its right side is concave in W of one sign, so that it is least at an end or at 0."""
     (left, right), values = map(ball, certificate.nodes[j : j + 2]), certificate.values[j : j + 2]
-    inward = found.inward_low[j] if min(values) >= 0 else found.inward_high[j]
     room = (ball(certificate.delta) - ball(float(found.mismatch[j]))) / noise.nu
     growth = (ball(values[1]) - ball(values[0])) / (2 * (right - left))
-    return all(growth <= room + _pull(certificate, ball(value), inward) for value in values)
+    ends = [*values, 0.0] if values[0] * values[1] < 0 else values
+    return all(growth <= room + _pull(certificate, value, found, j) for value in ends)
 
 
-def _pull(certificate: Certificate, value: arb, inward: float) -> arb:
-    """W B − ½ W²."""
+def _pull(certificate: Certificate, value: float, found: Bounds, j: int) -> arb:
+    """Below W B − ½ W² on a cell."""
     if value == 0:
-        return value
-    return value * ball(float(inward)) - (value * value / 2 if certificate.quantity == MOMENT else 0)
+        return ball(0)
+    inward = found.inward_low[j] if value > 0 else found.inward_high[j]
+    square = ball(value) * ball(value) / 2 if certificate.quantity == MOMENT else ball(0)
+    return ball(value) * ball(float(inward)) - square
+
+
+def _misplaced(certificate: Certificate, noise: Cylinder) -> str:
+    """Why the cells and the gauge are not what the theorem asks for."""
+    first, last = certificate.nodes[0], certificate.nodes[-1]
+    if certificate.tails is None:
+        return "" if (first, last) == (-1.0, 1.0) else "the cells do not cover the support"
+    if noise.is_bounded and not -1 < first <= 0 <= last < 1:
+        return "the core must hold 0, and not reach the ends of the support"
+    if certificate.quantity != MOMENT and certificate.basis.gauge != 0:
+        return "the drift has no gauge"
+    return ""
 
 
 def _objection_at_ends(certificate: Certificate, trial: Trial, bounder: Bounder) -> str:
-    """Where u is held, and beyond; or at the ends of the support."""
-    nodes, noise = certificate.nodes, trial.noise
+    """Where u is held, and beyond."""
+    nodes = certificate.nodes
     if certificate.tails is None:
-        return "" if (nodes[0], nodes[-1]) == (-1.0, 1.0) else "the cells do not cover the support"
-    if noise.is_bounded and not -1 < nodes[0] < nodes[-1] < 1:
-        return "the core reaches beyond the support"
-    if certificate.quantity != MOMENT and certificate.basis.gauge != 0:
-        return "the drift has no gauge"
+        return ""
     for sign, j in ((-1, 0), (1, -1)):
         (end,) = bounder.ends(np.array([nodes[j]]), sign)
         held = (sign * certificate.basis.gauge, sign * certificate.values[j], sign * certificate.tails[j])
-        if noise.is_bounded and sign * nodes[j] < 0:
-            return "an end of the core is on the wrong side of 0"
-        if not _holds_beyond(certificate, noise, end, *map(ball, held)):
+        if not _holds_beyond(certificate, trial.noise, end, *map(ball, held)):
             return f"the trial function does not serve beyond z = {nodes[j]:.6g}"
     return ""
 
