@@ -44,6 +44,8 @@ MESHES = {
     "full circle, seam at -0.3 pi": CylinderMesh(QUARTERS, np.linspace(-8, 8, 9), 14, 9),
     "half circle, seam at 7.2 pi": CylinderMesh(np.pi * np.array([7.2, 7.5, 7.9, 8.2]), np.linspace(-8, 8, 9), 14, 9),
 }
+COARSE = make_mesh(phi_cells=4, phi_degree=6, xi_cells=8)
+"""For pictures, which ParaView draws sooner."""
 
 
 def written(folder, solver, moments=MOMENTS, **options):
@@ -456,8 +458,7 @@ def paraview():
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results")
-    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
-    written(folder, solver)
+    written(folder, ExponentSolver(Problem(HARD, UNIT_NOISE), COARSE))
     copy_show_script(folder)
     return folder
 
@@ -488,15 +489,16 @@ print(json.dumps({"jumps": jumps, "fields": fields, "kinds": sorted(kinds)}))
 """
 
 
-def test_paraview_reads_the_collection(paraview, results, tmp_path):
+def test_paraview_reads_the_collection(paraview, tmp_path):
+    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
+    written(tmp_path, solver)
     script = tmp_path / "read.py"
     script.write_text(READ)
-    done = paraview(tmp_path, script, results / "eigenfunctions.pvd")
+    done = paraview(tmp_path, script, tmp_path / "eigenfunctions.pvd")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert [float(p) for p in found["jumps"]] == list(MOMENTS)
     assert found["kinds"] == [70]  # VTK_LAGRANGE_QUADRILATERAL
-    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
     for p, jumps in found["jumps"].items():
         assert found["fields"][p] == pytest.approx([float(p), solver.pair(float(p)).value], abs=1e-14)
         lines, ratios = np.transpose(jumps)
@@ -549,28 +551,30 @@ import json, sys
 sys.argv = [{script!r}, *{arguments!r}]
 exec(open({script!r}).read(), {{"__name__": "__main__", "__file__": {script!r}}})
 from paraview import servermanager, simple
-view, captions, titles = simple.GetActiveView(), [], []
-scene = simple.GetAnimationScene()
-scene.AnimationTime = {time} or scene.AnimationTime
-simple.Render(view)
-for source in simple.GetSources().values():
-    display, kind = simple.GetDisplayProperties(source, view), source.GetXMLName()
-    if kind == "TextSource":
-        captions.append([source.Text, list(display.BillboardPosition)])
-    elif kind == "PythonCalculator":
-        lowest = simple.GetColorTransferFunction("scaled").RGBPoints[0]
-    elif kind == "PythonAnnotation":
-        titles.append(servermanager.Fetch(source).GetRowData().GetAbstractArray(0).GetVariantValue(0).ToString())
-print(json.dumps([titles, captions, [view.AxesGrid.XTitle, view.AxesGrid.YTitle], lowest]))
+view, scene, found = simple.GetActiveView(), simple.GetAnimationScene(), []
+for time in {times!r}:
+    captions, titles = [], []
+    scene.AnimationTime = time or scene.AnimationTime
+    simple.Render(view)
+    for source in simple.GetSources().values():
+        display, kind = simple.GetDisplayProperties(source, view), source.GetXMLName()
+        if kind == "TextSource":
+            captions.append([source.Text, list(display.BillboardPosition)])
+        elif kind == "PythonCalculator":
+            lowest = simple.GetColorTransferFunction("scaled").RGBPoints[0]
+        elif kind == "PythonAnnotation":
+            titles.append(servermanager.Fetch(source).GetRowData().GetAbstractArray(0).GetVariantValue(0).ToString())
+    found.append([titles, captions, [view.AxesGrid.XTitle, view.AxesGrid.YTitle], lowest])
+print(json.dumps(found))
 """
 
 
-def words(paraview, folder, *arguments, time=0):
-    """What show.py writes into a picture, if need be at another time: above and below it, its captions with their
-    places, the titles of the axes grid, and the lowest value of the colours."""
+def words(paraview, folder, *arguments, times=(0,)):
+    """What show.py writes into a picture, at its own time and if need be at others: above and below it, its captions
+    with their places, the titles of the axes grid, and the lowest value of the colours."""
     script = folder / "words.py"
     arguments = [*arguments, "--output", "words.png"]
-    script.write_text(WORDS.format(script=str(folder / "show.py"), arguments=arguments, time=time))
+    script.write_text(WORDS.format(script=str(folder / "show.py"), arguments=arguments, times=times))
     done = paraview(folder, script)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
@@ -579,7 +583,7 @@ def words(paraview, folder, *arguments, time=0):
 @pytest.fixture(scope="module")
 def named_results(tmp_path_factory):
     """One p only, with parameters."""
-    folder, solver = tmp_path_factory.mktemp("named"), ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
+    folder, solver = tmp_path_factory.mktemp("named"), ExponentSolver(Problem(HARD, UNIT_NOISE), COARSE)
     parameters = {"oscillator.omega": 1.0, "oscillator.impact": "delta", "noise.D0": 0.5}
     written(folder, solver, [1.0], parameters=parameters, varied=["noise.D0"])
     copy_show_script(folder)
@@ -587,7 +591,7 @@ def named_results(tmp_path_factory):
 
 
 def test_words_of_the_picture(paraview, named_results):
-    (title, parameters), captions, grid, lowest = words(paraview, named_results)
+    [((title, parameters), captions, grid, lowest)] = words(paraview, named_results)
     assert title.startswith("noise.D0 = 0.5 (1/time)\np = 1 ")
     assert title.endswith(" (1/time)")
     assert 0 < lowest < 1
@@ -601,7 +605,7 @@ def test_words_of_the_picture(paraview, named_results):
 
 
 def test_the_stationary_density_is_that_at_p_0(paraview, named_results):
-    (title, _), *_, lowest = words(paraview, named_results, "--field", "stationary_density")
+    [((title, _), *_, lowest)] = words(paraview, named_results, "--field", "stationary_density")
     assert title.splitlines() == ["noise.D0 = 0.5 (1/time)", "stationary density (p = 0)"]
     assert lowest == 0
 
@@ -615,8 +619,9 @@ def several_curves(tmp_path_factory):
 
 def test_the_title_follows_the_curves(paraview, several_curves):
     titles = [
-        words(paraview, several_curves, "--collection", "curves.pvd", *options, time=time)[0]
-        for options, time in (([], 0), ([], 0.75), (["--time", "0.75"], 0))
+        title
+        for options, times in (([], (0, 0.75)), (["--time", "0.75"], (0,)))
+        for title, *_ in words(paraview, several_curves, "--collection", "curves.pvd", *options, times=times)
     ]
     assert [title.splitlines()[0] for title, _ in titles] == [f"noise.D0 = {D0} (1/time)" for D0 in (0.5, 0.75, 0.75)]
     assert titles[1] == titles[2]
@@ -640,7 +645,7 @@ def test_show_script_refuses_a_curve_that_is_not_there(paraview, several_curves,
 
 def test_words_around_the_cylinder(paraview, named_results):
     """Near the rim, whose radius is between 1 and 1.5."""
-    _, captions, *_ = words(paraview, named_results, "--cylinder")
+    [(_, captions, *_)] = words(paraview, named_results, "--cylinder")
     texts = [text for text, _ in captions]
     assert texts[:4] == ["phase phi = 0", "impact: pi/2", "pi", "impact: 3 pi/2"]
     assert len(texts) == 6
