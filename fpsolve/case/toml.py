@@ -19,6 +19,7 @@ _KEY = re.compile(r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')
 _STRING = re.compile(r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'', re.DOTALL)
 _WORDS = Words("the case", "a case file", "fig1.toml", "TOML", "start from a copy of cases/minimal.toml")
 _SCALAR = re.compile(r"[^,\]}\n#]+")
+_TOO_DEEP = "lists or tables are nested too deeply; a case needs three levels"
 
 
 def dotted(path: Sequence[str | int]) -> str:
@@ -70,8 +71,11 @@ class _Scanner:
 
     def _note(self, path: Sequence[str | int]) -> None:
         line, key = bisect_left(self._newlines, self.at) + 1, dotted(path)
-        for end in range(1, len(path)):
-            self.lines.setdefault(dotted(path[:end]), line)
+        for end in range(len(path) - 1, 0, -1):
+            table = dotted(path[:end])
+            if table in self.lines:  # and so are all around it
+                break
+            self.lines[table] = line
         if key not in self._explicit:
             self._explicit.add(key)
             self.lines[key] = line
@@ -166,7 +170,9 @@ class Document:
             for key in path:
                 value = value[key]
             _assign(self.data, dotted(path).split("."), value)
-        except (ValueError, RecursionError) as error:
+        except RecursionError:
+            self.faults.append(Fault(typed, None, _TOO_DEEP))
+        except ValueError as error:
             examples = "--set oscillator.omega=2.0 or --set 'oscillator.impact=\"delta\"'"
             self.faults.append(Fault(typed, None, f"{error}; write it as in {examples}"))
         else:
@@ -218,8 +224,7 @@ def read_document(
         data = _loads(text)
         document = Document(str(path), data, dict(_Scanner(text).scan().lines), text=text)
     except RecursionError:
-        fault = Fault("", None, "lists or tables are nested too deeply; a case needs three levels")
-        raise CaseError(str(path), [fault]) from None
+        raise CaseError(str(path), [Fault("", None, _TOO_DEEP)]) from None
     except ValueError as error:
         raise CaseError(str(path), [_syntax_fault(text, str(error))]) from None
     for override in overrides:

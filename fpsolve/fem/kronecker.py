@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix, identity, issparse, kron
+from scipy.sparse import csc_matrix, identity, issparse
 
 from fpsolve.arrays import FloatArray, dense
 
@@ -83,9 +83,28 @@ class KroneckerSum:
         return products.reshape(m, m, n, n).transpose(0, 2, 1, 3).reshape(m * n, m * n)
 
     def tocsc(self) -> csc_matrix:
-        """The sparse matrix."""
-        products = (kron(csr_matrix(phase), csr_matrix(noise), format="csr") for phase, noise in self.terms)
-        return csc_matrix(sum(products))
+        """The sparse matrix, with an entry wherever some φ-matrix and some ξ-matrix have one; column by column of φ."""
+        m, n = self.shape
+        (phase, phases), (noise, noises) = (_on_one_pattern([term[side] for term in self.terms]) for side in (0, 1))
+        counts, noise_counts = np.diff(phase.indptr), np.diff(noise.indptr)
+        noise_columns = np.repeat(np.arange(n), noise_counts)
+        orders = {count: np.argsort(np.tile(noise_columns, count), kind="stable") for count in set(counts.tolist())}
+        rows, values = [], []
+        for j, count in enumerate(counts.tolist()):
+            entries = slice(phase.indptr[j], phase.indptr[j + 1])
+            rows.append(np.add.outer(n * phase.indices[entries], noise.indices).ravel()[orders[count]])
+            values.append((phases[:, entries].T @ noises).ravel()[orders[count]])
+        starts = np.append(0, np.cumsum(np.outer(counts, noise_counts)))
+        return csc_matrix((np.concatenate(values), np.concatenate(rows), starts), shape=(m * n, m * n))
+
+
+def _on_one_pattern(matrices: Sequence[Any]) -> tuple[csc_matrix, FloatArray]:
+    """Where any of some matrices has an entry, and the entries of each of them there, one row for each."""
+    columnwise = [csc_matrix(matrix) for matrix in matrices]
+    pattern = csc_matrix(sum(abs(matrix) for matrix in columnwise))
+    pattern.sort_indices()
+    columns = np.repeat(np.arange(pattern.shape[1]), np.diff(pattern.indptr))
+    return pattern, np.stack([np.ravel(matrix[pattern.indices, columns]) for matrix in columnwise])
 
 
 def _identity(like: Any) -> Any:

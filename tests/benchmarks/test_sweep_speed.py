@@ -8,24 +8,16 @@ import time
 import pytest
 
 from fpsolve import load_case, moment_lyapunov
+from tests.solving import WEAK_NOISE
 from tests.test_sweeps import CASE, MAIN, dask_cluster
 
-WEAK = """
-title = "Weak noise"
-[oscillator]
-epsilon = 0.1
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.5
-tau0 = 0.5
-r0 = 0.95
+WEAK = f"""title = "Weak noise"
+{WEAK_NOISE}
 [moments]
 p = [2.0]
 [vary]
-"noise.D0" = { start = 0.1, stop = 1.0, num = 50 }
-"oscillator.omega" = { start = 0.5, stop = 3.0, num = 50 }
+"noise.D0" = {{ start = 0.1, stop = 1.0, num = 50 }}
+"oscillator.omega" = {{ start = 0.5, stop = 3.0, num = 50 }}
 [output]
 quantities = ["moment"]
 """

@@ -815,7 +815,7 @@ OVERRIDES = [
     ("a=1\nb=2", "must be one key=value, but 2 stand here"),
     ("oscillator.omega.x=1", "omega is not a table, so it has no key x"),
     ("expect.0.value=1", "expect is not a table, so it has no key 0"),
-    (f"title={'[' * 5000}", "recursion"),
+    (f"title={'[' * 5000}", "nested too deeply; a case needs three levels"),
 ]
 
 
@@ -825,6 +825,12 @@ def test_bad_override_names_itself(tmp_path: Path, override: str, words: str) ->
     message = only_message(path, ["noise.tau0=0.4", override])
     assert message.startswith(f"{path}: --set {override}: ")
     assert words in message
+
+
+def test_deep_nesting_is_refused_at_once(tmp_path: Path) -> None:
+    path, started = write(tmp_path, GOOD), time.process_time()
+    assert "nested too deeply" in only_message(path, [f"title={'[' * 5000}"])
+    assert time.process_time() - started < 1
 
 
 def quadrilaterals(phi: Any, z: Any) -> meshio.Mesh:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, kron, random
 
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, BlockFactors, DenseFactors, SparseFactors, factorised
 from fpsolve.fem.kronecker import KroneckerSum
@@ -37,6 +37,17 @@ def test_products_transposes_and_bounds(operator, rng):
     assert operator.norm() >= np.abs(matrix).sum(axis=0).max() - 1e-9
     first = np.kron(np.eye(operator.shape[0]), operator.terms[0][1])
     np.testing.assert_allclose(operator.shifted(0.3).toarray(), matrix - 0.3 * first, atol=1e-12)
+
+
+def test_the_sparse_matrix_is_that_of_the_products(rng):
+    """Whatever entries the factors have, and where columns have none."""
+    terms = [tuple(random(n, n, 0.2, "csr", random_state=rng) for n in (9, 6)) for _ in range(3)]
+    terms.append((np.eye(9), banded(rng, 6, 1)))
+    for some in (terms, terms[:2]):
+        found = KroneckerSum(some).tocsc()
+        expected = sum(kron(phase, noise) for phase, noise in some).toarray()
+        assert found.has_canonical_format
+        np.testing.assert_allclose(found.toarray(), expected, atol=1e-14)
 
 
 def test_the_kind_follows_from_the_factors(rng):

@@ -49,7 +49,7 @@ def moment_lyapunov(oscillator, noise, p, *, phases, steps, lower, upper, above,
         (matrix - above * sp.identity(matrix.shape[0])).tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.1
     )
     inverse = sp.linalg.LinearOperator(matrix.shape, matvec=lu.solve)
-    values, vectors = eigs(matrix, k=count, sigma=above, OPinv=inverse, v0=np.ones(matrix.shape[0]))
+    values, vectors = eigs(matrix, k=count, sigma=above, OPinv=inverse, v0=np.ones(matrix.shape[0]), tol=1e-9)
     at_rest = vectors.reshape(steps, phases, -1)[:, phases // 2]  # displaced, with little velocity: all paths pass here
     share = np.abs(at_rest).sum(axis=0) / np.abs(vectors).sum(axis=0)
     has_one_sign = np.abs(at_rest.sum(axis=0)) > 0.95 * np.abs(at_rest).sum(axis=0)

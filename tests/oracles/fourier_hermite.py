@@ -130,15 +130,10 @@ def _phase_matrices(k: np.ndarray) -> tuple[sp.csr_array, sp.csr_array, sp.csr_a
     derivative, cos2, sin2 = 1j * sp.diags_array(k.astype(float)), (up + up.T) / 2, (up - up.T) / 2j
 
     root = np.sqrt(0.5)
-    real = sp.dok_array((size, size), dtype=complex)  # column j: basis function j in the e^(ikφ)
-    for j in range(size):
-        if k[j] > 0:
-            real[j, j], real[size - 1 - j, j] = root, root  # √2 cos kφ
-        elif k[j] < 0:
-            real[j, j], real[size - 1 - j, j] = 1j * root, -1j * root  # √2 sin |k|φ
-        else:
-            real[j, j] = 1
-    real = real.tocsr()
+    j = np.arange(size)  # column j of the real basis: its function j in the e^(ikφ)
+    own = np.select([k > 0, k < 0], [root, 1j * root], 1.0)
+    mirrored = np.where(k == 0, 0.0, own.conj())
+    real = sp.csr_array((np.append(own, mirrored), (np.append(j, size - 1 - j), np.append(j, j))), shape=(size, size))
     return tuple((real.conj().T @ matrix @ real).real.tocsr() for matrix in (derivative, cos2, sin2))
 
 

@@ -10,18 +10,10 @@ import xarray as xr
 import fpsolve
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
+from tests.solving import WEAK_NOISE
 
-TEXT = """
-title = "A test"
-[oscillator]
-epsilon = 0.1
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.5
-tau0 = 0.5
-r0 = 0.95
+TEXT = f"""title = "A test"
+{WEAK_NOISE}
 [moments]
 p = [2.0, 0.0, -1.0]
 [output]

@@ -4,7 +4,6 @@ import csv
 import json
 import time
 
-import matplotlib.figure
 import numpy as np
 import pytest
 
@@ -14,38 +13,9 @@ from fpsolve.output.maps import Plane
 from fpsolve.output.series import Telling
 from fpsolve.pictures import label_of
 from fpsolve.theory.perturbation import second_order
-from tests.output.drawing import assert_sound, case_of, drawn_case, results_of, texts, tick_labels, words
+from tests.output.drawing import case_of, drawn_case, results_of, texts, tick_labels, words
 
 NARROW = "figure.width='single column'"
-
-
-@pytest.fixture
-def drawn(monkeypatch):
-    """The figures that are drawn while a test runs."""
-    figures = []
-
-    class Recorded(matplotlib.figure.Figure):
-        def __init__(self, *arguments, **options):
-            super().__init__(*arguments, **options)
-            figures.append(self)
-
-    monkeypatch.setattr(matplotlib.figure, "Figure", Recorded)
-    return figures
-
-
-@pytest.fixture
-def sound(monkeypatch):
-    """Figures that are looked at as they are written, in the style that they are drawn in."""
-    figures = []
-
-    class Checked(matplotlib.figure.Figure):
-        def savefig(self, *arguments, **options):
-            super().savefig(*arguments, **options)
-            assert_sound(self)
-            figures.append(self)
-
-    monkeypatch.setattr(matplotlib.figure, "Figure", Checked)
-    return figures
 
 
 def intensities(count):

@@ -4,18 +4,10 @@ import numpy as np
 import pytest
 
 from fpsolve import FpsolveError, load_case, open_results, run
+from tests.solving import WEAK_NOISE
 
-CASE = """
-title = "A curve"
-[oscillator]
-epsilon = 0.1
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.5
-tau0 = 0.5
-r0 = 0.95
+CASE = f"""title = "A curve"
+{WEAK_NOISE}
 [moments]
 p = [2.0]
 [output]

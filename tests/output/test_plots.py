@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import matplotlib.figure
 import numpy as np
 import pytest
 
@@ -15,20 +14,6 @@ from fpsolve.simulation.response import MEANS, Response
 from tests.solving import solve_case
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture
-def drawn(monkeypatch):
-    """The figures that are drawn while a test runs."""
-    figures = []
-
-    class Recorded(matplotlib.figure.Figure):
-        def __init__(self, *arguments, **options):
-            super().__init__(*arguments, **options)
-            figures.append(self)
-
-    monkeypatch.setattr(matplotlib.figure, "Figure", Recorded)
-    return figures
 
 
 def series(count=9, scale=1.0, **more):

@@ -1,17 +1,12 @@
-"""ParaView files: what pyvista and ParaView itself read back from them, and the script that draws them."""
+"""ParaView files: what pyvista reads back from them."""
 
-import ast
-import json
 import os
-import re
-import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from types import SimpleNamespace
 
-import matplotlib.image
 import numpy as np
 import pytest
 import pyvista
@@ -21,36 +16,18 @@ from fpsolve.case.case import load_case
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import CylinderMesh, make_mesh
+from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.output.vtk import copy_show_script, write_density, write_eigenfunctions, write_response
+from fpsolve.output.vtk import write_density, write_eigenfunctions, write_response
 from fpsolve.study import sweep
 from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE
 from tests.oracles.perturbation import first_order_eigenfunction
+from tests.output.eigenfunctions import HARD, MESHES, MOMENTS, written
 
-HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.2)
-FINE = {"phi_degree": 14, "xi_cells": 8}
 ROOT = Path(__file__).parents[2]
-MOMENTS = (-1.0, 0.0, 2.0)
-INSTALL = "apt-get install --no-install-recommends paraview python3-paraview xvfb xauth"
-QUARTERS = np.pi * np.array([-0.3, 0.1, 0.5, 0.8, 1.2, 1.5, 1.7])
-MESHES = {
-    "half circle": make_mesh(phi_cells=4, **FINE),
-    "half circle, cells across 0 and pi": make_mesh(phi_cells=3, **FINE),
-    "full circle": make_mesh(phi_cells=4, full_circle=True, **FINE),
-    "full circle, seam at -0.3 pi": CylinderMesh(QUARTERS, np.linspace(-8, 8, 9), 14, 9),
-    "half circle, seam at 7.2 pi": CylinderMesh(np.pi * np.array([7.2, 7.5, 7.9, 8.2]), np.linspace(-8, 8, 9), 14, 9),
-}
-
-
-def written(folder, solver, moments=MOMENTS, **options):
-    """Write eigenfunctions of a solver at some p, and read them back: {p: grid}."""
-    pairs = [solver.pair(p) for p in moments]
-    _, *files = write_eigenfunctions(folder, pairs, solver.pair(0.0), **options)
-    return {float(grid.field_data["p"][0]): grid for grid in map(pyvista.read, files)}
 
 
 @pytest.fixture(scope="module", params=MESHES)
@@ -413,274 +390,3 @@ print([name for name in sys.modules if "vtkRendering" in name])
         capture_output=True, text=True, check=True, env=environment, cwd=Path(__file__).parents[2],
     )  # fmt: skip
     assert done.stdout.strip() == "[]"
-
-
-def test_script_needs_only_the_standard_library_and_paraview(tmp_path):
-    script = copy_show_script(tmp_path)
-    imports = [
-        node for node in ast.walk(ast.parse(script.read_text())) if isinstance(node, ast.Import | ast.ImportFrom)
-    ]
-    names = {getattr(node, "module", None) or node.names[0].name for node in imports}
-    assert names - {"paraview"} <= sys.stdlib_module_names
-    assert f"FOLDER = {str(tmp_path)!r}" in script.read_text()
-
-
-@pytest.fixture(scope="module")
-def paraview():
-    """Runs a script in ParaView's Python, on a virtual display that says when it is ready."""
-    server, python = shutil.which("Xvfb"), shutil.which("pvpython")
-    if not (server and python):
-        message = f"ParaView is missing: {INSTALL}"
-        if os.environ.get("FPSOLVE_REQUIRE_PARAVIEW"):
-            pytest.fail(message)
-        pytest.skip(message)
-    ready, tell = os.pipe()
-    display = subprocess.Popen(
-        [server, "-displayfd", str(tell), "-noreset", "-screen", "0", "1280x1024x24"], pass_fds=[tell]
-    )
-    os.close(tell)
-    with os.fdopen(ready) as stream:
-        number = stream.readline().strip()
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-    environment["DISPLAY"] = f":{number}"
-
-    def run(folder, *arguments):
-        words = [python, *map(str, arguments)]
-        return subprocess.run(words, capture_output=True, text=True, cwd=folder, env=environment, timeout=300)
-
-    yield run
-    display.terminate()
-    display.wait()
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("results")
-    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
-    written(folder, solver)
-    copy_show_script(folder)
-    return folder
-
-
-READ = """
-import json, math, sys
-from paraview import servermanager, simple
-reader = simple.PVDReader(FileName=sys.argv[1])
-jumps, fields = {}, {}
-for p in reader.TimestepValues:
-    reader.UpdatePipeline(p)
-    grid = servermanager.Fetch(reader)
-    values = grid.GetPointData().GetArray("T")
-    density = grid.GetPointData().GetArray("tilted_density")
-    fields[p] = [grid.GetFieldData().GetArray(name).GetValue(0) for name in ("p", "Lambda")]
-    sides = {}
-    for k in range(grid.GetNumberOfCells()):
-        cell = grid.GetCell(k)
-        low, high = cell.GetBounds()[:2]
-        for m in range(cell.GetNumberOfPoints()):
-            phi, xi = cell.GetPoints().GetPoint(m)[:2]
-            i = cell.GetPointId(m)
-            if abs(math.cos(phi)) < 1e-12 and density.GetValue(i) > 1e-5:
-                sides.setdefault((round(phi), xi), {})["left" if phi == high else "right"] = values.GetValue(i)
-    jumps[p] = [(phi, pair["left"] / pair["right"]) for (phi, xi), pair in sides.items()]
-kinds = {grid.GetCellType(k) for k in range(grid.GetNumberOfCells())}
-print(json.dumps({"jumps": jumps, "fields": fields, "kinds": sorted(kinds)}))
-"""
-
-
-def test_paraview_reads_the_collection(paraview, results, tmp_path):
-    script = tmp_path / "read.py"
-    script.write_text(READ)
-    done = paraview(tmp_path, script, results / "eigenfunctions.pvd")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert [float(p) for p in found["jumps"]] == list(MOMENTS)
-    assert found["kinds"] == [70]  # VTK_LAGRANGE_QUADRILATERAL
-    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
-    for p, jumps in found["jumps"].items():
-        assert found["fields"][p] == pytest.approx([float(p), solver.pair(float(p)).value], abs=1e-14)
-        lines, ratios = np.transpose(jumps)
-        assert {int(k) for k in lines} == {2, 5}  # π/2 and 3π/2, rounded
-        assert ratios.size > 120
-        np.testing.assert_allclose(ratios, HARD.impact_factor(float(p)), rtol=1e-8)
-
-
-def assert_picture(file):
-    """Not blank, and neither noise: white around, and many colours inside."""
-    picture = matplotlib.image.imread(file)[:, :, :3]
-    assert picture.shape == (1000, 1600, 3)
-    assert 0.3 < np.mean(np.all(picture == 1, axis=2)) < 0.95
-    assert len(np.unique((picture * 255).astype(int).reshape(-1, 3), axis=0)) > 300
-
-
-@pytest.mark.parametrize(
-    ("arguments", "picture"),
-    [
-        ([], "eigenfunctions.png"),
-        (["--field", "T_adjoint"], "eigenfunctions-T_adjoint.png"),
-        (["--cylinder", "--field", "tilted_density"], "eigenfunctions-tilted_density-cylinder.png"),
-        (["--cylinder", "--p", "2", "--output", "cylinder.png"], "cylinder.png"),
-    ],
-)
-def test_show_script(paraview, results, arguments, picture):
-    """Every field and shape has a picture of its own."""
-    before = {file: file.read_bytes() for file in results.rglob("*.[pv][vt][du]")}
-    for old in results.glob("*.png"):
-        old.unlink()
-    done = paraview(results, "show.py", *arguments)
-    assert done.returncode == 0, done.stderr
-    assert "p = 2: " in done.stdout
-    assert [file.name for file in results.glob("*.png")] == [picture]
-    assert_picture(results / picture)
-    assert {file: file.read_bytes() for file in before} == before
-
-
-@pytest.mark.parametrize("p", ["17", "1.9", "nan"])
-def test_show_script_refuses_a_p_that_is_not_there(paraview, results, p):
-    done = paraview(results, "show.py", "--p", p, "--output", "refused.png")
-    assert done.returncode != 0
-    assert f"--p {p}: " in done.stderr
-    assert "choose one of -1, 0, 2" in done.stderr
-    assert not (results / "refused.png").exists()
-
-
-WORDS = """
-import json, sys
-sys.argv = [{script!r}, *{arguments!r}]
-exec(open({script!r}).read(), {{"__name__": "__main__", "__file__": {script!r}}})
-from paraview import servermanager, simple
-view, captions, titles = simple.GetActiveView(), [], []
-scene = simple.GetAnimationScene()
-scene.AnimationTime = {time} or scene.AnimationTime
-simple.Render(view)
-for source in simple.GetSources().values():
-    display, kind = simple.GetDisplayProperties(source, view), source.GetXMLName()
-    if kind == "TextSource":
-        captions.append([source.Text, list(display.BillboardPosition)])
-    elif kind == "PythonCalculator":
-        lowest = simple.GetColorTransferFunction("scaled").RGBPoints[0]
-    elif kind == "PythonAnnotation":
-        titles.append(servermanager.Fetch(source).GetRowData().GetAbstractArray(0).GetVariantValue(0).ToString())
-print(json.dumps([titles, captions, [view.AxesGrid.XTitle, view.AxesGrid.YTitle], lowest]))
-"""
-
-
-def words(paraview, folder, *arguments, time=0):
-    """What show.py writes into a picture, if need be at another time: above and below it, its captions with their
-    places, the titles of the axes grid, and the lowest value of the colours."""
-    script = folder / "words.py"
-    arguments = [*arguments, "--output", "words.png"]
-    script.write_text(WORDS.format(script=str(folder / "show.py"), arguments=arguments, time=time))
-    done = paraview(folder, script)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
-
-
-@pytest.fixture(scope="module")
-def named_results(tmp_path_factory):
-    """One p only, with parameters."""
-    folder, solver = tmp_path_factory.mktemp("named"), ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
-    parameters = {"oscillator.omega": 1.0, "oscillator.impact": "delta", "noise.D0": 0.5}
-    written(folder, solver, [1.0], parameters=parameters, varied=["noise.D0"])
-    copy_show_script(folder)
-    return folder
-
-
-def test_words_of_the_picture(paraview, named_results):
-    (title, parameters), captions, grid, lowest = words(paraview, named_results)
-    assert title.startswith("noise.D0 = 0.5 (1/time)\np = 1 ")
-    assert title.endswith(" (1/time)")
-    assert 0 < lowest < 1
-    assert parameters.splitlines() == ["oscillator: omega = 1 (rad/time), impact = delta"]
-    assert [text for text, _ in captions].count("impact") == 2
-    at = {text: place[0] for text, place in captions}
-    ticks = [at[text] for text in ("0", "pi/2", "pi", "3 pi/2", "2 pi")]
-    assert np.diff(ticks) == pytest.approx([ticks[4] / 4] * 4)
-    assert "phase phi (rad)" in at
-    assert [word.strip() for word in grid] == ["", "noise xi (1/time)"]
-
-
-def test_the_stationary_density_is_that_at_p_0(paraview, named_results):
-    (title, _), *_, lowest = words(paraview, named_results, "--field", "stationary_density")
-    assert title.splitlines() == ["noise.D0 = 0.5 (1/time)", "stationary density (p = 0)"]
-    assert lowest == 0
-
-
-@pytest.fixture(scope="module")
-def several_curves(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("several")
-    run(load_case(ROOT / "cases/minimal.toml", ["expect=[]", 'vary."noise.D0"=[0.5, 0.75]']), folder)
-    return folder / "minimal"
-
-
-def test_the_title_follows_the_curves(paraview, several_curves):
-    titles = [
-        words(paraview, several_curves, "--collection", "curves.pvd", *options, time=time)[0]
-        for options, time in (([], 0), ([], 0.75), (["--time", "0.75"], 0))
-    ]
-    assert [title.splitlines()[0] for title, _ in titles] == [f"noise.D0 = {D0} (1/time)" for D0 in (0.5, 0.75, 0.75)]
-    assert titles[1] == titles[2]
-    assert titles[0][0] != titles[1][0]
-
-
-@pytest.mark.parametrize(
-    ("option", "remedy"),
-    [
-        (["--p", "2"], "choose one with --time"),
-        (["--time", "0.6"], "choose one of 0.5, 0.75"),
-        (["--time", "0.5", "--p", "2"], "leave one out"),
-    ],
-)
-def test_show_script_refuses_a_curve_that_is_not_there(paraview, several_curves, option, remedy):
-    done = paraview(several_curves, "show.py", "--collection", "curves.pvd", *option, "--output", "refused.png")
-    assert done.returncode != 0
-    assert remedy in done.stderr
-    assert not (several_curves / "refused.png").exists()
-
-
-def test_words_around_the_cylinder(paraview, named_results):
-    """Near the rim, whose radius is between 1 and 1.5."""
-    _, captions, *_ = words(paraview, named_results, "--cylinder")
-    texts = [text for text, _ in captions]
-    assert texts[:4] == ["phase phi = 0", "impact: pi/2", "pi", "impact: 3 pi/2"]
-    assert len(texts) == 6
-    assert all(re.fullmatch(r"noise xi = \S+ \(1/time\)", text) for text in texts[4:])
-    for _, (x, y, _) in captions:
-        assert 1 < np.hypot(x, y) < 1.7
-
-
-def test_the_command_without_a_display_is_the_same_everywhere():
-    """Without -noreset the virtual display restarts under ParaView now and then."""
-    for file in ("README.md", "fpsolve/output/show.py"):
-        commands = re.findall("xvfb-run[^`\n]*", (ROOT / file).read_text(encoding="utf-8"))
-        assert commands == ["xvfb-run -a -s -noreset pvpython show.py"], file
-
-
-MENU = """
-import sys
-sys.argv = [""]
-exec(open({script!r}).read(), {{"__name__": "__vtkconsole__"}})
-print("and ParaView goes on")
-"""
-
-
-def test_show_script_from_the_menu(paraview, results, tmp_path):
-    """There neither the script's file nor its folder is known, and an error must not end ParaView."""
-    menu = tmp_path / "menu.py"
-    menu.write_text(MENU.format(script=str(results / "show.py")))
-    (results / "eigenfunctions.png").unlink(missing_ok=True)
-    done = paraview(tmp_path, menu)
-    assert "and ParaView goes on" in done.stdout, done.stderr
-    assert_picture(results / "eigenfunctions.png")
-    lost = tmp_path / "lost" / "show.py"
-    lost.parent.mkdir()
-    menu.write_text(MENU.format(script=str(copy_show_script(lost.parent))))
-    done = paraview(tmp_path, menu)
-    assert "there is no" in done.stdout
-    assert "and ParaView goes on" in done.stdout, done.stderr
-
-
-def test_show_script_refuses(paraview, tmp_path):
-    done = paraview(tmp_path, copy_show_script(tmp_path))
-    assert done.returncode != 0
-    assert f"there is no {tmp_path / 'eigenfunctions.pvd'}; name the collection with --collection" in done.stderr

@@ -1,0 +1,47 @@
+"""Estimates by simulation against the finite elements, and whether their standard errors mean what they say."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.problem import Problem
+from fpsolve.simulation.estimators import simulate
+from tests.agreement import cheap_step, rows
+from tests.simulation.problems import MODERATE, REDUCED, exact
+
+
+def test_agrees_with_finite_elements():
+    """90 combinations by both estimators, see tests/agreement.py; those without an estimate say so themselves."""
+    table = list(rows(paths=4096, transients=8, step=cheap_step))
+    assert len(table) == 180
+    given = [row for row in table if row.simulated.value is not None]
+    assert sum(row.simulated.estimator == "population" for row in given) >= 78
+    assert sum(row.simulated.estimator == "direct" for row in given) >= 50
+    deviations = np.abs([row.deviation for row in given])
+    assert np.mean(deviations <= 3) >= 0.95
+    assert np.max(deviations) <= 5
+    assert np.max([row.simulated.standard_error for row in given]) < 2e-3
+
+
+@pytest.mark.parametrize(("estimator", "paths", "time"), [("direct", 2048, 100.0), ("population", 2048, 50.0)])
+def test_standard_errors_are_honest(estimator, paths, time):
+    """Over 200 seeds the estimates deviate by their standard error, within 20 %, and their mean is Λ(p)."""
+    orders = [1.0] if estimator == "population" else [-1.0, 0.5, 1.0]
+    reference = exact(MODERATE, REDUCED, orders)
+    runs = [
+        simulate(MODERATE, REDUCED, orders, estimator=estimator, paths=paths, time=time, seed=seed)
+        for seed in range(200)
+    ]
+    exponent = ExponentSolver(Problem(MODERATE, REDUCED)).lyapunov_exponent().value
+    check_standard_errors([(run.lyapunov_exponent, run.lyapunov_exponent_error) for run in runs], exponent)
+    for k, value in enumerate(reference):
+        check_standard_errors([(run.estimates[k].value, run.estimates[k].standard_error) for run in runs], value)
+
+
+def check_standard_errors(pairs, reference):
+    values, errors = np.array(pairs, dtype=float).T
+    deviation = np.std(values, ddof=1)
+    assert deviation / math.sqrt(np.mean(errors**2)) == pytest.approx(1, abs=0.2)
+    assert abs(values.mean() - reference) < 4 * deviation / math.sqrt(200) + 0.1 * deviation
