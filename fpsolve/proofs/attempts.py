@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fpsolve.proofs.balls import ball, in_balls
@@ -17,8 +18,8 @@ from fpsolve.proofs.verify import objection
 
 GROWTH = 1.35
 MOST_UNKNOWNS = 25_000
-PATIENCE = 2
-"""Enlargements that do not bring the bounds closer, after which no more are tried."""
+PATIENCE, PROGRESS = 2, 0.7
+"""Enlargements that do not bring the bounds closer by this factor, after which no more are tried."""
 WHOLE_BELOW = 6.0
 """End exponents a below which the ends of the support carry too much weight to be cut off."""
 
@@ -74,29 +75,43 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0,
     Raises:
         NoSuchExponent: the noise has algebraic tails, r₀ > 1.
     """
-    noise, best, size, idle = cylinder(stated), Attempt(NOTHING, start), start, 0
-    basis = first_basis(noise, p)
-    while idle < PATIENCE and size.unknowns <= MOST_UNKNOWNS:
-        pair, basis = _solved(noise, basis, p, guess, size)
-        certificate = _certificate(stated, noise, basis, p, pair)
-        is_closer = certificate is not None and certificate.delta < 0.7 * best.delta
-        if certificate is not None and is_closer and not objection(certificate):
-            best, idle = Attempt(enclosure_of(certificate), size), 0
+    noise, best = cylinder(stated), Attempt(NOTHING, start)
+    for basis in bases(noise, p):
+        for found in _enlarged(stated, noise, basis, p, guess, best.size):
+            best = found if found.delta < best.delta else best
             if best.enclosure.width <= width:
-                break
-        elif best.enclosure.is_proven:
-            idle += 1
-        size = size.larger(pair.edges)
+                return best
     return best
 
 
-def first_basis(noise: Cylinder, p: str | None) -> Basis:
-    """The whole support, or a core around the noise in the moment by perturbation theory, b(z) = β."""
-    if noise.is_bounded and float(noise.slope) < WHOLE_BELOW:
-        return Whole()
+def _enlarged(
+    stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, guess: float, size: Size
+) -> Iterator[Attempt]:
+    """Bounds by larger and larger trials, as long as they come closer."""
+    delta, idle = math.inf, 0
+    while idle < PATIENCE and size.unknowns <= MOST_UNKNOWNS:
+        pair, basis = _solved(noise, basis, p, guess, size)
+        certificate = _certificate(stated, noise, basis, p, pair)
+        if certificate is not None and not objection(certificate):
+            idle = 0 if certificate.delta < PROGRESS * delta else idle + 1
+            delta = min(delta, certificate.delta)
+            yield Attempt(enclosure_of(certificate), size)
+        elif delta < math.inf:
+            idle += 1
+        size = size.larger(pair.edges)
+
+
+def bases(noise: Cylinder, p: str | None) -> Iterator[Basis]:
+    """What is worth trying, in this order: the whole support, or a core about where the noise is in the moment."""
+    slope = float(noise.slope)
+    if noise.is_bounded and slope < WHOLE_BELOW:
+        yield Whole()
+        return
     driven = 2 * float(noise.q[1].mean)
-    gauge = 0.0 if p is None else float(p) * driven / (2 * float(noise.nu) * float(noise.slope))
-    return _core(noise, _balance(noise, gauge))
+    gauge = 0.0 if p is None else float(p) * driven / (2 * float(noise.nu) * slope)  # by perturbation theory
+    yield _core(noise, _balance(noise, gauge))
+    if noise.is_bounded and slope < 2 * WHOLE_BELOW:
+        yield Whole()
 
 
 def _balance(noise: Cylinder, gauge: float) -> float:
