@@ -29,6 +29,7 @@ less than 1e-200; ηʲ is at least that.
 
 import math
 from fractions import Fraction
+from functools import lru_cache
 from typing import NamedTuple
 
 import mpmath
@@ -264,15 +265,20 @@ class Boxes(NamedTuple):
     rest: np.ndarray
 
 
+@lru_cache(maxsize=16)
+def _circle(number):
+    """Cosines and sines of 2πi/number, i = 0 … number − 1, rounded once."""
+    with mpmath.workprec(100):
+        angles = [2 * mpmath.pi * i / number for i in range(number)]
+        return np.array([[float(mpmath.cos(x)) for x in angles], [float(mpmath.sin(x)) for x in angles]])
+
+
 class Phases:
     """Cells of φ around πi/N, i = 0 … N − 1."""
 
     def __init__(self, number, harmonics):
         self.half_width = math.pi / (2 * number) * (1 + 2.0**-50)
-        with mpmath.workprec(100):
-            angles = [2 * mpmath.pi * i / number for i in range(number)]
-            circle = np.array([[float(mpmath.cos(x)) for x in angles], [float(mpmath.sin(x)) for x in angles]])
-        self.cos, self.sin = circle[:, np.outer(np.arange(harmonics), np.arange(number)) % number]
+        self.cos, self.sin = _circle(number)[:, np.outer(np.arange(harmonics), np.arange(number)) % number]
 
     def boxes(self, e):
         """A series, given by its expansion, over all boxes."""
