@@ -128,29 +128,38 @@ def test_tails_of_any_sign(parameters, side, end, rng):
 
 
 def constant(parameters, kind):
-    """Λ(0) = 0 with u = 1 and W next to 0."""
+    """Λ(p) = 0 of an oscillator without damping, noise and loss, ε = 0, with u = 1 and W next to 0."""
     whole = kind == "whole"
     certificate = {
-        **{"quantity": "moment", "p": "0", "parameters": parameters, "mu": 0.0, "delta": 1e-12, "phases": 8},
+        **{"quantity": "moment", "p": "1.5", "mu": 0.0, "delta": 1e-12, "phases": 8},
         "basis": {"kind": "whole"} if whole else {"kind": "core", "centre": 0.0, "scale": 1.0, "gauge": 0.0},
+        "parameters": {**parameters, "oscillator.epsilon": "0"},
         **{"cosine": [[1.0, 0.0]], "sine": [[0.0, 0.0]]},
         "nodes": [-1.0, 0.25, 1.0] if whole else [-0.5, 0.75],
         "values": [0.0, 0.0, 0.0] if whole else [-1e-59, 1e-59],
         "tails": None if whole else [-1e-60, 1e-60],
     }
-    return {"p": 0.0, "lower": -1e-9, "upper": 1e-9, "certificate": certificate}
+    return {"p": 1.5, "lower": -1e-9, "upper": 1e-9, "certificate": certificate}
 
 
 CONSTANTS = [(PARAMETERS, "core"), (EXACT, "core"), (EXACT, "whole"), (REACHED, "whole"), (REACHED, "core")]
 
 
 @pytest.mark.parametrize(("parameters", "kind"), CONSTANTS)
-def test_the_moment_of_order_zero(parameters, kind):
-    """Λ(0) = 0; and nothing else."""
+def test_a_system_at_rest(parameters, kind):
+    """Λ = 0; and nothing else."""
     entry = constant(parameters, kind)
     assert checker.check(entry) == ""
     entry["certificate"]["mu"] = 1e-10
     assert "fails" in checker.check(entry)
+
+
+def test_the_moment_of_order_zero(entry):
+    """Λ(0) = 0 needs no trial function."""
+    new = altered(entry, quantity="moment", p="0", mu=1e-9, delta=1e-9, cosine=[], nodes=[])
+    assert checker.check({**new, "p": 0.0, "lower": 0, "upper": 2.1e-9}) == ""
+    new["certificate"]["mu"] = -1.1e-9
+    assert "order 0" in checker.check({**new, "p": 0.0, "lower": -3e-9, "upper": 0})
 
 
 def test_a_positive_slope_needs_room():
