@@ -1,0 +1,162 @@
+"""Changed entries whose claim no longer follows from their certificate, for tests of a checker.
+
+A change may leave a proof: each mutation says whether the claim may still follow, and only the others must be refused.
+"""
+
+import copy
+import math
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev, hermite_e
+
+Truth = Callable[[dict[str, str], float | None], float]
+WORDS = ("oscillator.impact", "noise.treatment")
+
+
+class Mutation(NamedTuple):
+    """A changed entry, what was changed, and whether its claim may follow all the same."""
+
+    change: str
+    entry: dict[str, Any]
+    may_follow: bool
+
+
+def mutations(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
+    """All mutations of an entry; `truth` gives Λ(p), or λ for p = None, of parameters, to within the tolerance."""
+    yield from changed_coefficients(entry)
+    yield from changed_parameters(entry, truth, tolerance)
+    yield from moved_bounds(entry, truth, tolerance)
+
+
+def changed_coefficients(entry: dict[str, Any]) -> Iterator[Mutation]:
+    """Single cosines and sines changed by 100 δ and 1e4 δ of u: where samples of (*) then fail, nothing follows."""
+    size = abs(float(entry["certificate"]["cosine"][0][0])) or 1.0
+    last = len(entry["certificate"]["cosine"]) - 1
+    places = {(name, min(k, last), m) for name in ("cosine", "sine") for k, m in ((1, 0), (1, 1), (2, 0), (last, 2))}
+    for times in (100, 10000):
+        for name, k, m in sorted(places):
+            new = copy.deepcopy(entry)
+            row = new["certificate"][name][k]
+            row[m] = float(row[m]) + times * float(entry["certificate"]["delta"]) * size
+            yield Mutation(f"{name}[{k}][{m}] by {times} delta", new, not violated(new["certificate"]))
+
+
+def changed_parameters(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
+    """Each parameter, and p, changed by 1e-4 and 1e-2 of itself."""
+    names = [name for name in entry["certificate"]["parameters"] if name not in WORDS]
+    for name in names if entry["p"] is None else [*names, "p"]:
+        for factor in (Decimal("0.9999"), Decimal("1.01")):
+            new = copy.deepcopy(entry)
+            where = new["certificate"] if name == "p" else new["certificate"]["parameters"]
+            where[name] = str(Decimal(where[name]) * factor)
+            if name == "p":
+                new["p"] = Decimal(where[name])
+            yield Mutation(f"{name} = {where[name]}", new, _is_true(new, truth, tolerance))
+
+
+def moved_bounds(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
+    """A bound, or both of them with μ, past the true value."""
+    certificate = entry["certificate"]
+    value = truth(certificate["parameters"], _order(certificate))
+    delta, lower, upper = (float(x) for x in (certificate["delta"], entry["lower"], entry["upper"]))
+    for new_lower, new_upper, shift in (
+        (value + 0.1 * (upper - value), upper, 0.0),
+        (lower, value - 0.1 * (value - lower), 0.0),
+        *((lower + s * delta, upper + s * delta, s * delta) for s in (-4, -2.5, 2.5, 4)),
+    ):
+        new = copy.deepcopy(entry)
+        new["lower"], new["upper"] = new_lower, new_upper
+        new["certificate"]["mu"] = float(certificate["mu"]) + shift
+        yield Mutation(f"[{new_lower}, {new_upper}]", new, _is_true(new, truth, tolerance))
+
+
+def _order(certificate: dict[str, Any]) -> float | None:
+    return None if certificate["quantity"] == "lyapunov_exponent" else float(certificate["p"])
+
+
+def _is_true(entry: dict[str, Any], truth: Truth, tolerance: float) -> bool:
+    """Whether the bounds hold, or might within the tolerance of the true value."""
+    value = truth(entry["certificate"]["parameters"], _order(entry["certificate"]))
+    return float(entry["lower"]) - tolerance <= value <= float(entry["upper"]) + tolerance
+
+
+def violated(certificate: dict[str, Any]) -> bool:
+    """Whether (*) clearly fails at a sample: floats suffice to refute, if not to prove."""
+    nodes, values = (np.array([float(v) for v in certificate[name]]) for name in ("nodes", "values"))
+    z, w = (nodes[1:] + nodes[:-1]) / 2, (values[1:] + values[:-1]) / 2
+    slope, delta = np.diff(values) / np.diff(nodes), float(certificate["delta"])
+    constants = _constants(certificate["parameters"])
+    u, steep, mismatch, noise_drift = _samples(certificate, constants, z)
+    moment = certificate["quantity"] == "moment"
+    gauge = float(certificate["basis"].get("gauge", 0))
+    inward = noise_drift - (gauge + steep / u if moment else 0)
+    excess = (delta - np.abs(mismatch / u if moment else mismatch)) / constants["nu"]
+    margin = excess + w * inward - (w**2 / 2 if moment else 0) - slope / 2
+    size = np.abs(excess) + np.abs(w * inward) + w**2 + np.abs(slope)
+    return bool((u <= 0).any() and moment) or bool((margin < -1e-4 * size).any())
+
+
+def _constants(parameters: dict[str, str]) -> dict[str, float]:
+    """ω, ε²c₁, ε·unit, ln R/π, ν, b′(0) and whether the noise is bounded, in floats."""
+    v = {name: float(value) for name, value in parameters.items() if name not in WORDS}
+    eps = v["oscillator.epsilon"]
+    loss = eps**2 * (1 - v["oscillator.restitution"])
+    log_r = -loss if parameters["oscillator.impact"] == "delta" else math.log1p(-loss)
+    bounded = parameters.get("noise.treatment") == "exact" and v["noise.r0"] < 1
+    if bounded:
+        room = 1 - v["noise.r0"]
+        unit, nu, slope = math.sqrt(2 * v["noise.D0"] / (v["noise.tau0"] * room)), room / v["noise.tau0"], 1 / room
+    else:
+        if "noise.alpha" in v:
+            alpha, sigma = v["noise.alpha"], v["noise.sigma"]
+        else:
+            alpha = (5 - 3 * v["noise.r0"]) / (2 * (2 - v["noise.r0"]) * v["noise.tau0"])
+            sigma = math.sqrt(2 * v["noise.D0"]) / v["noise.tau0"]
+        unit, nu, slope = sigma / math.sqrt(2 * alpha), 2 * alpha, 0.5
+    mean = eps**2 * v["oscillator.c1"]
+    return {
+        **{"omega": v["oscillator.omega"], "mean": mean, "unit": eps * unit, "kappa": log_r / math.pi},
+        **{"nu": nu, "slope": slope, "bounded": float(bounded)},
+    }
+
+
+def _powers(certificate: dict[str, Any], degrees: int, z: np.ndarray) -> list[np.ndarray]:
+    """B_m, B_m′ and B_m″ at z, each (degrees, points)."""
+    basis, tables = certificate["basis"], []
+    for m in range(degrees):
+        unit = np.eye(degrees)[m]
+        if basis["kind"] == "core":
+            scale = float(basis["scale"])
+            y = (z - float(basis["centre"])) / scale
+            norm = math.sqrt(math.factorial(m))
+            tables.append([hermite_e.hermeval(y, hermite_e.hermeder(unit, j)) / norm / scale**j for j in range(3)])
+        else:
+            integral = chebyshev.chebint(chebyshev.chebmul([0.5, 0, -0.5], np.roll(unit, -1)))
+            integral[0] = 0
+            b = np.array([1.0]) if m == 0 else integral
+            tables.append([chebyshev.chebval(z, chebyshev.chebder(b, j)) for j in range(3)])
+    return list(np.swapaxes(np.array(tables), 0, 1))
+
+
+def _samples(certificate: dict[str, Any], c: dict[str, float], z: np.ndarray) -> tuple[np.ndarray, ...]:
+    """u, u_z, Lβu − μu (of λ: the drift less μ) at phases × z, and b at z."""
+    cosine, sine = (np.array([[float(v) for v in row] for row in certificate[name]]) for name in ("cosine", "sine"))
+    harmonics, (b0, b1, b2) = np.arange(len(cosine)), _powers(certificate, cosine.shape[1], z)
+    phi = np.linspace(0, np.pi, 8 * len(cosine) + 48, endpoint=False)
+    angle = 2 * np.outer(phi, harmonics)
+    waves, turned = (np.cos(angle), np.sin(angle)), 2 * harmonics
+    across = waves[0] @ cosine + waves[1] @ sine
+    along = (waves[0] * turned) @ sine - (waves[1] * turned) @ cosine
+    u, steep, second = across @ b0, across @ b1, across @ b2
+    moment, beta = certificate["quantity"] == "moment", float(certificate["basis"].get("gauge", 0))
+    carrier = u * float(certificate["p"]) if moment else np.ones_like(u)
+    v = along @ b0 + c["kappa"] * carrier
+    h1, q1 = (np.sin(2 * phi) / 2)[:, None], ((1 - np.cos(2 * phi)) / 2)[:, None]
+    b = c["slope"] * z / (1 - z**2) if c["bounded"] else c["slope"] * z
+    noise = c["nu"] * (second / 2 + beta * steep + beta**2 / 2 * u - b * (steep + beta * u))
+    push = (c["mean"] + c["unit"] * z) * (h1 * v + q1 * carrier)
+    mismatch = noise + c["omega"] * v + push - float(certificate["mu"]) * (u if moment else 1)
+    return u, steep, mismatch, b
