@@ -115,6 +115,8 @@ def march(side: Side, rates: Rates, delta: float) -> Factor | None:
 
 def _step(value: float, width: float, room: float, inward: float, is_moment: bool) -> float | None:
     """W at the end of a cell from W at its beginning; (*) then holds at both, and between, as its right is concave."""
+    if not math.isfinite(room):
+        return None
     q, safe = (1.0 if is_moment else 0.0), 1 - 1e-12
     found = value + 2 * width * (room + value * inward - q * value**2 / 2)
     if found * inward - q * found**2 / 2 < value * inward - q * value**2 / 2:
