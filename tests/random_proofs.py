@@ -79,9 +79,8 @@ def main(count: int) -> None:
     for share in SHARES:
         print(f"{sum(each.width <= share for each in found)} of {count} within {share:g} of the scale")
     seconds = np.array([each.seconds for each in found])
-    print(
-        f"{sum(each.off <= 1 for each in found)} of {count} agree; {np.median(seconds):.1f} s each, {seconds.max():.1f} at most"
-    )
+    agree = sum(each.off <= 1 for each in found)
+    print(f"{agree} of {count} agree; {np.median(seconds):.1f} s each, {seconds.max():.1f} at most")
 
 
 if __name__ == "__main__":

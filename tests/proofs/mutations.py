@@ -33,7 +33,7 @@ def mutations(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> 
 
 def changed_coefficients(entry: dict[str, Any]) -> Iterator[Mutation]:
     """Single cosines and sines changed by 100 δ and 1e4 δ of u: where samples of (*) then fail, nothing follows."""
-    size = abs(float(entry["certificate"]["cosine"][0][0])) or 1.0
+    size = 1.0 if entry["p"] is None else abs(float(entry["certificate"]["cosine"][0][0]))
     last = len(entry["certificate"]["cosine"]) - 1
     places = {(name, min(k, last), m) for name in ("cosine", "sine") for k, m in ((1, 0), (1, 1), (2, 0), (last, 2))}
     for times in (100, 10000):
