@@ -9,15 +9,15 @@ from dataclasses import dataclass
 from fpsolve.proofs.balls import ball, in_balls
 from fpsolve.proofs.basis import Basis, Core, Whole
 from fpsolve.proofs.bounds import Trial
-from fpsolve.proofs.certificate import BasisRecord, Certificate
+from fpsolve.proofs.certificate import BasisRecord, Certificate, SideRecord
 from fpsolve.proofs.enclosure import NOTHING, Enclosure, enclosure_of
 from fpsolve.proofs.galerkin import Galerkin, Pair
-from fpsolve.proofs.search import search
+from fpsolve.proofs.search import Found, search
 from fpsolve.proofs.statement import Cylinder, Parameters, cylinder
 from fpsolve.proofs.verify import objection
 
 GROWTH = 1.35
-MOST_UNKNOWNS = 25_000
+MOST_UNKNOWNS, ABSENT = 25_000, 1e9
 PATIENCE, PROGRESS = 2, 0.7
 """Enlargements that do not bring the bounds closer by this factor, after which no more are tried."""
 WHOLE_BELOW = 6.0
@@ -54,9 +54,9 @@ class Attempt:
 
     @property
     def delta(self) -> float:
-        """Half of how far the bounds are apart."""
+        """How far the bounds are apart."""
         certificate = self.enclosure.certificate
-        return math.inf if certificate is None else certificate.delta
+        return math.inf if certificate is None else apart(certificate)
 
 
 @in_balls
@@ -93,8 +93,8 @@ def _enlarged(
         pair, basis = _solved(noise, basis, p, guess, size)
         certificate = _certificate(stated, noise, basis, p, pair)
         if certificate is not None and not objection(certificate):
-            idle = 0 if certificate.delta < PROGRESS * delta else idle + 1
-            delta = min(delta, certificate.delta)
+            idle = 0 if apart(certificate) < PROGRESS * delta else idle + 1
+            delta = min(delta, apart(certificate))
             yield Attempt(enclosure_of(certificate), size)
         elif delta < math.inf:
             idle += 1
@@ -147,20 +147,31 @@ def _certificate(stated: Parameters, noise: Cylinder, basis: Basis, p: str | Non
         return None
     trial = Trial(noise, None if p is None else ball(p), pair.value, basis, pair.cosine, pair.sine)
     phases = max(128, 16 * len(pair.cosine))
-    found = search(trial, phases)
-    if found is None:
+    upper, lower = map(_record, search(trial, phases))
+    if upper is None and lower is None:
         return None
     return Certificate(
         quantity="lyapunov_exponent" if p is None else "moment",
         p=p,
         parameters=dict(stated),
         mu=pair.value,
-        delta=found.delta,
         basis=BasisRecord.of(basis),
         cosine=pair.cosine.tolist(),
         sine=pair.sine.tolist(),
-        nodes=found.nodes.tolist(),
-        values=found.values.tolist(),
-        tails=None if found.tails is None else [float(each) for each in found.tails],
+        upper=upper,
+        lower=lower,
         phases=phases,
     )
+
+
+def _record(found: Found | None) -> SideRecord | None:
+    """A bound as it stands in a certificate."""
+    if found is None:
+        return None
+    tails = None if found.tails is None else [float(each) for each in found.tails]
+    return SideRecord(delta=found.delta, nodes=found.nodes.tolist(), values=found.values.tolist(), tails=tails)
+
+
+def apart(certificate: Certificate) -> float:
+    """How far the bounds of a certificate are apart; one that is missing counts as far away."""
+    return sum(ABSENT if side is None else side.delta for side in (certificate.upper, certificate.lower))

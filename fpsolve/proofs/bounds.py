@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
 from fpsolve.proofs.balls import Balls, above, ball, balls, below, raised
@@ -73,23 +74,53 @@ class Trial:
 
 
 Range = tuple[FloatArray, FloatArray]
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Of a trial on cells of z, each of shape (cells,).
+    """Of a trial on cells of z, a pair of arrays of shape (cells,) below and above each.
 
     Attributes:
-        mismatch: above |Lu/u − μ|; ∞ where u > 0 is not certain.
-        steep_low, steep_high: around u_z/u; for λ around f_z.
-        inward_low, inward_high: around B; for λ around b.
+        mismatch: around Lu/u − μ; infinite where u > 0 is not certain.
+        inward: around B; for λ around b.
     """
 
-    mismatch: FloatArray
-    steep_low: FloatArray
-    steep_high: FloatArray
-    inward_low: FloatArray
-    inward_high: FloatArray
+    mismatch: Range
+    inward: Range
+
+    @property
+    def is_positive(self) -> NDArray[np.bool_]:
+        """Where u > 0 is certain."""
+        return np.isfinite(self.mismatch[0]) & np.isfinite(self.mismatch[1])
+
+    def above(self, sense: int) -> FloatArray:
+        """Above e of `factor`."""
+        return self.mismatch[1] if sense > 0 else -self.mismatch[0]
+
+
+@dataclass(frozen=True)
+class HeldBounds:
+    """Where u may be held, each below and above, on the right or mirrored onto it.
+
+    Attributes:
+        steep: around u_z/u; for λ around f_z.
+        mismatch, growth: around n and n_z of `factor`.
+        drift, slope: below b and b′.
+    """
+
+    steep: Pair
+    mismatch: Pair
+    growth: Pair
+    drift: float
+    slope: float
+
+    def end(self, sense: int) -> End:
+        """What counts for the upper or the lower bound."""
+        drop, mismatch, growth = (-self.steep[0], self.mismatch[1], self.growth[1])
+        if sense < 0:
+            drop, mismatch, growth = (self.steep[1], -self.mismatch[0], -self.growth[0])
+        return End(drop, mismatch, growth, self.drift, self.slope)
 
 
 class Bounder:
@@ -107,42 +138,46 @@ class Bounder:
         trial = self.trial
         cells = Cells(trial.basis, low, high)
         divisor = self._divisor(cells)
-        remainder = self._size(cells.modes(trial.mismatch), divisor)
+        mismatch = self._range(cells.modes(trial.mismatch), divisor)
         if trial.noise.is_bounded and not isinstance(trial.basis, Whole):
-            cleared = [below(1 - ball(each) ** 2) for each in np.maximum(np.abs(low), np.abs(high)).tolist()]
-            remainder = raised(remainder / np.array(cleared))
-        steep = self._range(cells.modes(trial.slope), divisor)
+            mismatch = _divided(mismatch, np.maximum(np.abs(low), np.abs(high)))
+        bend = np.zeros((2, 1))
+        if trial.p is not None:
+            bend = trial.basis.gauge + np.array(self._range(cells.modes(trial.slope), divisor))
         drift = [[bound(trial.noise.drift(z)) for z in balls(each)] for bound, each in ((below, low), (above, high))]
-        bend = trial.basis.gauge + (np.array(steep) if trial.p is not None else np.zeros((2, 1)))
-        inward = [np.array(b) - each for b, each in zip(drift, (bend[1], bend[0]), strict=True)]
         slack = 8 * 2.0**-53 * (np.abs(np.array(drift)) + np.abs(bend[::-1]))
-        return Bounds(remainder, *steep, inward[0] - slack[0], inward[1] + slack[1])
+        inward = np.array(drift) - bend[::-1]
+        return Bounds(mismatch, (inward[0] - slack[0], inward[1] + slack[1]))
 
-    def ends(self, z: FloatArray, sign: int) -> list[End]:
+    def held(self, z: FloatArray, sign: int) -> list[HeldBounds]:
         """Where u may be held, on the right or, with sign −1, on the left."""
         noise, cells, at = self.trial.noise, Cells(self.trial.basis, z, z), balls(z)
         divisor = self._divisor(cells)
-        steep = np.abs(self._range(cells.modes(self.trial.slope), divisor)).max(0)
-        drifts, sizes = (noise.drift(at), noise.drift_slope(at)), []
+        drifts = (noise.drift(at), noise.drift_slope(at))
+        ranges = [self._range(cells.modes(self.trial.slope), divisor)]
         for part, drift in zip(self.trial.held, drifts, strict=True):
             modes = cells.modes(part)
             if self.trial.p is not None:
                 values = cells.modes(padded(self.trial.values, waves=1))
                 modes = modes.minus(noise.nu * ball(self.trial.basis.gauge) * drift, values)
-            sizes.append(self._size(modes, divisor))
-        pulls = [[below(each) for each in (sign * drifts[0]).tolist()], [below(each) for each in drifts[1].tolist()]]
-        return [End(*map(float, each)) for each in zip(steep, *sizes, *pulls, strict=True)]
+            ranges.append(self._range(modes, divisor))
+        steep, mismatch, growth = (list(zip(*(each.tolist() for each in pair), strict=True)) for pair in ranges)
+        return [
+            HeldBounds(
+                _mirrored(steep[j], sign),
+                mismatch[j],
+                _mirrored(growth[j], sign),
+                below(sign * drifts[0][j]),
+                below(drifts[1][j]),
+            )
+            for j in range(len(z))
+        ]
 
     def _divisor(self, cells: Cells) -> Range:
         """Around u on every cell of φ and z; 1 for λ, where nothing is divided by f."""
         if self.trial.p is None:
             return np.ones((1, 1)), np.ones((1, 1))
         return self._phases.bounds(cells.modes(self.trial.values))
-
-    def _size(self, part: Modes, divisor: Range) -> FloatArray:
-        """Above |part|/u on every cell of z; ∞ where u > 0 is not certain."""
-        low, high = self._range(part, divisor)
-        return np.maximum(high, -low)
 
     def _range(self, part: Modes, divisor: Range) -> Range:
         """Around part/u on every cell of z."""
@@ -154,3 +189,15 @@ class Bounder:
             ]
         least_ratio, most_ratio = ratios[0].min(0), ratios[1].max(0)
         return least_ratio - raised(np.abs(least_ratio)) * 2.0**-51, most_ratio + raised(np.abs(most_ratio)) * 2.0**-51
+
+
+def _divided(bounds: Range, farthest: FloatArray) -> Range:
+    """Bounds of D times a mismatch as those of the mismatch, 0 < D = 1 − z² ≤ 1."""
+    least = np.array([below(1 - ball(each) ** 2) for each in farthest.tolist()])
+    low, high = bounds
+    return np.where(low < 0, -raised(-low / least), low), np.where(high > 0, raised(high / least), high)
+
+
+def _mirrored(pair: Pair, sign: int) -> Pair:
+    """Bounds of a number that changes its sign with z."""
+    return pair if sign > 0 else (-pair[1], -pair[0])

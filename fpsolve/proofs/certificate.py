@@ -62,15 +62,35 @@ class BasisRecord(Record):
         return Core(self.centre, self.scale, self.gauge) if self.kind == "core" else Whole()
 
 
+class SideRecord(Record):
+    """One of the two bounds.
+
+    Attributes:
+        delta: how far it is from mu.
+        nodes, values, tails: W of `factor`, linear between nodes, from left to right; its constants beyond.
+    """
+
+    delta: Annotated[float, Field(ge=0)]
+    nodes: Annotated[list[float], Field(min_length=2, max_length=MOST["cells"])]
+    values: Annotated[list[float], Field(min_length=2, max_length=MOST["cells"])]
+    tails: Annotated[list[float], Field(min_length=2, max_length=2)] | None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if len(self.nodes) != len(self.values) or np.any(np.diff(self.nodes) <= 0):
+            raise ValueError("nodes must increase, with one of values for each")
+        return self
+
+
 class Certificate(Record):
-    """That Λ(p), or λ, is within delta of mu.
+    """That mu − lower.delta ≤ Λ(p) ≤ mu + upper.delta, or the same of λ.
 
     Attributes:
         quantity: "moment" or "lyapunov_exponent".
         p: the moment as a decimal.
         parameters: as decimals, and two words, by the keys of a case file.
         cosine, sine: the trial function, as `bounds.Trial` has it.
-        nodes, values, tails: W of `factor`, linear between nodes, from left to right; its constants beyond.
+        upper, lower: the two bounds; None where one is not proven.
         phases: how many cells of φ suffice.
     """
 
@@ -78,13 +98,11 @@ class Certificate(Record):
     p: Decimal | None = None
     parameters: Mapping[str, str]
     mu: float
-    delta: Annotated[float, Field(ge=0)]
     basis: BasisRecord
     cosine: Annotated[Table, Field(max_length=MOST["rows"])]
     sine: Annotated[Table, Field(max_length=MOST["rows"])]
-    nodes: Annotated[list[float], Field(min_length=2, max_length=MOST["cells"])]
-    values: Annotated[list[float], Field(min_length=2, max_length=MOST["cells"])]
-    tails: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    upper: SideRecord | None
+    lower: SideRecord | None
     phases: Annotated[int, Field(ge=4, le=MOST["phases"])]
 
     @model_validator(mode="after")
@@ -92,9 +110,11 @@ class Certificate(Record):
         shapes = {np.shape(row) for table in (self.cosine, self.sine) for row in table}
         if len(shapes) != 1 or len(self.cosine) != len(self.sine):
             raise ValueError("cosine and sine must be tables of one shape")
-        if len(self.nodes) != len(self.values) or np.any(np.diff(self.nodes) <= 0):
-            raise ValueError("nodes must increase, with one of values for each")
-        if (self.quantity == MOMENT) == (self.p is None) or (self.tails is None) == (self.basis.kind == "core"):
+        sides = [each for each in (self.upper, self.lower) if each is not None]
+        is_core = self.basis.kind == "core"
+        if not sides:
+            raise ValueError("neither bound is there")
+        if (self.quantity == MOMENT) == (self.p is None) or any((each.tails is None) == is_core for each in sides):
             raise ValueError("a moment has its p, and a core its tails; nothing else has")
         return self
 

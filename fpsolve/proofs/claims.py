@@ -35,13 +35,11 @@ class Bound(Record):
                 yield "there is no certificate"
             return
         certificate = self.certificate
-        if self.lower is None or self.upper is None:
-            yield "a bound is missing"
-        elif certificate.quantity != quantity or (p is not None and float(certificate.p or "nan") != p):
+        if certificate.quantity != quantity or (p is not None and float(certificate.p or "nan") != p):
             yield "the certificate is of another quantity"
         elif not _are_same(certificate.parameters, parameters):
             yield "the certificate is of other parameters"
-        elif not follows(Fraction(self.lower), Fraction(self.upper), certificate):
+        elif not follows(_exact(self.lower), _exact(self.upper), certificate):
             yield "the bounds are closer than those of the certificate"
         else:
             yield from filter(None, [objection(certificate)])
@@ -158,6 +156,10 @@ def verdicts(moments: list[tuple[float, int]], exponent: int) -> list[str]:
     words = {1: "grows", -1: "decays"}
     found = [f"almost every path {words[exponent]}"] if exponent else []
     return found + [f"the moment of order {p + 0.0:g} {words[sign]}" for p, sign in moments if sign and p]
+
+
+def _exact(bound: Decimal | None) -> Fraction | None:
+    return None if bound is None else Fraction(bound)
 
 
 def _sign(bound: Bound) -> int:

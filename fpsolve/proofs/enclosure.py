@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from fpsolve.proofs.balls import ball, in_balls
-from fpsolve.proofs.certificate import BasisRecord, Certificate
+from fpsolve.proofs.certificate import BasisRecord, Certificate, SideRecord
 from fpsolve.proofs.statement import Parameters
 
 
@@ -18,7 +19,7 @@ class Enclosure:
     The bounds hold for the floats, and for the decimals that they are printed as.
 
     Attributes:
-        certificate: from which they follow; None where nothing is proven and the bounds are infinite.
+        certificate: from which they follow; None where nothing is proven. A bound that is not proven is infinite.
         wanted: how far they may be apart.
     """
 
@@ -39,7 +40,7 @@ class Enclosure:
 
     @property
     def is_proven(self) -> bool:
-        """Whether there are bounds."""
+        """Whether there is a bound."""
         return self.certificate is not None
 
     @property
@@ -56,16 +57,31 @@ NOTHING = Enclosure(-math.inf, math.inf)
 
 @in_balls
 def enclosure_of(certificate: Certificate) -> Enclosure:
-    """mu ± delta, rounded outward."""
-    mu, delta = ball(certificate.mu), ball(certificate.delta)
-    return Enclosure(_outward(mu - delta, -math.inf), _outward(mu + delta, math.inf), certificate)
+    """mu − lower.delta and mu + upper.delta, rounded outward; infinite where there is none."""
+    lower, upper = _ends(certificate)
+    return Enclosure(
+        -math.inf if lower is None else _outward(lower, -math.inf),
+        math.inf if upper is None else _outward(upper, math.inf),
+        certificate,
+    )
 
 
 @in_balls
-def follows(lower: Fraction, upper: Fraction, certificate: Certificate) -> bool:
-    """Whether bounds hold if the certificate does."""
-    mu, delta = ball(certificate.mu), ball(certificate.delta)
-    return bool(ball(lower) <= mu - delta and mu + delta <= ball(upper))
+def follows(lower: Fraction | None, upper: Fraction | None, certificate: Certificate) -> bool:
+    """Whether bounds hold if the certificate does; None claims nothing."""
+    low, high = _ends(certificate)
+    if (lower is not None and low is None) or (upper is not None and high is None):
+        return False
+    return (lower is None or bool(ball(lower) <= low)) and (upper is None or bool(ball(upper) >= high))
+
+
+def _ends(certificate: Certificate) -> tuple[Any, Any]:
+    """The bounds of a certificate as balls."""
+    mu, lower, upper = ball(certificate.mu), certificate.lower, certificate.upper
+    return (
+        None if lower is None else mu - ball(lower.delta),
+        None if upper is None else mu + ball(upper.delta),
+    )
 
 
 def _outward(bound: object, direction: float) -> float:
@@ -83,18 +99,17 @@ def _is_beyond(found: float, bound: object, direction: float) -> bool:
 
 def trivial(stated: Parameters) -> Enclosure:
     """Λ(0) = 0, as T = 1."""
+    side = SideRecord(delta=0.0, nodes=[-0.5, 0.5], values=[0.0, 0.0], tails=[0.0, 0.0])
     unit = Certificate(
         quantity="moment",
         p="0.0",
         parameters=dict(stated),
         mu=0.0,
-        delta=0.0,
         basis=BasisRecord(kind="core"),
         cosine=[[1.0]],
         sine=[[0.0]],
-        nodes=[-0.5, 0.5],
-        values=[0.0, 0.0],
-        tails=[0.0, 0.0],
+        upper=side,
+        lower=side,
         phases=4,
     )
     return enclosure_of(unit)

@@ -1,26 +1,29 @@
 """From the largest mismatch to the mean one: the factor e^{±ψ(z)} of the trial function, W = ψ′.
 
-Let u > 0 and |Lu/u − μ| ≤ m(z) where z is noise and β the gauge of u. Then T = e^{ψ}u has
+Let u > 0, z be noise and β the gauge of u. The upper bound has q = 1 and T = e^{ψ}u, the lower one q = −1 and
+T = e^{−ψ}u, each with a ψ of its own. With e = q (Lu/u − μ) and B = b(z) − β − u_z/u
 
-    LT/T = Lu/u + ν (½ W′ + ½ W² − W B),      B = b(z) − β − u_z/u,
+    q (LT/T − μ) = e + ν (½ W′ + ½ q W² − W B),
 
-so that LT ≤ (μ + δ) T, and with e^{−ψ} instead of e^{ψ} also LT ≥ (μ − δ) T, as soon as
+so that LT ≤ (μ + δ) T, or LT ≥ (μ − δ) T, as soon as
 
-    ½ W′ ≤ (δ − m)/ν + W B − ½ W².                                                                              (*)
+    ½ W′ ≤ (δ − e)/ν + W B − ½ q W².                                                                            (*)
 
-Outward from W = 0 where the noise mostly is, W may grow like e^{z²/2}, so that δ need hardly exceed the mean of m under
+Outward from W = 0 where the noise mostly is, W may grow like e^{z²/2}, so that δ need hardly exceed the mean of e under
 the law of the noise in the moment, and is far below its maximum. Where W jumps downward, ψ has a concave kink and −ψ a
 convex one, which only helps: the local time at the kink enters with the sign of the inequality (Itô-Tanaka).
 
-Where u serves only between two ends, it is held there: T = e^{βz ± ψ} u(φ, end) beyond. Its slope jumps by −u_z/u at
-the right end, so that W must drop by max|u_z/u| at least; beyond, W is a constant κ ≥ |β| (mirrored on the left), with
+Where u serves only between two ends, it is held there: T = e^{βz ± ψ} u(φ, end) beyond. At the right end the slope of
+ln T loses r = u_z/u, so that its kink is concave for q = 1 if W drops by max(−r) at least, and convex for q = −1 if W
+drops by max r at least. Beyond, W is a constant κ ≥ −qβ, which keeps T from 0 for q = 1 and bounded for q = −1, with
 
-    0 ≤ (δ − |n|)/ν + κ (b − β) − ½ κ²,      n(φ, z) = (F₀ + z F₁ + ½ νβ² − νβ b(z) − μ) u/u,
+    0 ≤ (δ − q n)/ν + κ (b − β) − ½ q κ²,      n(φ, z) = (F₀ + z F₁ + ½ νβ² − νβ b(z) − μ) u/u,
 
-which holds beyond an end z ≥ 0 if it holds there and νκ b′ ≥ max|n_z| there: b′ increases with z > 0, where both sides
-grow by νκ Δb′ and by ν|β| Δb′ at most.
+which holds beyond an end z ≥ 0 if it holds there and νκ b′ ≥ max(q n_z) there: b′ increases with z > 0, and with it the
+slope of the right side by (κ + qβ) Δb′ ≥ 0. The left end is mirrored onto the right one, z → −z, β → −β, W → −W.
 
-The drift of ln‖x‖ + f + ψ is bounded in the same way, without W² and with B = b: ½ W′ ≤ (δ − m)/ν + W b.
+The drift of ln‖x‖ + f ± ψ is bounded in the same way, with e = q (its drift − μ), without W² and with B = b, β = 0 and
+r = f_z.
 """
 
 from __future__ import annotations
@@ -32,23 +35,28 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 
+UPPER, LOWER = 1, -1
+"""q."""
+MOST = 1e6
+"""More than W needs to be anywhere; for q = −1 it would grow beyond all bounds."""
+
 
 @dataclass(frozen=True)
 class End:
-    """What is known where u is held, by absolute values.
+    """What is known where u is held at the right end, or mirrored onto it.
 
     Attributes:
-        slope: above max|u_z/u|, or |f_z|.
-        mismatch: above max|n| at the end.
-        growth: above max|n_z|.
-        drift, bend: below b and b′, of the right end or mirrored onto it.
+        drop: above what W must drop by.
+        mismatch: above q n at the end.
+        growth: above q n_z there.
+        drift, slope: below b and b′.
     """
 
-    slope: float
+    drop: float
     mismatch: float
     growth: float
     drift: float
-    bend: float
+    slope: float
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,7 @@ class Side:
 
     Attributes:
         nodes: z at the ends of cells, increasing from the middle on; one more than cells.
-        mismatch: m, above |Lu/u − μ| on each cell.
+        mismatch: above e on each cell.
         inward: below B on each cell.
         beta: β.
         ends: what is known at the nodes where u may be held; None where u serves to the end of the support.
@@ -72,15 +80,23 @@ class Side:
 
 @dataclass(frozen=True)
 class Rates:
-    """ν, and whether W² counts: for moments it does, for the drift of ln‖x‖ not.
+    """ν, and which bound is sought.
 
     Attributes:
         nu_above, nu_below: floats beside ν.
+        sense: q.
+        is_moment: whether W² counts: for the drift of ln‖x‖ it does not.
     """
 
     nu_above: float
     nu_below: float
+    sense: int
     is_moment: bool
+
+    @property
+    def square(self) -> int:
+        """q in front of W², or 0."""
+        return self.sense if self.is_moment else 0
 
     def over_nu(self, amount: float) -> float:
         """Below amount/ν."""
@@ -100,8 +116,7 @@ def march(side: Side, rates: Rates, delta: float) -> Factor | None:
     values = [0.0]
     for j, inward in enumerate(side.inward):
         width = side.nodes[j + 1] - side.nodes[j]
-        room = rates.over_nu(delta - side.mismatch[j])
-        value = _step(values[-1], width, room, inward, rates.is_moment)
+        value = _step(values[-1], width, rates.over_nu(delta - side.mismatch[j]), inward, rates.square)
         if value is None:
             return None
         values.append(value)
@@ -113,32 +128,41 @@ def march(side: Side, rates: Rates, delta: float) -> Factor | None:
     return Factor(np.array(values), None) if side.ends is None else None
 
 
-def _step(value: float, width: float, room: float, inward: float, is_moment: bool) -> float | None:
-    """W at the end of a cell from W at its beginning; (*) then holds at both, and between, as its right is concave."""
+def _step(value: float, width: float, room: float, inward: float, q: int) -> float | None:
+    """W at the end of a cell from W at its beginning, so that (*) holds at both and between.
+
+    For q = −1 its right side is convex; where that matters, −½ q W² ≥ 0 is left out.
+    """
     if not math.isfinite(room):
         return None
-    q, safe = (1.0 if is_moment else 0.0), 1 - 1e-12
-    found = value + 2 * width * (room + value * inward - q * value**2 / 2)
-    if found * inward - q * found**2 / 2 < value * inward - q * value**2 / 2:
+    found = value + 2 * width * (room + _pull(value, inward, q))
+    if q < 0 and (inward < 0 or found < value):
+        q = 0
+        found = value + 2 * width * (room + value * inward)
+    if _pull(found, inward, q) < _pull(value, inward, q):
         linear, rest = 1 - 2 * width * inward, value + 2 * width * room
         square = linear**2 + 4 * width * q * rest
-        if rest < 0 or square < 0:
+        if rest < 0 or square < 0 or (linear <= 0 and not q):
             return None
-        found = 2 * rest / (linear + math.sqrt(square)) if linear > 0 or q else math.inf
-        found = min(found, value + 2 * width * (room + value * inward - q * value**2 / 2))
+        found = min(found, 2 * rest / (linear + math.sqrt(square)))
     if found < 0 or not math.isfinite(found):
         return None
     growth = found - value
-    return min(value + (growth * safe if growth > 0 else growth * (2 - safe)), max(inward, value) if q else math.inf)
+    safe = value + growth * (1 - 1e-12 if growth > 0 else 1 + 1e-12)
+    return min(safe, MOST)
+
+
+def _pull(value: float, inward: float, q: int) -> float:
+    """W B − ½ q W²."""
+    return value * inward - q * value**2 / 2
 
 
 def _tail(side: Side, rates: Rates, delta: float, j: int, value: float, end: End) -> float | None:
     """κ beyond a node, if there is one."""
-    q, pull = (1.0 if rates.is_moment else 0.0), end.drift - side.beta
-    most = (value - end.slope) * (1 - 1e-12)
-    least = max(abs(side.beta), end.growth / (rates.nu_below * end.bend)) * (1 + 1e-12)
-    kappa = min(most, max(pull, least)) if q else most
+    pull, most = end.drift - side.beta, (value - end.drop) * (1 - 1e-12)
+    least = max(-rates.sense * side.beta, max(end.growth, 0.0) / (rates.nu_below * end.slope)) * (1 + 1e-12)
+    kappa = min(most, max(pull, least)) if rates.square > 0 else most
     if kappa < least or pull <= 0 or side.nodes[j] < 0:
         return None
-    holds = rates.over_nu(delta - end.mismatch) * (1 + 1e-12) + kappa * pull - q * kappa**2 / 2 > 0
-    return kappa if holds else None
+    room = rates.over_nu(delta - end.mismatch) * (1 - 1e-12 if delta > end.mismatch else 1 + 1e-12)
+    return kappa if room + (1 - 1e-12) * _pull(kappa, pull, rates.square) > 0 else None

@@ -10,8 +10,8 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.proofs.balls import above, below
 from fpsolve.proofs.basis import Core
-from fpsolve.proofs.bounds import Bounder, Bounds, Trial
-from fpsolve.proofs.factor import Factor, Rates, Side, march
+from fpsolve.proofs.bounds import Bounder, Bounds, HeldBounds, Trial
+from fpsolve.proofs.factor import LOWER, UPPER, Factor, Rates, Side, march
 
 CELLS, REACH, HELD_FROM, CANDIDATES = 480, 10.0, 3.5, 24
 SLACK = 1e-6
@@ -20,7 +20,7 @@ SLACK = 1e-6
 
 @dataclass(frozen=True)
 class Found:
-    """W and δ.
+    """W and δ of one bound.
 
     Attributes:
         nodes, values: W at nodes from left to right.
@@ -34,10 +34,34 @@ class Found:
     delta: float
 
 
-def rates_of(trial: Trial) -> Rates:
-    """ν and b′(0) as floats."""
-    noise = trial.noise
-    return Rates(above(noise.nu), below(noise.nu), trial.p is not None)
+@dataclass(frozen=True)
+class Known:
+    """What is known of a trial on all cells, and where u may be held.
+
+    Attributes:
+        nodes: ends of the cells.
+        bounds: on them.
+        middle: the node where W is 0.
+        held: by the number of a node, on the left and on the right; None where u serves on the whole support.
+    """
+
+    nodes: FloatArray
+    bounds: Bounds
+    middle: int
+    held: tuple[dict[int, HeldBounds], dict[int, HeldBounds]] | None
+
+
+def search(trial: Trial, phases: int) -> tuple[Found | None, Found | None]:
+    """The least δ of the upper and of the lower bound, to 1 %, each None where there is none."""
+    nodes, bounder = nodes_for(trial), Bounder(trial, phases)
+    bounds = bounder.bounds(nodes[:-1], nodes[1:])
+    if not np.any(bounds.is_positive):
+        return None, None
+    inward = np.maximum(np.abs(bounds.inward[0]), np.abs(bounds.inward[1]))
+    middle = int(np.argmin(np.where(bounds.is_positive, inward, np.inf)))
+    held = _held(trial, bounder, nodes, bounds, middle) if isinstance(trial.basis, Core) else None
+    known = Known(nodes, bounds, middle, held)
+    return _least(trial, known, UPPER), _least(trial, known, LOWER)
 
 
 def nodes_for(trial: Trial) -> FloatArray:
@@ -52,62 +76,63 @@ def nodes_for(trial: Trial) -> FloatArray:
     return np.linspace(low, high, CELLS + 1)
 
 
-def search(trial: Trial, phases: int) -> Found | None:
-    """The least δ for a trial, to 1 %; None where there is none."""
-    nodes, bounder = nodes_for(trial), Bounder(trial, phases)
-    found = bounder.bounds(nodes[:-1], nodes[1:])
-    if not np.any(np.isfinite(found.mismatch)):
-        return None
-    middle = _middle(found)
-    sides = _sides(trial, bounder, nodes, found, middle)
-    rates = rates_of(trial)
-    least = max(float(np.min(found.mismatch)), 1e-18)
-    high = least
+def _held(
+    trial: Trial, bounder: Bounder, nodes: FloatArray, bounds: Bounds, middle: int
+) -> tuple[dict[int, HeldBounds], dict[int, HeldBounds]]:
+    """Some nodes on either side, far enough out and with u > 0 up to there."""
+    bad = np.flatnonzero(~bounds.is_positive)
+    first = bad[bad < middle].max(initial=-1) + 1
+    last = bad[bad >= middle].min(initial=len(nodes) - 1)
+    far = np.abs(nodes - trial.basis.centre) > HELD_FROM * trial.basis.scale  # type: ignore[attr-defined]
+    inside = np.flatnonzero(far & (np.arange(len(nodes)) >= first) & (np.arange(len(nodes)) <= last))
+    found = []
+    for sign, chosen in ((-1, inside[inside < middle]), (1, inside[inside > middle])):
+        picked = np.unique(chosen[np.linspace(0, len(chosen) - 1, CANDIDATES).astype(int)]) if len(chosen) else chosen
+        held = bounder.held(nodes[picked], sign) if len(picked) else []
+        found.append(dict(zip(picked.tolist(), held, strict=True)))
+    return found[0], found[1]
+
+
+def _least(trial: Trial, known: Known, sense: int) -> Found | None:
+    """The least δ of one bound."""
+    noise = trial.noise
+    rates = Rates(above(noise.nu), below(noise.nu), sense, trial.p is not None)
+    sides = _sides(trial, known, sense)
+    excess = known.bounds.above(sense)
+    high = max(float(np.min(excess)), 1e-18)
     while not _both(sides, rates, high):
         high *= 10
         if not high < 1e6:
             return None
     low = high / 10
     while high > 1.01 * low:
-        middle_delta = math.sqrt(low * high)
-        if _both(sides, rates, middle_delta):
-            high = middle_delta
+        between = math.sqrt(low * high)
+        if _both(sides, rates, between):
+            high = between
         else:
-            low = middle_delta
+            low = between
     both = _both(sides, rates, high)
     return None if both is None else _joined(sides, *both, high)
 
 
-def _middle(found: Bounds) -> int:
-    """The node where B changes its sign and u is sure to be positive."""
-    inward = np.maximum(np.abs(found.inward_low), np.abs(found.inward_high))
-    return int(np.argmin(np.where(np.isfinite(found.mismatch), inward, np.inf)))
-
-
-def _sides(trial: Trial, bounder: Bounder, nodes: FloatArray, found: Bounds, middle: int) -> tuple[Side, Side]:
+def _sides(trial: Trial, known: Known, sense: int) -> tuple[Side, Side]:
     """The left, mirrored, and the right."""
-    mismatch = found.mismatch * (1 + SLACK)
+    middle, nodes = known.middle, known.nodes
+    excess = known.bounds.above(sense)
+    excess = excess + SLACK * np.abs(excess)
     beta = trial.basis.gauge if trial.p is not None else 0.0
-    left = (-nodes[middle::-1], mismatch[:middle][::-1], -found.inward_high[:middle][::-1], -beta)
-    right = (nodes[middle:], mismatch[middle:], found.inward_low[middle:], beta)
-    return _side(trial, bounder, *left, -1), _side(trial, bounder, *right, 1)
+    low, high = known.bounds.inward
+    ends = (None, None) if known.held is None else [{j: h.end(sense) for j, h in side.items()} for side in known.held]
+    left = None if ends[0] is None else {middle - j: end for j, end in ends[0].items()}
+    right = None if ends[1] is None else {j - middle: end for j, end in ends[1].items()}
+    return (
+        Side(-nodes[middle::-1], excess[:middle][::-1], _cautious(-high[:middle][::-1]), -beta, left),
+        Side(nodes[middle:], excess[middle:], _cautious(low[middle:]), beta, right),
+    )
 
 
-def _side(
-    trial: Trial, bounder: Bounder, nodes: FloatArray, mismatch: FloatArray, inward: FloatArray, beta: float, sign: int
-) -> Side:
-    good = np.isfinite(mismatch)
-    inward = inward - SLACK * 1e-3 * (1 + np.abs(inward))
-    ends = None
-    if isinstance(trial.basis, Core):
-        last = len(good) if good.all() else int(np.argmin(good))
-        nodes, mismatch, inward = nodes[: last + 1], mismatch[:last], inward[:last]
-        far = np.abs(nodes - sign * trial.basis.centre) > HELD_FROM * trial.basis.scale
-        chosen = np.flatnonzero(far)
-        chosen = np.unique(chosen[np.linspace(0, len(chosen) - 1, CANDIDATES).astype(int)]) if len(chosen) else chosen
-        known = bounder.ends(sign * nodes[chosen], sign) if len(chosen) else []
-        ends = {int(j): end for j, end in zip(chosen, known, strict=True) if math.isfinite(end.mismatch)}
-    return Side(nodes, mismatch, inward, beta, ends)
+def _cautious(inward: FloatArray) -> FloatArray:
+    return inward - SLACK * 1e-3 * (1 + np.abs(inward))
 
 
 def _both(sides: tuple[Side, Side], rates: Rates, delta: float) -> tuple[Factor, Factor] | None:

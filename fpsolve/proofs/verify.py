@@ -22,22 +22,25 @@ motion, chapter XI). LT may tend to −∞ there for the upper bound, to +∞ fo
 λ₋ ≤ q + L(0) f with convex kinks, q + L(0) f ≤ λ₊ with concave ones. Then ln‖x‖ + f − ∫ (q + L(0) f) dt less the local
 times is a martingale whose bracket is at most C t, hence o(t), and so is f: λ₋ ≤ λ ≤ λ₊ for almost every path.
 
-What is verified are the inequalities of `factor`, from which those of the theorem follow for T = R^{ps} e^{βz ± ψ} u.
+What is verified are the inequalities of `factor`, from which those of the theorem follow for T = R^{ps} e^{βz ± ψ} u,
+the upper and the lower bound each with a ψ of its own.
 Coefficients are in balls; floats are rounded outward.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.proofs.balls import ball, in_balls
 from fpsolve.proofs.bounds import Bounder, Bounds, Trial
-from fpsolve.proofs.certificate import MOMENT, Certificate
-from fpsolve.proofs.factor import End
+from fpsolve.proofs.certificate import MOMENT, Certificate, SideRecord
+from fpsolve.proofs.factor import LOWER, UPPER, End
 from fpsolve.proofs.statement import Cylinder, cylinder
 
 if TYPE_CHECKING:
@@ -46,22 +49,22 @@ if TYPE_CHECKING:
 
 @in_balls
 def objection(certificate: Certificate) -> str:
-    """Why Λ(p), or λ, need not be within delta of mu; empty where it is proven."""
+    """Why the bounds of a certificate need not hold; empty where they are proven."""
+    sides = [(q, side) for q, side in ((UPPER, certificate.upper), (LOWER, certificate.lower)) if side is not None]
     if certificate.p is not None and Fraction(certificate.p) == 0:  # Λ(0) = 0, as T = 1
-        return "" if abs(certificate.mu) <= certificate.delta else "Λ(0) = 0"
+        return "" if all(q * Fraction(certificate.mu) + Fraction(side.delta) >= 0 for q, side in sides) else "Λ(0) = 0"
     trial = trial_of(certificate)
-    misplaced = _misplaced(certificate, trial.noise)
-    if misplaced:
-        return misplaced
+    for _, side in sides:
+        misplaced = _misplaced(certificate, trial.noise, side)
+        if misplaced:
+            return misplaced
     bounder = Bounder(trial, certificate.phases)
-    nodes = np.array(certificate.nodes)
-    found = bounder.bounds(nodes[:-1], nodes[1:])
-    if not np.all(np.isfinite(found.mismatch)):
-        return f"u > 0 is not certain near z = {nodes[np.argmax(~np.isfinite(found.mismatch))]:.6g}"
-    for j in range(len(nodes) - 1):
-        if not _holds(certificate, trial.noise, found, j):
-            return f"the mismatch of {found.mismatch[j]:.3g} near z = {nodes[j]:.6g} is not made up for"
-    return _objection_at_ends(certificate, trial, bounder)
+    cells = sorted({cell for _, side in sides for cell in pairwise(side.nodes)})
+    low, high = np.array(cells).T
+    found, places = bounder.bounds(low, high), {cell: j for j, cell in enumerate(cells)}
+    if not np.all(found.is_positive):
+        return f"u > 0 is not certain near z = {low[np.argmin(found.is_positive)]:.6g}"
+    return "".join(_objection(certificate, bounder, q, side, found, places) for q, side in sides)
 
 
 def trial_of(certificate: Certificate) -> Trial:
@@ -76,28 +79,10 @@ def trial_of(certificate: Certificate) -> Trial:
     )
 
 
-def _holds(certificate: Certificate, noise: Cylinder, found: Bounds, j: int) -> bool:
-    """(*) of `factor` on a cell: its right side is concave in W of one sign, so that it is least at an end or at 0."""
-    (left, right), values = map(ball, certificate.nodes[j : j + 2]), certificate.values[j : j + 2]
-    room = (ball(certificate.delta) - ball(float(found.mismatch[j]))) / noise.nu
-    growth = (ball(values[1]) - ball(values[0])) / (2 * (right - left))
-    ends = [*values, 0.0] if values[0] * values[1] < 0 else values
-    return all(growth <= room + _pull(certificate, value, found, j) for value in ends)
-
-
-def _pull(certificate: Certificate, value: float, found: Bounds, j: int) -> arb:
-    """Below W B − ½ W² on a cell."""
-    if value == 0:
-        return ball(0)
-    inward = found.inward_low[j] if value > 0 else found.inward_high[j]
-    square = ball(value) * ball(value) / 2 if certificate.quantity == MOMENT else ball(0)
-    return ball(value) * ball(float(inward)) - square
-
-
-def _misplaced(certificate: Certificate, noise: Cylinder) -> str:
+def _misplaced(certificate: Certificate, noise: Cylinder, side: SideRecord) -> str:
     """Why the cells and the gauge are not what the theorem asks for."""
-    first, last = certificate.nodes[0], certificate.nodes[-1]
-    if certificate.tails is None:
+    first, last = side.nodes[0], side.nodes[-1]
+    if side.tails is None:
         return "" if (first, last) == (-1.0, 1.0) else "the cells do not cover the support"
     if noise.is_bounded and not -1 < first <= 0 <= last < 1:
         return "the core must hold 0, and not reach the ends of the support"
@@ -106,26 +91,56 @@ def _misplaced(certificate: Certificate, noise: Cylinder) -> str:
     return ""
 
 
-def _objection_at_ends(certificate: Certificate, trial: Trial, bounder: Bounder) -> str:
-    """Where u is held, and beyond."""
-    nodes = certificate.nodes
-    if certificate.tails is None:
-        return ""
+def _objection(
+    certificate: Certificate, bounder: Bounder, q: int, side: SideRecord, found: Bounds, places: Mapping[Any, int]
+) -> str:
+    """Why one of the bounds need not hold."""
+    noise, square = bounder.trial.noise, q if certificate.quantity == MOMENT else 0
+    excess, name = found.above(q), "upper" if q > 0 else "lower"
+    for cell, values in zip(pairwise(side.nodes), pairwise(side.values), strict=True):
+        j = places[cell]
+        left, right, start, stop = map(ball, (*cell, *values))
+        room = (ball(side.delta) - ball(float(excess[j]))) / noise.nu
+        inward = (float(found.inward[0][j]), float(found.inward[1][j]))
+        if not all((stop - start) / (2 * (right - left)) <= room + pull for pull in _pulls(values, inward, square)):
+            return f"{name} bound: the mismatch near z = {cell[0]:.6g} is not made up for; "
     for sign, j in ((-1, 0), (1, -1)):
-        (end,) = bounder.ends(np.array([nodes[j]]), sign)
-        held = (sign * certificate.basis.gauge, sign * certificate.values[j], sign * certificate.tails[j])
-        if not _holds_beyond(certificate, trial.noise, end, *map(ball, held)):
-            return f"the trial function does not serve beyond z = {nodes[j]:.6g}"
+        if side.tails is None:
+            break
+        (held,) = bounder.held(np.array([side.nodes[j]]), sign)
+        tail = (sign * certificate.basis.gauge, sign * side.values[j], sign * side.tails[j], side.delta)
+        if not _holds_beyond(noise, held.end(q), q, square, *map(ball, tail)):
+            return f"{name} bound: the trial function does not serve beyond z = {side.nodes[j]:.6g}; "
     return ""
 
 
-def _holds_beyond(certificate: Certificate, noise: Cylinder, end: End, beta: arb, value: arb, kappa: arb) -> bool:
+def _pulls(values: tuple[float, float], inward: tuple[float, float], square: int) -> Iterator[arb]:
+    """Numbers of which one is below W B − ½ q W² for all W between two values and B between two others.
+
+    For W of one sign it is least where W B is, at one end of B; then at an end of W, or for q = −1 at W = −B.
+    """
+    places = [*values, 0.0] if values[0] * values[1] < 0 else list(values)
+    for value in places:
+        yield _pull(value, inward[0] if value > 0 else inward[1], square)
+    for bound in inward if square < 0 else ():
+        if min(values) < -bound < max(values):
+            yield _pull(-bound, bound, square)
+
+
+def _pull(value: float, inward: float, square: int) -> arb:
+    """W B − ½ q W²."""
+    w = ball(value)
+    return w if value == 0 else w * ball(inward) - square * (w * w) / 2
+
+
+def _holds_beyond(
+    noise: Cylinder, end: End, q: int, square: int, beta: arb, value: arb, kappa: arb, delta: arb
+) -> bool:
     """Whether u may be held at the right end, mirrored onto it if it is the left one."""
-    slope, mismatch, growth, drift, bend = map(ball, asdict(end).values())
-    square = kappa * kappa / 2 if certificate.quantity == MOMENT else 0
+    drop, mismatch, growth, drift, slope = map(ball, asdict(end).values())
     return bool(
-        value - kappa >= slope
-        and kappa >= abs(beta)
-        and noise.nu * bend * kappa >= growth
-        and (ball(certificate.delta) - mismatch) / noise.nu + kappa * (drift - beta) - square >= 0
+        kappa <= value - drop
+        and kappa >= -q * beta
+        and noise.nu * slope * kappa >= growth
+        and (delta - mismatch) / noise.nu + kappa * (drift - beta) - square * (kappa * kappa) / 2 >= 0
     )

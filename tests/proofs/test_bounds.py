@@ -11,6 +11,7 @@ from fpsolve.proofs.balls import above, ball, below, precision, rounded
 from fpsolve.proofs.basis import Core, Whole
 from fpsolve.proofs.bounds import Bounder, Trial
 from fpsolve.proofs.cells import Cells
+from fpsolve.proofs.factor import LOWER, UPPER
 from fpsolve.proofs.phases import Phases
 from fpsolve.proofs.statement import cylinder
 
@@ -102,13 +103,15 @@ def test_the_mismatch_is_within_its_bounds_and_these_are_close(name, p):
     phi, z = points(name)
     with precision():
         of = trial(name, p=p)
-        expected = np.abs(expected_mismatch(of, phi, z, p))
+        expected = expected_mismatch(of, phi, z, p)
         found = Bounder(of, 256).bounds(np.nextafter(z, -9) - 1e-4, z + 1e-4)
-    assert np.all(expected <= found.mismatch + 1e-12)
-    worst = [
-        np.abs(expected_mismatch(of, np.linspace(0, math.pi, 400), np.full(400, each), p)).max() for each in z[:20]
-    ]
-    np.testing.assert_allclose(found.mismatch[:20], worst, rtol=0.05)
+    low, high = found.mismatch
+    assert np.all(low - 1e-12 <= expected)
+    assert np.all(expected <= high + 1e-12)
+    around = np.array([expected_mismatch(of, circle, np.full(400, each), p) for each in z[:20]])
+    size = np.abs(around).max(axis=1)
+    assert np.all(np.abs(low[:20] - around.min(axis=1)) < 0.05 * size)
+    assert np.all(np.abs(high[:20] - around.max(axis=1)) < 0.05 * size)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -119,8 +122,8 @@ def test_the_drift_inward_is_within_its_bounds(name):
         u, _, u_z, _ = sampled(of, phi, z)
         drift = float(of.noise.slope) * z / (1 - z * z if of.noise.is_bounded else 1) - of.basis.gauge - u_z / u
         found = Bounder(of, 256).bounds(z - 1e-4, z + 1e-4)
-    assert np.all(found.inward_low <= drift + 1e-12)
-    assert np.all(drift <= found.inward_high + 1e-12)
+    assert np.all(found.inward[0] <= drift + 1e-12)
+    assert np.all(drift <= found.inward[1] + 1e-12)
 
 
 @pytest.mark.parametrize("width", [0.0, 1e-3, 0.05])
@@ -143,7 +146,7 @@ def test_where_u_is_not_positive_nothing_is_bounded():
         of = trial("whole")
         of.cosine[0, 0] = 0.05
         found = Bounder(of, 64).bounds(np.array([-0.5, 0.2]), np.array([-0.4, 0.3]))
-    assert np.all(np.isinf(found.mismatch))
+    assert not np.any(found.is_positive)
 
 
 @pytest.mark.parametrize("name", ["core, bounded", "core, unbounded"])
@@ -153,7 +156,7 @@ def test_what_is_left_where_u_is_held(name, sign):
     z, phi = sign * 0.5, np.linspace(0, math.pi, 721)
     with precision():
         of = trial(name)
-        (end,) = Bounder(of, 512).ends(np.array([z]), sign)
+        (held,) = Bounder(of, 512).held(np.array([z]), sign)
     noise, (u, u_phi, u_z, _) = of.noise, sampled(of, phi, np.full_like(phi, z))
     beta, nu = of.basis.gauge, float(noise.nu)
 
@@ -164,10 +167,18 @@ def test_what_is_left_where_u_is_held(name, sign):
         rest = speed * u_phi / u + P * (drive * q1 + kappa * speed)
         return rest + nu * (beta**2 / 2 - beta * float(noise.drift(ball(z)))) - of.mu
 
-    assert end.mismatch == pytest.approx(np.abs(left(z)).max(), rel=0.02)
-    assert end.growth == pytest.approx(np.abs(left(z + 1e-5) - left(z - 1e-5)).max() / 2e-5, rel=0.02)
-    assert end.slope == pytest.approx(np.abs(u_z / u).max(), rel=0.02)
-    assert end.drift == pytest.approx(sign * float(noise.drift(ball(z))))
+    growth = sign * (left(z + 1e-5) - left(z - 1e-5)) / 2e-5
+    for (low, high), expected in zip(
+        (held.steep, held.mismatch, held.growth), (sign * u_z / u, left(z), growth), strict=True
+    ):
+        near = pytest.approx((expected.min(), expected.max()), abs=0.02 * np.abs(expected).max())
+        assert (low, high) == near
+        assert low <= expected.min() <= expected.max() <= high + 1e-9
+    assert held.drift == pytest.approx(sign * float(noise.drift(ball(z))))
+    assert held.slope == pytest.approx(float(noise.drift(ball(z + 1e-6)) - noise.drift(ball(z - 1e-6))) / 2e-6)
+    upper, lower = held.end(UPPER), held.end(LOWER)
+    assert (upper.drop, upper.mismatch, upper.growth) == (-held.steep[0], held.mismatch[1], held.growth[1])
+    assert (lower.drop, lower.mismatch, lower.growth) == (held.steep[1], -held.mismatch[0], -held.growth[0])
 
 
 def test_floats_beside_balls():
