@@ -18,11 +18,15 @@ from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_IND
 from fpsolve.files import write_text
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.summary import MOST_ROWS, MOST_TABLES, varied_columns
+from fpsolve.proofs.claims import verdicts
 from fpsolve.proofs.enclosure import Enclosure
 from fpsolve.proofs.questions import IndexEnclosure
+from fpsolve.proofs.statement import IMPACT, TREATMENT
 from fpsolve.study.prove import CurveProof
 
 PROOF = "proof.json"
+MOST_TOLD = 4
+"""Of so many moments at most a sentence tells each."""
 WORDS = {1: "grows", -1: "decays", 0: "open"}
 
 
@@ -36,15 +40,15 @@ def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_wh
 
 def _curve_text(proof: CurveProof) -> str:
     """A curve as JSON, a line for each bound."""
-    moments = ",\n".join(f"    {_line({'p': p} | _bound(found))}" for p, found in proof.moments)
+    moments = ",\n".join(f"    {_moment(p, found)}" for p, found in proof.moments)
     index = proof.index
     others = {
-        "lyapunov_exponent": None if proof.exponent is None else _bound(proof.exponent),
-        "stability_index": None if index is None else _index(index),
-        "verdicts": proof.verdicts,
+        "lyapunov_exponent": "null" if proof.exponent is None else _line(_bound(proof.exponent)),
+        "stability_index": "null" if index is None else _index(index),
+        "verdicts": _line(proof.verdicts),
     }
-    rest = ",\n".join(f"   {json.dumps(key)}: {_line(value)}" for key, value in others.items())
-    parameters = f'   "parameters": {_line(dict(proof.curve.parameters))}'
+    rest = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in others.items())
+    parameters = f'   "parameters": {_parameters(proof)}'
     return f'  {{\n{parameters},\n   "moments": [\n{moments}\n   ],\n{rest}\n  }}'
 
 
@@ -55,11 +59,23 @@ def _bound(found: Enclosure | None) -> dict[str, Any]:
     return {"lower": found.lower, "upper": found.upper, "certificate": found.certificate.model_dump(mode="json")}
 
 
-def _index(found: IndexEnclosure) -> dict[str, Any]:
+def _moment(p: str, found: Enclosure | None) -> str:
+    """The bounds on Λ(p); p as the decimal of which they hold."""
+    return f'{{"p": {p}, {_line(_bound(found))[1:]}'
+
+
+def _index(found: IndexEnclosure) -> str:
     """Bounds on δ_p, and Λ at two p beside it."""
-    moments = [{"p": float(p)} | _bound(each) for p, each in found.moments]
     ends = (found.lower, found.upper) if found.is_proven else (None, None)
-    return {"lower": ends[0], "upper": ends[1], "moments": moments}
+    moments = ", ".join(_moment(p, each) for p, each in found.moments)
+    return f'{{"lower": {_line(ends[0])}, "upper": {_line(ends[1])}, "moments": [{moments}]}}'
+
+
+def _parameters(proof: CurveProof) -> str:
+    """All parameters of a curve, numbers as the decimals of which the bounds hold."""
+    written = {key: _line(value) for key, value in proof.curve.parameters.items()}
+    numbers = {key: text for key, text in proof.stated.items() if key not in (IMPACT, TREATMENT)}
+    return f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in (written | numbers).items())}}}"
 
 
 def _line(data: Any) -> str:
@@ -77,7 +93,7 @@ def print_proofs(case: Case, proofs: Sequence[CurveProof]) -> None:
         indices = [(LYAPUNOV_EXPONENT.symbol, proof.exponent), (STABILITY_INDEX.symbol, proof.index)]
         screen.packed([f"{symbol} {_between(found)}" for symbol, found in indices if found is not None])
         if proof.verdicts:
-            screen.say(f"Proven: {'; '.join(proof.verdicts)}.")
+            screen.say(f"Proven: {_in_short(proof)}.")
         screen.lines([""])
 
 
@@ -87,13 +103,14 @@ def _moment_grid(case: Case, proof: CurveProof) -> Grid:
     columns = [Column("p"), Column(f"{symbol} ≥"), Column(f"{symbol} ≤"), Column("width", 2), Column("the moment", 1)]
     grid = Grid(case.heading(proof.curve), columns)
     for p, found in proof.moments:
-        row: list[Cell] = [f"{p + 0.0:g}", "", "", "", Text("not proven", "bold red")]
+        order = float(p) + 0.0
+        row: list[Cell] = [f"{order:.10g}", "", "", "", Text("not proven", "bold red")]
         if found is not None and found.is_proven:
             style = "" if found.is_met else "yellow"
             row[1:] = [
                 *bounds_text(found),
-                Text(f"{found.width:.0e}", style),
-                WORDS[found.sign] if p else "is constant",
+                Text(f"{found.width:.0e}" if found.width else "0", style),
+                WORDS[found.sign] if order else "is constant",
             ]
         elif found is None:
             row[4] = "not tried"
@@ -103,14 +120,27 @@ def _moment_grid(case: Case, proof: CurveProof) -> Grid:
 
 def _curve_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
     """What varies, how many Λ(p) are proven, the bounds on λ, and what follows."""
-    columns = [*varied_columns(case), Column("proven"), Column(LYAPUNOV_EXPONENT.symbol, 1)]
+    has_exponent = any(proof.exponent is not None for proof in proofs)
+    columns = [*varied_columns(case), Column("proven"), *[Column(LYAPUNOV_EXPONENT.symbol, 1)] * has_exponent]
     grid = Grid(case.headline, [*columns, Column("verdicts", 2, is_text=True)])
     for proof in proofs[:MOST_ROWS]:
         proven = sum(found is not None and found.is_proven for _, found in proof.moments)
-        exponent = "" if proof.exponent is None else _between(proof.exponent)
+        exponent = ["" if proof.exponent is None else _between(proof.exponent)] * has_exponent
         varied = map(written, proof.curve.varied.values())
-        grid.rows.append([*varied, f"{proven} of {len(proof.moments)}", exponent, "; ".join(proof.verdicts)])
+        grid.rows.append([*varied, f"{proven} of {len(proof.moments)}", *exponent, _in_short(proof)])
     return grid
+
+
+def _in_short(proof: CurveProof) -> str:
+    """The verdicts; of many moments how many grow and how many decay."""
+    signs = [found.sign for p, found in proof.moments if found is not None]
+    if sum(map(abs, signs)) <= MOST_TOLD:
+        return "; ".join(proof.verdicts)
+    told = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
+    for sign, word in WORDS.items():
+        count = signs.count(sign) if sign else 0
+        told += [f"{count} moments {word.removesuffix('s')}" if count > 1 else f"1 moment {word}"] if count else []
+    return "; ".join(told)
 
 
 def _between(found: Enclosure | IndexEnclosure) -> str:
