@@ -18,15 +18,16 @@ from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_IND
 from fpsolve.files import write_text
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.summary import MOST_ROWS, MOST_TABLES, varied_columns
-from fpsolve.proofs.claims import verdicts
+from fpsolve.proofs.claims import plain, verdicts
 from fpsolve.proofs.enclosure import Enclosure
 from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.proofs.statement import IMPACT, TREATMENT
 from fpsolve.study.prove import CurveProof
 
 PROOF = "proof.json"
-MOST_TOLD = 4
-"""Of so many moments at most a sentence tells each."""
+NOT_PROVEN = "not proven"
+MOST_TOLD, LONGEST = 4, 12
+"""Of so many moments at most a sentence tells each; and of so many digits at most a p is told in a table."""
 WORDS = {1: "grows", -1: "decays", 0: "open"}
 
 
@@ -103,49 +104,64 @@ def _moment_grid(case: Case, proof: CurveProof) -> Grid:
     columns = [Column("p"), Column(f"{symbol} ≥"), Column(f"{symbol} ≤"), Column("width", 2), Column("the moment", 1)]
     grid = Grid(case.heading(proof.curve), columns)
     for p, found in proof.moments:
-        order = float(p) + 0.0
-        row: list[Cell] = [f"{order:.10g}", "", "", "", Text("not proven", "bold red")]
+        fate = _fate(p, found)
+        row: list[Cell] = [_order(p), "", "", "", Text(fate, "bold red") if fate == NOT_PROVEN else fate]
         if found is not None and found.is_proven:
-            style = "" if found.is_met else "yellow"
-            row[1:] = [
-                *bounds_text(found),
-                Text(f"{found.width:.0e}" if found.width else "0", style),
-                WORDS[found.sign] if order else "is constant",
-            ]
-        elif found is None:
-            row[4] = "not tried"
+            width = f"{found.width:.0e}" if found.width else "0"
+            row[1:4] = [*bounds_text(found), Text(width, "" if found.is_met else "yellow")]
         grid.rows.append(row)
     return grid
 
 
 def _curve_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
-    """What varies, how many Λ(p) are proven, the bounds on λ, and what follows."""
+    """What varies, how many Λ(p) are proven, the bounds on λ, and what becomes of paths and moments."""
     has_exponent = any(proof.exponent is not None for proof in proofs)
-    columns = [*varied_columns(case), Column("proven"), *[Column(LYAPUNOV_EXPONENT.symbol, 1)] * has_exponent]
-    grid = Grid(case.headline, [*columns, Column("verdicts", 2, is_text=True)])
+    p = [p for p, _ in proofs[0].moments]
+    headings = [f"p = {_order(each)}" for each in p] if len(p) <= MOST_TOLD else ["moments"]
+    columns = [*varied_columns(case), Column("proven")]
+    columns += [Column(LYAPUNOV_EXPONENT.symbol, 1), Column("paths", 2)] * has_exponent
+    grid = Grid(case.headline, [*columns, *[Column(heading, 3) for heading in headings]])
     for proof in proofs[:MOST_ROWS]:
         proven = sum(found is not None and found.is_proven for _, found in proof.moments)
-        exponent = ["" if proof.exponent is None else _between(proof.exponent)] * has_exponent
+        exponent = ["", ""] if proof.exponent is None else [_between(proof.exponent), WORDS[proof.exponent.sign]]
+        words = [_fate(each, found) for each, found in proof.moments]
+        moments = words if len(p) <= MOST_TOLD else [_counted(proof)]
         varied = map(written, proof.curve.varied.values())
-        grid.rows.append([*varied, f"{proven} of {len(proof.moments)}", *exponent, _in_short(proof)])
+        grid.rows.append([*varied, f"{proven} of {len(p)}", *exponent[: 2 * has_exponent], *moments])
     return grid
+
+
+def _fate(p: str, found: Enclosure | None) -> str:
+    """What becomes of a moment."""
+    if found is None or not found.is_proven:
+        return "not tried" if found is None else NOT_PROVEN
+    return WORDS[found.sign] if float(p) else "is constant"
+
+
+def _order(p: str) -> str:
+    """p for the eye."""
+    return text if len(text := plain(p)) <= LONGEST else f"{float(p):.10g}"
 
 
 def _in_short(proof: CurveProof) -> str:
     """The verdicts; of many moments how many grow and how many decay."""
-    signs = [found.sign for p, found in proof.moments if found is not None]
-    if sum(map(abs, signs)) <= MOST_TOLD:
+    if sum(found is not None and found.sign != 0 for _, found in proof.moments) <= MOST_TOLD:
         return "; ".join(proof.verdicts)
-    told = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
-    for sign, word in WORDS.items():
-        count = signs.count(sign) if sign else 0
-        told += [f"{count} moments {word.removesuffix('s')}" if count > 1 else f"1 moment {word}"] if count else []
-    return "; ".join(told)
+    path = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
+    return "; ".join([*path, f"of {len(proof.moments)} moments {_counted(proof)}"])
+
+
+def _counted(proof: CurveProof) -> str:
+    """ "31 grow, 1 decays"."""
+    signs = [found.sign for _, found in proof.moments if found is not None]
+    counts = {word: signs.count(sign) for sign, word in WORDS.items() if sign}
+    told = [f"{n} {word if n == 1 else word.removesuffix('s')}" for word, n in counts.items() if n]
+    return ", ".join(told) or "none is known"
 
 
 def _between(found: Enclosure | IndexEnclosure) -> str:
     """ "in [0.0010257274, 0.0010257275]"."""
-    return f"in [{', '.join(bounds_text(found))}]" if found.is_proven else "not proven"
+    return f"in [{', '.join(bounds_text(found))}]" if found.is_proven else NOT_PROVEN
 
 
 def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:
