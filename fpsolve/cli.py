@@ -244,7 +244,9 @@ def prove(
     if (check is None) == (not cases):
         raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
     if check is not None:
-        return _verify(check, is_quiet=quiet)
+        if width is not None or overrides or jobs is not None or scheduler:
+            raise FpsolveError("--check takes a proof.json and nothing else, as that says all that is verified")
+        return _verify(check)
     code, loaded = 0, load_to_write(cases or [], overrides, {}, monte_carlo=False)
     for case in loaded:
         refuse_unprovable_case(case, width)
@@ -261,18 +263,20 @@ def prove(
     return code
 
 
-def _verify(path: Path, *, is_quiet: bool) -> int:
+def _verify(path: Path) -> int:
     """Check a proof.json, and say which claims do not follow."""
     from fpsolve.workflow.proofs import check_proof
 
     checked = check_proof(path)
     for text in checked.objections:
         _print_error(f"{path}: {text}")
-    count = checked.claims.count
+    bounds = f"bounds on {checked.claims.count} number{'s' * (checked.claims.count != 1)}"
     if checked.objections:
-        print(f"rejected: {path} ({len(checked.objections)} objections, {count} bounds)")
+        objections = f"{len(checked.objections)} objection{'s' * (len(checked.objections) > 1)}"
+        print(f"rejected: {path} ({objections}, {bounds})")
         return CHECK_FAILED
-    print(f"accepted: {path} ({count} bounds follow from their certificates)")
+    unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
+    print(f"accepted: {path} ({bounds} follow from their certificates{unfinished})")
     return 0
 
 

@@ -57,7 +57,7 @@ ROOMS = {
         *("reading", "toml", "messages", "sections", "vary", "set_file", "vary_table", "figure", "chart", "output"),
         *("curves", "remedies", "refusals", "case"),
     ],
-    "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart", "prove"],
+    "study": ["results", "solve", "records", "sweep", "simulated", "simulate", "chart", "decimals", "prove"],
     "output": [
         *("vtk", "provenance", "records", "tables", "datasets", "frame", "series", "many", "plots", "maps"),
         *("charts", "figures", "screen", "remarks", "summary", "terminal", "proofs"),

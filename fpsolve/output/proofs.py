@@ -18,11 +18,16 @@ from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_IND
 from fpsolve.files import write_text
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.summary import MOST_ROWS, MOST_TABLES, varied_columns
+from fpsolve.proofs.claims import plain, verdicts
 from fpsolve.proofs.enclosure import Enclosure
 from fpsolve.proofs.questions import IndexEnclosure
+from fpsolve.proofs.statement import IMPACT, TREATMENT
 from fpsolve.study.prove import CurveProof
 
 PROOF = "proof.json"
+NOT_PROVEN = "not proven"
+MOST_TOLD, LONGEST = 4, 12
+"""Of so many moments at most a sentence tells each; and of so many digits at most a p is told in a table."""
 WORDS = {1: "grows", -1: "decays", 0: "open"}
 
 
@@ -36,15 +41,15 @@ def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_wh
 
 def _curve_text(proof: CurveProof) -> str:
     """A curve as JSON, a line for each bound."""
-    moments = ",\n".join(f"    {_line({'p': p} | _bound(found))}" for p, found in proof.moments)
+    moments = ",\n".join(f"    {_moment(p, found)}" for p, found in proof.moments)
     index = proof.index
     others = {
-        "lyapunov_exponent": None if proof.exponent is None else _bound(proof.exponent),
-        "stability_index": None if index is None else _index(index),
-        "verdicts": proof.verdicts,
+        "lyapunov_exponent": "null" if proof.exponent is None else _line(_bound(proof.exponent)),
+        "stability_index": "null" if index is None else _index(index),
+        "verdicts": _line(proof.verdicts),
     }
-    rest = ",\n".join(f"   {json.dumps(key)}: {_line(value)}" for key, value in others.items())
-    parameters = f'   "parameters": {_line(dict(proof.curve.parameters))}'
+    rest = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in others.items())
+    parameters = f'   "parameters": {_parameters(proof)}'
     return f'  {{\n{parameters},\n   "moments": [\n{moments}\n   ],\n{rest}\n  }}'
 
 
@@ -52,14 +57,27 @@ def _bound(found: Enclosure | None) -> dict[str, Any]:
     """lower, upper and the certificate; null where nothing is proven."""
     if found is None or found.certificate is None:
         return {"lower": None, "upper": None, "certificate": None}
-    return {"lower": found.lower, "upper": found.upper, "certificate": found.certificate.model_dump(mode="json")}
+    ends = (end if math.isfinite(end) else None for end in (found.lower, found.upper))
+    return dict(zip(("lower", "upper"), ends, strict=True)) | {"certificate": found.certificate.model_dump(mode="json")}
 
 
-def _index(found: IndexEnclosure) -> dict[str, Any]:
+def _moment(p: str, found: Enclosure | None) -> str:
+    """The bounds on Λ(p); p as the decimal of which they hold."""
+    return f'{{"p": {p}, {_line(_bound(found))[1:]}'
+
+
+def _index(found: IndexEnclosure) -> str:
     """Bounds on δ_p, and Λ at two p beside it."""
-    moments = [{"p": float(p)} | _bound(each) for p, each in found.moments]
     ends = (found.lower, found.upper) if found.is_proven else (None, None)
-    return {"lower": ends[0], "upper": ends[1], "moments": moments}
+    moments = ", ".join(_moment(p, each) for p, each in found.moments)
+    return f'{{"lower": {_line(ends[0])}, "upper": {_line(ends[1])}, "moments": [{moments}]}}'
+
+
+def _parameters(proof: CurveProof) -> str:
+    """All parameters of a curve, numbers as the decimals of which the bounds hold."""
+    written = {key: _line(value) for key, value in proof.curve.parameters.items()}
+    numbers = {key: text for key, text in proof.stated.items() if key not in (IMPACT, TREATMENT)}
+    return f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in (written | numbers).items())}}}"
 
 
 def _line(data: Any) -> str:
@@ -77,7 +95,7 @@ def print_proofs(case: Case, proofs: Sequence[CurveProof]) -> None:
         indices = [(LYAPUNOV_EXPONENT.symbol, proof.exponent), (STABILITY_INDEX.symbol, proof.index)]
         screen.packed([f"{symbol} {_between(found)}" for symbol, found in indices if found is not None])
         if proof.verdicts:
-            screen.say(f"Proven: {'; '.join(proof.verdicts)}.")
+            screen.say(f"Proven: {_in_short(proof)}.")
         screen.lines([""])
 
 
@@ -87,42 +105,78 @@ def _moment_grid(case: Case, proof: CurveProof) -> Grid:
     columns = [Column("p"), Column(f"{symbol} ≥"), Column(f"{symbol} ≤"), Column("width", 2), Column("the moment", 1)]
     grid = Grid(case.heading(proof.curve), columns)
     for p, found in proof.moments:
-        row: list[Cell] = [f"{p + 0.0:g}", "", "", "", Text("not proven", "bold red")]
+        fate = _fate(p, found)
+        row: list[Cell] = [_order(p), "", "", "", Text(fate, "bold red") if fate == NOT_PROVEN else fate]
         if found is not None and found.is_proven:
-            style = "" if found.is_met else "yellow"
-            row[1:] = [
-                *bounds_text(found),
-                Text(f"{found.width:.0e}", style),
-                WORDS[found.sign] if p else "is constant",
-            ]
-        elif found is None:
-            row[4] = "not tried"
+            width = f"{found.width:.0e}".replace("inf", "∞") if found.width else "0"
+            row[1:4] = [*bounds_text(found), Text(width, "" if found.is_met else "yellow")]
         grid.rows.append(row)
     return grid
 
 
 def _curve_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
-    """What varies, how many Λ(p) are proven, the bounds on λ, and what follows."""
-    columns = [*varied_columns(case), Column("proven"), Column(LYAPUNOV_EXPONENT.symbol, 1)]
-    grid = Grid(case.headline, [*columns, Column("verdicts", 2, is_text=True)])
+    """What varies, how many Λ(p) are proven, the bounds on λ, and what becomes of paths and moments."""
+    has_exponent = any(proof.exponent is not None for proof in proofs)
+    p = [p for p, _ in proofs[0].moments]
+    headings = [f"p = {_order(each)}" for each in p] if len(p) <= MOST_TOLD else ["moments"]
+    columns = [*varied_columns(case), Column("proven")]
+    columns += [Column(LYAPUNOV_EXPONENT.symbol, 1), Column("paths", 2)] * has_exponent
+    grid = Grid(case.headline, [*columns, *[Column(heading, 3) for heading in headings]])
     for proof in proofs[:MOST_ROWS]:
         proven = sum(found is not None and found.is_proven for _, found in proof.moments)
-        exponent = "" if proof.exponent is None else _between(proof.exponent)
+        exponent = ["", ""] if proof.exponent is None else [_between(proof.exponent), WORDS[proof.exponent.sign]]
+        words = [_fate(each, found) for each, found in proof.moments]
+        moments = words if len(p) <= MOST_TOLD else [_counted(proof)]
         varied = map(written, proof.curve.varied.values())
-        grid.rows.append([*varied, f"{proven} of {len(proof.moments)}", exponent, "; ".join(proof.verdicts)])
+        grid.rows.append([*varied, f"{proven} of {len(p)}", *exponent[: 2 * has_exponent], *moments])
     return grid
+
+
+def _fate(p: str, found: Enclosure | None) -> str:
+    """What becomes of a moment."""
+    if found is None or not found.is_proven:
+        return "not tried" if found is None else NOT_PROVEN
+    return WORDS[found.sign] if float(p) else "is constant"
+
+
+def _order(p: str) -> str:
+    """p for the eye."""
+    return text if len(text := plain(p)) <= LONGEST else f"{float(p):.10g}"
+
+
+def _in_short(proof: CurveProof) -> str:
+    """The verdicts; of many moments how many grow and how many decay."""
+    if sum(found is not None and found.sign != 0 for _, found in proof.moments) <= MOST_TOLD:
+        return "; ".join(proof.verdicts)
+    path = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
+    return "; ".join([*path, f"of {len(proof.moments)} moments {_counted(proof)}"])
+
+
+def _counted(proof: CurveProof) -> str:
+    """ "31 grow, 1 decays"."""
+    signs = [found.sign for _, found in proof.moments if found is not None]
+    counts = {word: signs.count(sign) for sign, word in WORDS.items() if sign}
+    told = [f"{n} {word if n == 1 else word.removesuffix('s')}" for word, n in counts.items() if n]
+    return ", ".join(told) or "none is known"
 
 
 def _between(found: Enclosure | IndexEnclosure) -> str:
     """ "in [0.0010257274, 0.0010257275]"."""
-    return f"in [{', '.join(bounds_text(found))}]" if found.is_proven else "not proven"
+    return f"in [{', '.join(bounds_text(found))}]" if found.is_proven else NOT_PROVEN
 
 
 def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:
-    """Both bounds with two digits of how far they are apart, rounded outward."""
+    """Both bounds with two digits of how far they are apart, of a single one five digits, rounded outward."""
     if found.lower == found.upper:
         return f"{found.lower:g}", f"{found.upper:g}"
-    step = Decimal(1).scaleb(math.floor(math.log10(found.upper - found.lower)) - 1)
+    known = [end for end in (found.lower, found.upper) if math.isfinite(end)]
+    size, digits = (found.upper - found.lower, 2) if len(known) > 1 else (abs(known[0]) or 1.0, 5)
+    step = Decimal(1).scaleb(math.floor(math.log10(size)) + 1 - digits)
     ends = ((found.lower, ROUND_FLOOR), (found.upper, ROUND_CEILING))
-    low, high = (f"{Decimal(repr(end)).quantize(step, rounding)}" for end, rounding in ends)
+    low, high = (_end(end, step, rounding) for end, rounding in ends)
     return low, high
+
+
+def _end(end: float, step: Decimal, rounding: str) -> str:
+    """A bound in steps, or that there is none."""
+    return f"{Decimal(repr(end)).quantize(step, rounding)}" if math.isfinite(end) else f"{end}".replace("inf", "∞")

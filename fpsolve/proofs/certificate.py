@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -16,9 +17,9 @@ from fpsolve.proofs.basis import Basis, Core, Whole
 from fpsolve.proofs.statement import DIRECT, EXACT, IMPACT, NOISE, OSCILLATOR, REDUCED, TREATMENT
 
 MOMENT, DRIFT = "moment", "lyapunov_exponent"
-MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 16_384}
+MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 16_384, "values": 2**23}
 """Of what a certificate may hold, so that a file cannot ask for more than a machine has."""
-DECIMAL = re.compile(r"-?(\d{1,400}(\.\d{0,1100})?|\.\d{1,1100})([eE][-+]?\d{1,3})?")
+DECIMAL = re.compile(r"-?(\d{1,400}(\.\d{0,1100})?|\.\d{1,1100})([eE][-+]?\d{1,3})?", re.ASCII)
 
 
 class MalformedProof(FpsolveError):
@@ -119,6 +120,14 @@ class Certificate(Record):
         return self
 
     @model_validator(mode="after")
+    def _fits_into_memory(self) -> Self:
+        cells = max(len(side.nodes) for side in (self.upper, self.lower) if side is not None)
+        values = cells * max(self.phases, 8 * len(self.cosine), 8 * len(self.cosine[0]))
+        if values > MOST["values"]:
+            raise ValueError("nodes, phases and coefficients are too many together")
+        return self
+
+    @model_validator(mode="after")
     def _is_of_an_oscillator(self) -> Self:
         _check_parameters(self.parameters)
         is_bounded = self.parameters.get(TREATMENT) == EXACT and float(self.parameters[NOISE[2]]) < 1
@@ -134,8 +143,12 @@ def _check_parameters(stated: Mapping[str, str]) -> None:
     if set(stated) != expected:
         raise ValueError(f"parameters must be {', '.join(sorted(expected))}")
     numbers = {key: float(_decimal(text)) for key, text in stated.items() if key not in (IMPACT, TREATMENT)}
-    if not direct and stated[TREATMENT] not in (EXACT, REDUCED):
-        raise ValueError(f"got {TREATMENT} = {stated[TREATMENT]!r}; must be {EXACT!r} or {REDUCED!r}")
+    impacts = [str(law) for law in ImpactLaw]
+    for key, words in ((IMPACT, impacts), *(() if direct else ((TREATMENT, [EXACT, REDUCED]),))):
+        if stated[key] not in words:
+            raise ValueError(f"got {key} = {stated[key][:40]!r}; must be {' or '.join(map(repr, words))}")
+    if not direct and stated[TREATMENT] == EXACT and Fraction(stated[NOISE[2]]) > 1:
+        raise ValueError(f"got {NOISE[2]} = {stated[NOISE[2]][:40]}; must be <= 1 for {TREATMENT} = {EXACT!r}")
     VibroImpactOscillator(
         **{key.partition(".")[2]: numbers[key] for key in OSCILLATOR}, impact=ImpactLaw(stated[IMPACT])
     )
@@ -146,4 +159,24 @@ def first_fault(failure: ValidationError) -> str:
     """The first of the faults, with its place."""
     first = failure.errors(include_url=False)[0]
     place = ".".join(map(str, first["loc"]))
-    return f"{place + ': ' if place else ''}{first['msg']}"
+    said = re.sub(r"^(Input|List|String) should|^Value error, | after validation", _must, first["msg"])
+    text = _PLAINLY.get(first["type"], said)
+    return f"{place + ': ' if place else ''}{text}"
+
+
+def _must(words: re.Match[str]) -> str:
+    return "must" if words[0].endswith("should") else ""
+
+
+_PLAINLY = {
+    "missing": "is missing",
+    "extra_forbidden": "is no key of a proof",
+    "is_instance_of": "must be a finite number",
+    "model_type": "must be a table",
+    "dict_type": "must be a table",
+    "list_type": "must be a list",
+    "float_type": "must be a number",
+    "string_type": "must be a text",
+    "bool_type": "must be true or false",
+    "int_type": "must be a whole number",
+}

@@ -3,59 +3,68 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from decimal import Decimal
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal, InvalidOperation
 from fractions import Fraction
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ValidationError
+import numpy as np
+from pydantic import Field, ValidationError
 
 from fpsolve.proofs.certificate import MOMENT, Certificate, MalformedProof, Record, first_fault
 from fpsolve.proofs.enclosure import follows
 from fpsolve.proofs.statement import IMPACT, TREATMENT
 from fpsolve.proofs.verify import objection
 
-ENDS = "lower", "upper"
-FARTHEST = 400
-"""Powers of ten beyond which a bound is none."""
+EXACT = "lower", "upper", "p", "parameters"
+"""The keys whose numbers are read as the decimals that they are written as; others are floats."""
+SMALLEST, MOST_DIGITS = -400, 2000
+"""Of such a number: the least power of ten, and how many digits it may have; it must be a finite float, too."""
+NONLINEAR = {"oscillator.c2", "oscillator.c3"}
+"""Parameters of the motion far from rest, on which no exponent depends."""
 Place = tuple[str, ...]
+Stated = Mapping[str, Decimal | str]
+"""The parameters of a curve."""
 
 
 class Bound(Record):
-    """lower ≤ a number ≤ upper, as decimals; null where nothing is proven."""
+    """lower ≤ a number ≤ upper, as decimals and as the floats next to these; null where nothing is proven."""
 
     lower: Decimal | None
     upper: Decimal | None
     certificate: Certificate | None
 
-    def objections(self, quantity: str, p: float | None, parameters: Mapping[str, float | str]) -> Iterator[str]:
+    @property
+    def sign(self) -> int:
+        """That of the number as claimed, 0 where it is open."""
+        return int(self.lower is not None and self.lower > 0) - int(self.upper is not None and self.upper < 0)
+
+    def objections(self, quantity: str, p: Decimal | None, parameters: Stated) -> Iterator[str]:
         """Why the bounds need not hold."""
         if self.certificate is None:
             if (self.lower, self.upper) != (None, None):
                 yield "there is no certificate"
             return
         certificate = self.certificate
-        if certificate.quantity != quantity or (p is not None and float(certificate.p or "nan") != p):
+        if certificate.quantity != quantity:
             yield "the certificate is of another quantity"
+        elif p is not None and Decimal(certificate.p or "nan") != p:
+            yield "the certificate is of another p"
         elif not _are_same(certificate.parameters, parameters):
             yield "the certificate is of other parameters"
-        elif not follows(_exact(self.lower), _exact(self.upper), certificate):
+        elif not all(follows(low, high, certificate) for low, high in _as_read(self.lower, self.upper)):
             yield "the bounds are closer than those of the certificate"
         else:
-            yield from filter(None, [objection(certificate)])
+            with np.errstate(all="ignore"):  # what overflows proves nothing
+                yield from filter(None, [objection(certificate)])
 
 
 class MomentBound(Bound):
     """Of Λ(p)."""
 
-    p: float
-
-    @property
-    def sign(self) -> int:
-        """That of Λ(p) as claimed, 0 where it is open."""
-        if self.lower is None or self.upper is None:
-            return 0
-        return int(self.lower > 0) - int(self.upper < 0)
+    p: Decimal
 
 
 class IndexBound(Record):
@@ -65,7 +74,7 @@ class IndexBound(Record):
     upper: Decimal | None
     moments: list[MomentBound]
 
-    def objections(self, parameters: Mapping[str, float | str]) -> Iterator[str]:
+    def objections(self, parameters: Stated) -> Iterator[str]:
         """Why the bounds need not hold."""
         if not self.moments and (self.lower, self.upper) == (None, None):
             return
@@ -74,17 +83,17 @@ class IndexBound(Record):
             return
         for moment in self.moments:
             yield from moment.objections(MOMENT, moment.p, parameters)
-        low, high = (Fraction(each.certificate.p or "0") if each.certificate else 0 for each in self.moments)
+        low, high = (Fraction(each.p) for each in self.moments)
         if self.moments[0].sign * self.moments[1].sign >= 0 or not (0 < low < high or low < high < 0):
             yield "Λ does not change its sign between two p of one sign"
-        elif not Fraction(self.lower) <= low < high <= Fraction(self.upper):
+        elif not all(lower <= low and high <= upper for lower, upper in _as_read(self.lower, self.upper)):
             yield "the bounds of δ_p are closer than the two p"
 
 
 class CurveClaims(Record):
     """What is claimed for one parameter set."""
 
-    parameters: dict[str, float | str]
+    parameters: dict[str, Decimal | str]
     moments: list[MomentBound]
     lyapunov_exponent: Bound | None
     stability_index: IndexBound | None
@@ -102,10 +111,8 @@ class CurveClaims(Record):
             for text in self.stability_index.objections(self.parameters):
                 yield ("stability_index",), text
         exponent = self.lyapunov_exponent
-        proven = verdicts(
-            [(each.p, each.sign) for each in self.moments],
-            0 if exponent is None or exponent.lower is None or exponent.upper is None else _sign(exponent),
-        )
+        signs = [(str(each.p), each.sign) for each in self.moments]
+        proven = verdicts(signs, 0 if exponent is None else exponent.sign)
         for text in self.verdicts:
             if text not in proven:
                 yield ("verdicts",), f"{text!r} does not follow"
@@ -117,7 +124,7 @@ class Claims(Record):
     fpsolve: str
     case: str
     complete: bool
-    curves: list[CurveClaims]
+    curves: Annotated[list[CurveClaims], Field(min_length=1)]
 
     @property
     def count(self) -> int:
@@ -142,7 +149,9 @@ def claims_from(text: str) -> Claims:
         MalformedProof: it is no proof.json.
     """
     try:
-        return Claims.model_validate(_numbers(json.loads(text, parse_float=Decimal)))
+        return Claims.model_validate(
+            _numbers(json.loads(text, parse_float=_number, parse_int=_whole, object_pairs_hook=_table))
+        )
     except ValidationError as failure:
         raise MalformedProof(first_fault(failure)) from None
     except RecursionError:
@@ -151,37 +160,78 @@ def claims_from(text: str) -> Claims:
         raise MalformedProof(f"is no JSON ({failure})") from None
 
 
-def verdicts(moments: list[tuple[float, int]], exponent: int) -> list[str]:
-    """What the signs of λ and of Λ at some p say of paths and moments."""
+def verdicts(moments: Sequence[tuple[str, int]], exponent: int) -> list[str]:
+    """What the signs of λ and of Λ at some p, as decimals, say of paths and moments."""
     words = {1: "grows", -1: "decays"}
     found = [f"almost every path {words[exponent]}"] if exponent else []
-    return found + [f"the moment of order {p + 0.0:g} {words[sign]}" for p, sign in moments if sign and p]
+    return found + [f"the moment of order {plain(p)} {words[sign]}" for p, sign in moments if sign and Decimal(p)]
 
 
-def _exact(bound: Decimal | None) -> Fraction | None:
-    return None if bound is None else Fraction(bound)
+def plain(number: str) -> str:
+    """A decimal without digits that say nothing: "2.0" as "2"."""
+    short = f"{float(number) + 0.0:g}"
+    return short if Decimal(short) == Decimal(number) else str(Decimal(number))
 
 
-def _sign(bound: Bound) -> int:
-    lower, upper = bound.lower or Decimal(0), bound.upper or Decimal(0)
-    return int(lower > 0) - int(upper < 0)
+def _number(text: str) -> Decimal:
+    try:
+        return Decimal(text)
+    except InvalidOperation:
+        raise MalformedProof(f"{text[:40]} is out of range") from None
 
 
-def _numbers(data: Any, key: str = "") -> Any:
-    """Decimals as floats, but for the bounds, which are read as they stand."""
+def _whole(text: str) -> int:
+    if len(text) > MOST_DIGITS:
+        raise MalformedProof(f"{text[:40]}… has too many digits")
+    return int(text)
+
+
+def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A table; programs differ in which of two equal keys they read."""
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        [(name, _)] = Counter(name for name, _ in pairs).most_common(1)
+        raise MalformedProof(f"{name[:40]!r} stands twice in a table")
+    return table
+
+
+def _numbers(data: Any, is_exact: bool = False) -> Any:
+    """Numbers as decimals where they are read as they stand, else as floats."""
     if isinstance(data, dict):
-        return {name: _numbers(value, name) for name, value in data.items()}
+        return {
+            name: _floats(value) if name == "certificate" else _numbers(value, is_exact or name in EXACT)
+            for name, value in data.items()
+        }
     if isinstance(data, list):
         return [_numbers(each) for each in data]
-    if key in ENDS and isinstance(data, Decimal | int) and not isinstance(data, bool):
-        bound = Decimal(data)
-        if bound and abs(bound.adjusted()) > FARTHEST:
-            raise MalformedProof(f"{key} = {data} is out of range")
-        return bound
+    if is_exact and isinstance(data, Decimal | int) and not isinstance(data, bool):
+        return _in_range(Decimal(data))
     return float(data) if isinstance(data, Decimal) else data
 
 
-def _are_same(stated: Mapping[str, str], parameters: Mapping[str, float | str]) -> bool:
-    """Whether decimals are those of a curve."""
-    read = {key: text if key in (IMPACT, TREATMENT) else float(text) for key, text in stated.items()}
-    return read.items() <= parameters.items()
+def _floats(data: Any) -> Any:
+    """The numbers of a certificate, which are floats."""
+    if isinstance(data, dict):
+        return {name: _floats(value) for name, value in data.items()}
+    if isinstance(data, list):
+        return [_floats(each) for each in data]
+    return float(data) if isinstance(data, Decimal) else data
+
+
+def _in_range(number: Decimal) -> Decimal:
+    is_tiny = bool(number) and number.adjusted() < SMALLEST
+    if is_tiny or not math.isfinite(float(number)) or len(number.as_tuple().digits) > MOST_DIGITS:
+        raise MalformedProof(f"{str(number)[:40]} is out of range")
+    return number
+
+
+def _as_read(*bounds: Decimal | None) -> Iterator[tuple[Any, ...]]:
+    """Bounds as they stand, and as the floats that programs make of them, None where there is none."""
+    yield tuple(None if bound is None else Fraction(bound) for bound in bounds)
+    yield tuple(None if bound is None else Fraction(float(bound)) for bound in bounds)
+
+
+def _are_same(stated: Mapping[str, str], parameters: Stated) -> bool:
+    """Whether decimals are those of a curve, which has no others but those that do not matter."""
+    read = {key: text if key in (IMPACT, TREATMENT) else Decimal(text) for key, text in stated.items()}
+    return set(parameters) - NONLINEAR == set(read) and all(parameters[key] == read[key] for key in read)

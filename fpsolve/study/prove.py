@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import math
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from decimal import Decimal
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.case.sections import Sweep
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.proofs.claims import verdicts
@@ -25,6 +20,9 @@ from fpsolve.proofs.questions import (
     refuse_unprovable,
 )
 from fpsolve.proofs.statement import IMPACT, NOISE, OSCILLATOR, TREATMENT, Parameters
+from fpsolve.study.decimals import Literals, decimal_of, literals_of
+
+ORDERS = "moments.p"
 
 
 @dataclass(frozen=True)
@@ -50,13 +48,15 @@ class CurveProof:
     """What is proven of one parameter set.
 
     Attributes:
-        moments: p, and bounds on Λ(p) or None where that was not tried.
+        stated: its parameters as decimals, as far as what is proven depends on them.
+        moments: p as a decimal, and bounds on Λ(p) or None where that was not tried.
         exponent: bounds on λ; None where they are not asked for, or were not tried.
         index: bounds on δ_p; the same.
     """
 
     curve: Curve
-    moments: tuple[tuple[float, Enclosure | None], ...]
+    stated: Parameters
+    moments: tuple[tuple[str, Enclosure | None], ...]
     exponent: Enclosure | None = None
     index: IndexEnclosure | None = None
 
@@ -126,21 +126,24 @@ class Plan:
     def questions(self) -> Iterator[Question]:
         """All of them, curve by curve."""
         literals = _literals(self.case)
-        orders = [_order(self.case, p, literals) for p in self.case.p.tolist()]
         for curve in self.case.curves():
             stated = _stated(curve, literals)
-            yield from (Question(curve, MOMENT.name, stated, p, self.width) for p in orders)
+            yield from (Question(curve, MOMENT.name, stated, p, self.width) for p in self._orders(literals))
             yield from (Question(curve, name, stated, width=self.width) for name in self.indices)
 
     def gathered(self, answers: Sequence[Enclosure | IndexEnclosure]) -> list[CurveProof]:
         """What is proven of each curve, from the first answers, in the order of the questions."""
-        found = []
-        for number, curve in enumerate(self.case.curves()):
+        found, literals = [], _literals(self.case)
+        for number, curve in enumerate(self.case.curves(stop=-(-len(answers) // self.each))):
             given = answers[number * self.each : (number + 1) * self.each]
             padded = [*given, *[None] * (self.each - len(given))]
-            if given:
-                found.append(_proof(curve, self.case.p.tolist(), self.indices, padded))
+            stated = _stated(curve, literals)
+            found.append(_proof(curve, stated, self._orders(literals), self.indices, padded))
         return found
+
+    def _orders(self, literals: Mapping[str, Literals]) -> list[str]:
+        """All p as decimals."""
+        return [decimal_of(p, literals[ORDERS]) for p in self.case.p.tolist()]
 
 
 def answer(question: Question) -> Enclosure | IndexEnclosure:
@@ -154,7 +157,11 @@ def answer(question: Question) -> Enclosure | IndexEnclosure:
 
 
 def _proof(
-    curve: Curve, p: Sequence[float], indices: Sequence[str], given: Sequence[Enclosure | IndexEnclosure | None]
+    curve: Curve,
+    stated: Parameters,
+    p: Sequence[str],
+    indices: Sequence[str],
+    given: Sequence[Enclosure | IndexEnclosure | None],
 ) -> CurveProof:
     """The answers to the questions of one curve."""
     moments = [each if isinstance(each, Enclosure) else None for each in given[: len(p)]]
@@ -162,40 +169,18 @@ def _proof(
     exponent, index = (others.get(each.name) for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX))
     return CurveProof(
         curve,
+        stated,
         tuple(zip(p, moments, strict=True)),
         exponent if isinstance(exponent, Enclosure) else None,
         index if isinstance(index, IndexEnclosure) else None,
     )
 
 
-def _stated(curve: Curve, literals: Mapping[float, str]) -> Parameters:
+def _stated(curve: Curve, literals: Mapping[str, Literals]) -> Parameters:
     """The parameters of the linear motion as the decimals that a case states."""
-    keys = (*OSCILLATOR, IMPACT, *NOISE, TREATMENT)
-    return {key: _decimal(curve.parameters[key], literals) for key in keys}
+    stated = {key: decimal_of(float(curve.parameters[key]), literals[key]) for key in (*OSCILLATOR, *NOISE)}
+    return stated | {key: str(curve.parameters[key]) for key in (IMPACT, TREATMENT)}
 
 
-def _decimal(value: float | str, literals: Mapping[float, str]) -> str:
-    return str(value) if isinstance(value, str) else literals.get(value, repr(float(value)))
-
-
-def _order(case: Case, p: float, literals: Mapping[float, str]) -> str:
-    """p as a decimal: as the case states it, or of a sweep the float as it stands."""
-    return str(Decimal(p)) if isinstance(case.moments.p, Sweep) else _decimal(p, literals)
-
-
-def _literals(case: Case) -> Mapping[float, str]:
-    """The numbers of a case that have more digits than their floats, by these."""
-    found: dict[float, str] = {}
-
-    def note(text: str) -> float:
-        plain = text.replace("_", "")
-        value = float(plain)
-        if math.isfinite(value) and Decimal(plain) != Decimal(repr(value)):
-            found[value] = f"{Decimal(plain)}"
-        return value
-
-    tomllib.loads(case.text, parse_float=note)
-    for override in case.overrides:
-        with suppress(ValueError):
-            tomllib.loads(f"value = {override.partition('=')[2]}", parse_float=note)
-    return found
+def _literals(case: Case) -> Mapping[str, Literals]:
+    return literals_of(case, (*OSCILLATOR, *NOISE, ORDERS))

@@ -108,6 +108,7 @@ def test_the_mismatch_is_within_its_bounds_and_these_are_close(name, p):
     low, high = found.mismatch
     assert np.all(low - 1e-12 <= expected)
     assert np.all(expected <= high + 1e-12)
+    circle = np.linspace(0, math.pi, 400)
     around = np.array([expected_mismatch(of, circle, np.full(400, each), p) for each in z[:20]])
     size = np.abs(around).max(axis=1)
     assert np.all(np.abs(low[:20] - around.min(axis=1)) < 0.05 * size)

@@ -65,10 +65,10 @@ def objections(entry):
         {"lower": Decimal(entry["lower"]), "upper": Decimal(entry["upper"]), "certificate": certificate}
     )
     parameters = {
-        name: value if name.endswith(("impact", "treatment")) else float(value)
+        name: value if name.endswith(("impact", "treatment")) else Decimal(value)
         for name, value in certificate["parameters"].items()
     }
-    p = None if entry["p"] is None else float(entry["p"])
+    p = None if entry["p"] is None else Decimal(entry["p"])
     return list(bound.objections(certificate["quantity"], p, parameters))
 
 
