@@ -65,6 +65,7 @@ ROOMS = {
     "workflow": ["watch", "folders", "sets", "simulations", "cases", "proofs"],
     "progress": [],
     "arguments": [],
+    "commands": [],
     "cli": [],
 }
 """Rooms from the ground up, each with its files from the lowest to the highest."""

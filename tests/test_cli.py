@@ -13,7 +13,8 @@ import pytest
 
 from fpsolve import cli
 from fpsolve.case.vary import PARAMETERS
-from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
+from fpsolve.cli import main
+from fpsolve.commands import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED
 from fpsolve.files import alone
 from fpsolve.model.parameters import unit_of
 from fpsolve.output.summary import digits
@@ -321,14 +322,14 @@ def test_signals_end_a_run_as_ctrl_c_does(case, tmp_path, name):
 
 
 def test_a_second_signal_does_not_hinder_the_message(case, capsys, monkeypatch):
-    original = cli._print_error
+    original = cli.print_error
 
     def interrupted(text):
         signal.raise_signal(signal.SIGHUP)
         original(text)
 
     monkeypatch.setattr(sweep, "solve_curve", lambda *_: signal.raise_signal(signal.SIGTERM))
-    monkeypatch.setattr(cli, "_print_error", interrupted)
+    monkeypatch.setattr(cli, "print_error", interrupted)
     assert main(["run", case]) == 128 + signal.SIGTERM
     assert capsys.readouterr().err == "interrupted after 0 of 2 curves; run it again to go on\n"
 

@@ -140,7 +140,7 @@ class Bounder:
         divisor = self._divisor(cells)
         mismatch = self._range(cells.modes(trial.mismatch), divisor)
         if trial.noise.is_bounded and not isinstance(trial.basis, Whole):
-            mismatch = _divided(mismatch, np.maximum(np.abs(low), np.abs(high)))
+            mismatch = _divided(mismatch, low, high)
         bend = np.zeros((2, 1))
         if trial.p is not None:
             bend = trial.basis.gauge + np.array(self._range(cells.modes(trial.slope), divisor))
@@ -191,11 +191,14 @@ class Bounder:
         return least_ratio - raised(np.abs(least_ratio)) * 2.0**-51, most_ratio + raised(np.abs(most_ratio)) * 2.0**-51
 
 
-def _divided(bounds: Range, farthest: FloatArray) -> Range:
-    """Bounds of D times a mismatch as those of the mismatch, 0 < D = 1 − z² ≤ 1."""
+def _divided(bounds: Range, left: FloatArray, right: FloatArray) -> Range:
+    """Bounds of D times a mismatch on cells as those of the mismatch, D = 1 − z² > 0."""
+    farthest = np.maximum(np.abs(left), np.abs(right))
+    nearest = np.where(left * right > 0, np.minimum(np.abs(left), np.abs(right)), 0.0)
     least = np.array([below(1 - ball(each) ** 2) for each in farthest.tolist()])
-    low, high = bounds
-    return np.where(low < 0, -raised(-low / least), low), np.where(high > 0, raised(high / least), high)
+    most = np.array([above(1 - ball(each) ** 2) for each in nearest.tolist()])
+    low, high = (each / np.where(sign * each > 0, least, most) for each, sign in zip(bounds, (-1, 1), strict=True))
+    return low - 2.0**-51 * raised(np.abs(low)), high + 2.0**-51 * raised(np.abs(high))
 
 
 def _mirrored(pair: Pair, sign: int) -> Pair:
