@@ -152,7 +152,10 @@ def _check_parameters(stated: Mapping[str, str]) -> None:
     VibroImpactOscillator(
         **{key.partition(".")[2]: numbers[key] for key in OSCILLATOR}, impact=ImpactLaw(stated[IMPACT])
     )
-    (OrnsteinUhlenbeck if direct else NonGaussianNoise)(*(numbers[key] for key in (DIRECT if direct else NOISE)))
+    keys = DIRECT if direct else NOISE
+    noise = (OrnsteinUhlenbeck if direct else NonGaussianNoise)(*(numbers[key] for key in keys))
+    if isinstance(noise, NonGaussianNoise) and stated[TREATMENT] == REDUCED:
+        noise.ou_reduction()
 
 
 def first_fault(failure: ValidationError) -> str:

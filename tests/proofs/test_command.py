@@ -1,0 +1,357 @@
+"""`fpsolve prove`: what it writes and says, its exit codes, and that what is proven holds."""
+
+import json
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from scipy.special import eval_gegenbauer, roots_jacobi
+
+import fpsolve
+from fpsolve.case.case import load_case
+from fpsolve.case.curves import make_curve
+from fpsolve.cli import BAD_INPUT, NOT_CONVERGED, main
+from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.output.proofs import print_proofs
+from fpsolve.proofs.certificate import Certificate
+from fpsolve.proofs.enclosure import Enclosure
+from fpsolve.study.decimals import decimal_of, literals_of
+from fpsolve.study.prove import CurveProof
+from tests.conftest import heed_signals
+from tests.oracles.moment_hierarchy import rates_of_monomials
+
+CASE = """
+title = "Proofs"
+[oscillator]
+epsilon = 0.4
+omega = 1.2
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 1.0
+tau0 = 0.5
+r0 = 0.9
+[moments]
+p = [0.0, 2.0]
+[output]
+quantities = ["moment"]
+"""
+LOOSE = ["--width", "0.01"]
+
+
+@pytest.fixture
+def case(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "proven.toml"
+    path.write_text(CASE, encoding="utf-8")
+    return str(path)
+
+
+@pytest.fixture
+def no_proving(monkeypatch):
+    """Nothing is proven in less than no time."""
+    monkeypatch.setattr("fpsolve.proofs.questions.moment_lyapunov", lambda *_, **__: pytest.fail("proves"))
+
+
+def read(folder):
+    return json.loads((folder / "results/proven/proof.json").read_text(encoding="utf-8"))
+
+
+def test_bounds_and_verdicts_are_told_and_written(case, tmp_path, capsys):
+    assert main(["prove", case, *LOOSE]) == 0
+    out, err = capsys.readouterr()
+    assert not err
+    assert re.search(r"│ 0 │ +0 │ +0 │ +0 │ is constant │", out)
+    assert "Proven: the moment of order 2 grows." in out
+    assert "λ" not in out
+    assert re.search(r"written: results/proven \(1 curve, [\d.]+ s\)", out)
+    proof = read(tmp_path)
+    assert set(proof) == {"fpsolve", "case", "complete", "curves"}
+    assert proof["complete"] is True
+    (curve,) = proof["curves"]
+    assert set(curve) == {"parameters", "moments", "lyapunov_exponent", "stability_index", "verdicts"}
+    assert curve["lyapunov_exponent"] is curve["stability_index"] is None
+    zero, second = curve["moments"]
+    assert [zero[key] for key in ("p", "lower", "upper")] == [0.0, 0.0, 0.0]
+    assert 0 < second["upper"] - second["lower"] <= 0.01
+    (solved,) = fpsolve.moment_lyapunov(next(load_case(case).curves()).problem, [2.0]).value
+    assert second["lower"] < solved < second["upper"]
+    assert main(["prove", "--check", "results/proven/proof.json"]) == 0
+
+
+def test_several_processes_write_the_same_file(case, tmp_path):
+    varied = ["--set", 'vary."noise.D0"=[0.5, 1.0]', *LOOSE, "--quiet"]
+    assert main(["prove", case, *varied, "--jobs", "1"]) == 0
+    assert main(["prove", case, *varied, "--jobs", "2", "--out", "others"]) == 0
+    first, second = (tmp_path / name / "proven/proof.json" for name in ("results", "others"))
+    assert first.read_bytes() == second.read_bytes()
+    assert [curve["parameters"]["noise.D0"] for curve in read(tmp_path)["curves"]] == [0.5, 1.0]
+
+
+def test_a_width_that_is_not_met_is_told_and_the_bounds_are_kept(case, tmp_path, capsys):
+    assert main(["prove", case, "--width", "1e-30", "--set", "moments.p=[1e-300]", "--quiet"]) == NOT_CONVERGED
+    assert "(1 curve, 1 not as close as wanted, " in capsys.readouterr().out
+    (moment,) = read(tmp_path)["curves"][0]["moments"]
+    assert moment["lower"] < moment["upper"]
+    assert moment["upper"] - moment["lower"] > 1e-30
+
+
+@pytest.mark.usefixtures("no_proving")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--width", "0"], "--width: got width = 0.0; must be a positive number"),
+        (["--width=-1"], "--width: got width = -1.0; must be a positive number"),
+        (["--width", "nan"], "--width: got width = nan; must be a positive number"),
+        (["--width", "inf"], "--width: got width = inf; must be a positive number"),
+        (["--width", "small"], 'unable to convert "small" into float'),
+        (["--jobs", "0"], "got 0; must be a whole number"),
+        (["--check", "proof.json"], "name either cases to prove, or with --check a proof.json"),
+        (["--out", "proven.toml"], "cannot be made"),
+        (["proven.toml"], 'several cases are called "proven"'),
+        (["--set", 'vary."noise.r0"=[0.9,1.5]', "--set", "noise.treatment=exact"], "algebraic tails"),
+    ],
+)
+def test_bad_input_is_refused_before_anything_is_written(case, tmp_path, capsys, arguments, words):
+    assert main(["prove", case, *arguments]) == BAD_INPUT
+    out, err = capsys.readouterr()
+    assert words in " ".join(err.split())
+    assert not out
+    assert [path.name for path in tmp_path.iterdir()] == ["proven.toml"]
+
+
+@pytest.mark.usefixtures("no_proving")
+@pytest.mark.parametrize("r0", ["1.5", "1.00000000000000000000001"])
+def test_algebraic_tails_are_refused_also_where_the_moments_are_finite(case, tmp_path, capsys, r0):
+    tails = [f"--set=noise.r0={r0}", "--set=noise.treatment=exact", "--set=moments.p=[-0.5]"]
+    assert main(["prove", case, *tails]) == BAD_INPUT
+    err = capsys.readouterr().err
+    assert f"got noise.r0 = {r0}; for r0 > 1 the noise of Eq. (7) has algebraic tails" in err
+    assert "choose r0 <= 1" in err
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "name either cases to prove, or with --check a proof.json"),
+        (["--check", "nothing.json"], "nothing.json: no such file"),
+        (["--check", "."], ".: is a directory; name a proof in it, such as proof.json"),
+        (["--check", os.devnull], "is a pipe or a device"),
+        (["--check", "a.json", "--width", "1"], "--check takes a proof.json and nothing else"),
+        (["--check", "a.json", "--set", "noise.D0=1.0"], "--check takes a proof.json and nothing else"),
+        (["--check", "a.json", "--jobs", "2"], "--check takes a proof.json and nothing else"),
+    ],
+)
+def test_what_cannot_be_checked(tmp_path, monkeypatch, capsys, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert main(["prove", *arguments]) == BAD_INPUT
+    out, err = capsys.readouterr()
+    assert words in err
+    assert not out
+    assert err.count("\n") == 1
+
+
+def test_without_flint_the_package_to_install_is_named(case, tmp_path, monkeypatch, capsys):
+    assert main(["prove", case, *LOOSE, "--quiet"]) == 0
+    kept = (tmp_path / "results/proven/proof.json").rename(tmp_path / "kept.json")
+    capsys.readouterr()
+    monkeypatch.setitem(sys.modules, "flint", None)
+    for arguments in ([case, "--out", "others"], ["--check", str(kept)]):
+        assert main(["prove", *arguments]) == BAD_INPUT
+        out, err = capsys.readouterr()
+        assert err == "proofs need python-flint; install it with: pip install 'fpsolve[proof]'\n"
+        assert not out
+    assert not (tmp_path / "others").exists()
+
+
+def test_a_folder_holds_proofs_of_its_parameters_only(case, tmp_path):
+    proof = tmp_path / "results/proven/proof.json"
+    shorter = ["--quiet", "--set", "moments.p=[1.0]"]
+    long_decimal = ["--set", "noise.D0=1.00000000000000000000001"]
+    assert main(["prove", case, *LOOSE, "--quiet", *long_decimal]) == 0
+    before = proof.read_bytes()
+    assert main(["run", case, *shorter]) == 0
+    assert proof.read_bytes() == before
+    assert main(["run", case, *shorter, "--set", "noise.D0=0.9"]) == 0
+    assert not proof.exists()
+    assert main(["prove", case, *LOOSE, "--quiet"]) == 0
+    assert not (proof.parent / "summary.json").exists()
+    assert read(tmp_path)["curves"][0]["parameters"]["noise.D0"] == 1.0
+
+
+def stated(case, *overrides):
+    """The decimals of all p and of D0 and ω of the first curve."""
+    loaded = load_case(case, overrides)
+    literals = literals_of(loaded, ["moments.p", "noise.D0", "oscillator.omega"])
+    curve = next(loaded.curves())
+    numbers = [decimal_of(p, literals["moments.p"]) for p in loaded.p.tolist()]
+    return numbers, *(decimal_of(curve.parameters[key], literals[key]) for key in ("noise.D0", "oscillator.omega"))
+
+
+LONG, LONGER = "1.00000000000000000000001", "0.1000000000000000000000000000000002"
+
+
+def test_numbers_are_the_decimals_that_a_case_states(case):
+    assert stated(case) == (["0.0", "2.0"], "1.0", "1.2")
+    assert stated(case, f"noise.D0={LONG}", "oscillator.omega=1.0") == (["0.0", "2.0"], LONG, "1.0")
+    assert stated(case, f"moments.p=[{LONGER}, {LONG}]") == ([LONGER, LONG], "1.0", "1.2")
+    assert stated(case, f"moments.p=[{LONG}]", "moments.p=[1.0]")[0] == ["1.0"]
+    assert stated(case, f"moments={{p=[{LONG}, 3]}}")[0] == [LONG, "3.0"]
+    assert stated(case, "moments.p=[1e-400, 1_0.000_000_000_000_000_000_01]")[0] == ["0.0", "10.00000000000000000001"]
+
+
+def test_numbers_of_vary_take_the_place_of_those_of_the_section(case):
+    varied = [f"noise.D0={LONG}", 'vary."noise.D0"=[1.0, 2.0]']
+    with open(case, encoding="utf-8") as file:  # noqa: PTH123
+        text = file.read().replace("D0 = 1.0", f"D0 = {LONG}")
+    with open(case, "w", encoding="utf-8") as file:  # noqa: PTH123
+        file.write(text)
+    assert stated(case)[1] == LONG
+    assert stated(case, varied[1])[1] == "1.0"
+    assert stated(case, f"vary.noise.D0=[{LONG}]")[1] == LONG
+    assert stated(case, varied[1], "vary={}")[1] == LONG
+
+
+def test_ranges_are_of_the_shortest_decimals(case):
+    assert stated(case, "moments.p={start=-0.1, stop=0.5, num=4}")[0] == ["-0.1", "0.1", "0.3", "0.5"]
+    start = "0.10000000000000000000001"
+    assert stated(case, f"moments.p={{start={start}, stop=0.3, num=3}}")[0] == [start, "0.2", "0.3"]
+
+
+def test_long_decimals_stand_in_the_entry_as_in_its_certificate(case, tmp_path):
+    overrides = [f"--set=moments.p=[{LONGER}]", f"--set=noise.D0={LONG}", "--quiet"]
+    assert main(["prove", case, *LOOSE, *overrides]) == 0
+    text = (tmp_path / "results/proven/proof.json").read_text(encoding="utf-8")
+    for name, number in (("p", LONGER), ("noise.D0", LONG)):
+        assert text.count(f'"{name}": {number}') == text.count(f'"{name}": "{number}"') == 1
+    assert main(["prove", "--check", "results/proven/proof.json"]) == 0
+
+
+def enclosure(lower, upper, p):
+    """Bounds that are as good as proven."""
+    return Enclosure(lower, upper, Certificate.model_construct(p=p))
+
+
+def proofs(case, count, orders):
+    """Of several curves, the moment of order p being bounded by p ± 1/4, and λ by ± 1/8."""
+    loaded = load_case(case, [f'vary."noise.D0"={json.dumps([1.0 + i for i in range(count)])}'])
+    moments = tuple((p, enclosure(float(p) - 0.25, float(p) + 0.25, p)) for p in orders)
+    return loaded, [
+        CurveProof(make_curve(each.oscillator, loaded.noise, each.varied), {}, moments, enclosure(-0.125, 0.125, None))
+        for each in loaded.curves()
+    ]
+
+
+def test_the_sentence_tells_few_moments_and_counts_many(case, capsys):
+    few, many = ["-1.0", "2.0000001"], [f"{n}.0" for n in range(-1, 30)]
+    print_proofs(*proofs(case, 1, few))
+    out = capsys.readouterr().out
+    assert "Proven: the moment of order -1 decays; the moment of order 2.0000001 grows.\n" in out
+    assert "│ 2.0000001 │" in out
+    print_proofs(*proofs(case, 1, many))
+    assert "Proven: of 31 moments 29 grow, 1 decays.\n" in capsys.readouterr().out
+
+
+def test_many_curves_have_a_row_each(case, capsys):
+    print_proofs(*proofs(case, 11, ["-1.0", "2.5"]))
+    out = capsys.readouterr().out
+    heading = next(line for line in out.splitlines() if "proven" in line)
+    assert re.sub(r"[┃ ]+", " ", heading).split() == ["D0", "proven", "λ", "paths", "p", "=", "-1", "p", "=", "2.5"]
+    assert len(re.findall(r"2 of 2 │ in \[-0\.13, 0\.13\] │ +open │ decays │ +grows", out)) == 11
+
+
+CODE = "from fpsolve.cli import main; print('begun', flush=True); raise SystemExit(main())"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize(("kind", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_what_an_interrupted_run_has_proven_is_kept(case, tmp_path, kind, code):
+    """Of p = 0, which needs no time, and another, which takes longer than anybody waits."""
+    slow = CODE.replace(
+        "print(",
+        "import fpsolve.proofs.questions as questions, time; "
+        "questions.moment_lyapunov = lambda *_, **__: (print('slow', flush=True), time.sleep(60)); print(",
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", slow, "prove", case, "--jobs", "1"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=heed_signals,
+    )
+    assert [process.stdout.readline() for _ in range(2)] == ["begun\n", "slow\n"]
+    time.sleep(0.1)
+    process.send_signal(kind)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == code
+    assert "interrupted after 1 of 2 bounds; what was done is kept in results/proven" in said
+    proof = read(tmp_path)
+    assert proof["complete"] is False
+    zero, second = proof["curves"][0]["moments"]
+    assert zero["certificate"] is not None
+    assert second == {"p": 2.0, "lower": None, "upper": None, "certificate": None}
+    assert main(["prove", "--check", "results/proven/proof.json"]) == 0
+
+
+ORACLE = VibroImpactOscillator(omega=1.3, restitution=1.0, c1=-0.2, epsilon=0.6)
+ORACLE_NOISE = NonGaussianNoise(D0=0.7, tau0=0.4, r0=0.5)
+
+
+def second_moment(generator, position):
+    """Λ(2) of x″ + ω²x = (ε²c₁ + εξ) x′ from E x^k y^(2−k) B_n(ξ), for L_ξ and ξ as matrices on functions B_n."""
+    omega, push = ORACLE.omega, ORACLE.epsilon**2 * ORACLE.c1
+    still = rates_of_monomials([[0.0, omega], [-omega, push]], 2)
+    driven = rates_of_monomials([[0.0, 0.0], [0.0, ORACLE.epsilon]], 2)
+    total = np.kron(generator, np.eye(3)) + np.kron(np.eye(len(generator)), still) + np.kron(position, driven)
+    return float(np.max(np.linalg.eigvals(total).real))
+
+
+def reduced_noise(count=40):
+    """Eqs. (13)-(15) on Hermite polynomials."""
+    D0, tau0, r0 = ORACLE_NOISE.D0, ORACLE_NOISE.tau0, ORACLE_NOISE.r0
+    alpha = (5 - 3 * r0) / (2 * (2 - r0) * tau0)
+    spread = math.sqrt(2 * D0 / tau0**2 / (2 * alpha))
+    step = np.sqrt(np.arange(1, count))
+    return np.diag(-alpha * np.arange(count)), spread * (np.diag(step, 1) + np.diag(step, -1))
+
+
+def exact_noise(count=40):
+    """Eq. (7) on Gegenbauer polynomials, which are orthogonal under its law (1 − z²)^a, by its Dirichlet form."""
+    D0, tau0, r0 = ORACLE_NOISE.D0, ORACLE_NOISE.tau0, ORACLE_NOISE.r0
+    half_width, a = math.sqrt(2 * D0 / (tau0 * (1 - r0))), 1 / (1 - r0)
+    z, weights = roots_jacobi(2 * count, a, a)
+    degrees = np.arange(count)[:, None]
+    values = eval_gegenbauer(degrees, a + 0.5, z)
+    slopes = np.where(degrees > 0, (2 * a + 1) * eval_gegenbauer(np.maximum(degrees - 1, 0), a + 1.5, z), 0.0)
+    size = np.sqrt((values**2 * weights).sum(1, keepdims=True))
+    values, slopes = values / size, slopes / size
+    diffusion = D0 / tau0**2 / half_width**2
+    return -diffusion * (slopes * weights) @ slopes.T, half_width * (values * weights * z) @ values.T
+
+
+@pytest.mark.parametrize(
+    ("treatment", "matrices", "error"), [("exact", exact_noise, 1e-10), ("ou-reduction", reduced_noise, 1e-13)]
+)
+def test_the_moment_hierarchy_lies_within_the_bounds(case, tmp_path, treatment, matrices, error):
+    value = second_moment(*matrices())
+    assert abs(value - second_moment(*matrices(30))) < 0.1 * error
+    noise = ORACLE_NOISE if treatment == "exact" else ORACLE_NOISE.ou_reduction()
+    found = fpsolve.prove(ORACLE, noise, 2.0)
+    assert found.width < 1e-6
+    assert found.lower < value - error < value + error < found.upper
+    names = {name: getattr(ORACLE, name) for name in ("omega", "restitution", "c1", "epsilon")}
+    sets = [f"--set=oscillator.{name}={number}" for name, number in names.items()]
+    sets += [f"--set=noise.{name}={getattr(ORACLE_NOISE, name)}" for name in ("D0", "tau0", "r0")]
+    sets += [f"--set=noise.treatment={treatment}", "--set=moments.p=[2.0]", "--quiet"]
+    assert main(["prove", case, *sets]) == 0
+    (moment,) = read(tmp_path)["curves"][0]["moments"]
+    assert moment["lower"] < value - error < value + error < moment["upper"]
+    assert moment["upper"] - moment["lower"] < 1e-6
