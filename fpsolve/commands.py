@@ -28,7 +28,6 @@ from fpsolve.errors import FpsolveError
 from fpsolve.process import drop_blocked_output
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case
     from fpsolve.workflow.watch import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
@@ -69,6 +68,7 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
+    from fpsolve.output.remarks import note_missing
     from fpsolve.output.terminal import done_of, known_of, print_written
     from fpsolve.workflow.cases import run_case
 
@@ -79,10 +79,8 @@ def run(
         outcome = run_case(case, out, monte_carlo=monte_carlo, pool=pool, is_fresh=fresh, watch=watch)
         if outcome.interruption:
             print_error(outcome.interruption)
-        if monte_carlo and not quiet:
-            _note_missing_dots(case)
-        if case.leaves_out_eigenfunctions and not quiet:
-            _note_missing_eigenfunctions(case)
+        if not quiet:
+            note_missing(case, monte_carlo=monte_carlo)
         if json:
             print(_in_one_line(out / case.name / "summary.json"))
         else:
@@ -329,22 +327,6 @@ def print_error(text: str) -> None:
 def _in_one_line(summary: Path) -> str:
     """A file of JSON, which may be long, as one line."""
     return "".join(line.strip() + " " for line in summary.read_text(encoding="utf-8").splitlines()).rstrip()
-
-
-def _note_missing_dots(case: Case) -> None:
-    from fpsolve.exponent.quantities import STABILITY_INDEX
-    from fpsolve.output.remarks import print_remark
-
-    if case.figure.y == STABILITY_INDEX.name:
-        print_remark(f"{case.name}: a simulation gives no stability index, so that the figure has no dots")
-
-
-def _note_missing_eigenfunctions(case: Case) -> None:
-    from fpsolve.case.case import MOST_DRAWN
-    from fpsolve.output.remarks import print_remark
-
-    why = f"no eigenfunctions are written, as there are more than {MOST_DRAWN} curves"
-    print_remark(f"{case.name}: {why}; name the p that you want, as in [output] eigenfunctions = [{case.usual_p!r}]")
 
 
 def _watch(*, is_json: bool = False, is_quiet: bool = False) -> Watch:

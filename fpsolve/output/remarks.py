@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from fpsolve.case.case import Case
+from fpsolve.case.case import MOST_DRAWN, Case
 from fpsolve.case.curves import Curve
+from fpsolve.exponent.quantities import STABILITY_INDEX
 from fpsolve.output.screen import Screen
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
@@ -143,3 +144,13 @@ def _measure(text: str) -> float | None:
         return float(found[-1]) if found else None
     except ValueError:
         return None
+
+
+def note_missing(case: Case, *, monte_carlo: bool) -> None:
+    """What a run leaves out: dots of a simulation that has none to give, eigenfunctions of too many curves."""
+    if monte_carlo and case.figure.y == STABILITY_INDEX.name:
+        print_remark(f"{case.name}: a simulation gives no stability index, so that the figure has no dots")
+    if case.leaves_out_eigenfunctions:
+        why = f"no eigenfunctions are written, as there are more than {MOST_DRAWN} curves"
+        wanted = f"name the p that you want, as in [output] eigenfunctions = [{case.usual_p!r}]"
+        print_remark(f"{case.name}: {why}; {wanted}")
