@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
+from fpsolve.case.sections import Sweep
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.proofs.claims import verdicts
@@ -142,7 +144,9 @@ class Plan:
         return found
 
     def _orders(self, literals: Mapping[str, Literals]) -> list[str]:
-        """All p as decimals."""
+        """All p as decimals: as the case states them, or of a range the floats as they stand."""
+        if isinstance(self.case.moments.p, Sweep):
+            return [str(Decimal(p)) for p in self.case.p.tolist()]
         return [decimal_of(p, literals[ORDERS]) for p in self.case.p.tolist()]
 
 
