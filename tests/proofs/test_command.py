@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from fractions import Fraction
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -24,8 +25,7 @@ from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.output.proofs import print_proofs
 from fpsolve.proofs.certificate import Certificate
 from fpsolve.proofs.enclosure import Enclosure
-from fpsolve.study.decimals import decimal_of, literals_of
-from fpsolve.study.prove import CurveProof
+from fpsolve.study.prove import CurveProof, Plan
 from tests.conftest import heed_signals
 from tests.oracles.moment_hierarchy import rates_of_monomials
 
@@ -191,11 +191,11 @@ def test_a_folder_holds_proofs_of_its_parameters_only(case, tmp_path):
 
 def stated(case, *overrides):
     """The decimals of all p and of D0 and ω of the first curve."""
-    loaded = load_case(case, overrides)
-    literals = literals_of(loaded, ["moments.p", "noise.D0", "oscillator.omega"])
-    curve = next(loaded.curves())
-    numbers = [decimal_of(p, literals["moments.p"]) for p in loaded.p.tolist()]
-    return numbers, *(decimal_of(curve.parameters[key], literals[key]) for key in ("noise.D0", "oscillator.omega"))
+    plan = Plan(load_case(case, overrides), None)
+    questions = list(islice(plan.questions(), plan.each))
+    parameters = questions[0].stated
+    numbers = [each.p for each in questions if each.quantity == "moment"]
+    return numbers, *(parameters[key] for key in ("noise.D0", "oscillator.omega"))
 
 
 LONG, LONGER = "1.00000000000000000000001", "0.1000000000000000000000000000000002"
