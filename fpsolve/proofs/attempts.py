@@ -18,8 +18,9 @@ from fpsolve.proofs.verify import objection
 
 GROWTH = 1.35
 MOST_UNKNOWNS, ABSENT = 25_000, 1e9
-PATIENCE, PROGRESS = 2, 0.7
-"""Enlargements that do not bring the bounds closer by this factor, after which no more are tried."""
+PATIENCE, PROGRESS, FAR = {False: 2, True: 6}, 0.7, 1e4
+"""Enlargements that do not bring the bounds closer by this factor, after which no more are tried; more of them where
+the bounds are much farther apart than wanted."""
 WHOLE_BELOW = 6.0
 """End exponents a below which the ends of the support carry too much weight to be cut off."""
 
@@ -77,7 +78,7 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0,
     """
     noise, best = cylinder(stated), Attempt(NOTHING, start)
     for basis in bases(noise, p):
-        for found in _enlarged(stated, noise, basis, p, guess, best.size):
+        for found in _enlarged(stated, noise, basis, p, guess, best.size, FAR * width):
             best = found if found.delta < best.delta else best
             if best.enclosure.width <= width:
                 return best
@@ -85,11 +86,11 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0,
 
 
 def _enlarged(
-    stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, guess: float, size: Size
+    stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, guess: float, size: Size, far: float
 ) -> Iterator[Attempt]:
     """Bounds by larger and larger trials, as long as they come closer."""
     delta, idle = math.inf, 0
-    while idle < PATIENCE and size.unknowns <= MOST_UNKNOWNS:
+    while idle < PATIENCE[delta > far] and size.unknowns <= MOST_UNKNOWNS:
         pair, basis = _solved(noise, basis, p, guess, size)
         certificate = _certificate(stated, noise, basis, p, pair)
         if certificate is not None and not objection(certificate):
