@@ -5,26 +5,28 @@ degrees): cosines, then sines.  The noise is z = centre + scale·x.  B_m(z) is H
 Chebyshev's T_m(x) ("whole", where z = x).  Every array has room for the harmonics and degrees that products
 add.
 
-**Enclosures.**  Over a box |φ − φ_i| ≤ h, |x − x_c| ≤ η a series is P = P₀ + P₁s + P₂t + R with |s|, |t| ≤ 1:
-the Taylor polynomial A_j(φ) = ηʲ ∂ₓʲP(φ, x_c)/j! in the noise ends at the degree of P, so with a_jk = |A_jk|
-(the length of the cosine and sine of 2kφ)
+**Enclosures.**  Over a cell |x − x_c| ≤ η of the noise, a series is Σ tʲ A_j(φ) with |t| ≤ 1: Taylor's polynomial
+A_j = ηʲ ∂ₓʲP(φ, x_c)/j! ends at the degree of P.  The first `ORDERS` of them are kept; the others add up to less
+than the sum of their |A_jk|, the lengths of the cosine and sine of 2kφ.  Polynomials in t that are waves of the phase
+are brought to Bernstein's form Σ c_i(φ) B_i(t), a mean of the c_i that has c at both ends of the cell.  And over
+|φ − φ_i| ≤ h, with |s| ≤ 1,
 
-    P₀ = A₀(φ_i)   P₁ = h A₀′(φ_i)   P₂ = A₁(φ_i)   |R| ≤ ½h² Σ(2k)²a_0k + h Σ 2k a_1k + Σ_{j≥2} Σ a_jk.
+    c(φ) = c(φ_i) + h c′(φ_i) s + R,   |R| ≤ ½h² Σ (2k)²|c_k|.
 
 **Rounding.**  With unit roundoff u = 2⁻⁵³, K harmonics and n degrees:
-- x_c is a multiple of 2⁻³², so the integers 2^{32m}He_m(x_c) and 2^{32m}T_m(x_c) are exact; their quotients by
-  2^{32m} are rounded once, √m! and the division by it thrice: a relative error of 4u in each V_m = B_m(x_c).
-- A coefficient in floats is off by 2u of itself and the width of its interval; `size` holds its magnitude and
+- x_c is a multiple of 2⁻⁶⁴, so the integers 2^{64m}He_m(x_c) and 2^{64m}T_m(x_c) are exact; their quotients by
+  2^{64m} are rounded once, √m! and the division by it thrice: a relative error of 4u in each V_m = B_m(x_c).
+- A coefficient in floats is off by 2u of itself and the width of its interval; `sizes` holds its magnitude and
   2⁶⁰ widths.
 - A product of matrices with n terms is off by at most 1.01 n u of the product of the magnitudes, in any order
   of summation. One derivative (a product with a matrix of at most n rows, its entries off by 2u, and a division
   by j) thus adds (n + 5)u of the same expression in magnitudes, the product with V adds (n + 6)u, the powers of
   η add 2u each. So A_j is off by less than (j + 1)(2n + 16)u of S_j, its expression in magnitudes.
 - cos and sin of 2kφ_i are off by u at most; the sum over them adds 2K u, factors h and k add 4u.
-Hence P₀, P₁, P₂ are off by γS₀, γS₀·2kh, γS₁ with γ = (4n + 4K + 64)u, sums over k, and a_jk for j ≥ 2 by
-nγS_j.  The bounds on R are sums of fewer than 2nK numbers ≥ 0, each of them off by less than 2n²u; with n ≤ 160
-the factor 1 + 64Kγ covers both.  As |V_m| < e^{x²/4 + 1} < 1e99 for |x| ≤ 30, all that underflows adds up to
-less than 1e-200; ηʲ is at least that.
+Hence A_jk is off by ORDERS·γS_jk with γ = (4n + 4K + 64)u, and by nγS_jk in what is not kept; a value or slope at φ_i
+by γ of its expression in magnitudes besides.  The bounds on R are sums of fewer than 2nK numbers ≥ 0, each of them off
+by less than 2n²u; with n ≤ 160 the factor 1 + 64Kγ covers both.  As |V_m| < e^{x²/4 + 1} < 1e99 for |x| ≤ 30, all that
+underflows adds up to less than 1e-200; ηʲ is at least that.
 """
 
 import math
@@ -40,7 +42,8 @@ from mpmath.ctx_iv import MPIntervalContext
 IV = MPIntervalContext()
 IV.prec = 192
 ROUNDOFF = 2.0**-53
-_BITS = 32  # of the middles of cells after the point
+ORDERS = 5  # of Taylor's polynomials that are kept
+BITS = 64  # of the middles of cells after the point
 
 
 def exact(value):
@@ -125,10 +128,10 @@ class Hermite:
         return a @ np.array(row[: a.shape[-1]], dtype=object)
 
     def table(self, middles, degrees):
-        """Values at the middles, given as integers in units of 2⁻³²."""
+        """Values at the middles, given as integers in units of 2⁻⁶⁴."""
         rows = [middles * 0 + 1, middles]
         for m in range(1, degrees):
-            rows.append(middles * rows[m] - (m << 2 * _BITS) * rows[m - 1])
+            rows.append(middles * rows[m] - (m << 2 * BITS) * rows[m - 1])
         scales = np.array([math.sqrt(math.factorial(m)) for m in range(degrees)])
         return _quotients(rows[:degrees]) / scales
 
@@ -165,10 +168,10 @@ class Chebyshev:
         return out
 
     def table(self, middles, degrees):
-        """Values at the middles, given as integers in units of 2⁻³²."""
+        """Values at the middles, given as integers in units of 2⁻⁶⁴."""
         rows = [middles * 0 + 1, middles]
         for m in range(1, degrees):
-            rows.append(2 * middles * rows[m] - (1 << 2 * _BITS) * rows[m - 1])
+            rows.append(2 * middles * rows[m] - (1 << 2 * BITS) * rows[m - 1])
         return _quotients(rows[:degrees])
 
     def derivative(self, degrees):
@@ -181,8 +184,8 @@ class Chebyshev:
 
 
 def _quotients(rows):
-    """Row m divided by 2^{32m}, rounded once (integers divide so in Python), as (cells, degrees)."""
-    return np.array([[int(value) / (1 << _BITS * m) for value in row] for m, row in enumerate(rows)]).T
+    """Row m divided by 2^{64m}, rounded once (integers divide so in Python), as (cells, degrees)."""
+    return np.array([[int(value) / (1 << BITS * m) for value in row] for m, row in enumerate(rows)]).T
 
 
 class Series(NamedTuple):
@@ -201,7 +204,7 @@ def series(a):
 
 
 class Cells(NamedTuple):
-    """Middles x_c (integers in units of 2⁻³²) and half widths η ≥ |x − x_c| of cells of the noise."""
+    """Middles x_c (integers in units of 2⁻⁶⁴) and half widths η ≥ |x − x_c| of cells of the noise."""
 
     middles: np.ndarray
     half_widths: np.ndarray
@@ -212,20 +215,18 @@ def cells(basis, left, right):
     middles, halves = [], []
     for low, high in zip(left, right, strict=True):
         low, high = ((Fraction(z) - basis.centre) / basis.scale for z in (float(low), float(high)))
-        middle = round((low + high) / 2 * 2**_BITS)
-        half = max(high - Fraction(middle, 2**_BITS), Fraction(middle, 2**_BITS) - low)
+        middle = round((low + high) / 2 * 2**BITS)
+        half = max(high - Fraction(middle, 2**BITS), Fraction(middle, 2**BITS) - low)
         middles.append(middle)
         halves.append(math.nextafter(float(half), math.inf))
     return Cells(np.array(middles, dtype=object), np.array(halves))
 
 
 class Expansion(NamedTuple):
-    """A_0, A_1 (2, cells, K), S_0, S_1 (cells, K) and the bound on all that follows (cells) of a series in cells."""
+    """A_j (ORDERS, 2, cells, K), S_j (ORDERS, cells, K) and the bound on all that follows (cells); γ."""
 
-    start: np.ndarray
-    slope: np.ndarray
-    start_size: np.ndarray
-    slope_size: np.ndarray
+    coefficients: np.ndarray
+    sizes: np.ndarray
     rest: np.ndarray
     gamma: float
 
@@ -237,32 +238,42 @@ def expansion(basis, s, place):
     table, derivative = basis.table(place.middles, degrees), basis.derivative(degrees)
     values, sizes, power = s.coefficients, s.sizes, np.ones((len(place.middles), 1))
     parts, bounds, rest = [], [], np.zeros(len(place.middles))
-    for j in range(degrees):
+    for j in range(max(degrees, ORDERS)):
         part, bound = power * (table @ np.swapaxes(values, 1, 2)), power * (np.abs(table) @ sizes.T)
-        if j < 2:
+        if j < ORDERS:
             parts.append(part)
             bounds.append(bound)
         else:
             rest += (np.hypot(*part) + degrees * gamma * bound).sum(axis=1)
         values, sizes = values @ derivative / (j + 1), sizes @ derivative / (j + 1)
         power = np.maximum(power * place.half_widths[:, None], 1e-200)
-    return Expansion(parts[0], parts[1], bounds[0], bounds[1], rest, gamma)
+    return Expansion(np.array(parts), np.array(bounds), rest * (1 + 64 * harmonics * gamma) + 1e-200, gamma)
 
 
-def held(s):
-    """The expansion of coefficients of the phase alone, which is constant in the noise: one cell without a width."""
-    values, sizes = s.coefficients[:, None, :, 0], s.sizes[None, :, 0]
-    gamma = (4 * len(s.sizes) + 68) * ROUNDOFF
-    return Expansion(values, 0 * values, sizes, 0 * sizes, np.zeros(1), gamma)
+@lru_cache(maxsize=16)
+def bernstein(degree):
+    """The matrix from the powers of t, −1 ≤ t ≤ 1, to Bernstein's form; none of its entries exceeds 1."""
+    rows = np.zeros((degree + 1, degree + 1))
+    for i, j in np.ndindex(rows.shape):
+        powers = [math.comb(j, m) * 2**m * (-1) ** (j - m) for m in range(j + 1)]  # of (1 + t)/2 in tʲ
+        rows[i, j] = float(sum(c * Fraction(math.comb(i, m), math.comb(degree, m)) for m, c in enumerate(powers)))
+    return rows
 
 
-class Boxes(NamedTuple):
-    """P₀, P₁, P₂ (cells, phases) and the bound on R (cells, 1)."""
+class Waves(NamedTuple):
+    """Functions of the phase: cosines and sines (2, n, K), off by γ of their magnitudes (n, K), and by rest (n)."""
 
-    value: np.ndarray
-    along_phase: np.ndarray
-    along_noise: np.ndarray
+    coefficients: np.ndarray
+    sizes: np.ndarray
     rest: np.ndarray
+    gamma: float
+
+
+def waves(a):
+    """One function of the phase from intervals, (2, K)."""
+    s = series(a)
+    gamma = (4 * len(s.sizes) + 68) * ROUNDOFF
+    return Waves(s.coefficients[:, None, :, 0], s.sizes[None, :, 0], np.zeros(1), gamma)
 
 
 @lru_cache(maxsize=16)
@@ -280,43 +291,14 @@ class Phases:
         self.half_width = math.pi / (2 * number) * (1 + 2.0**-50)
         self.cos, self.sin = _circle(number)[:, np.outer(np.arange(harmonics), np.arange(number)) % number]
 
-    def boxes(self, e):
-        """A series, given by its expansion, over all boxes."""
-        h = self.half_width
-        steep = 2 * h * np.arange(len(self.cos))
-        weight = 1 + steep + steep**2
-        (a, b), (c, d) = e.start, e.slope
-        rest = (np.hypot(a, b) * steep**2 / 2 + np.hypot(c, d) * steep).sum(axis=1) + e.rest
-        rest += e.gamma * ((e.start_size + e.slope_size) * weight).sum(axis=1)
-        rest = rest * (1 + 64 * len(self.cos) * e.gamma) + 1e-200
-        return Boxes(
-            a @ self.cos + b @ self.sin,
-            (b * steep) @ self.cos - (a * steep) @ self.sin,
-            c @ self.cos + d @ self.sin,
-            rest[:, None],
-        )
-
-
-class Ratio(NamedTuple):
-    """A quotient of two series over boxes: within `spread` of `middle`; positive tells whether the divisor is."""
-
-    middle: np.ndarray
-    spread: np.ndarray
-    positive: np.ndarray
-
-
-def ratio(top, bottom):
-    """Enclose P/Q over boxes: P − rQ with r = P₀/Q₀ vanishes at the middle but for rounding, its slopes are small.
-
-    A dozen roundings of 2⁻⁵³ of the magnitudes in P − rQ, and of Q, are covered by 2⁻⁴⁸ of them.
-    """
-    tiny = 2.0**-48
-    least = bottom.value - np.abs(bottom.along_phase) - np.abs(bottom.along_noise) - bottom.rest
-    least = least - tiny * (np.abs(bottom.value) + np.abs(bottom.along_phase) + np.abs(bottom.along_noise))
-    positive = least > 0
-    least = np.where(positive, least, 1.0)
-    r = top.value / np.where(positive, bottom.value, 1.0)
-    first = np.abs(top.along_phase - r * bottom.along_phase) + np.abs(top.along_noise - r * bottom.along_noise)
-    size = sum(np.abs(top[i]) + np.abs(r * bottom[i]) for i in range(3))
-    spread = (first + top.rest + np.abs(r) * bottom.rest + tiny * size) / least * (1 + tiny)
-    return Ratio(r, np.where(positive, spread, np.inf), positive)
+    def bounds(self, w):
+        """Lower bounds in all cells, and upper bounds in their middles, each (n, N)."""
+        steep = 2 * self.half_width * np.arange(len(self.cos))
+        a, b = w.coefficients
+        value = a @ self.cos + b @ self.sin
+        slope = (b * steep) @ self.cos - (a * steep) @ self.sin
+        loose = w.gamma * (w.sizes * (1 + steep + steep**2)).sum(axis=1) + w.rest
+        bent = (np.hypot(a, b) * steep**2 / 2).sum(axis=1)
+        more = 1 + 64 * len(self.cos) * w.gamma
+        loose, bent = (more * x + 1e-200 for x in (loose, bent))
+        return value - np.abs(slope) - (loose + bent)[:, None], value + loose[:, None]

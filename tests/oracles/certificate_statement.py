@@ -18,7 +18,7 @@ class Refused(Exception):
 
 
 class Model(NamedTuple):
-    """Constants: of the phase, of the noise (b = slope·z, over 1 − z² if bounded), and of the claim."""
+    """Constants: of the phase, of the noise (b = slope·z, over 1 − z² if bounded), and what is bounded."""
 
     omega: Fraction
     mean: Fraction  # ε²c₁
@@ -30,7 +30,6 @@ class Model(NamedTuple):
     moment: bool
     p: Fraction
     mu: float
-    delta: float
 
 
 class Trial(NamedTuple):
@@ -42,6 +41,17 @@ class Trial(NamedTuple):
     steep: object  # u_z or f_z
     divisor: object  # u or 1
     function: object  # u or f
+
+
+class Side(NamedTuple):
+    """One of the two proofs: its name and sign (1 for the upper bound), δ, the nodes, W there and in the tails."""
+
+    name: str
+    sign: int
+    delta: float
+    nodes: np.ndarray
+    values: np.ndarray
+    tails: np.ndarray | None
 
 
 def require(condition, reason):
@@ -77,8 +87,7 @@ def model_of(certificate):
     omega, eps = given["oscillator.omega"], given["oscillator.epsilon"]
     require(omega > 0, "omega must be positive: the phase must cross each impact forward.")
     nu, slope, bounded, square = _noise(given)
-    mu, delta = float(binary(certificate["mu"])), float(binary(certificate["delta"]))
-    require(delta > 0, "delta must be positive.")
+    require(Fraction(1, 10**80) < nu < 10**80, "The rate of the noise is out of range.")
     loss = eps**2 * (1 - given["oscillator.restitution"])
     return Model(
         omega=omega,
@@ -90,8 +99,7 @@ def model_of(certificate):
         bounded=bounded,
         moment=quantity == "moment",
         p=decimal(certificate["p"]) if quantity == "moment" else Fraction(0),
-        mu=mu,
-        delta=delta,
+        mu=float(binary(certificate["mu"])),
     )
 
 
@@ -119,31 +127,52 @@ def _noise(given):
     return 2 / tau1, Fraction(1, 2), False, d0 * tau1 / tau**2
 
 
+def deltas(certificate):
+    """δ of the lower and of the upper proof."""
+    found = [float(binary(certificate[name]["delta"])) for name in ("lower", "upper")]
+    require(min(found) >= 0, "delta must not be negative.")
+    return found
+
+
 def read_trial(model, certificate):
-    """The trial function with what follows from it, the nodes and W there."""
-    about, nodes, values = certificate["basis"], binary(certificate["nodes"]), binary(certificate["values"])
+    """The trial function with what follows from it."""
+    about = certificate["basis"]
     require(about["kind"] in ("whole", "core"), f"No basis is called {about['kind']!r}.")
-    whole, tails = about["kind"] == "whole", certificate["tails"]
+    whole = about["kind"] == "whole"
     floats = np.stack([binary(certificate["cosine"]), binary(certificate["sine"])])
     require(floats.ndim == 3 and 2 <= floats.shape[2] <= 150, "The coefficients are no table of 2 to 150 degrees.")
-    require(nodes.ndim == 1 and len(nodes) > 1 and nodes.shape == values.shape, "Nodes and values do not match.")
-    require(np.all(np.diff(nodes) > 0), "The nodes do not rise.")
-    require((tails is None) == whole, "A core has two tails, the whole interval has none.")
     if whole:
-        require(model.bounded and nodes[0] == -1 and nodes[-1] == 1, "The whole interval is [-1, 1], of bounded noise.")
+        require(model.bounded, "Only bounded noise has a whole interval.")
         gauge = float(binary(about.get("gauge", 0.0)))
         basis = cs.Chebyshev()
     else:
         centre, scale, gauge = (float(binary(about[name])) for name in ("centre", "scale", "gauge"))
         require(scale > 0, "The scale must be positive.")
-        require(not model.bounded or (nodes[0] > -1 and nodes[-1] < 1), "The core leaves the range of the noise.")
-        reach = np.abs(nodes[[0, -1]] - centre) / scale
-        require((reach <= 29).all(), "The core reaches further than 29 scales.")
         basis = cs.Hermite(centre, scale)
     require(gauge == 0 or (model.moment and not whole), "A gauge needs a moment and a core.")
     harmonics, degrees = floats.shape[1] + 2, floats.shape[2] + 6
     given = cs.intervals(floats, harmonics, degrees)
-    return (_whole if whole else _core)(model, basis, gauge, given), nodes, values
+    return (_whole if whole else _core)(model, basis, gauge, given)
+
+
+def read_side(model, trial, certificate, name):
+    """The proof of the "upper" or of the "lower" bound."""
+    given = certificate[name]
+    nodes, values, tails = binary(given["nodes"]), binary(given["values"]), given["tails"]
+    require(nodes.ndim == 1 and len(nodes) > 1 and nodes.shape == values.shape, "Nodes and values do not match.")
+    require(np.all(np.diff(nodes) > 0), "The nodes do not rise.")
+    require((tails is None) == isinstance(trial.basis, cs.Chebyshev), "A core has tails, the whole interval has none.")
+    if tails is None:
+        require(nodes[0] == -1 and nodes[-1] == 1, "The whole interval is [-1, 1].")
+        require(values[0] <= 0 <= values[-1], "W pushes out at an end of the whole interval.")
+    else:
+        tails = binary(tails)
+        require(tails.shape == (2,), "A core has two tails.")
+        require(not model.bounded or (nodes[0] > -1 and nodes[-1] < 1), "The core leaves the range of the noise.")
+        reach = np.abs(nodes[[0, -1]] - float(trial.basis.centre)) / float(trial.basis.scale)
+        require((reach <= 29).all(), "The core reaches further than 29 scales.")
+    sign = {"upper": 1, "lower": -1}[name]
+    return Side(name, sign, float(binary(given["delta"])), nodes, values, tails)
 
 
 def transport(model, function, divisor):

@@ -14,6 +14,7 @@ from numpy.polynomial import chebyshev, hermite_e
 
 Truth = Callable[[dict[str, str], float | None], float]
 WORDS = ("oscillator.impact", "noise.treatment")
+SIDES = {"upper": 1, "lower": -1}
 
 
 class Mutation(NamedTuple):
@@ -27,21 +28,46 @@ class Mutation(NamedTuple):
 def mutations(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
     """All mutations of an entry; `truth` gives Λ(p), or λ for p = None, of parameters, to within the tolerance."""
     yield from changed_coefficients(entry)
+    yield from changed_sides(entry)
     yield from changed_parameters(entry, truth, tolerance)
     yield from moved_bounds(entry, truth, tolerance)
 
 
 def changed_coefficients(entry: dict[str, Any]) -> Iterator[Mutation]:
-    """Single cosines and sines changed by 100 δ and 1e4 δ of u: where samples of (*) then fail, nothing follows."""
+    """Single cosines and sines changed by 100 δ and 1e4 δ of u: where samples of a side then fail, nothing follows."""
     size = 1.0 if entry["p"] is None else abs(float(entry["certificate"]["cosine"][0][0]))
+    delta = max(float(entry["certificate"][name]["delta"]) for name in SIDES)
     last = len(entry["certificate"]["cosine"]) - 1
     places = {(name, min(k, last), m) for name in ("cosine", "sine") for k, m in ((1, 0), (1, 1), (2, 0), (last, 2))}
     for times in (100, 10000):
         for name, k, m in sorted(places):
             new = copy.deepcopy(entry)
             row = new["certificate"][name][k]
-            row[m] = float(row[m]) + times * float(entry["certificate"]["delta"]) * size
+            row[m] = float(row[m]) + times * delta * size
             yield Mutation(f"{name}[{k}][{m}] by {times} delta", new, not violated(new["certificate"]))
+
+
+def changed_sides(entry: dict[str, Any]) -> Iterator[Mutation]:
+    """The two sides exchanged, or one of them with a smaller δ (and bound), or with another W."""
+    new = copy.deepcopy(entry)
+    certificate = new["certificate"]
+    certificate["upper"], certificate["lower"] = certificate["lower"], certificate["upper"]
+    new["lower"], new["upper"] = (
+        Decimal(certificate["mu"]) + s * 2 * Decimal(certificate[n]["delta"]) for s, n in ((-1, "lower"), (1, "upper"))
+    )
+    yield Mutation("sides exchanged", new, not violated(certificate))
+    for name, sign in SIDES.items():
+        for factor in (0.0, 0.3, 0.7):
+            new = copy.deepcopy(entry)
+            side = new["certificate"][name]
+            side["delta"] = factor * float(side["delta"])
+            new[name] = float(new["certificate"]["mu"]) + sign * (1 + 1e-9) * side["delta"] + sign * 1e-15
+            yield Mutation(f"{name} delta times {factor}", new, not violated(new["certificate"]))
+        for factor in (-1.0, 0.0, 0.5, 2.0):
+            new = copy.deepcopy(entry)
+            side = new["certificate"][name]
+            side["values"] = [factor * float(value) for value in side["values"]]
+            yield Mutation(f"{name} W times {factor}", new, not violated(new["certificate"]))
 
 
 def changed_parameters(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
@@ -61,7 +87,8 @@ def moved_bounds(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) 
     """A bound, or both of them with μ, past the true value."""
     certificate = entry["certificate"]
     value = truth(certificate["parameters"], _order(certificate))
-    delta, lower, upper = (float(x) for x in (certificate["delta"], entry["lower"], entry["upper"]))
+    lower, upper = float(entry["lower"]), float(entry["upper"])
+    delta = sum(float(certificate[name]["delta"]) for name in SIDES) / 2
     for new_lower, new_upper, shift in (
         (value + 0.1 * (upper - value), upper, 0.0),
         (lower, value - 0.1 * (value - lower), 0.0),
@@ -84,17 +111,22 @@ def _is_true(entry: dict[str, Any], truth: Truth, tolerance: float) -> bool:
 
 
 def violated(certificate: dict[str, Any]) -> bool:
-    """Whether (*) clearly fails at a sample: floats suffice to refute, if not to prove."""
-    nodes, values = (np.array([float(v) for v in certificate[name]]) for name in ("nodes", "values"))
-    z, w = (nodes[1:] + nodes[:-1]) / 2, (values[1:] + values[:-1]) / 2
-    slope, delta = np.diff(values) / np.diff(nodes), float(certificate["delta"])
+    """Whether (*) of either side clearly fails at a sample: floats suffice to refute, if not to prove."""
     constants = _constants(certificate["parameters"])
+    return any(_violated_side(certificate, constants, certificate[name], sign) for name, sign in SIDES.items())
+
+
+def _violated_side(certificate: dict[str, Any], constants: dict[str, float], side: dict[str, Any], sign: int) -> bool:
+    """Whether (*) of the upper (sign 1) or lower side clearly fails at the middle of a cell."""
+    nodes, values = (np.array([float(v) for v in side[name]]) for name in ("nodes", "values"))
+    z, w = (nodes[1:] + nodes[:-1]) / 2, (values[1:] + values[:-1]) / 2
+    slope, delta = np.diff(values) / np.diff(nodes), float(side["delta"])
     u, steep, mismatch, noise_drift = _samples(certificate, constants, z)
     moment = certificate["quantity"] == "moment"
     gauge = float(certificate["basis"].get("gauge", 0))
     inward = noise_drift - (gauge + steep / u if moment else 0)
-    excess = (delta - np.abs(mismatch / u if moment else mismatch)) / constants["nu"]
-    margin = excess + w * inward - (w**2 / 2 if moment else 0) - slope / 2
+    excess = (delta - sign * (mismatch / u if moment else mismatch)) / constants["nu"]
+    margin = excess + w * inward - (sign * w**2 / 2 if moment else 0) - slope / 2
     size = np.abs(excess) + np.abs(w * inward) + w**2 + np.abs(slope)
     return bool((u <= 0).any() and moment) or bool((margin < -1e-4 * size).any())
 
