@@ -48,7 +48,7 @@ def changed_coefficients(entry: dict[str, Any]) -> Iterator[Mutation]:
 
 
 def changed_sides(entry: dict[str, Any]) -> Iterator[Mutation]:
-    """The two sides exchanged, or one of them with a smaller δ (and bound), or with another W."""
+    """The two sides exchanged, or one of them with a smaller δ (and bound), another W, or other tails."""
     new = copy.deepcopy(entry)
     certificate = new["certificate"]
     certificate["upper"], certificate["lower"] = certificate["lower"], certificate["upper"]
@@ -68,6 +68,12 @@ def changed_sides(entry: dict[str, Any]) -> Iterator[Mutation]:
             side = new["certificate"][name]
             side["values"] = [factor * float(value) for value in side["values"]]
             yield Mutation(f"{name} W times {factor}", new, not violated(new["certificate"]))
+        for last in (0, 1) if entry["certificate"][name]["tails"] else ():
+            for change in (-10.0, 0.1, 10.0):
+                new = copy.deepcopy(entry)
+                tails = new["certificate"][name]["tails"]
+                tails[last] = float(tails[last]) + (2 * last - 1) * change
+                yield Mutation(f"{name} tail {last} by {change}", new, not violated(new["certificate"]))
 
 
 def changed_parameters(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
@@ -111,9 +117,24 @@ def _is_true(entry: dict[str, Any], truth: Truth, tolerance: float) -> bool:
 
 
 def violated(certificate: dict[str, Any]) -> bool:
-    """Whether (*) of either side clearly fails at a sample: floats suffice to refute, if not to prove."""
-    constants = _constants(certificate["parameters"])
-    return any(_violated_side(certificate, constants, certificate[name], sign) for name, sign in SIDES.items())
+    """Whether a side clearly fails at a sample, (*) or its tails: floats suffice to refute, if not to prove."""
+    given = certificate, _constants(certificate["parameters"])
+    return any(
+        _violated_side(*given, certificate[name], sign) or _violated_tail(*given, certificate[name], sign)
+        for name, sign in SIDES.items()
+    )
+
+
+def _violated_tail(certificate: dict[str, Any], constants: dict[str, float], side: dict[str, Any], sign: int) -> bool:
+    """Whether the slope of ln T clearly jumps the wrong way at an end of the core, or that of T in a tail."""
+    if side["tails"] is None:
+        return False
+    nodes, values, tails = (np.array([float(side[name][i]) for i in (0, -1)]) for name in ("nodes", "values", "tails"))
+    u, steep, _, _ = _samples(certificate, constants, nodes)
+    rise = sign * (steep / u if certificate["quantity"] == "moment" else steep)
+    toward, gauge = np.array([-1, 1]), float(certificate["basis"].get("gauge", 0))
+    jump = (toward * (values - tails + rise)).min(axis=0)
+    return bool((jump < -1e-6).any() or (toward * (tails + sign * gauge) < -1e-6).any())
 
 
 def _violated_side(certificate: dict[str, Any], constants: dict[str, float], side: dict[str, Any], sign: int) -> bool:

@@ -20,7 +20,7 @@ PARAMETERS = {
 }
 
 
-def certified(p, parameters=PARAMETERS, harmonics=4, degrees=8):
+def certified(p, parameters=PARAMETERS, harmonics=4, degrees=6):
     """An entry with the certificate of Λ(p), or of λ if p is None."""
     model = _Model(parameters, p, harmonics, degrees)
     mu, u = model.moment() if p is not None else model.drift()
