@@ -30,13 +30,15 @@ from fpsolve.proofs.balls import (
 )
 from fpsolve.proofs.basis import Basis, Core
 
+NARROWEST = 1e-30
+"""Half a cell at least, so that none of its powers that are needed is below the smallest float."""
 ORDER, FOLLOWED = 8, 3
 """Of Taylor's formula; and of how many of its terms the dependence on φ is followed."""
 
 
 @dataclass(frozen=True)
 class Modes:
-    """f on cells of z by its modes in φ, f = Σ e^{2ikφ} (c_0k ± c_1k ± …) with a common sign for all k of a term.
+    """f on cells of z by its modes in φ, f = Σ e^{2ikφ} (c_0k + s c_1k + s² c_2k + …), |s| ≤ 1.
 
     Attributes:
         terms: floats near c_ik = f_k^(i)(middle) hⁱ/i!, complex, k = 0 … K, each of shape (K + 1, cells).
@@ -47,7 +49,7 @@ class Modes:
     stray: FloatArray
 
     def minus(self, factors: Balls, other: Modes) -> Modes:
-        """f − factor · g at single points, with a factor for each."""
+        """f − factor · g at single points, where the terms after the first are 0; with a factor for each."""
         near, off = rounded(factors)
         share = near * other.terms[0]
         rounding = 2.0**-50 * (np.abs(self.terms[0]) + np.abs(share)) + off * np.abs(other.terms[0])
@@ -70,7 +72,7 @@ class Cells:
         else:
             left, right = mapped("acos", right), mapped("acos", left)
         self._middle = (left + right) / 2
-        self._half = np.array([max(above(each), 0.0) for each in (right - left) / 2])
+        self._half = np.array([max(above(each), NARROWEST) for each in (right - left) / 2])
 
     def modes(self, u: Balls) -> Modes:
         """Those of a sum with coefficients u of the polynomials; u_{−k} is the conjugate of u_k."""

@@ -15,12 +15,14 @@ convex one, which only helps: the local time at the kink enters with the sign of
 
 Where u serves only between two ends, it is held there: T = e^{βz ± ψ} u(φ, end) beyond. At the right end the slope of
 ln T loses r = u_z/u, so that its kink is concave for q = 1 if W drops by max(−r) at least, and convex for q = −1 if W
-drops by max r at least. Beyond, W is a constant κ ≥ −qβ, which keeps T from 0 for q = 1 and bounded for q = −1, with
+drops by max r at least. Beyond, W is a constant κ ≥ max(0, −qβ), which keeps T from 0 for q = 1 and bounded for
+q = −1, with
 
     0 ≤ (δ − q n)/ν + κ (b − β) − ½ q κ²,      n(φ, z) = (F₀ + z F₁ + ½ νβ² − νβ b(z) − μ) u/u,
 
-which holds beyond an end z ≥ 0 if it holds there and νκ b′ ≥ max(q n_z) there: b′ increases with z > 0, and with it the
-slope of the right side by (κ + qβ) Δb′ ≥ 0. The left end is mirrored onto the right one, z → −z, β → −β, W → −W.
+which holds beyond an end if it holds there and νκ b′ ≥ max(q n_z) there: b′ does not decrease, for bounded noise with
+z ≥ 0, and with it the slope of the right side grows by (κ + qβ) Δb′ ≥ 0. The left end is mirrored onto the right one,
+z → −z, β → −β, W → −W.
 
 The drift of ln‖x‖ + f ± ψ is bounded in the same way, with e = q (its drift − μ), without W² and with B = b, β = 0 and
 r = f_z.

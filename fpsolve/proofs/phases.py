@@ -2,7 +2,8 @@
 
 A sum of n products of floats, however ordered and whether or not multiplications and additions are fused, is off by
 at most γ_n Σ|a||b| with γ_n = n u/(1 − n u), u = 2⁻⁵³ (N. J. Higham, Accuracy and stability of numerical algorithms,
-SIAM 2002, section 3.1). Cosines and sines are floats within u of their values.
+SIAM 2002, section 3.1). That products of matrices are such sums, and not by a fast algorithm, is taken for granted.
+Cosines and sines are floats within u of their values.
 """
 
 from __future__ import annotations

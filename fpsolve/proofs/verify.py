@@ -1,16 +1,17 @@
 """Whether a bound follows from a certificate.
 
 **Theorem.** Let T > 0 be continuous on the cylinder but for T(φ⁻) = R^p T(φ⁺) at impacts, once differentiable in φ
-between them, twice in ξ but for kinks, and let λ₋ T ≤ L(p) T ≤ λ₊ T.
+between them, twice in ξ but for finitely many ξ, where T_ξ is continuous, or jumps by a smooth function of φ (a kink),
+and let λ₋ T ≤ L(p) T ≤ λ₊ T elsewhere. The ξ that are left out take no time.
 
 *Upper bound.* Let T ≥ c > 0 and its kinks in ξ be concave. By Itô's and Tanaka's formulas M = e^{−λ₊ t} ‖x‖^p T(φ, ξ)
 is a local supermartingale: at impacts ‖x‖^p gains R^p and T loses it, between them the drift of M is
-e^{−λ₊ t} ‖x‖^p (L(p) T − λ₊ T) ≤ 0, and kinks add local times with a sign ≤ 0. As M ≥ 0, E M(t) ≤ M(0), so that
-E‖x(t)‖^p ≤ e^{λ₊ t} M(0)/c and Λ(p) ≤ λ₊.
+e^{−λ₊ t} ‖x‖^p (L(p) T − λ₊ T) ≤ 0, and kinks add local times with a sign ≤ 0. As M ≥ 0, E M(t) ≤ M(0), which
+is finite for every start, so that E‖x(t)‖^p ≤ e^{λ₊ t} M(0)/c and Λ(p) ≤ λ₊.
 
 *Lower bound.* Let T ≤ C and its kinks be convex. M = e^{−λ₋ t} ‖x‖^p T is a local submartingale; on [0, t] it is at
-most C e^{|λ₋| t} sup‖x‖^p, whose mean is finite as d ln‖x‖/dt is at most linear in ξ, bounded or Gaussian. So
-M(0) ≤ E M(t) ≤ C e^{−λ₋ t} E‖x(t)‖^p and Λ(p) ≥ λ₋.
+most C e^{|λ₋| t} sup‖x‖^p, whose mean is finite as d ln‖x‖/dt and dφ/dt, and with it the number of impacts in [0, t],
+are at most linear in ξ, bounded or Gaussian. So M(0) ≤ E M(t) ≤ C e^{−λ₋ t} E‖x(t)‖^p and Λ(p) ≥ λ₋.
 
 *Ends of bounded noise*, |ξ| → half_width. The distance X from an end is, up to its scale and to bounded drifts, a
 Bessel process of dimension 1 + a, a = 1/(1 − r₀) > 0. For r₀ ≥ 0 the ends are not reached and nothing is asked there.
@@ -83,7 +84,9 @@ def _misplaced(certificate: Certificate, noise: Cylinder, side: SideRecord) -> s
     """Why the cells and the gauge are not what the theorem asks for."""
     first, last = side.nodes[0], side.nodes[-1]
     if side.tails is None:
-        return "" if (first, last) == (-1.0, 1.0) else "the cells do not cover the support"
+        if (first, last) != (-1.0, 1.0):
+            return "the cells do not cover the support"
+        return "" if side.values[0] <= 0 <= side.values[-1] else "W points outward at an end of the support"
     if noise.is_bounded and not -1 < first <= 0 <= last < 1:
         return "the core must hold 0, and not reach the ends of the support"
     if certificate.quantity != MOMENT and certificate.basis.gauge != 0:
@@ -141,6 +144,7 @@ def _holds_beyond(
     return bool(
         kappa <= value - drop
         and kappa >= -q * beta
+        and kappa >= 0  # as b and b′ are bounded from below
         and noise.nu * slope * kappa >= growth
         and (delta - mismatch) / noise.nu + kappa * (drift - beta) - square * (kappa * kappa) / 2 >= 0
     )
