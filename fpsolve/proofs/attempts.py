@@ -18,9 +18,9 @@ from fpsolve.proofs.verify import objection
 
 GROWTH = 1.35
 MOST_UNKNOWNS, ABSENT = 25_000, 1e9
-PATIENCE, PROGRESS, FAR = {False: 2, True: 6}, 0.7, 1e4
+PATIENCE, PROGRESS, FAR = {False: 2, True: 6}, 0.7, 1e-2
 """Enlargements that do not bring the bounds closer by this factor, after which no more are tried; more of them where
-the bounds are much farther apart than wanted."""
+the bounds are farther apart than this share of the number."""
 WHOLE_BELOW = 6.0
 """End exponents a below which the ends of the support carry too much weight to be cut off."""
 
@@ -78,7 +78,7 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0,
     """
     noise, best = cylinder(stated), Attempt(NOTHING, start)
     for basis in bases(noise, p):
-        for found in _enlarged(stated, noise, basis, p, guess, best.size, FAR * width):
+        for found in _enlarged(stated, noise, basis, p, guess, best.size):
             best = found if found.delta < best.delta else best
             if best.enclosure.width <= width:
                 return best
@@ -86,12 +86,13 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0,
 
 
 def _enlarged(
-    stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, guess: float, size: Size, far: float
+    stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, guess: float, size: Size
 ) -> Iterator[Attempt]:
     """Bounds by larger and larger trials, as long as they come closer."""
-    delta, idle = math.inf, 0
-    while idle < PATIENCE[delta > far] and size.unknowns <= MOST_UNKNOWNS:
+    delta, idle, value = math.inf, 0, math.inf
+    while idle < PATIENCE[delta > FAR * abs(value)] and size.unknowns <= MOST_UNKNOWNS:
         pair, basis = _solved(noise, basis, p, guess, size)
+        value = pair.value
         certificate = _certificate(stated, noise, basis, p, pair)
         if certificate is not None and not objection(certificate):
             idle = 0 if apart(certificate) < PROGRESS * delta else idle + 1

@@ -32,7 +32,7 @@ OF_A_CASE = re.compile(
 """Sections, options (two are those of Dask's workers), and what a case calls the reduction."""
 KEY = re.compile(r"(oscillator|noise)\.\w+")
 """The name of a parameter, which is no sentence."""
-COMMANDS = {"cli.py", "arguments.py"}
+COMMANDS = {"cli.py", "commands.py", "arguments.py"}
 
 
 @pytest.mark.parametrize("remedy", Remedy)
