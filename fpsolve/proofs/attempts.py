@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fpsolve.exponent.branch import is_numerical
 from fpsolve.proofs.balls import ball, in_balls
 from fpsolve.proofs.basis import Basis, Core, Whole
 from fpsolve.proofs.bounds import Trial
@@ -91,7 +92,12 @@ def _enlarged(
     """Bounds by larger and larger trials, as long as they come closer."""
     delta, idle, value = math.inf, 0, math.inf
     while idle < PATIENCE[delta > FAR * abs(value)] and size.unknowns <= MOST_UNKNOWNS:
-        pair, basis = _solved(noise, basis, p, guess, size)
+        try:
+            pair, basis = _solved(noise, basis, p, guess, size)
+        except (ArithmeticError, RuntimeError) as failure:
+            if not is_numerical(failure):
+                raise
+            return
         value = pair.value
         certificate = _certificate(stated, noise, basis, p, pair)
         if certificate is not None and not objection(certificate):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic
 
 from fpsolve.case.case import Case
 from fpsolve.case.reading import Unreadable, Words, read_text
@@ -19,6 +20,8 @@ from fpsolve.study.prove import CurveProof, Plan, answer, refuse_unprovable_case
 from fpsolve.workflow.folders import ANEW, PROVEN, own_folder, saying_if_interrupted
 from fpsolve.workflow.watch import BOUNDS, NOBODY, Phase, Watch
 
+EVERY = 30.0
+"""Seconds after which the curves that are done are written, so that a run that is killed keeps them."""
 _WORDS = Words("the proof", "a proof", "proof.json", "JSON", "make one with `fpsolve prove`")
 
 
@@ -63,15 +66,25 @@ def prove_case(
         watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
         pool or here() as workers,
     ):
+        written = monotonic()
         try:
             for found in workers.map(answer, plan.questions()):
                 answers.append(found)
                 progress(failed=not found.is_proven)
+                if monotonic() - written > EVERY and len(answers) % plan.each == 0:
+                    _write(plan, answers, folder)
+                    written = monotonic()
         finally:
-            proofs = plan.gathered(answers)
-            if proofs:
-                with writable(folder):
-                    write_proof(case, proofs, folder, is_whole=len(answers) == plan.total)
+            proofs = _write(plan, answers, folder)
+    return proofs
+
+
+def _write(plan: Plan, answers: Sequence[Enclosure | IndexEnclosure], folder: Path) -> list[CurveProof]:
+    """What is proven so far, also into its file."""
+    proofs = plan.gathered(answers)
+    if proofs:
+        with writable(folder):
+            write_proof(plan.case, proofs, folder, is_whole=len(answers) == plan.total)
     return proofs
 
 

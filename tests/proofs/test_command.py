@@ -357,3 +357,22 @@ def test_the_moment_hierarchy_lies_within_the_bounds(case, tmp_path, treatment, 
     (moment,) = read(tmp_path)["curves"][0]["moments"]
     assert moment["lower"] < value - error < value + error < moment["upper"]
     assert moment["upper"] - moment["lower"] < 1e-6
+
+
+def test_curves_that_are_done_are_written_before_the_end(case, monkeypatch):
+    """So that a run that is killed keeps them."""
+    kept = []
+
+    def write(case, proofs, folder, *, is_whole):
+        kept.append((len(proofs), is_whole))
+
+    monkeypatch.setattr("fpsolve.workflow.proofs.EVERY", 0.0)
+    monkeypatch.setattr("fpsolve.workflow.proofs.write_proof", write)
+    overrides = [
+        "--set=vary.noise.r0=[0.9,0.95]",
+        "--set=moments.p=[1.0]",
+        '--set=output.quantities=["moment"]',
+        "--quiet",
+    ]
+    assert main(["prove", case, *LOOSE, *overrides]) == 0
+    assert kept == [(1, False), (2, True), (2, True)]
