@@ -62,14 +62,13 @@ class Attempt:
 
 
 @in_balls
-def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0, start: Size = SMALLEST) -> Attempt:
+def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0) -> Enclosure:
     """Bounds on Λ(p), or on λ where p is None, that are at most `width` apart, if that can be done.
 
     Args:
         stated: parameters as decimals.
         p: the moment as a decimal.
         guess: Λ(p), about.
-        start: of the first trial.
 
     Returns:
         The closest bounds that were found.
@@ -77,13 +76,13 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0,
     Raises:
         NoSuchExponent: the noise has algebraic tails, r₀ > 1.
     """
-    noise, best = cylinder(stated), Attempt(NOTHING, start)
+    noise, best = cylinder(stated), Attempt(NOTHING, SMALLEST)
     for basis in bases(noise, p):
         for found in _enlarged(stated, noise, basis, p, guess, best.size):
             best = found if found.delta < best.delta else best
             if best.enclosure.width <= width:
-                return best
-    return best
+                return best.enclosure
+    return best.enclosure
 
 
 def _enlarged(

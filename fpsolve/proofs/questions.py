@@ -113,7 +113,7 @@ def prove_moment(problem: Problem, stated: Parameters, p: str, width: float | No
     guess = _guess(lambda rtol: float(moment_lyapunov(problem, [order], rtol=rtol).value[0]))
     scale = max(abs(guess or 0.0), float(scale_of(problem).moment(order)))
     wanted = SHARE * scale if width is None else width
-    found = NOTHING if guess is None else enclose(stated, p, wanted, guess).enclosure
+    found = NOTHING if guess is None else enclose(stated, p, wanted, guess)
     return replace(found, wanted=wanted)
 
 
@@ -124,7 +124,7 @@ def prove_exponent(problem: Problem, stated: Parameters, width: float | None) ->
     guess = _guess(lambda rtol: lyapunov_exponent(problem, rtol=rtol).value)
     scale = max(abs(guess or 0.0), float(scale_of(problem).linear))
     wanted = SHARE * scale if width is None else width
-    return replace(enclose(stated, None, wanted).enclosure, wanted=wanted)
+    return replace(enclose(stated, None, wanted), wanted=wanted)
 
 
 def prove_index(problem: Problem, stated: Parameters) -> IndexEnclosure:
