@@ -195,26 +195,17 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return table
 
 
-def _numbers(data: Any, is_exact: bool = False) -> Any:
-    """Numbers as decimals where they are read as they stand, else as floats."""
+def _numbers(data: Any, exact: Sequence[str] = EXACT, is_exact: bool = False) -> Any:
+    """Numbers below some keys as decimals, others, and all of certificates, as floats."""
     if isinstance(data, dict):
         return {
-            name: _floats(value) if name == "certificate" else _numbers(value, is_exact or name in EXACT)
+            name: _numbers(value, () if name == "certificate" else exact, is_exact or name in exact)
             for name, value in data.items()
         }
     if isinstance(data, list):
-        return [_numbers(each) for each in data]
+        return [_numbers(each, exact) for each in data]
     if is_exact and isinstance(data, Decimal | int) and not isinstance(data, bool):
         return _in_range(Decimal(data))
-    return float(data) if isinstance(data, Decimal) else data
-
-
-def _floats(data: Any) -> Any:
-    """The numbers of a certificate, which are floats."""
-    if isinstance(data, dict):
-        return {name: _floats(value) for name, value in data.items()}
-    if isinstance(data, list):
-        return [_floats(each) for each in data]
     return float(data) if isinstance(data, Decimal) else data
 
 
