@@ -12,21 +12,7 @@ from fpsolve.commands import BAD_INPUT, CHECK_FAILED
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import claims_from, plain, verdicts
 from fpsolve.workflow.proofs import prove_case
-
-CASE = """
-title = "Proofs"
-[oscillator]
-epsilon = 0.4
-omega = 1.2
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 1.0
-tau0 = 0.5
-r0 = 0.9
-[moments]
-p = [0.0, 2.0]
-"""
+from tests.proofs.case import CASE
 
 
 @pytest.fixture(scope="module")

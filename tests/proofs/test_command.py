@@ -28,23 +28,9 @@ from fpsolve.proofs.enclosure import Enclosure
 from fpsolve.study.prove import CurveProof, Plan
 from tests.conftest import heed_signals
 from tests.oracles.moment_hierarchy import rates_of_monomials
+from tests.proofs.case import CASE
 
-CASE = """
-title = "Proofs"
-[oscillator]
-epsilon = 0.4
-omega = 1.2
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 1.0
-tau0 = 0.5
-r0 = 0.9
-[moments]
-p = [0.0, 2.0]
-[output]
-quantities = ["moment"]
-"""
+MOMENTS = CASE + '[output]\nquantities = ["moment"]\n'
 LOOSE = ["--width", "0.01"]
 
 
@@ -52,7 +38,7 @@ LOOSE = ["--width", "0.01"]
 def case(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "proven.toml"
-    path.write_text(CASE, encoding="utf-8")
+    path.write_text(MOMENTS, encoding="utf-8")
     return str(path)
 
 
