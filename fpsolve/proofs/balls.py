@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from functools import wraps
+from operator import attrgetter, methodcaller
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -81,15 +82,17 @@ def balls(numbers: Any) -> Balls:
 
 def mapped(function: str, numbers: Balls) -> Balls:
     """A method of each ball, such as "cos"."""
-    found = np.empty(numbers.size, dtype=object)
-    found[:] = [getattr(each, function)() for each in numbers.ravel().tolist()]
-    return found.reshape(numbers.shape)
+    return _of_each(methodcaller(function), numbers)
 
 
 def field(name: str, numbers: Balls) -> Balls:
     """An attribute of each ball, such as "real"."""
+    return _of_each(attrgetter(name), numbers)
+
+
+def _of_each(function: Callable[[Any], Any], numbers: Balls) -> Balls:
     found = np.empty(numbers.size, dtype=object)
-    found[:] = [getattr(each, name) for each in numbers.ravel().tolist()]
+    found[:] = [function(each) for each in numbers.ravel().tolist()]
     return found.reshape(numbers.shape)
 
 
