@@ -65,7 +65,7 @@ class Cells:
     """
 
     def __init__(self, basis: Basis, low: FloatArray, high: FloatArray) -> None:
-        self.basis, self.low, self.high = basis, low, high
+        self.basis = basis
         left, right = balls(low), balls(high)
         if isinstance(basis, Core):
             left, right = ((each - ball(basis.centre)) / ball(basis.scale) for each in (left, right))

@@ -16,7 +16,7 @@ from fpsolve.model.vibro_impact import ImpactLaw, VibroImpactOscillator
 from fpsolve.proofs.basis import Basis, Core, Whole
 from fpsolve.proofs.statement import DIRECT, EXACT, IMPACT, NOISE, OSCILLATOR, REDUCED, TREATMENT
 
-MOMENT, DRIFT = "moment", "lyapunov_exponent"
+MOMENT = "moment"
 MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 16_384, "values": 2**23}
 """Of what a certificate may hold, so that a file cannot ask for more than a machine has."""
 DECIMAL = re.compile(r"-?(\d{1,400}(\.\d{0,1100})?|\.\d{1,1100})([eE][-+]?\d{1,3})?", re.ASCII)

@@ -29,7 +29,6 @@ class Phases:
     """
 
     def __init__(self, count: int, waves: int) -> None:
-        self.count = count
         self._half = raised(math.pi / (2 * count))
         circle = [ball(i) / count for i in range(2 * count)]  # of π
         cosines, sines = (np.array([float(getattr(each, name)()) for each in circle]) for name in ("cos_pi", "sin_pi"))

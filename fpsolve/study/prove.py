@@ -128,19 +128,21 @@ class Plan:
     def questions(self) -> Iterator[Question]:
         """All of them, curve by curve."""
         literals = _literals(self.case)
+        orders = self._orders(literals)
         for curve in self.case.curves():
             stated = _stated(curve, literals)
-            yield from (Question(curve, MOMENT.name, stated, p, self.width) for p in self._orders(literals))
+            yield from (Question(curve, MOMENT.name, stated, p, self.width) for p in orders)
             yield from (Question(curve, name, stated, width=self.width) for name in self.indices)
 
     def gathered(self, answers: Sequence[Enclosure | IndexEnclosure]) -> list[CurveProof]:
         """What is proven of each curve, from the first answers, in the order of the questions."""
         found, literals = [], _literals(self.case)
+        orders = self._orders(literals)
         for number, curve in enumerate(self.case.curves(stop=-(-len(answers) // self.each))):
             given = answers[number * self.each : (number + 1) * self.each]
             padded = [*given, *[None] * (self.each - len(given))]
             stated = _stated(curve, literals)
-            found.append(_proof(curve, stated, self._orders(literals), self.indices, padded))
+            found.append(_proof(curve, stated, orders, self.indices, padded))
         return found
 
     def _orders(self, literals: Mapping[str, Literals]) -> list[str]:
