@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,6 +15,8 @@ from fpsolve.errors import FpsolveError
 PROCESSORS = "FPSOLVE_PROCESSORS"
 """The variable of the environment that limits how many processors a process and its children use."""
 ENDING = ("SIGHUP", "SIGTERM")
+REPEAT_SECONDS = 0.02
+"""After which an interrupt that Python lost comes again."""
 _limits: list[int] = []
 
 
@@ -58,10 +60,12 @@ def ended_by_signals() -> Iterator[list[int]]:
     them.
     """
     received: list[int] = []
+    lost: list[int] = []
 
     def interrupt(number: int, _: Any) -> None:
-        if not received:
-            received.append(number)
+        if not received or lost:
+            received[:] = received or [number]
+            lost.clear()
             raise KeyboardInterrupt
 
     known = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
@@ -70,10 +74,46 @@ def ended_by_signals() -> Iterator[list[int]]:
     for number in taken:
         signal.signal(number, interrupt)
     try:
-        yield received
+        with _interrupts_repeated(received, lost):
+            yield received
     finally:
         for number in taken:
             signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def _interrupts_repeated(received: Sequence[int], lost: list[int]) -> Iterator[None]:
+    """An interrupt of the body that Python loses, as in what runs when an object is freed, comes once more.
+
+    Args:
+        received: its signal, if that was not the one of Ctrl-C.
+        lost: gets it.
+    """
+    former, timers = sys.unraisablehook, list[threading.Timer]()
+
+    def repeat(unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+            former(unraisable)
+            return
+        lost.extend(received)
+        timers.append(threading.Timer(REPEAT_SECONDS, _signal_main, (*received, signal.SIGINT)[:1]))
+        timers[-1].start()
+
+    sys.unraisablehook = repeat
+    try:
+        yield
+    finally:
+        sys.unraisablehook = former
+        for timer in timers:
+            timer.cancel()
+
+
+def _signal_main(number: int) -> None:
+    """A signal for the main thread, also if it waits."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:  # on Windows
+        signal.raise_signal(number)
 
 
 @contextmanager

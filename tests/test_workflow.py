@@ -24,7 +24,7 @@ from fpsolve.files import alone
 from fpsolve.output.tables import write_results
 from fpsolve.study import sweep
 from fpsolve.study.solve import compare, solve_curve
-from fpsolve.workflow import Watch, check_case, run_case, simulate_case
+from fpsolve.workflow import Watch, check_case, run_case, sets, simulate_case
 from tests.solving import solve_case, solve_sets
 
 TEXT = """
@@ -310,6 +310,28 @@ def test_an_interruption_keeps_the_finished_curves(case, tmp_path, monkeypatch):
     summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
     assert [curve["varied"]["noise.D0"] for curve in summary["curves"]] == [0.1]
     assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 1)
+    assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
+
+
+@pytest.mark.parametrize("name", ["write_results", "write_curves", "write_dataset"])
+def test_tables_are_whole_where_an_interruption_comes_as_they_are_written(case, tmp_path, monkeypatch, name):
+    """All sets are solved, and the tables tell of them."""
+    writes = getattr(sets, name)
+
+    def interrupted(*arguments):
+        if name != "write_results" or len(arguments[1]) == 2:  # there are tables of fewer sets
+            signal.raise_signal(signal.SIGINT)
+        return writes(*arguments)
+
+    monkeypatch.setattr(sets, name, interrupted)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt, match=r"^interrupted after 2 of 2 curves; what was done is kept in "):
+            fpsolve.run(case, tmp_path / "out")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    assert (summary["complete"], summary["planned"], summary["done"]) == (True, 2, 2)
     assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
 
 

@@ -15,6 +15,7 @@ from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_simulation
 from fpsolve.output.vtk import write_response
 from fpsolve.pool import Pool, cluster, here, several
+from fpsolve.process import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
@@ -243,7 +244,7 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
             sweep.find()
             sweep.write_all()
             raise
-        with watch.bar(Phase(case.name, "tables")):
+        with watch.bar(Phase(case.name, "tables")), signals_held():
             sweep.write_all()
     return sweep
 
