@@ -36,6 +36,7 @@ ROOMS = {
             "pictured",
             "eigen",
             "bordered",
+            "corners",
             "error",
             "rival",
             "refine",

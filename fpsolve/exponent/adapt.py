@@ -12,6 +12,7 @@ import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from fpsolve.errors import MeshError, NotConverged, Remedy
+from fpsolve.exponent.corners import corners
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import doubled, first, first_far, refined
@@ -194,4 +195,6 @@ def fits(generator: Generator, q: float, p: float) -> bool:
         return False
     if frozen is None or not generator.chosen.polynomials:
         return True
+    if corners(generator.problem, p):
+        return False
     return abs(frozen.tilt(frozen.center(p)) - generator.chosen.slope * p) <= MOST_TILT_AWAY

@@ -13,6 +13,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError, NotConverged, Remedy
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
+from fpsolve.exponent.corners import corners
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import refined
@@ -161,7 +162,7 @@ class Branch:
 
     def _from_start(self, p: float, tolerance: Tolerance) -> Solution | None:
         """The solution at p with what was chosen for it in the problem close by, or None."""
-        if p not in self.starts:
+        if p not in self.starts or corners(self.problem, p):  # which lie elsewhere there
             return None
         chosen = _trimmed(self.starts[p], tolerance)
         try:

@@ -9,7 +9,7 @@ and how it falls tells what is left of it.
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, brief, dataset, described
 from fpsolve.errors import NotConverged
+from fpsolve.exponent.corners import corners, slow_shares
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_space import CellSpace, NoiseSpace
 from fpsolve.fem.phase_space import PhaseSpace
@@ -156,19 +157,19 @@ class ModeEffects:
     Attributes:
         degrees: of the cells, shape (cells,).
         two, four: the effects of the two and of the four highest modes, shape (cells,).
-        slowest: the least share of the effect of two modes that is thought to be left.
+        slowest: the least share of the effect of two modes that is thought to be left, of all cells or for each.
     """
 
     degrees: Any
     two: FloatArray
     four: FloatArray
-    slowest: float = 0.0
+    slowest: Any = 0.0
 
     @property
     def of_cells(self) -> FloatArray:
         """Estimate of what each cell lacks, half way from the effect of two modes to what its fall predicts."""
         left = np.sqrt(self.two / np.maximum(self.four, 1e-300))
-        return self.two * np.clip(left, self.slowest, 1.0)
+        return np.asarray(self.two * np.maximum(np.minimum(left, 1.0), self.slowest))
 
     @property
     def error(self) -> float:
@@ -206,7 +207,18 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects, ModeEffects | None]:
             shares = np.abs(left * mask * image).sum(axis=1 - axis)[high]
             effects.append(np.bincount(line.cells[high], shares, minlength=count) / abs(norm))
         found.append(ModeEffects(degrees, effects[0], effects[1], axis * space.xi.slowest))
-    return found[0], found[1]  # type: ignore[return-value]
+    return _with_corners(pair, *found)  # type: ignore[arg-type]
+
+
+def _with_corners(
+    pair: PrincipalPair, phi: ModeEffects, xi: ModeEffects | None
+) -> tuple[ModeEffects, ModeEffects | None]:
+    """The same where T is singular in some cells."""
+    chosen, found = pair.generator.chosen, corners(pair.generator.problem, pair.p)
+    if xi is None or not (found and chosen.z_lines.size):
+        return phi, xi
+    slow = slow_shares(found, chosen, (phi.degrees, xi.degrees))
+    return replace(phi, slowest=slow[0]), replace(xi, slowest=slow[1])
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.exponent.corners import corners, resolving
 from fpsolve.exponent.error import ModeEffects, Solution
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import MAX_DEGREE, halved
@@ -59,7 +60,9 @@ def first(problem: Problem, p: float, center: float, rtol: float) -> Discretisat
         slope = frozen.tilt(center) / p if frozen else 0.0
         count = round(digits / 2) + (3 if math.isinf(end) else 5)
         chosen = Discretisation(np.zeros(0), None, polynomials=count, slope=slope)
-    return _with_phi(chosen, system, unit * reach, digits)
+    chosen = _with_phi(chosen, system, unit * reach, digits)
+    found = corners(problem, p, center)
+    return resolving(found, chosen, noise, center, rtol) if found else chosen
 
 
 def first_far(problem: Problem, place: Place, rtol: float) -> Discretisation:

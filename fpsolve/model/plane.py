@@ -17,10 +17,13 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from fpsolve.arrays import Coefficient, FloatArray, one
 
 Matrix = Sequence[Sequence[float]]
+SAMPLES = 4001
+"""ξ among which the speed of the phase is seen to change its sign."""
 
 
 @dataclass(frozen=True)
@@ -227,6 +230,18 @@ def crosses_both_ways(system: System, kick: Kick, xi: ArrayLike) -> bool:
     """Whether the phase passes the ray of a kick forward for some of the ξ and backward for others."""
     speed = phase_speed(system, xi)(kick.phase)
     return bool(np.min(speed) < 0 < np.max(speed))
+
+
+def turning_noise(system: System, kick: Kick, ends: FloatArray) -> FloatArray:
+    """The ξ between two ends for which the phase turns at the ray of a kick, from forward to backward or back."""
+    xi = np.linspace(ends[0], ends[1], SAMPLES)
+    backward = phase_speed(system, xi)(kick.phase) < 0
+    at = np.flatnonzero(backward[1:] != backward[:-1])
+
+    def speed(xi: float) -> float:
+        return float(phase_speed(system, xi)(kick.phase))
+
+    return np.array([brentq(speed, xi[i], xi[i + 1], xtol=1e-14, rtol=1e-14) for i in at])
 
 
 def _total(system: System, parts: Sequence[Harmonics], xi: ArrayLike) -> Harmonics:

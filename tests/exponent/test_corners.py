@@ -1,0 +1,163 @@
+"""Rays that stretch and that noise lets the phase pass both ways: T is singular where it turns."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fpsolve.analysis.sensitivity import sensitivities
+from fpsolve.arrays import identity
+from fpsolve.exponent.corners import corners
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.plane import Drive, Kick, PlaneSystem
+from fpsolve.model.problem import Problem
+from tests.oracles import two_way_rays
+
+ROTATION, STIFFNESS = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))
+FREE, DRIVEN = Drive(0, ROTATION), Drive(1, STIFFNESS, identity)
+NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
+SYSTEM = PlaneSystem([FREE, DRIVEN], [Kick(0.4, math.log(0.8))])
+PROBLEM = Problem(SYSTEM, NOISE)
+TURN = -math.sqrt(2) / math.cos(0.4) ** 2
+"""z at which dφ/dt = 1 + ξ cos² φ is 0 at the ray, ξ = z/√2."""
+
+
+def waves(drives):
+    """h and q of a system without and with the noise, as tuples."""
+    return tuple(
+        tuple(
+            tuple(float(getattr(getattr(drive, name), part)) for part in ("mean", "cosine", "sine")) for drive in drives
+        )
+        for name in ("h", "q")
+    )
+
+
+def test_corners_lie_where_the_phase_turns_at_the_ray():
+    [corner] = corners(PROBLEM, 1.0)
+    assert (corner.phase, corner.factor) == (0.4, pytest.approx(0.8))
+    assert corner.z == pytest.approx(TURN, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        Problem(SYSTEM, MarkovChain.telegraph(2.0, 1.0)),
+        Problem(replace(SYSTEM, kicks=[Kick(0.4, 0.0)]), NOISE),
+        Problem(replace(SYSTEM, kicks=[Kick(math.pi / 2, -0.2)]), NOISE),  # dφ/dt = 1 there
+        Problem(replace(SYSTEM, epsilon=0.1), NOISE),  # seventeen standard deviations away
+    ],
+)
+def test_where_nothing_is_singular_there_is_no_corner(problem):
+    assert corners(problem, 1.0) == []
+
+
+def test_the_order_of_convergence():
+    """Without a stretch |v| T T* is integrated over a length h, v ~ h: 2. At R^p = 2 nothing converges any more."""
+    [corner] = corners(PROBLEM, 1.0)
+    assert [replace(corner, factor=factor).order for factor in (1.0, 2.0, 0.0)] == pytest.approx([2, 0, 3])
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "kicks", "noise", "size"),
+    [
+        (STIFFNESS, [(0.4, math.log(0.8))], NOISE, (60, 120)),
+        (((0.1, 0.3), (-1.2, 0.2)), [(1.1, -0.3), (2.7, 0.2)], OrnsteinUhlenbeck(alpha=1.5, sigma=1.1), (70, 140)),
+    ],
+)
+def test_the_exponent_of_a_density_that_is_smooth(stiffness, kicks, noise, size):
+    drives = [FREE, Drive(1, stiffness, identity)]
+    expected, coarse = (
+        two_way_rays.lyapunov_exponent(
+            *waves(drives), kicks, alpha=noise.alpha, std=noise.standard_deviation, harmonics=k, polynomials=n
+        )
+        for k, n in (size, (2 * size[0] // 3, 2 * size[1] // 3))
+    )
+    assert abs(expected - coarse) < 1e-10
+    for rtol in (1e-4, 1e-6, 1e-8):
+        problem = Problem(PlaneSystem(drives, [Kick(*kick) for kick in kicks]), noise)
+        found = ExponentSolver(problem, rtol=rtol).lyapunov_exponent()
+        assert abs(found.value - expected) <= found.error_estimate + 1e-10
+
+
+@pytest.mark.parametrize("p", [1.0, 2.0])
+def test_moments_by_finite_volumes(p):
+    """Of the first order: what is left is about as much as half the cells have brought."""
+    near = ExponentSolver(PROBLEM, rtol=1e-6).solution(p)
+    coarse, fine = (
+        two_way_rays.moment_lyapunov(
+            *waves(SYSTEM.drives),
+            (0.4, math.log(0.8)),
+            p,
+            alpha=1.0,
+            std=math.sqrt(0.5),
+            phases=n,
+            steps=n // 2,
+            near=near.pair.value + 0.01,
+        )
+        for n in (200, 400)
+    )
+    assert abs(fine - near.pair.value) < 1.2 * abs(fine - coarse) < 1e-3
+
+
+@pytest.mark.parametrize("p", [1.0, 2.0, -1.0])
+def test_the_error_is_within_its_estimate(p):
+    best = ExponentSolver(PROBLEM, rtol=1e-8).solution(p)
+    for rtol in (1e-4, 1e-5, 1e-6):
+        found = ExponentSolver(PROBLEM, rtol=rtol).solution(p)
+        assert abs(found.pair.value - best.pair.value) <= found.error + best.error
+
+
+@pytest.mark.parametrize("noise", [NonGaussianNoise(D0=1.0, tau0=1.0, r0=r0) for r0 in (0.7, 0.95, 1.1)])
+def test_other_noise_has_corners_too(noise):
+    """A system stretched by an unstretched one: λ is affine in ln R, and for p = 0 nothing else is singular."""
+    values = []
+    for log in (-0.2, 0.1, 0.0):
+        problem = Problem(replace(SYSTEM, kicks=[Kick(0.4, log)]), noise)
+        assert bool(corners(problem, -0.5)) == (log != 0)
+        found = ExponentSolver(problem, rtol=1e-7).lyapunov_exponent()
+        values.append((found.value, found.error_estimate))
+    (low, e1), (high, e2), (free, e3) = values
+    assert low / 3 + 2 * high / 3 == pytest.approx(free, abs=e1 / 3 + 2 * e2 / 3 + e3)
+
+
+@pytest.mark.parametrize("p", [1.0, -1.0])
+def test_the_power_at_a_corner(p):
+    """T ~ |ξ − ξ₀|^s at the ray, s = ½ − (3/π) arcsin(R^p/2): H. P. McKean, J. Math. Kyoto Univ. 2, 1963."""
+    pair = ExponentSolver(PROBLEM, rtol=1e-8).solution(p).pair
+    line = pair.space.phi
+    trace = np.ravel(line.right_trace[line.vertices_at(0.4)] @ pair.space.table(pair.right))
+    slopes = []
+    for side in (-1, 1):
+        near, far = pair.space.xi.values_at(TURN + side * np.array([0.02, 0.04])) @ trace
+        slopes.append(math.log2(far / near))
+    assert np.mean(slopes) == pytest.approx(0.5 - 3 / math.pi * math.asin(0.8**p / 2), abs=3e-3)
+
+
+def test_sensitivities():
+    """∂Λ/∂ε is that of a difference, though the corner moves with ε."""
+    [found] = sensitivities(PROBLEM, 1.0, rtol=1e-6).moments
+    low, high = (ExponentSolver(Problem(replace(SYSTEM, epsilon=e), NOISE), rtol=1e-7) for e in (0.995, 1.005))
+    slope = (high.solution(1.0).pair.value - low.solution(1.0).pair.value) / 0.01
+    assert found["oscillator.epsilon"].value == pytest.approx(slope, rel=1e-4)
+
+
+def test_a_discretisation_for_another_p_is_not_taken_where_there_is_a_corner():
+    """At p = 12 the tilted density lies eleven standard deviations out, and polynomials do; at p = 1 they do not."""
+    problem = Problem(replace(SYSTEM, epsilon=0.5), OrnsteinUhlenbeck(alpha=0.3, sigma=1.2))
+    assert [len(corners(problem, p)) for p in (12.0, 1.0)] == [0, 1]
+    solver = ExponentSolver(problem, rtol=1e-5)
+    assert solver.solution(12.0).pair.generator.chosen.polynomials
+    alone, after = ExponentSolver(problem, rtol=1e-5).solution(1.0), solver.solution(1.0)
+    assert not after.pair.generator.chosen.polynomials
+    assert abs(after.pair.value - alone.pair.value) <= alone.error + after.error
+
+
+def test_what_is_known_of_a_problem_close_by_is_not_taken():
+    """Its corner lies elsewhere."""
+    close = Problem(replace(SYSTEM, epsilon=1.05), NOISE)
+    starts = {1.0: ExponentSolver(close, rtol=1e-5).solution(1.0)}
+    found = ExponentSolver(PROBLEM, rtol=1e-5, starts=starts).solution(1.0).pair.generator.chosen
+    assert np.min(np.abs(found.z_lines - TURN)) < 1e-12
