@@ -21,7 +21,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.fem.space import Discretisation
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import Diffusion
-from fpsolve.model.plane import turning_noise
+from fpsolve.model.plane import is_steady, turning_noise
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
@@ -75,16 +75,16 @@ def corners(problem: Problem, p: float, center: float | None = None) -> list[Cor
     Args:
         center: about the mean z of the tilted density; None for that where slow noise carries the moment.
     """
-    noise, frozen = problem.noise, frozen_noise(problem)
-    kicks = [kick for kick in problem.system.kicks if kick.log_factor]
-    if isinstance(noise, MarkovChain) or frozen is None or not kicks:
+    noise, system = problem.noise, problem.system
+    kicks = [kick for kick in system.kicks if kick.log_factor and not is_steady(system, kick)]
+    if not kicks or isinstance(noise, MarkovChain) or (frozen := frozen_noise(problem)) is None:
         return []
     center = frozen.center(p) if center is None else center
     unit, ends = noise.standard_deviation, _interval(noise, center)
     found = [
         Corner(kick.phase, float(xi) / unit, math.exp(p * kick.log_factor), min(abs(p), 1.0))
         for kick in kicks
-        for xi in turning_noise(problem.system, kick, unit * ends)
+        for xi in turning_noise(system, kick, unit * ends)
     ]
     places = np.array([center, *(corner.z for corner in found)])
     logs = noise.log_density(unit * places) + 2 * frozen.tilt(center) * places

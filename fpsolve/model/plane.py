@@ -232,6 +232,13 @@ def crosses_both_ways(system: System, kick: Kick, xi: ArrayLike) -> bool:
     return bool(np.min(speed) < 0 < np.max(speed))
 
 
+def is_steady(system: System, kick: Kick) -> bool:
+    """Whether no noise changes the speed of the phase at the ray of a kick, but for rounding."""
+    return all(
+        drive.g is one or abs(float(drive.h(kick.phase))) <= 1e-12 * drive.h.amplitude for drive in system.drives
+    )
+
+
 def turning_noise(system: System, kick: Kick, ends: FloatArray) -> FloatArray:
     """The ξ between two ends for which the phase turns at the ray of a kick, from forward to backward or back."""
     xi = np.linspace(ends[0], ends[1], SAMPLES)
