@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,6 +24,11 @@ SYSTEM = PlaneSystem([FREE, DRIVEN], [Kick(0.4, math.log(0.8))])
 PROBLEM = Problem(SYSTEM, NOISE)
 TURN = -math.sqrt(2) / math.cos(0.4) ** 2
 """z at which dφ/dt = 1 + ξ cos² φ is 0 at the ray, ξ = z/√2."""
+
+
+@cache
+def best(p):
+    return ExponentSolver(PROBLEM, rtol=1e-7).solution(p)
 
 
 def waves(drives):
@@ -104,10 +110,9 @@ def test_moments_by_finite_volumes(p):
 
 @pytest.mark.parametrize("p", [1.0, 2.0, -1.0])
 def test_the_error_is_within_its_estimate(p):
-    best = ExponentSolver(PROBLEM, rtol=1e-8).solution(p)
-    for rtol in (1e-4, 1e-5, 1e-6):
+    for rtol in (1e-4, 1e-5):
         found = ExponentSolver(PROBLEM, rtol=rtol).solution(p)
-        assert abs(found.pair.value - best.pair.value) <= found.error + best.error
+        assert abs(found.pair.value - best(p).pair.value) <= found.error + best(p).error
 
 
 @pytest.mark.parametrize("noise", [NonGaussianNoise(D0=1.0, tau0=1.0, r0=r0) for r0 in (0.7, 0.95, 1.1)])
@@ -126,7 +131,7 @@ def test_other_noise_has_corners_too(noise):
 @pytest.mark.parametrize("p", [1.0, -1.0])
 def test_the_power_at_a_corner(p):
     """T ~ |ξ − ξ₀|^s at the ray, s = ½ − (3/π) arcsin(R^p/2): H. P. McKean, J. Math. Kyoto Univ. 2, 1963."""
-    pair = ExponentSolver(PROBLEM, rtol=1e-8).solution(p).pair
+    pair = best(p).pair
     line = pair.space.phi
     trace = np.ravel(line.right_trace[line.vertices_at(0.4)] @ pair.space.table(pair.right))
     slopes = []
@@ -138,7 +143,7 @@ def test_the_power_at_a_corner(p):
 
 def test_sensitivities():
     """∂Λ/∂ε is that of a difference, though the corner moves with ε."""
-    [found] = sensitivities(PROBLEM, 1.0, rtol=1e-6).moments
+    [found] = sensitivities(PROBLEM, 1.0, rtol=1e-5).moments
     low, high = (ExponentSolver(Problem(replace(SYSTEM, epsilon=e), NOISE), rtol=1e-7) for e in (0.995, 1.005))
     slope = (high.solution(1.0).pair.value - low.solution(1.0).pair.value) / 0.01
     assert found["oscillator.epsilon"].value == pytest.approx(slope, rel=1e-4)
