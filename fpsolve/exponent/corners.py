@@ -33,13 +33,15 @@ WIDTH = 2.0
 """Of cells away from corners, in standard deviations."""
 RATIO, CUBED = 0.5, 0.125
 """Of cells towards a corner, in ξ and in φ."""
-UNGRADED, MOST_LEVELS = 1e-3, 8
-"""Error of Λ(p) over (R^p − 1)² and its scale, where cells have one size; how often cells may get smaller."""
+UNGRADED, MOST_LEVELS, MOST_MORE = 1e-3, 8, 4
+"""Error of Λ(p) over (R^p − 1)² and its scale, where cells have one size; how often cells get smaller at once."""
 DEGREE = 6
 SAFETY = 2.0
 """Of what is thought to be left in cells with a corner: without it some errors are 1.2 times their estimate."""
-NEAR = 1e-9
-"""Lines closer than that are one."""
+THINNEST = {RATIO: 1e-4, CUBED: 1e-8}
+"""No cells get smaller than that: where lines of ξ are closer, rounding counts."""
+NEAR, CLOSE = 1e-9, 1e-5
+"""Within the first a line is a place, within the second two corners have one line of ξ."""
 
 
 @dataclass(frozen=True)
@@ -95,16 +97,19 @@ def resolving(
     found: Sequence[Corner], chosen: Discretisation, noise: Diffusion, center: float, rtol: float
 ) -> Discretisation:
     """Cells instead of polynomials, smaller towards the corners."""
-    levels = max(corner.levels(rtol) for corner in found)
     lower, upper = _interval(noise, center)
     even = np.linspace(lower, upper, math.ceil((upper - lower) / WIDTH) + 1)
-    places = np.array([corner.z for corner in found])
-    z_lines = _graded(_with(chosen.z_lines if chosen.z_lines.size else even, places), places, RATIO, levels)
-    phi_lines = _graded(chosen.phi_lines, _rays(found, chosen.phi_lines), CUBED, levels)
-    degrees = np.full(phi_lines.size - 1, min(DEGREE, int(np.max(chosen.phi_degrees))))
-    return replace(
-        chosen, phi_lines=phi_lines, phi_degrees=degrees, polynomials=0, slope=0.0, z_lines=z_lines, xi_degree=DEGREE
-    )
+    z_lines = _with(chosen.z_lines if chosen.z_lines.size else even, _z(found))
+    degrees = np.minimum(DEGREE, chosen.phi_degrees)
+    cells = replace(chosen, phi_degrees=degrees, polynomials=0, slope=0.0, z_lines=z_lines, xi_degree=DEGREE)
+    levels = max(corner.levels(rtol) for corner in found)
+    return _graded(found, cells, levels, levels)
+
+
+def graded_more(found: Sequence[Corner], chosen: Discretisation, excess: tuple[float, float]) -> Discretisation:
+    """With cells that get smaller so often more that errors at the corners fall by these factors, in φ and in ξ."""
+    levels = [math.log2(max(each, 1.0)) / max(_order(found), 1e-3) for each in excess]
+    return _graded(found, chosen, *(math.ceil(min(each, MOST_MORE)) for each in levels))
 
 
 def slow_shares(found: Sequence[Corner], chosen: Discretisation, degrees: tuple[Any, Any]) -> tuple[Any, Any]:
@@ -115,17 +120,26 @@ def slow_shares(found: Sequence[Corner], chosen: Discretisation, degrees: tuple[
     Args:
         degrees: of the cells of φ, and of ξ, two arrays.
     """
-    z = np.array([corner.z for corner in found])
     return (
-        _slow(chosen.phi_lines, _rays(found, chosen.phi_lines), degrees[0], min(corner.order for corner in found) / 3),
-        _slow(chosen.z_lines, z, degrees[1], min(corner.order for corner in found)),
+        _slow(chosen.phi_lines, _rays(found, chosen.phi_lines), degrees[0], _order(found) / 3),
+        _slow(chosen.z_lines, _z(found), degrees[1], _order(found)),
     )
 
 
 def _slow(lines: FloatArray, places: FloatArray, degrees: Any, order: float) -> FloatArray:
-    is_place = np.min(np.abs(lines[:, None] - places), axis=1) < NEAR
-    d = np.maximum(degrees, 3.0)
+    is_place, d = _are(lines, places), np.maximum(degrees, 3.0)
     return np.where(is_place[:-1] | is_place[1:], SAFETY / np.expm1(2 * max(order, 1e-3) * np.log(d / (d - 2))), 0.0)
+
+
+def _order(found: Sequence[Corner]) -> float:
+    """The least one."""
+    return min(corner.order for corner in found)
+
+
+def _z(found: Sequence[Corner]) -> FloatArray:
+    """z of corners, one for all that are `CLOSE`: an error of the size `CLOSE`² is nothing."""
+    z = np.sort([corner.z for corner in found])
+    return z[np.append(True, np.diff(z) > CLOSE)]
 
 
 def _rays(found: Sequence[Corner], lines: FloatArray) -> FloatArray:
@@ -139,7 +153,7 @@ def _rays(found: Sequence[Corner], lines: FloatArray) -> FloatArray:
 
 
 def _interval(noise: Diffusion, center: float) -> FloatArray:
-    """z on which a mesh for a tilted density is made, and where it is 0 without a tilt."""
+    """The ends of the z around those of the tilted density and around 0, or of the support if it ends near by."""
     end = noise.half_width / noise.standard_deviation
     lower, upper = min(center, 0.0) - REACH, max(center, 0.0) + REACH
     return np.array([-end if -end > lower - WIDTH else lower, end if end < upper + WIDTH else upper])
@@ -151,14 +165,25 @@ def _with(lines: FloatArray, places: FloatArray) -> FloatArray:
     return np.unique(np.concatenate([lines[:1], lines[1:-1][far], lines[-1:], places]))
 
 
-def _graded(lines: FloatArray, places: FloatArray, ratio: float, levels: int) -> FloatArray:
-    """Lines, and more between each place, which is one of them, and its neighbours, by a ratio nearer to it."""
-    is_place = np.min(np.abs(lines[:, None] - places), axis=1) < NEAR
-    found, shares = [lines], ratio ** np.arange(1, levels + 1)
+def _are(lines: FloatArray, places: FloatArray) -> Any:
+    """Which lines are places."""
+    return np.min(np.abs(lines[:, None] - places), axis=1) < NEAR
+
+
+def _graded(found: Sequence[Corner], chosen: Discretisation, in_phi: int, in_z: int) -> Discretisation:
+    """With cells that get smaller so often towards the corners."""
+    phi, phi_cells = _towards(chosen.phi_lines, _rays(found, chosen.phi_lines), CUBED, in_phi)
+    z, _ = _towards(chosen.z_lines, _z(found), RATIO, in_z)
+    return replace(chosen, phi_lines=phi, phi_degrees=chosen.phi_degrees[phi_cells], z_lines=z)
+
+
+def _towards(lines: FloatArray, places: FloatArray, ratio: float, levels: int) -> tuple[FloatArray, Any]:
+    """Lines, and more between each place, which is one of them, and its neighbours; the old cell of each cell."""
+    is_place, found = _are(lines, places), [lines]
     for a, b, left, right in zip(lines[:-1], lines[1:], is_place[:-1], is_place[1:], strict=True):
         width = 0.5 * (b - a) if left and right else b - a
-        if left:
-            found.append(a + width * np.append(shares, 1.0))
-        if right:
-            found.append(b - width * shares)
-    return np.unique(np.concatenate(found))
+        steps = width * ratio ** np.arange(0 if left and right else 1, levels + 1)
+        steps = steps[steps > THINNEST[ratio]]
+        found += [a + steps] * int(left) + [b - steps[steps < 0.9 * width]] * int(right)
+    new = np.unique(np.concatenate(found))
+    return new, np.searchsorted(lines, new[:-1], side="right") - 1

@@ -157,19 +157,27 @@ class ModeEffects:
     Attributes:
         degrees: of the cells, shape (cells,).
         two, four: the effects of the two and of the four highest modes, shape (cells,).
-        slowest: the least share of the effect of two modes that is thought to be left, of all cells or for each.
+        slowest: the least share of the effect of two modes that is thought to be left.
+        corners: that of the cells in which T is singular, 0 for others, shape (cells,); None if there are none.
     """
 
     degrees: Any
     two: FloatArray
     four: FloatArray
-    slowest: Any = 0.0
+    slowest: float = 0.0
+    corners: FloatArray | None = None
 
     @property
     def of_cells(self) -> FloatArray:
         """Estimate of what each cell lacks, half way from the effect of two modes to what its fall predicts."""
         left = np.sqrt(self.two / np.maximum(self.four, 1e-300))
-        return np.asarray(self.two * np.maximum(np.minimum(left, 1.0), self.slowest))
+        shares = np.clip(left, self.slowest, 1.0)
+        return self.two * (shares if self.corners is None else np.maximum(shares, self.corners))
+
+    @property
+    def at_corners(self) -> Any:
+        """Which cells T is singular in, shape (cells,)."""
+        return np.zeros_like(self.degrees, dtype=bool) if self.corners is None else self.corners > 0
 
     @property
     def error(self) -> float:
@@ -218,7 +226,7 @@ def _with_corners(
     if xi is None or not (found and chosen.z_lines.size):
         return phi, xi
     slow = slow_shares(found, chosen, (phi.degrees, xi.degrees))
-    return replace(phi, slowest=slow[0]), replace(xi, slowest=slow[1])
+    return replace(phi, corners=slow[0]), replace(xi, corners=slow[1])
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.exponent.corners import corners, resolving
+from fpsolve.exponent.corners import corners, graded_more, resolving
 from fpsolve.exponent.error import ModeEffects, Solution
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import MAX_DEGREE, halved
@@ -32,6 +32,8 @@ FREE_STAGES = 4
 """From this number of stages on, no cell is made coarser."""
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
+CORNERS = 0.3
+"""Share that all cells at corners may lack."""
 LEAST_DEGREE, SPLIT_DEGREE, MOST_DEGREE = 4, 6, 14
 FEWEST_CELLS, FALL_PER_CELL = 4, 8.0
 """Of a first discretisation of a place far out, and of ln P_s in one of its cells."""
@@ -138,6 +140,11 @@ def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation
     elif xi:
         lines, degrees = _split(chosen.z_lines, xi, share, may_coarsen)
         new = _reaching(replace(new, z_lines=lines, xi_degree=int(np.max(degrees))), solution, share)
+        if np.any(phi.at_corners):
+            pair, (in_phi, in_xi) = solution.pair, (float(np.sum(each.of_cells[each.at_corners])) for each in (phi, xi))
+            allowed = CORNERS * tolerance
+            found = corners(pair.generator.problem, pair.p)
+            new = graded_more(found, new, (in_phi / allowed, in_xi / allowed))
     grows = new.unknowns(noise) > chosen.unknowns(noise)
     return new if grows or solution.error <= tolerance else _raised(new)
 
@@ -147,11 +154,13 @@ def _split(
 ) -> tuple[FloatArray, Any]:
     """Lines and a degree for each cell with which all together should lack no more than a share.
 
-    A cell is halved, or cut into other parts, where halves take fewer unknowns: in them the effects fall faster.
+    A cell is halved, or cut into other parts, where halves take fewer unknowns: in them the effects fall faster. Those
+    at corners are left as they are.
     """
     rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
     if not may_coarsen:
         needed = np.maximum(needed, effects.degrees)
+    needed = np.where(effects.at_corners, effects.degrees - 0.2, needed)  # see `graded_more`
     in_half = needed * rate / (rate + HALVING)
     is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)
     is_split |= needed > MOST_DEGREE
