@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 from fpsolve.errors import FpsolveError
@@ -74,7 +74,7 @@ def ended_by_signals() -> Iterator[list[int]]:
     for number in taken:
         signal.signal(number, interrupt)
     try:
-        with _interrupts_repeated(received, lost):
+        with _interrupts_repeated(received, lost) if is_main else nullcontext():
             yield received
     finally:
         for number in taken:
@@ -86,8 +86,8 @@ def _interrupts_repeated(received: Sequence[int], lost: list[int]) -> Iterator[N
     """An interrupt of the body that Python loses, as in what runs when an object is freed, comes once more.
 
     Args:
-        received: its signal, if that was not the one of Ctrl-C.
-        lost: gets it.
+        received: the signal that ends the body; empty after Ctrl-C.
+        lost: what was received is put there, so that it may interrupt again.
     """
     former, timers = sys.unraisablehook, list[threading.Timer]()
 
@@ -97,6 +97,7 @@ def _interrupts_repeated(received: Sequence[int], lost: list[int]) -> Iterator[N
             return
         lost.extend(received)
         timers.append(threading.Timer(REPEAT_SECONDS, _signal_main, (*received, signal.SIGINT)[:1]))
+        timers[-1].daemon = True
         timers[-1].start()
 
     sys.unraisablehook = repeat
@@ -106,6 +107,7 @@ def _interrupts_repeated(received: Sequence[int], lost: list[int]) -> Iterator[N
         sys.unraisablehook = former
         for timer in timers:
             timer.cancel()
+            timer.join()  # what it has sent already still meets the handlers of the body
 
 
 def _signal_main(number: int) -> None:
@@ -118,7 +120,7 @@ def _signal_main(number: int) -> None:
 
 @contextmanager
 def signals_held() -> Iterator[None]:
-    """Signals that interrupt wait until the body has ended: an import of compiled modules may crash where one comes.
+    """Signals that interrupt wait until the body has ended: an import that may crash, or files that belong together.
 
     Those that Python does not handle are left alone; so are all outside of the main thread, which alone receives them.
     """

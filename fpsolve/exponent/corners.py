@@ -33,8 +33,10 @@ WIDTH = 2.0
 """Of cells away from corners, in standard deviations."""
 RATIO, CUBED = 0.5, 0.125
 """Of cells towards a corner, in ξ and in φ."""
-UNGRADED, MOST_LEVELS, MOST_MORE = 1e-3, 8, 4
-"""Error of Λ(p) over (R^p − 1)² and its scale, where cells have one size; how often cells get smaller at once."""
+UNGRADED = 1e-3
+"""Error of Λ(p) over (R^p − 1)² and its scale, where cells have one size."""
+FEWEST_LEVELS, MOST_LEVELS, MOST_MORE = 2, 8, 4
+"""How often cells get smaller, first and then again."""
 DEGREE = 6
 SAFETY = 2.0
 """Of what is thought to be left in cells with a corner: without it some errors are 1.2 times their estimate."""
@@ -42,6 +44,8 @@ THINNEST = {RATIO: 1e-4, CUBED: 1e-8}
 """No cells get smaller than that: where lines of ξ are closer, rounding counts."""
 NEAR, CLOSE = 1e-9, 1e-5
 """Within the first a line is a place, within the second two corners have one line of ξ."""
+AT_END = 1e-4
+"""From the end of the support: a corner closer by does not count, as next to no path comes there."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +56,13 @@ class Corner:
         phase: φ of the ray.
         z: the noise, in standard deviations.
         factor: R^p.
-        share: |p|, or 1 for larger ones, as Λ(p) is about p times a rate.
+        scale: of Λ(p), which is about p times a rate: |p|, but not more than 1.
     """
 
     phase: float
     z: float
     factor: float
-    share: float
+    scale: float
 
     @property
     def order(self) -> float:
@@ -67,8 +71,8 @@ class Corner:
 
     def levels(self, rtol: float) -> int:
         """How often cells should get smaller towards it."""
-        needed = math.log2(max(UNGRADED * (self.factor - 1) ** 2 / (rtol * self.share), 2.0))
-        return math.ceil(min(needed / max(self.order, 1e-3), MOST_LEVELS))
+        needed = math.log2(max(UNGRADED * (self.factor - 1) ** 2 / (rtol * self.scale), 2.0))
+        return math.ceil(np.clip(needed / max(self.order, 1e-3), FEWEST_LEVELS, MOST_LEVELS))
 
 
 def corners(problem: Problem, p: float, center: float | None = None) -> list[Corner]:
@@ -83,10 +87,11 @@ def corners(problem: Problem, p: float, center: float | None = None) -> list[Cor
         return []
     center = frozen.center(p) if center is None else center
     unit, ends = noise.standard_deviation, _interval(noise, center)
+    inside = noise.half_width / unit - AT_END
     found = [
         Corner(kick.phase, float(xi) / unit, math.exp(p * kick.log_factor), min(abs(p), 1.0))
         for kick in kicks
-        for xi in turning_noise(system, kick, unit * ends)
+        for xi in turning_noise(system, kick, unit * np.clip(ends, -inside, inside))
     ]
     places = np.array([center, *(corner.z for corner in found)])
     logs = noise.log_density(unit * places) + 2 * frozen.tilt(center) * places
@@ -96,14 +101,18 @@ def corners(problem: Problem, p: float, center: float | None = None) -> list[Cor
 def resolving(
     found: Sequence[Corner], chosen: Discretisation, noise: Diffusion, center: float, rtol: float
 ) -> Discretisation:
-    """Cells instead of polynomials, smaller towards the corners."""
+    """Cells instead of polynomials, smaller towards the corners; none is larger than its distance to an end near by.
+
+    There P_s is singular, which no quadrature overlooks that is as far away.
+    """
     lower, upper = _interval(noise, center)
     even = np.linspace(lower, upper, math.ceil((upper - lower) / WIDTH) + 1)
     z_lines = _with(chosen.z_lines if chosen.z_lines.size else even, _z(found))
     degrees = np.minimum(DEGREE, chosen.phi_degrees)
     cells = replace(chosen, phi_degrees=degrees, polynomials=0, slope=0.0, z_lines=z_lines, xi_degree=DEGREE)
     levels = max(corner.levels(rtol) for corner in found)
-    return _graded(found, cells, levels, levels)
+    to_end = noise.half_width / noise.standard_deviation - np.max(np.abs(_z(found)))
+    return _graded(found, cells, levels, max(levels, math.ceil(math.log2(WIDTH / min(to_end, WIDTH)))))
 
 
 def graded_more(found: Sequence[Corner], chosen: Discretisation, excess: tuple[float, float]) -> Discretisation:
@@ -124,6 +133,14 @@ def slow_shares(found: Sequence[Corner], chosen: Discretisation, degrees: tuple[
         _slow(chosen.phi_lines, _rays(found, chosen.phi_lines), degrees[0], _order(found) / 3),
         _slow(chosen.z_lines, _z(found), degrees[1], _order(found)),
     )
+
+
+def left_on_mesh(found: Sequence[Corner], degree: int, finer: int) -> float:
+    """The error on a given mesh over the difference from one of a higher degree, or of cells half as large."""
+    if not found:
+        return 1.0
+    fall = 2 * math.log(finer / degree) if finer > degree else math.log(2)
+    return 1 / -math.expm1(-max(_order(found), 1e-3) / 3 * fall)
 
 
 def _slow(lines: FloatArray, places: FloatArray, degrees: Any, order: float) -> FloatArray:

@@ -19,7 +19,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, brief, dataset, described
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.corners import corners, slow_shares
+from fpsolve.exponent.corners import corners, left_on_mesh, slow_shares
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_space import CellSpace, NoiseSpace
 from fpsolve.fem.phase_space import PhaseSpace
@@ -144,10 +144,17 @@ class Solution:
     def error(self) -> float:
         """Estimate of the error of `pair.value`: discretisation, truncation and rounding."""
         if self.finer is not None:
-            missing = abs(self.finer.value - self.pair.value)
+            missing = abs(self.finer.value - self.pair.value) * self._left
         else:
             missing = sum(each.error for each in self.effects if each)
         return missing + sum(self.truncation) + self.pair.rounding
+
+    @property
+    def _left(self) -> float:
+        """The error over the difference from the finer pair: 1 but where T is singular."""
+        assert self.finer is not None
+        degrees = (int(np.max(pair.generator.chosen.phi_degrees)) for pair in (self.pair, self.finer))
+        return left_on_mesh(corners(self.pair.generator.problem, self.pair.p), *degrees)
 
 
 @dataclass(frozen=True, eq=False)
