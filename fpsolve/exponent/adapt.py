@@ -129,8 +129,11 @@ def _search(
             continue
         solution = Solution(pair)
         allowed = tolerance(pair.value)
-        if solution.error <= allowed:
-            return solution
+        if solution.error_by_modes <= allowed:
+            if solution.error <= allowed:
+                return solution
+            chosen = chosen.enriched()
+            continue
         meter.note(solution, allowed)
         chosen = refined(solution, allowed, meter.stages)
 
@@ -165,8 +168,8 @@ class _Meter:
 
     def note(self, solution: Solution, allowed: float) -> None:
         """Keep the best solution; stop where only rounding is left."""
-        if solution.error / allowed < self.share:
-            self.best, self.share = solution, solution.error / allowed
+        if solution.error_by_modes / allowed < self.share:
+            self.best, self.share = solution, solution.error_by_modes / allowed
         if solution.pair.rounding > allowed:
             self.stop(f"rounding alone may change it by {solution.pair.rounding:.1e}: use a larger rtol")
 
@@ -181,7 +184,7 @@ class _Meter:
         best = self.best
         raise NotConverged(
             f"Λ({self.p:g}) did not converge: {reason}; best value {best.pair.value:.6g} with an estimated error of "
-            f"{best.error:.1e}, {self.share:.1e} times the tolerance; {Remedy.BUDGET}",
+            f"{best.error_by_modes:.1e}, {self.share:.1e} times the tolerance; {Remedy.BUDGET}",
             best,
         )
 

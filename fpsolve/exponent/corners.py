@@ -101,18 +101,18 @@ def corners(problem: Problem, p: float, center: float | None = None) -> list[Cor
 def resolving(
     found: Sequence[Corner], chosen: Discretisation, noise: Diffusion, center: float, rtol: float
 ) -> Discretisation:
-    """Cells instead of polynomials, smaller towards the corners; none is larger than its distance to an end near by.
+    """Cells instead of polynomials, smaller towards the corners, down to the distance of one to the end of the support.
 
-    There P_s is singular, which no quadrature overlooks that is as far away.
+    Beyond the end P_s is singular, and between both the phase runs the other way.
     """
     lower, upper = _interval(noise, center)
     even = np.linspace(lower, upper, math.ceil((upper - lower) / WIDTH) + 1)
     z_lines = _with(chosen.z_lines if chosen.z_lines.size else even, _z(found))
     degrees = np.minimum(DEGREE, chosen.phi_degrees)
     cells = replace(chosen, phi_degrees=degrees, polynomials=0, slope=0.0, z_lines=z_lines, xi_degree=DEGREE)
-    levels = max(corner.levels(rtol) for corner in found)
     to_end = noise.half_width / noise.standard_deviation - np.max(np.abs(_z(found)))
-    return _graded(found, cells, levels, max(levels, math.ceil(math.log2(WIDTH / min(to_end, WIDTH)))))
+    levels = max(math.ceil(math.log2(WIDTH / min(to_end, WIDTH))), *(corner.levels(rtol) for corner in found))
+    return _graded(found, cells, levels, levels)
 
 
 def graded_more(found: Sequence[Corner], chosen: Discretisation, excess: tuple[float, float]) -> Discretisation:

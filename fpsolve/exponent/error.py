@@ -8,6 +8,7 @@ and how it falls tells what is left of it.
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -18,9 +19,10 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, brief, dataset, described
-from fpsolve.errors import NotConverged
-from fpsolve.exponent.corners import corners, left_on_mesh, slow_shares
-from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.errors import MeshError, NotConverged
+from fpsolve.exponent.corners import Corner, corners, left_on_mesh, slow_shares
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_space import CellSpace, NoiseSpace
 from fpsolve.fem.phase_space import PhaseSpace
 from fpsolve.model.quantity import UNNAMED, Quantity
@@ -144,17 +146,36 @@ class Solution:
     def error(self) -> float:
         """Estimate of the error of `pair.value`: discretisation, truncation and rounding."""
         if self.finer is not None:
-            missing = abs(self.finer.value - self.pair.value) * self._left
-        else:
-            missing = sum(each.error for each in self.effects if each)
-        return missing + sum(self.truncation) + self.pair.rounding
+            return self._beside(self.finer) + self._other
+        return max(self.error_by_modes, self._beside_enriched + self._other if self._corners else 0.0)
+
+    @cached_property
+    def error_by_modes(self) -> float:
+        """The same from the highest modes alone, which where T is singular may be too small."""
+        return sum(each.error for each in self.effects if each) + self._other
+
+    @cached_property
+    def _other(self) -> float:
+        return sum(self.truncation) + self.pair.rounding
+
+    @cached_property
+    def _corners(self) -> list[Corner]:
+        return corners(self.pair.generator.problem, self.pair.p)
 
     @property
-    def _left(self) -> float:
-        """The error over the difference from the finer pair: 1 but where T is singular."""
-        assert self.finer is not None
-        degrees = (int(np.max(pair.generator.chosen.phi_degrees)) for pair in (self.pair, self.finer))
-        return left_on_mesh(corners(self.pair.generator.problem, self.pair.p), *degrees)
+    def _beside_enriched(self) -> float:
+        """By two degrees more."""
+        generator = self.pair.generator
+        try:
+            finer = Generator(generator.problem, generator.chosen.enriched())
+            return self._beside(principal_pair(finer, self.pair.p, start=self.pair))
+        except (NotConverged, MeshError):
+            return math.inf
+
+    def _beside(self, finer: PrincipalPair) -> float:
+        """What is missing, by that of a finer pair."""
+        degrees = (int(np.max(pair.generator.chosen.phi_degrees)) for pair in (self.pair, finer))
+        return abs(finer.value - self.pair.value) * left_on_mesh(self._corners, *degrees)
 
 
 @dataclass(frozen=True, eq=False)

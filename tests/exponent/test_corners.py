@@ -11,6 +11,7 @@ from fpsolve.analysis.sensitivity import sensitivities
 from fpsolve.arrays import identity
 from fpsolve.exponent.corners import corners
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.model.plane import Drive, Kick, PlaneSystem
@@ -82,7 +83,7 @@ def test_the_exponent_of_a_density_that_is_smooth(stiffness, kicks, noise, size)
         for k, n in (size, (2 * size[0] // 3, 2 * size[1] // 3))
     )
     assert abs(expected - coarse) < 1e-10
-    for rtol in (1e-4, 1e-6, 1e-8):
+    for rtol in (1e-4, 1e-7):
         problem = Problem(PlaneSystem(drives, [Kick(*kick) for kick in kicks]), noise)
         found = ExponentSolver(problem, rtol=rtol).lyapunov_exponent()
         assert abs(found.value - expected) <= found.error_estimate + 1e-10
@@ -120,7 +121,7 @@ def test_moments_by_finite_volumes(p):
     assert abs(fine - near.pair.value) < 1.2 * abs(fine - coarse) < 1e-3
 
 
-@pytest.mark.parametrize("p", [1.0, 2.0, -1.0])
+@pytest.mark.parametrize("p", [1.0, -1.0])
 def test_the_error_is_within_its_estimate(p):
     for rtol in (1e-4, 1e-5):
         found = ExponentSolver(PROBLEM, rtol=rtol).solution(p)
@@ -138,6 +139,34 @@ def test_other_noise_has_corners_too(noise):
         values.append((found.value, found.error_estimate))
     (low, e1), (high, e2), (free, e3) = values
     assert low / 3 + 2 * high / 3 == pytest.approx(free, abs=e1 / 3 + 2 * e2 / 3 + e3)
+
+
+@pytest.mark.parametrize("excess", [1e-6, 0.003, 0.03, 0.1])
+def test_corners_near_the_end_of_the_noise(excess):
+    """There P_s, here ~ (distance to the end)^(1/6), is singular, and the phase runs backward only beyond the corner."""
+    noise = NonGaussianNoise(D0=1.0, tau0=1.0, r0=-5.0)
+    epsilon = (1 + excess) / noise.half_width / math.cos(0.4) ** 2
+    problem = Problem(replace(SYSTEM, epsilon=epsilon), noise)
+    assert len(corners(problem, 1.0)) == (excess > 1e-4)
+    rough, fine = (ExponentSolver(problem, rtol=rtol).solution(1.0) for rtol in (1e-5, 1e-7))
+    assert abs(rough.pair.value - fine.pair.value) <= rough.error + fine.error
+
+
+@pytest.mark.parametrize("phase", [0.0, -1e-12, math.pi, 3 * math.pi / 4 - 2 * math.pi])
+def test_cells_are_never_thin_by_rounding(phase):
+    problem = Problem(replace(SYSTEM, kicks=[Kick(phase, math.log(0.8))]), NOISE)
+    chosen = ExponentSolver(problem, rtol=1e-6).solution(1.0).pair.generator.chosen
+    assert np.diff(chosen.z_lines).min() > 1e-3
+    assert np.diff(chosen.phi_lines).min() > 1e-6
+
+
+def test_a_mesh_of_ones_own():
+    """The error is larger than what a higher degree changes."""
+    problem = Problem(replace(SYSTEM, kicks=[Kick(3 * math.pi / 4, math.log(0.8))]), NOISE)
+    given = make_mesh(phi_cells=8, phi_degree=8, xi_cells=16, xi_degree=8)
+    found = ExponentSolver(problem, given).solution(1.0)
+    best = ExponentSolver(problem, rtol=1e-6).solution(1.0)
+    assert abs(found.pair.value - best.pair.value) <= found.error + best.error < 1e-5
 
 
 @pytest.mark.parametrize("p", [1.0, -1.0])
