@@ -29,7 +29,7 @@ TURN = -math.sqrt(2) / math.cos(0.4) ** 2
 
 @cache
 def best(p):
-    return ExponentSolver(PROBLEM, rtol=3e-8).solution(p)
+    return ExponentSolver(PROBLEM, rtol=3e-8 if p > 0 else 1e-7).solution(p)
 
 
 def waves(drives):
@@ -143,7 +143,7 @@ def test_other_noise_has_corners_too(noise):
 
 @pytest.mark.parametrize("excess", [1e-6, 0.003, 0.03, 0.1])
 def test_corners_near_the_end_of_the_noise(excess):
-    """There P_s, here ~ (distance to the end)^(1/6), is singular, and the phase runs backward only beyond the corner."""
+    """There P_s ~ (distance to the end)^(1/6) is singular, and the phase runs backward only beyond the corner."""
     noise = NonGaussianNoise(D0=1.0, tau0=1.0, r0=-5.0)
     epsilon = (1 + excess) / noise.half_width / math.cos(0.4) ** 2
     problem = Problem(replace(SYSTEM, epsilon=epsilon), noise)
@@ -185,9 +185,9 @@ def test_the_power_at_a_corner(p):
 def test_sensitivities():
     """∂Λ/∂ε is that of a difference, though the corner moves with ε."""
     [found] = sensitivities(PROBLEM, 1.0, rtol=1e-5).moments
-    low, high = (ExponentSolver(Problem(replace(SYSTEM, epsilon=e), NOISE), rtol=1e-7) for e in (0.995, 1.005))
-    slope = (high.solution(1.0).pair.value - low.solution(1.0).pair.value) / 0.01
-    assert found["oscillator.epsilon"].value == pytest.approx(slope, rel=1e-4)
+    low, high = (ExponentSolver(Problem(replace(SYSTEM, epsilon=e), NOISE), rtol=1e-6) for e in (0.99, 1.01))
+    slope = (high.solution(1.0).pair.value - low.solution(1.0).pair.value) / 0.02
+    assert found["oscillator.epsilon"].value == pytest.approx(slope, rel=1e-3)
 
 
 def test_a_discretisation_for_another_p_is_not_taken_where_there_is_a_corner():
