@@ -129,13 +129,12 @@ def _search(
             continue
         solution = Solution(pair)
         allowed = tolerance(pair.value)
-        if solution.error_by_modes <= allowed:
-            if solution.error <= allowed:
-                return solution
-            chosen = chosen.enriched()
-            continue
-        meter.note(solution, allowed)
-        chosen = refined(solution, allowed, meter.stages)
+        seems_enough = solution.error_by_modes <= allowed
+        error = solution.error if seems_enough else solution.error_by_modes
+        if error <= allowed:
+            return solution
+        meter.note(solution, error, allowed)
+        chosen = chosen.enriched() if seems_enough else refined(solution, allowed, meter.stages)
 
 
 @dataclass
@@ -148,6 +147,7 @@ class _Meter:
     started: float = field(default_factory=time.thread_time)
     stages: int = 0
     best: Solution | None = None
+    error: float = math.inf
     share: float = math.inf
     failure: Exception | None = None
     last: tuple[float, int] = (0.0, 0)
@@ -166,10 +166,10 @@ class _Meter:
             self.stop(f"{MAX_STAGES} meshes were tried")
         self.last, self.stages = (elapsed, size), self.stages + 1
 
-    def note(self, solution: Solution, allowed: float) -> None:
+    def note(self, solution: Solution, error: float, allowed: float) -> None:
         """Keep the best solution; stop where only rounding is left."""
-        if solution.error_by_modes / allowed < self.share:
-            self.best, self.share = solution, solution.error_by_modes / allowed
+        if error / allowed < self.share:
+            self.best, self.error, self.share = solution, error, error / allowed
         if solution.pair.rounding > allowed:
             self.stop(f"rounding alone may change it by {solution.pair.rounding:.1e}: use a larger rtol")
 
@@ -184,7 +184,7 @@ class _Meter:
         best = self.best
         raise NotConverged(
             f"Λ({self.p:g}) did not converge: {reason}; best value {best.pair.value:.6g} with an estimated error of "
-            f"{best.error_by_modes:.1e}, {self.share:.1e} times the tolerance; {Remedy.BUDGET}",
+            f"{self.error:.1e}, {self.share:.1e} times the tolerance; {Remedy.BUDGET}",
             best,
         )
 

@@ -115,7 +115,7 @@ def resolving(
     return _graded(found, cells, levels, levels)
 
 
-def graded_more(found: Sequence[Corner], chosen: Discretisation, excess: tuple[float, float]) -> Discretisation:
+def graded_more(found: Sequence[Corner], chosen: Discretisation, excess: Sequence[float]) -> Discretisation:
     """With cells that get smaller so often more that errors at the corners fall by these factors, in φ and in ξ."""
     levels = [math.log2(max(each, 1.0)) / max(_order(found), 1e-3) for each in excess]
     return _graded(found, chosen, *(math.ceil(min(each, MOST_MORE)) for each in levels))

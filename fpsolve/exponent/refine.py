@@ -141,12 +141,11 @@ def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation
         lines, degrees = _split(chosen.z_lines, xi, share, may_coarsen)
         new = _reaching(replace(new, z_lines=lines, xi_degree=int(np.max(degrees))), solution, share)
         if np.any(phi.at_corners):
-            pair, (in_phi, in_xi) = solution.pair, (float(np.sum(each.of_cells[each.at_corners])) for each in (phi, xi))
-            allowed = CORNERS * tolerance
-            found = corners(pair.generator.problem, pair.p)
-            new = graded_more(found, new, (in_phi / allowed, in_xi / allowed))
+            lacking = [float(np.sum(each.of_cells[each.at_corners])) for each in (phi, xi)]
+            found = corners(solution.pair.generator.problem, solution.pair.p)
+            new = graded_more(found, new, [each / (CORNERS * tolerance) for each in lacking])
     grows = new.unknowns(noise) > chosen.unknowns(noise)
-    return new if grows or solution.error <= tolerance else _raised(new)
+    return new if grows or solution.error_by_modes <= tolerance else _raised(new)
 
 
 def _split(
