@@ -7,7 +7,7 @@ each by both estimators. The other parameters are those of Fig. 1 with D₀ = 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count, product
 
@@ -58,10 +58,22 @@ def cheap_step(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float
     return half_turn / math.ceil(half_turn / largest_step(oscillator, noise)[0])
 
 
-def rows(paths: int = PATHS, transients: int = LENGTH, first_seed: int = 0, step: Step = default_step) -> Iterator[Row]:
-    """All combinations by both estimators, each simulation with a seed of its own."""
+SETS = tuple(product((0.1, 0.5, 1.0), (0.6, 0.8, 1.0), NOISES))
+"""ε, r and the noise of all combinations but p."""
+
+
+def rows(
+    sets: Sequence[tuple[float, float, str]] = SETS,
+    *,
+    paths: int = PATHS,
+    transients: int = LENGTH,
+    first_seed: int = 0,
+    step: Step = default_step,
+) -> Iterator[Row]:
+    """All p of some sets by both estimators, each simulation with a seed of its own."""
     seeds = count(first_seed)
-    for epsilon, restitution, (name, noise) in product((0.1, 0.5, 1.0), (0.6, 0.8, 1.0), NOISES.items()):
+    for epsilon, restitution, name in sets:
+        noise = NOISES[name]
         oscillator = VibroImpactOscillator(
             omega=1.0, restitution=restitution, c1=0.1, epsilon=epsilon, impact="restitution"
         )
