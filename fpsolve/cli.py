@@ -1,23 +1,81 @@
-"""The command line: runs a command, and says what went wrong."""
+"""The command line, fpsolve run | check | simulate | chart | prove | mesh: runs a command, and says what went wrong."""
 
 from __future__ import annotations
 
+import os
+import re
 import sys
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from io import TextIOWrapper
 from pathlib import Path
+from shlex import quote
+from time import monotonic
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import CycloptsError
+from cyclopts import App, CycloptsError, Parameter, Token
 from rich.console import Console
 
-from fpsolve import letters
-from fpsolve.commands import BAD_INPUT, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, app, print_error
-from fpsolve.errors import FpsolveError, NotConverged
-from fpsolve.process import drop_blocked_output, ended_by_signals, flush_output
+from fpsolve import __version__
+from fpsolve.case.remedies import in_words_of_a_case
+from fpsolve.errors import CaseError, FpsolveError, NotConverged
+from fpsolve.output.screen import HANDLER
+from fpsolve.signals import ended_by_signals
+
+if TYPE_CHECKING:
+    from fpsolve.case.case import Case
+    from fpsolve.pool import Pool
+    from fpsolve.workflow.progress import Watch
+
+CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
+
+app = App(
+    name="fpsolve",
+    help="""Moment Lyapunov exponents of a vibro-impact oscillator under coloured noise, by finite elements.
+
+    Example: fpsolve run cases/fig1.toml
+
+    Exit codes: 0 success, 1 a checked value differs, 2 bad input, 3 not converged, 130 interrupted""",
+    version=lambda: f"fpsolve {__version__}",
+    help_format="plaintext",
+    suppress_keyboard_interrupt=False,
+)
+
+UNITS = "Units: omega in rad/time, c1 in 1/time, D0 in 1/time, tau0 in time"
+Cases = Annotated[list[Path], Parameter(help="Case files.", consume_multiple=True, negative="")]
+ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True, negative="")]
+SET = f"Another value for a key of the case, e.g. oscillator.omega=2.0. {UNITS}."
+Overrides = Annotated[list[str] | None, Parameter(name="--set", help=SET, negative="")]
+
+
+def _whole(_: type, tokens: Sequence[Token]) -> int:
+    """A whole number; cyclopts alone would take 2.5 for 2."""
+    try:
+        return int(tokens[0].value)
+    except ValueError:
+        raise ValueError(f'got "{tokens[0].value}"; must be a whole number') from None
+
+
+Count = Annotated[int, Parameter(converter=_whole)]
+Jobs = Annotated[Count | None, Parameter(help="How many processes; as many as there are processors if omitted.")]
+Out = Annotated[Path, Parameter(help="Folder for the results.")]
+Scheduler = Annotated[
+    str, Parameter(help="Address of a Dask scheduler whose workers do the work, e.g. tcp://host:8786.")
+]
+Fresh = Annotated[bool, Parameter(help="Begin anew, also what an earlier run has finished.", negative="")]
+Quiet = Annotated[
+    bool,
+    Parameter(
+        help='Print the last line only, and on the standard error what is wrong or "not converged": no tables, notes, '
+        "warnings or progress; all of that is in the files.",
+        negative="",
+    ),
+]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; the help of `app` names the exit codes.
+    """Run a command, and return its exit code, see the help of `app`.
 
     SIGHUP and SIGTERM interrupt it too; the exit code is then 128 and the number of the signal.
     """
@@ -30,11 +88,15 @@ def _run(argv: Sequence[str] | None) -> int:
     """Run a command, and say what went wrong."""
     for stream in (sys.stdout, sys.stderr):  # a terminal that has no Greek shows its names
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors=letters.HANDLER)
+            stream.reconfigure(errors=HANDLER)
     try:
-        _refuse_lost_folder()
+        try:
+            Path.cwd()
+        except OSError:
+            raise FpsolveError("the working folder does not exist any more; change to another folder") from None
         code = app(argv, result_action="return_value", exit_on_error=False, error_console=Console(stderr=True))
-        flush_output()
+        if sys.stdout is not None:  # as it is where the output is closed
+            sys.stdout.flush()
     except CycloptsError:  # cyclopts has said what is wrong
         return BAD_INPUT
     except FpsolveError as failure:
@@ -44,25 +106,369 @@ def _run(argv: Sequence[str] | None) -> int:
         print_error(str(interrupt) or "interrupted")
         return INTERRUPTED
     except (OSError, SystemExit) as failure:  # rich exits where a pipe is closed
-        return _end_blocked(failure)
+        _drop_blocked_output()
+        if isinstance(failure, BrokenPipeError | SystemExit):  # nobody reads the output any more, as with `| head -1`
+            return CLOSED_PIPE
+        place, reason = failure.filename or "the output", failure.strerror or failure
+        print_error(f"{place} cannot be written: {reason}; send it to another place")
+        return BAD_INPUT
     return code if isinstance(code, int) else 0
 
 
-def _end_blocked(failure: OSError | SystemExit) -> int:
-    """End where the output cannot be written: quietly if nobody reads it any more, as with `| head -1`."""
-    drop_blocked_output()
-    if isinstance(failure, BrokenPipeError | SystemExit):
-        return CLOSED_PIPE
-    place, reason = failure.filename or "the output", failure.strerror or failure
-    print_error(f"{place} cannot be written: {reason}; send it to another place")
-    return BAD_INPUT
+def print_error(text: str) -> None:
+    """Print what is wrong on the standard error, in the words of case files."""
+    from rich.text import Text
 
-
-def _refuse_lost_folder() -> None:
     try:
-        Path.cwd()
-    except OSError:
-        raise FpsolveError("the working folder does not exist any more; change to another folder") from None
+        Console(stderr=True).print(Text(in_words_of_a_case(text)), style="bold red", soft_wrap=True)
+    except (OSError, SystemExit):  # nobody can be told
+        _drop_blocked_output()
+
+
+def _drop_blocked_output() -> None:
+    """Drop what waits in the standard output or errors and cannot be written, so that Python need not at its end."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:
+                stream.flush()
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)
+
+
+@app.command
+def run(
+    cases: Cases,
+    *,
+    out: Out = Path("results"),
+    monte_carlo: Annotated[
+        bool, Parameter(help="Simulate too, as [monte_carlo] of the case says, and draw both.", negative="")
+    ] = False,
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    fresh: Fresh = False,
+    json: Annotated[
+        bool, Parameter(help="Print the summaries, one line of JSON for each case, instead of tables.", negative="")
+    ] = False,
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
+    """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
+
+    What an earlier run has finished, also one that was killed, is not solved again.
+
+    Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
+    """
+    from fpsolve.output.remarks import note_missing
+    from fpsolve.output.terminal import done_of, known_of, print_written
+    from fpsolve.workflow.cases import run_case
+
+    code, loaded = 0, load_to_write(cases, overrides, monte_carlo=monte_carlo)
+    pool = pool_of(jobs, scheduler, loaded)
+    for case in loaded:
+        start, watch = monotonic(), _watch(is_json=json, is_quiet=quiet)
+        outcome = run_case(case, out, monte_carlo=monte_carlo, pool=pool, is_fresh=fresh, watch=watch)
+        if outcome.interruption:
+            print_error(outcome.interruption)
+        if not quiet:
+            note_missing(case, monte_carlo=monte_carlo)
+        if json:
+            lines = (out / case.name / "summary.json").read_text(encoding="utf-8").splitlines()
+            print(" ".join(line.strip() for line in lines))
+        else:
+            what = done_of(case, len(outcome.results), sum(bool(each.failures) for each in outcome.results))
+            print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known))
+        if outcome.interruption:
+            return INTERRUPTED
+        if outcome.failures:
+            code = NOT_CONVERGED
+    return code
+
+
+@app.command
+def simulate(
+    cases: Cases,
+    *,
+    out: Out = Path("results"),
+    paths: Annotated[Count | None, Parameter(help="How many paths; 32768 if nothing is stated.")] = None,
+    time: Annotated[float | None, Parameter(help="Length of the paths; 64 transients if nothing is stated.")] = None,
+    seed: Annotated[Count | None, Parameter(help="Seed of the random numbers; 0 if nothing is stated.")] = None,
+    estimator: Annotated[
+        str | None,
+        Parameter(help="direct (if nothing is stated), or population for strong noise or large |p|."),
+    ] = None,
+    jobs: Annotated[Count | None, Parameter(help="How many processors; all if omitted.")] = None,
+    scheduler: Scheduler = "",
+    fresh: Fresh = False,
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
+    """Simulate the system with its impacts and estimate the exponents; write monte_carlo.json into OUT/<case>/.
+
+    Ctrl-C ends it early and keeps what is done; curves that an earlier simulation has finished are not simulated again.
+
+    Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
+    """
+    from fpsolve.output.terminal import done_of, known_of, print_written
+    from fpsolve.workflow.cases import simulate_case
+
+    stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
+    options = {
+        f"--{name} {value:{'g' if name == 'time' else ''}}": f"monte_carlo.{name}={value}"
+        for name, value in stated.items()
+        if value is not None
+    }
+    loaded = load_to_write(cases, overrides, options, monte_carlo=True)
+    pool = pool_of(jobs, scheduler)
+    for case in loaded:
+        start, watch = monotonic(), _watch(is_quiet=quiet)
+        outcome = simulate_case(case, out, pool=pool if scheduler else None, is_fresh=fresh, watch=watch)
+        if outcome.interruption:
+            print_error(outcome.interruption)
+        what = done_of(case, sum(not each.interrupted for each in outcome.simulated))
+        print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known))
+        if outcome.interruption:
+            return INTERRUPTED
+    return 0
+
+
+@app.command
+def check(
+    cases: Cases,
+    *,
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
+    """Solve case files and compare with the values that they expect; write nothing.
+
+    Example: fpsolve check cases/fig1.toml cases/minimal.toml
+    """
+    from fpsolve.output.terminal import agreement, print_comparisons, print_failures, print_warnings
+    from fpsolve.workflow.cases import check_case
+
+    code, loaded = 0, load(cases, overrides)
+    pool = pool_of(jobs, scheduler, loaded)
+    for case in loaded:
+        outcome = check_case(case, pool=pool, watch=_watch(is_quiet=quiet))
+        if quiet:
+            print(f"{case.name}: {agreement(outcome.comparisons)}")
+            print_failures(case, outcome.results, file="")
+        else:
+            print_comparisons(case, outcome.comparisons)
+            print_warnings(case, outcome.results, file="")
+        if outcome.failures:
+            code = NOT_CONVERGED
+        elif not all(comparison.met for comparison in outcome.comparisons):
+            code = max(code, CHECK_FAILED)
+    return code
+
+
+@app.command
+def chart(
+    cases: Cases,
+    *,
+    out: Out = Path("results"),
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
+    """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
+
+    Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
+    """
+    from fpsolve.output.remarks import FAILURE, print_remark
+    from fpsolve.output.terminal import print_chart, print_written, traced
+    from fpsolve.study.chart import refuse_no_chart
+    from fpsolve.workflow.cases import chart_case
+
+    code, loaded = 0, load_to_write(cases, overrides)
+    for case in loaded:
+        refuse_no_chart(case)
+    pool = pool_of(jobs, scheduler)
+    for case in loaded:
+        start = monotonic()
+        found = chart_case(case, out, pool=pool, watch=_watch(is_quiet=quiet))
+        if quiet:
+            for text in dict.fromkeys(found.failures):
+                print_remark(f"{case.name}: {in_words_of_a_case(text)}", FAILURE)
+        else:
+            print_chart(case, found)
+        print_written(out / case.name, traced(found), monotonic() - start)
+        if found.failures:
+            code = NOT_CONVERGED
+    return code
+
+
+@app.command
+def prove(
+    cases: ProvenCases = None,
+    *,
+    width: Annotated[
+        float | None, Parameter(help="Wanted upper - lower, in 1/time; 1e-7 of the scale of each number if omitted.")
+    ] = None,
+    check: Annotated[Path | None, Parameter(help="Verify a proof.json from its certificates alone instead.")] = None,
+    out: Out = Path("results"),
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
+    """Prove bounds on the exponents that hold with certainty; write them with certificates, OUT/<case>/proof.json.
+
+    Needs python-flint: pip install 'fpsolve[proof]'. Exit codes: 0 proven, 3 a width is not met; of --check 0 accepted,
+    1 rejected, 2 malformed.
+
+    Example: fpsolve prove cases/fig1.toml --width 1e-9
+    """
+    from fpsolve.output.proofs import print_proofs
+    from fpsolve.output.terminal import done_of, print_written
+    from fpsolve.study.prove import refuse_unprovable_case
+    from fpsolve.workflow.proofs import prove_case
+
+    if (check is None) == (not cases):
+        raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
+    if check is not None:
+        if width is not None or overrides or jobs is not None or scheduler:
+            raise FpsolveError("--check takes a proof.json and nothing else, as that says all that is verified")
+        return _verify(check)
+    code, loaded = 0, load_to_write(cases or [], overrides)
+    for case in loaded:
+        refuse_unprovable_case(case, width)
+    pool = pool_of(jobs, scheduler)
+    for case in loaded:
+        start = monotonic()
+        proofs = prove_case(case, out, width=width, pool=pool, watch=_watch(is_quiet=quiet))
+        if not quiet:
+            print_proofs(case, proofs)
+        unmet = sum(not each.is_met for each in proofs)
+        print_written(out / case.name, done_of(case, len(proofs), unmet, "not as close as wanted"), monotonic() - start)
+        if unmet:
+            code = NOT_CONVERGED
+    return code
+
+
+def _verify(path: Path) -> int:
+    """Check a proof.json, and say which claims do not follow."""
+    from fpsolve.workflow.proofs import check_proof
+
+    checked = check_proof(path)
+    for text in checked.objections:
+        print_error(f"{path}: {text}")
+    bounds = f"bounds on {checked.claims.count} number{'s' * (checked.claims.count != 1)}"
+    if checked.objections:
+        objections = f"{len(checked.objections)} objection{'s' * (len(checked.objections) > 1)}"
+        print(f"rejected: {path} ({objections}, {bounds})")
+        return CHECK_FAILED
+    unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
+    print(f"accepted: {path} ({bounds} follow from their certificates{unfinished})")
+    return 0
+
+
+@app.command
+def mesh(
+    output: Annotated[Path, Parameter(help="The file to write: .vtu for ParaView, .msh for Gmsh.")],
+    *,
+    phi_cells: Annotated[Count, Parameter(help="Cells in the phase from one impact to the next.")] = 2,
+    phi_degree: Annotated[Count, Parameter(help="Degree of the elements in the phase.")] = 10,
+    xi_cells: Annotated[Count, Parameter(help="Cells in the noise.")] = 4,
+    xi_degree: Annotated[Count, Parameter(help="Degree of the elements in the noise.")] = 9,
+    xi_min: Annotated[float, Parameter(help="Lower end of the noise, in standard deviations.")] = -8.0,
+    xi_max: Annotated[float, Parameter(help="Upper end of the noise, in standard deviations.")] = 8.0,
+    grading: Annotated[
+        float, Parameter(help="Size of the outermost noise cells over the innermost; 1 is uniform.")
+    ] = 1.0,
+    full_circle: Annotated[bool, Parameter(help="Mesh the whole circle instead of one half.", negative="")] = False,
+) -> int:
+    """Write a mesh that a case can name as [mesh] file.
+
+    Example: fpsolve mesh meshes/graded.vtu --phi-cells 3 --xi-cells 8 --grading 2
+    """
+    from fpsolve.fem.mesh import make_mesh
+    from fpsolve.fem.mesh_file import write_mesh
+
+    made = make_mesh(
+        phi_cells=phi_cells,
+        phi_degree=phi_degree,
+        xi_cells=xi_cells,
+        xi_degree=xi_degree,
+        xi_min=xi_min,
+        xi_max=xi_max,
+        grading=grading,
+        full_circle=full_circle,
+    )
+    write_mesh(made, output)
+    cells = (made.phi_lines.size - 1) * (made.z_lines.size - 1)
+    unknowns = (made.phi_lines.size - 1) * (phi_degree + 1) * ((made.z_lines.size - 1) * xi_degree + 1)
+    print(f"written: {output} ({cells} cells, {unknowns} unknowns)")
+    return 0
+
+
+def load(
+    paths: Sequence[Path], overrides: Sequence[str] | None, options: Mapping[str, str] = MappingProxyType({})
+) -> list[Case]:
+    """All cases. Raises one `FpsolveError` with the faults of all of them."""
+    from fpsolve.case.case import load_case
+
+    cases, errors = [], []
+    for path in paths:
+        try:
+            cases.append(load_case(path, overrides or (), options))
+        except CaseError as error:
+            is_there = os.path.exists(path)  # noqa: PTH110  (Path.exists raises where a name is too long)
+            if is_there or not re.match(r'[\w."-]+ *=', str(path)):
+                errors.append(str(error))
+            else:
+                words = " ".join(f"--set {quote(text)}" for text in [*(overrides or ()), str(path)])
+                errors.append(f"{path}: no such file; each --set takes one assignment: write {words}")
+    if errors:
+        raise FpsolveError("\n".join(errors))
+    return cases
+
+
+def load_to_write(
+    paths: Sequence[Path],
+    overrides: Sequence[str] | None,
+    options: Mapping[str, str] = MappingProxyType({}),
+    *,
+    monte_carlo: bool = False,
+) -> list[Case]:
+    """All cases, or an error where two would write into one folder, or one that shall be simulated cannot be."""
+    from fpsolve.study.simulate import refuse_obstacles
+
+    cases = load(paths, overrides, options)
+    for name, count in Counter(case.name for case in cases).items():
+        if count > 1:
+            raise FpsolveError(f'several cases are called "{name}" and would overwrite each other; run them apart')
+    for case in cases if monte_carlo else ():
+        refuse_obstacles(case)
+    return cases
+
+
+def pool_of(jobs: int | None, scheduler: str, cases: Sequence[Case] = ()) -> Pool:
+    """Who does the work that the options ask for; no more processes than a case has sets, where cases are given."""
+    from fpsolve.pool import MOST_JOBS, cluster, limit_processors, parallel
+
+    if jobs is not None and scheduler:
+        raise FpsolveError("--jobs is for this machine, and --scheduler for a cluster; name one of them")
+    pool = cluster(scheduler) if scheduler else parallel(jobs, max((case.planned for case in cases), default=MOST_JOBS))
+    if jobs is not None:
+        limit_processors(jobs)
+    return pool
+
+
+def _watch(*, is_json: bool = False, is_quiet: bool = False) -> Watch:
+    """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
+    from fpsolve.output.terminal import print_failures, print_results, print_simulation, print_warnings
+    from fpsolve.workflow.progress import Bars, Watch
+
+    if is_quiet:
+        return Watch(solved=print_failures)
+    bar = Bars().bar
+    return Watch(bar, print_warnings) if is_json else Watch(bar, print_results, print_simulation)
 
 
 if __name__ == "__main__":

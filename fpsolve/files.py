@@ -3,38 +3,42 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import os
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 from typing import Any, TextIO
 
 from fpsolve.errors import OutputError, Remedy
 
 LOCK = ".fpsolve.lock"
+LOCK_SECONDS = 0.1
+"""For which a run tries to lock a folder; it tries again where another run has just removed the file of its lock."""
+NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP)
+"""What file systems answer that have no locks."""
 TEMPORARY = r"\.fpsolve-[a-z0-9_]{8}(\.\w+)?"
-"""The pattern of the names of files that are being written; what is killed leaves them."""
+"""The pattern of the names of unfinished files, which a killed run leaves."""
 
 
 @contextmanager
 def atomic(path: Path) -> Iterator[Path]:
     """A temporary file beside `path`, with the same ending, that takes its place when the body succeeds.
 
-    Folders are made as needed; when the body fails nothing is left of the file.
+    Missing folders are made. When the body fails the temporary file is removed. Who may read the file follows from the
+    umask, as for any new file.
 
     Raises:
         OSError: the folder cannot be made, or the file cannot be written; it names `path`.
     """
+    temporary = path.with_name(f".fpsolve-{token_hex(4)}{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".fpsolve-", suffix=path.suffix)
-        os.close(handle)
-        temporary = Path(name)
+        temporary.touch(exist_ok=False)
         try:
             yield temporary
-            temporary.chmod(0o666 & ~_umask())
             temporary.replace(path)
         finally:
             temporary.unlink(missing_ok=True)
@@ -66,50 +70,31 @@ def writable(folder: Path) -> Iterator[None]:
 def alone(folder: Path) -> Iterator[None]:
     """Make a folder for results, and keep other runs out of it during the body.
 
-    The lock is one of the operating system on a hidden file, which ends with the process however that ends. The file is
-    removed with the lock still held; what was killed leaves it, and then it does not hinder the next run. Where there
-    are no such locks nobody is kept out; on Windows, too, where the file, open as it is, cannot be removed and stays.
+    The lock is one of the operating system on a hidden file. It ends with the process, so that a file that a killed run
+    leaves does not hinder the next one; else the file is removed with the lock still held. On a file system without
+    locks nobody is kept out: a file that only exists as a lock would outlive a run that another machine kills.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run has it.
     """
+    from filelock import FileLock, Timeout  # not before it is needed, as it takes a while
+
     path = folder / LOCK
+    lock = FileLock(path, timeout=LOCK_SECONDS, poll_interval=LOCK_SECONDS / 2, fallback_to_soft=False)
     with writable(folder):
-        handle = _lock(path)
+        try:
+            lock.acquire()
+        except Timeout:
+            raise OutputError(f"{folder} is being written by another run; wait for it, or {Remedy.FOLDER}") from None
+        except OSError as failure:
+            if failure.errno not in NO_LOCKS:
+                raise
     try:
         yield
     finally:
         with suppress(OSError):
             path.unlink()
-        os.close(handle)
-
-
-def _lock(path: Path) -> int:
-    """An open file that is locked and stands at its path; one that its owner removed meanwhile is opened anew."""
-    while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        if not _is_ours(handle):
-            os.close(handle)
-            raise OutputError(f"{path.parent} is being written by another run; wait for it, or {Remedy.FOLDER}")
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(handle), path.stat()):
-                return handle
-        os.close(handle)
-
-
-def _is_ours(handle: int) -> bool:
-    """Lock an open file, unless another has locked it; file systems that know no locks say nothing against it."""
-    try:
-        import fcntl
-    except ImportError:  # on Windows
-        return True
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-    return True
+        lock.release()
 
 
 def write_json(path: Path, data: Any) -> None:
@@ -136,9 +121,3 @@ def write_text(path: Path, text: str) -> None:
     """Text as UTF-8."""
     with atomic(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -17,7 +17,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.pictures import SIZE, STYLE, title_of
-from fpsolve.process import signals_held
+from fpsolve.signals import signals_held
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

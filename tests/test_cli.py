@@ -13,8 +13,7 @@ import pytest
 
 from fpsolve import cli
 from fpsolve.case.vary import PARAMETERS
-from fpsolve.cli import main
-from fpsolve.commands import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED
+from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.model.parameters import unit_of
 from fpsolve.output.summary import digits

@@ -1,6 +1,7 @@
 """Files that are written whole, and folders that one run has for itself."""
 
 import errno
+import os
 import signal
 import subprocess
 import sys
@@ -96,19 +97,65 @@ def test_a_folder_is_kept_from_the_same_process(tmp_path):
         pass
 
 
-def test_a_lock_that_its_owner_removes_is_taken_anew(tmp_path, monkeypatch):
+@pytest.fixture
+def locking(monkeypatch):
+    """Replaces the lock of the operating system."""
+    fcntl = pytest.importorskip("fcntl")
+    original = fcntl.flock
+
+    def replace(lock):
+        monkeypatch.setattr(fcntl, "flock", lambda *arguments: lock(original, *arguments))
+
+    return replace
+
+
+def test_a_lock_that_its_owner_removes_is_taken_anew(tmp_path, locking):
     """One run opens the file of another, which ends before the first has locked it."""
-    from fpsolve import files
+    opened = []
 
-    original, opened = files._is_ours, []
-
-    def after_the_other_ended(handle):
+    def after_the_other_ended(original, handle, operation):
         if not opened:
-            (tmp_path / files.LOCK).unlink()
+            (tmp_path / LOCK).unlink()
         opened.append(handle)
-        return original(handle)
+        return original(handle, operation)
 
-    monkeypatch.setattr(files, "_is_ours", after_the_other_ended)
+    locking(after_the_other_ended)
     with alone(tmp_path):
         assert len(opened) == 2
-        assert (tmp_path / files.LOCK).exists()
+        assert (tmp_path / LOCK).exists()
+
+
+@pytest.mark.parametrize("name", ["ENOSYS", "ENOLCK", "EOPNOTSUPP"])
+def test_a_file_system_without_locks_keeps_nobody_out(tmp_path, locking, name):
+    def refused(*_):
+        raise OSError(getattr(errno, name), "no locks")
+
+    locking(refused)
+    with alone(tmp_path), alone(tmp_path):
+        write_text(tmp_path / "table.csv", "1, 2")
+    assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_a_lock_that_fails_for_another_reason_is_an_output_error(tmp_path, locking):
+    def failed(*_):
+        raise OSError(errno.EIO, "Input/output error")
+
+    locking(failed)
+    with pytest.raises(OutputError, match="Input/output error"), alone(tmp_path):
+        raise AssertionError
+
+
+@pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")
+@pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o002, 0o664), (0o077, 0o600)])
+def test_the_umask_says_who_may_read_a_file(tmp_path, mask, mode):
+    """Colleagues may, where it lets them; a file of `tempfile` only its owner."""
+    former = os.umask(mask)
+    try:
+        write_text(tmp_path / "table.csv", "1, 2")
+        with atomic(tmp_path / "new.nc") as temporary:  # a library may replace the file
+            temporary.unlink()
+            temporary.write_bytes(b"")
+        assert os.umask(mask) == mask
+    finally:
+        os.umask(former)
+    assert [path.stat().st_mode & 0o777 for path in sorted(tmp_path.iterdir())] == [mode, mode]

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from fpsolve.process import processors
+from fpsolve.pool import processors
 from tests.conftest import heed_signals
 
 CASE = """

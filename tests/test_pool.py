@@ -13,8 +13,7 @@ import pytest
 
 from fpsolve import pool
 from fpsolve.errors import FpsolveError
-from fpsolve.pool import Pool, cluster, here, several
-from fpsolve.process import processors
+from fpsolve.pool import PROCESSORS, Pool, cluster, limit_processors, parallel, processors, serial
 from tests.conftest import heed_signals
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
@@ -60,7 +59,7 @@ class Cluster(Executor):
 
 @pytest.mark.parametrize("count", [1, 2, None])
 def test_map_keeps_the_order(count):
-    with several(count) as workers:
+    with parallel(count) as workers:
         assert list(workers.map(square, range(300))) == [number**2 for number in range(300)]
         assert list(workers.map(square, ())) == []
         assert list(workers.map(square, [4])) == [16]  # the workers are still there
@@ -75,7 +74,7 @@ def test_items_are_taken_when_they_are_needed():
             taken.append(number)
             yield number
 
-    with several(2) as workers:
+    with parallel(2) as workers:
         found = workers.run(square, items())
         next(found)
         assert len(taken) <= 2 * pool.AHEAD + 1
@@ -94,7 +93,7 @@ def test_items_are_taken_when_they_are_needed():
             return self.left.pop()
 
     items = Growing()
-    with here() as workers:
+    with serial() as workers:
         for done in workers.run(square, items):
             if done.item:
                 items.left.append(done.item - 1)
@@ -102,7 +101,7 @@ def test_items_are_taken_when_they_are_needed():
     assert last.item == 0
 
 
-@pytest.mark.parametrize("workers", [several(2), Pool(Cluster, ahead=3)])
+@pytest.mark.parametrize("workers", [parallel(2), Pool(Cluster, ahead=3)])
 def test_a_dead_worker_costs_its_task_only(workers):
     with workers:
         found = {done.item: done for done in workers.run(deadly, range(15))}
@@ -113,13 +112,13 @@ def test_a_dead_worker_costs_its_task_only(workers):
 
 
 def test_a_dead_worker_ends_a_map():
-    with several(2) as workers, pytest.raises(FpsolveError, match="a worker died"):
+    with parallel(2) as workers, pytest.raises(FpsolveError, match="a worker died"):
         list(workers.map(deadly, range(15)))
 
 
 INTERRUPTED = """
 import time
-from fpsolve.pool import here
+from fpsolve.pool import serial
 
 def task(number):
     print("begun", flush=True)
@@ -127,7 +126,7 @@ def task(number):
     while time.monotonic() < end:
         pass
 
-with here() as workers:
+with serial() as workers:
     list(workers.run(task, [1]))
 """
 
@@ -147,19 +146,19 @@ def test_an_interrupt_reaches_a_task_of_this_process():
 def test_a_map_of_this_process_is_as_lazy_as_the_builtin():
     """Who looks at the first result need not wait for others."""
     done = []
-    with here() as workers:
+    with serial() as workers:
         next(workers.map(done.append, range(100)))
     assert done == [0]
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_exceptions_are_raised_here(count):
-    with several(count) as workers, pytest.raises(OSError, match="No space"):
+    with parallel(count) as workers, pytest.raises(OSError, match="No space"):
         list(workers.run(faulty, range(20)))
 
 
 def test_workers_are_other_processes_with_one_processor_each():
-    with several(2) as workers:
+    with parallel(2) as workers:
         found = set(workers.map(whereabouts, range(20)))
     assert len(found) == 2
     assert {count for _, count in found} == {1}
@@ -169,19 +168,19 @@ def test_workers_are_other_processes_with_one_processor_each():
 def test_little_work_is_done_here(monkeypatch):
     """Others would take as long to start."""
     monkeypatch.setattr(pool, "processors", lambda: 2)
-    with several() as workers:
+    with parallel() as workers:
         assert {number for number, _ in workers.map(whereabouts, range(3))} == {os.getpid()}
     monkeypatch.setattr(pool, "START_SECONDS", 0.1)
-    with several() as workers:
+    with parallel() as workers:
         found = [number for number, _ in workers.map(whereabouts, range(30))]
     assert found[0] == os.getpid()
     assert len(set(found)) == 3
 
 
 SCRIPT = """
-from fpsolve.pool import several
+from fpsolve.pool import parallel
 from tests.test_pool import square
-with several(2) as workers:
+with parallel(2) as workers:
     print(sum(done.result for done in workers.run(square, range(4))))
 """
 
@@ -205,15 +204,15 @@ def test_a_script_needs_no_guard(tmp_path, is_file):
 
 
 def test_no_more_processes_than_tasks():
-    with several(1000, 2) as workers:
+    with parallel(1000, 2) as workers:
         assert len(set(workers.map(whereabouts, range(20)))) == 2
-    assert several(2, 1).own_seconds == math.inf
+    assert parallel(2, 1).own_seconds == math.inf
 
 
 @pytest.mark.parametrize("count", [0, -1, 2.5, "2", True, 1001, 10**20])
 def test_what_is_no_number_of_processes_is_refused(count):
     with pytest.raises(FpsolveError, match=r"jobs.*must be a whole number from 1 to 1000"):
-        several(count)
+        parallel(count)
 
 
 def test_processes_that_cannot_be_started():
@@ -222,7 +221,7 @@ def test_processes_that_cannot_be_started():
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (len(list(Path("/dev/fd").iterdir())) + 12, before[1]))
     try:
-        with several(100) as workers, pytest.raises(FpsolveError, match=r"cannot be started: .*; use fewer jobs"):
+        with parallel(100) as workers, pytest.raises(FpsolveError, match=r"cannot be started: .*; use fewer jobs"):
             list(workers.map(square, range(300)))
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, before)
@@ -248,3 +247,53 @@ def test_without_dask(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(FpsolveError, match=r"pip install 'fpsolve\[cluster\]'"):
         cluster("tcp://127.0.0.1:8786")
+
+
+@pytest.fixture
+def _four_processors(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1, 2, 5}, raising=False)
+    monkeypatch.setattr(pool, "_limits", [])
+    monkeypatch.delenv(PROCESSORS, raising=False)
+
+
+@pytest.mark.usefixtures("_four_processors")
+def test_the_least_limit_of_processors_counts(monkeypatch):
+    assert processors() == 4
+    monkeypatch.setenv(PROCESSORS, " 3 ")
+    assert processors() == 3
+    limit_processors(2)
+    assert processors() == 2
+    limit_processors(9)
+    assert processors() == 3
+    monkeypatch.setenv(PROCESSORS, "")
+    assert processors() == 4
+
+
+@pytest.mark.usefixtures("_four_processors")
+def test_without_affinities_all_processors_count(monkeypatch):
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: 6)
+    assert processors() == 6
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert processors() == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no affinities")
+def test_a_process_that_is_bound_to_one_processor_uses_one():
+    code = "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\nfrom fpsolve.pool import *"
+    command = [sys.executable, "-c", f"{code}; print(processors())"]
+    assert subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip() == "1"
+
+
+@pytest.mark.usefixtures("_four_processors")
+@pytest.mark.parametrize("text", ["0", "00", "-1", "two", "1.5", "²"])
+def test_a_limit_that_is_no_number_is_refused(monkeypatch, text):
+    monkeypatch.setenv(PROCESSORS, text)
+    with pytest.raises(FpsolveError, match=f'^FPSOLVE_PROCESSORS, .*got "{text}"; must be a whole number >= 1; set it'):
+        processors()
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.0, True, "2"])
+def test_a_bad_limit_is_refused(count):
+    with pytest.raises(ValueError, match=f"got count = {count!r}; must be a whole number >= 1"):
+        limit_processors(count)

@@ -6,8 +6,7 @@ import re
 import pytest
 from rich.console import Console
 
-from fpsolve.progress import Bars, Stretch, hidden
-from fpsolve.workflow.watch import MOMENTS, PERCENT, POINTS, SETS, Phase
+from fpsolve.workflow.progress import MOMENTS, PERCENT, POINTS, SETS, SILENT, Bars, Phase, State
 
 SOLVING = Phase("case", "solving", 400, SETS)
 
@@ -31,13 +30,14 @@ def console(width=80, **options):
     return Console(file=io.StringIO(), width=width, **options)
 
 
-def test_the_time_to_go_follows_from_the_sets_of_this_run_alone():
-    stretch = Stretch(SOLVING, begun=0.0)
-    stretch.advance(300, 0, known=True)
-    assert stretch.left(60.0) is None
-    stretch.advance(20, 0, known=False)
-    assert stretch.left(60.0) == pytest.approx(80 * 60.0 / 20)
-    assert stretch.count == "320 of 400 sets"
+def test_the_time_to_go_follows_from_the_sets_of_this_run_alone(clock):
+    state = State(SOLVING, clock)
+    state.advance(300, known=True)
+    clock.now += 60.0
+    assert state.left is None
+    state.advance(20)
+    assert state.left == pytest.approx(80 * 60.0 / 20)
+    assert state.count == "320 of 400 sets"
 
 
 @pytest.mark.parametrize(
@@ -50,17 +50,18 @@ def test_the_time_to_go_follows_from_the_sets_of_this_run_alone():
         (Phase("case", "figures"), 0, 0, ""),
     ],
 )
-def test_what_is_counted(phase, done, failed, told):
-    stretch = Stretch(phase, begun=0.0)
-    stretch.advance(done, failed, known=False)
-    assert stretch.count == told
+def test_what_is_counted(phase, done, failed, told, clock):
+    state = State(phase, clock)
+    state.advance(done, failed=failed)
+    clock.now += 10.0
+    assert state.count == told
     if phase.total is None:
-        assert stretch.left(10.0) is None
+        assert state.left is None
 
 
 def test_a_file_gets_a_line_each_tenth_of_a_long_phase(clock):
     screen = console()
-    with Bars(screen, clock).phase(SOLVING) as advance:
+    with Bars(screen, clock).bar(SOLVING) as advance:
         advance(200, known=True)
         for number in range(200):
             clock.now += 1.0
@@ -74,7 +75,7 @@ def test_a_file_gets_a_line_each_tenth_of_a_long_phase(clock):
 
 def test_a_file_gets_no_line_of_a_short_phase(clock):
     screen = console()
-    with Bars(screen, clock).phase(SOLVING) as advance:
+    with Bars(screen, clock).bar(SOLVING) as advance:
         for _ in range(400):
             clock.now += 0.02
             advance()
@@ -86,12 +87,12 @@ def test_a_terminal_shows_all_phases_in_lines_that_fit(clock, width, monkeypatch
     monkeypatch.setenv("TERM", "xterm")
     screen = console(width, force_terminal=True, color_system=None, legacy_windows=False)
     bars = Bars(screen, clock)
-    with bars.phase(SOLVING) as advance:
+    with bars.bar(SOLVING) as advance:
         advance(100, known=True)
         clock.now += 60.0
         advance(30, failed=3)
         bars._display.refresh()
-    with bars.phase(Phase("case", "figures")):
+    with bars.bar(Phase("case", "figures")):
         bars._display.refresh()
     lines = re.split(r"[\r\n]+", re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.file.getvalue()))
     assert any("130 of 400 sets, 3 failed" in line and "0:09:00 left" in line for line in lines)
@@ -106,8 +107,8 @@ def test_two_phases_show_at_a_time(clock, monkeypatch):
     screen = console(100, force_terminal=True)
     bars = Bars(screen, clock)
     with (
-        bars.phase(Phase("case", "scan", 4, "nodes")) as progress,
-        bars.phase(Phase("case", "lines", unit=POINTS)) as stepped,
+        bars.bar(Phase("case", "scan", 4, "nodes")) as progress,
+        bars.bar(Phase("case", "lines", unit=POINTS)) as stepped,
     ):
         progress()
         stepped()
@@ -118,13 +119,13 @@ def test_two_phases_show_at_a_time(clock, monkeypatch):
 def test_a_dumb_terminal_is_like_a_file(clock, monkeypatch):
     monkeypatch.setenv("TERM", "dumb")
     screen = console(force_terminal=True)
-    with Bars(screen, clock).phase(SOLVING) as advance:
+    with Bars(screen, clock).bar(SOLVING) as advance:
         clock.now += 100.0
         advance(40)
     assert screen.file.getvalue() == "case, solving: 40 of 400 sets, 0:15:00 left\n"
 
 
-def test_nothing_is_seen_of_hidden_phases(capsys):
-    with hidden(SOLVING) as advance:
+def test_nothing_is_seen_of_silent_phases(capsys):
+    with SILENT.bar(SOLVING) as advance:
         advance(400, failed=3, known=True)
     assert capsys.readouterr() == ("", "")

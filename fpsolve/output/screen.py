@@ -5,22 +5,29 @@ Nothing is cut, and no word and no number is broken.
 
 from __future__ import annotations
 
+import codecs
 import re
 import shutil
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from textwrap import wrap
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from textwrap import TextWrapper
 
 from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fpsolve.letters import spelt
-
 ENDLESS = 1_000_000
-"""The width of what is no terminal."""
+"""The width of what is not a terminal."""
 Cell = str | Text
+HANDLER = "fpsolve.spelt"
+"""The name under which `codecs` knows `_spell`, which spells letters that an encoding does not have."""
+_SIGNS = {
+    "′": "'", "″": "''", "−": "-", "–": "-", "±": "+-", "≤": "<=", "≥": ">=", "≠": "!=", "∞": "inf", "×": "x",
+    "·": "*", "‖": "||", "⟨": "<", "⟩": ">", "→": "->", "…": "...", "√": "sqrt", "∂": "d", "ẋ": "x'", "ẍ": "x''",
+    "½": "1/2", "²": "^2", "³": "^3", "⁴": "^4", "“": '"', "”": '"', "’": "'",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -81,20 +88,20 @@ class Screen:
         return cls(console, console.width)
 
     def lines(self, texts: Sequence[str], style: str = "") -> None:
-        """Lines as they are."""
+        """Print lines as they are."""
         for text in texts:
-            self.console.print(Text(spelt(text, self.console.encoding)), style=style, soft_wrap=True)
+            self.console.print(Text(self._spelt(text)), style=style, soft_wrap=True)
 
     def say(self, text: str, style: str = "") -> None:
-        """A text in lines that fit, indented from the second one on; those that it has remain."""
+        """Print a text in lines that fit, indented from the second one on; its own line ends remain."""
         for line in text.split("\n"):
-            self.lines(wrapped(spelt(line, self.console.encoding), self.width - 1), style)
+            self.lines(wrapped(self._spelt(line), self.width - 1), style)
 
     def packed(self, parts: Sequence[str], indent: str = "", hang: str = "") -> None:
-        """Texts in as few lines as hold them whole; those from the second on are indented by `hang` more."""
+        """Print texts in as few lines as hold them whole; from the second line on they are indented by `hang` more."""
         room = (80 if self.width == ENDLESS else self.width) - 1 - len(indent + hang)
         lines: list[str] = []
-        for part in (spelt(each, self.console.encoding) for each in parts):
+        for part in map(self._spelt, parts):
             if lines and cell_len(lines[-1]) + 3 + cell_len(part) <= room:
                 lines[-1] += f"   {part}"
             else:
@@ -104,34 +111,68 @@ class Screen:
             self.lines(wrapped(start + line, self.width - 1, start + "  "))
 
     def show(self, grid: Grid) -> None:
-        """A table in as many columns as there is room for; in lines of "heading = number" where there is too little."""
+        """Print a table of as many columns as there is room for; where there is too little, "heading = number" lines.
+
+        Where it has too little room, rich would break numbers; so columns and the breaks of headings are chosen here.
+        """
         self.say(grid.title, "italic")
-        grid = self._spelt(grid)
-        chosen = next(_layouts(grid, self.width), None)
+        columns = [replace(each, heading=self._spelt(each.heading)) for each in grid.columns]
+        rows = [[self._cell(each) for each in row] for row in grid.rows]
+        chosen = self._layout(columns, rows)
         if chosen is None:
-            self._list(grid)
+            for row in rows:
+                parts = []
+                for column, cell in zip(columns, row, strict=True):
+                    first, *others = cell.plain.split("\n")
+                    parts += [f"{column.heading} = {first}" if first and column.heading else first, *others]
+                self.packed(list(filter(None, parts)), hang="  ")
         else:
-            self.console.print(_table(grid, *chosen))
-            left_out = [column.heading for i, column in enumerate(grid.columns) if i not in chosen[0]]
+            kept, is_folded = chosen
+            table = Table()
+            for i in kept:
+                if columns[i].is_text:
+                    table.add_column(Text(columns[i].heading), overflow="fold")
+                else:
+                    heading = columns[i].heading.replace(" ", "\n") if is_folded else columns[i].heading
+                    table.add_column(Text(heading), justify="right", no_wrap=True)
+            for number, row in enumerate(rows):
+                table.add_row(*(row[i] for i in kept), end_section=number in grid.ends)
+            self.console.print(table)
+            left_out = [column.heading for i, column in enumerate(columns) if i not in kept]
             if left_out:
                 self.say(f"no room for: {', '.join(left_out)}", "dim")
         if grid.remark:
             self.say(grid.remark, "dim italic")
 
-    def _spelt(self, grid: Grid) -> Grid:
-        """A table as the encoding of the output can show it."""
-        encoding = self.console.encoding
-        columns = [Column(spelt(each.heading, encoding), each.rank, each.is_text) for each in grid.columns]
-        rows: list[Sequence[Cell]] = [[_spelt_cell(cell, encoding) for cell in row] for row in grid.rows]
-        return Grid(grid.title, columns, rows, grid.ends, grid.remark)
+    def _layout(self, columns: Sequence[Column], rows: Sequence[Sequence[Text]]) -> tuple[list[int], bool] | None:
+        """The columns that are shown, and whether their headings are in several lines; None where no table fits."""
 
-    def _list(self, grid: Grid) -> None:
-        for row in grid.rows:
-            parts = []
-            for column, cell in zip(grid.columns, row, strict=True):
-                first, *others = str(cell).split("\n")
-                parts += [f"{column.heading} = {first}" if first and column.heading else first, *others]
-            self.packed(list(filter(None, parts)), hang="  ")
+        def needed(i: int) -> int:
+            """The least width of a column."""
+            is_text = columns[i].is_text
+            heading = columns[i].heading.split() if is_folded or is_text else [columns[i].heading]
+            cells = [row[i].plain for row in rows]
+            parts = [part for cell in cells for part in (cell.split() if is_text else cell.split("\n"))]
+            return max(map(cell_len, [*heading, *parts]), default=0)
+
+        kept = list(range(len(columns)))
+        leaving = sorted((i for i in kept if columns[i].rank), key=lambda i: columns[i].rank)
+        while True:
+            for is_folded in (False, True):
+                if sum(needed(i) + 3 for i in kept) + 1 <= self.width:
+                    return kept, is_folded
+            if not leaving:
+                return None
+            kept.remove(leaving.pop())
+
+    def _spelt(self, text: str) -> str:
+        return spelt(text, self.console.encoding)
+
+    def _cell(self, cell: Cell) -> Text:
+        """A cell as the encoding of the output can show it."""
+        text = Text(cell) if isinstance(cell, str) else cell
+        plain = self._spelt(text.plain)
+        return text if plain == text.plain else Text(plain, text.style)
 
 
 def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
@@ -139,68 +180,39 @@ def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
 
     "D0 = 0.1" and "0.1 ± 1e-3" stay together where they fit.
     """
-    tied = _TIE.sub(lambda found: found[0].replace(" ", _TIED), text)
-    lines = _lines(tied, width, indent)
+    start = text[: len(text) - len(text.lstrip())]
+    wrapper = TextWrapper(max(width, 20), start, indent, break_long_words=False, break_on_hyphens=False)
+    tied = _TIE.sub(lambda found: found[0].replace(" ", _TIED), text.strip())
+    lines = wrapper.wrap(tied) or [""]
     if max(map(len, lines)) > width:
-        lines = _lines(text, width, indent)
+        lines = wrapper.wrap(text.strip()) or [""]
     return [line.replace(_TIED, " ") for line in lines]
 
 
 _TIE, _TIED = re.compile(r"(?<=\S) (=|±|<=|<|>) (?=\S)"), "\0"
 
 
-def _lines(text: str, width: int, indent: str) -> list[str]:
-    start = text[: len(text) - len(text.lstrip())]
-    lines = wrap(
-        text.strip(),
-        max(width, 20),
-        initial_indent=start,
-        subsequent_indent=indent,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return lines or [""]
+def spelt(text: str, encoding: str) -> str:
+    """A text as an output with this encoding can show it: Greek letters and signs in words, where it has none."""
+    return text.encode(encoding, errors=HANDLER).decode(encoding)
 
 
-def _layouts(grid: Grid, width: int) -> Iterator[tuple[list[int], bool]]:
-    """The columns that may be shown, and whether their headings are in several lines, the best first."""
-    leaving = sorted((column.rank, i) for i, column in enumerate(grid.columns) if column.rank)
-    kept = list(range(len(grid.columns)))
-    while True:
-        for is_folded in (False, True):
-            needed = sum(_width(grid, i, is_folded=is_folded) for i in kept) + 3 * len(kept) + 1
-            if needed <= width:
-                yield kept, is_folded
-        if not leaving:
-            return
-        kept = [i for i in kept if i != leaving[-1][1]]
-        leaving.pop()
-
-
-def _width(grid: Grid, i: int, *, is_folded: bool) -> int:
-    """The least width of a column."""
-    column = grid.columns[i]
-    heading = column.heading.split() if is_folded or column.is_text else [column.heading]
-    cells = [str(row[i]) for row in grid.rows]
-    parts = [part for cell in cells for part in (cell.split() if column.is_text else cell.split("\n"))]
-    return max(map(cell_len, [*heading, *parts]), default=0)
-
-
-def _table(grid: Grid, kept: Sequence[int], is_folded: bool) -> Table:
-    table = Table()
-    for column in (grid.columns[i] for i in kept):
-        heading = Text(column.heading.replace(" ", "\n") if is_folded and not column.is_text else column.heading)
-        if column.is_text:
-            table.add_column(heading, overflow="fold")
+def _spell(failure: UnicodeError) -> tuple[str, int]:
+    """For `codecs`: what cannot be encoded, in words of ASCII; "?" where nothing is like it."""
+    if not isinstance(failure, UnicodeEncodeError):
+        raise failure
+    words = []
+    for letter in failure.object[failure.start : failure.end]:
+        name = unicodedata.name(letter, "")
+        case, _, greek = name.removeprefix("GREEK ").partition(" LETTER ")
+        if letter in _SIGNS:
+            words.append(_SIGNS[letter])
+        elif name.startswith("GREEK ") and greek.isalpha():
+            word = "lambda" if greek == "LAMDA" else greek.lower()
+            words.append(word.capitalize() if case == "CAPITAL" else word)
         else:
-            table.add_column(heading, justify="right", no_wrap=True)
-    for number, row in enumerate(grid.rows):
-        cells = [Text(cell) if isinstance(cell, str) else cell for cell in (row[i] for i in kept)]
-        table.add_row(*cells, end_section=number in grid.ends)
-    return table
+            words.append(unicodedata.normalize("NFKD", letter).encode("ascii", errors="ignore").decode() or "?")
+    return "".join(words), failure.end
 
 
-def _spelt_cell(cell: Cell, encoding: str) -> Cell:
-    if isinstance(cell, str):
-        return spelt(cell, encoding)
-    return cell if spelt(cell.plain, encoding) == cell.plain else Text(spelt(cell.plain, encoding), style=cell.style)
+codecs.register_error(HANDLER, _spell)

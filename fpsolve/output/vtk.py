@@ -23,7 +23,7 @@ from fpsolve.exponent.fields import xi_marginal
 from fpsolve.exponent.nodes import Nodes
 from fpsolve.files import write_text
 from fpsolve.model.quantity import parameter_lines, parameter_words
-from fpsolve.process import signals_held
+from fpsolve.signals import signals_held
 from fpsolve.study.results import SimulatedCurve, Solved
 
 CURVES = "curves.pvd"

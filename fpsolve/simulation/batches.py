@@ -13,7 +13,7 @@ from numpy.random import SeedSequence, default_rng
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import ColouredNoise, has_algebraic_tails, relaxation_time
-from fpsolve.process import processors
+from fpsolve.pool import processors
 from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
 from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator
 from fpsolve.simulation.step import Motion, NoiseStep, noise_step, starting_state

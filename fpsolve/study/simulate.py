@@ -10,7 +10,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.errors import FpsolveError
-from fpsolve.process import processors
+from fpsolve.pool import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.theory.validity import simulated_tail_note

@@ -4,5 +4,5 @@ from .cases import check_case as check_case
 from .cases import run as run
 from .cases import run_case as run_case
 from .cases import simulate_case as simulate_case
-from .watch import Phase as Phase
-from .watch import Watch as Watch
+from .progress import Phase as Phase
+from .progress import Watch as Watch

@@ -14,8 +14,8 @@ from fpsolve.output.charts import draw_chart, write_chart
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_simulation
 from fpsolve.output.vtk import write_response
-from fpsolve.pool import Pool, cluster, here, several
-from fpsolve.process import signals_held
+from fpsolve.pool import Pool, cluster, parallel, serial
+from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
@@ -31,9 +31,9 @@ from fpsolve.workflow.folders import (
     own_folder,
     saying_if_interrupted,
 )
+from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Advance, Phase, Watch, ignore
 from fpsolve.workflow.sets import Sweep
 from fpsolve.workflow.simulations import Simulations
-from fpsolve.workflow.watch import NOBODY, NODES, PERCENT, POINTS, SETS, Advance, Phase, Watch, unheeded
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +88,8 @@ def run(
         NotConverged: some p or indices failed; everything else is written, and `partial` holds it.
     """
     read = case if isinstance(case, Case) else load_case(case)
-    pool = cluster(scheduler) if scheduler else several(jobs, read.planned)
-    watch = Watch(bar=lambda phase: nullcontext(_each(progress) if phase.unit else unheeded))
+    pool = cluster(scheduler) if scheduler else parallel(jobs, read.planned)
+    watch = Watch(bar=lambda phase: nullcontext(_each(progress) if phase.unit else ignore))
     outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=watch)
     results = tuple(outcome.results)
     if outcome.failures:
@@ -104,7 +104,7 @@ def run_case(
     monte_carlo: bool = False,
     pool: Pool | None = None,
     is_fresh: bool = False,
-    watch: Watch = NOBODY,
+    watch: Watch = SILENT,
 ) -> Outcome:
     """Solve a case, simulate it too if `monte_carlo` says so, and draw both in one figure.
 
@@ -126,7 +126,7 @@ def run_case(
     simulators = pool if pool and pool.is_elsewhere else None
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
     with own_folder(case, out, replaced) as folder:
-        sweep = _solve(case, folder, pool or here(), watch, is_fresh=is_fresh)
+        sweep = _solve(case, folder, pool or serial(), watch, is_fresh=is_fresh)
         with saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}"):
             try:
                 watch.solved(case, sweep.results)
@@ -147,7 +147,7 @@ def simulate_case(
     *,
     pool: Pool | None = None,
     is_fresh: bool = False,
-    watch: Watch = NOBODY,
+    watch: Watch = SILENT,
 ) -> Outcome:
     """Simulate a case and write monte_carlo.json into `out`/<name of the case>/; further curves have a number.
 
@@ -177,7 +177,7 @@ def simulate_case(
     return Outcome((), tuple(simulated), interruption, known=simulations.known)
 
 
-def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = None, watch: Watch = NOBODY) -> Chart:
+def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = None, watch: Watch = SILENT) -> Chart:
     """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
 
     Tables are written anew after every branch. What an earlier chart wrote there is removed first, and what was solved
@@ -199,7 +199,7 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
         watch.bar(Phase(case.name, "scan", chart_work(case), NODES)) as progress,
         watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
         writable(folder),
-        pool or here() as workers,
+        pool or serial() as workers,
     ):
         try:
             for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map):
@@ -210,14 +210,14 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
     return chart
 
 
-def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = NOBODY) -> Outcome:
+def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:
     """Solve what a case expects, and compare it; nothing is written."""
     numerics = Numerics.of(case)
     found: list[CurveResult] = []
     with (
         saying_if_interrupted(lambda: kept(case, len(found)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
-        pool or here() as workers,
+        pool or serial() as workers,
     ):
         tasks = batches(case, lambda curve: Order(curve, expected(case, curve), ""), numerics)
         for done in workers.run(SolveBatch(result_alone), tasks):

@@ -11,14 +11,14 @@ from fpsolve.case.case import Case
 from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.files import writable
 from fpsolve.output.proofs import write_proof
-from fpsolve.pool import Pool, here
+from fpsolve.pool import Pool, serial
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import Claims, claims_from
 from fpsolve.proofs.enclosure import Enclosure
 from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.study.prove import CurveProof, Plan, answer, refuse_unprovable_case
 from fpsolve.workflow.folders import ANEW, PROVEN, own_folder, saying_if_interrupted
-from fpsolve.workflow.watch import BOUNDS, NOBODY, Phase, Watch
+from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
 
 EVERY = 30.0
 """Seconds after which the curves that are done are written, so that a run that is killed keeps them."""
@@ -44,7 +44,7 @@ def prove_case(
     *,
     width: float | None = None,
     pool: Pool | None = None,
-    watch: Watch = NOBODY,
+    watch: Watch = SILENT,
 ) -> list[CurveProof]:
     """Prove bounds on Λ at every p of every curve of a case, and on λ and δ_p; write proof.json into `out`/<case>/.
 
@@ -64,7 +64,7 @@ def prove_case(
         own_folder(case, out, (PROVEN,)) as folder,
         saying_if_interrupted(lambda: _kept(plan, len(answers), folder), ANEW),
         watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
-        pool or here() as workers,
+        pool or serial() as workers,
     ):
         written = monotonic()
         try:

@@ -14,12 +14,12 @@ from fpsolve.output.provenance import Run
 from fpsolve.output.records import Place, Records, Results, append
 from fpsolve.output.tables import write_results
 from fpsolve.output.vtk import write_curves, write_functions
-from fpsolve.pool import Pool, here
+from fpsolve.pool import Pool, serial
 from fpsolve.study.records import key_of, record_of
 from fpsolve.study.results import CurveResult, Solved
 from fpsolve.study.solve import Numerics, Wanted, everything, without_failed
 from fpsolve.study.sweep import Batch, Order, SolveBatch, batches, lost
-from fpsolve.workflow.watch import MOMENTS, SETS, Advance, Phase
+from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
 Found = tuple[int, Place | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
@@ -83,7 +83,7 @@ class Sweep:
         if self._settled:
             progress(self._settled * self._steps_each, known=True)
         queue = _Queue(batches(self.case, self._order, self.numerics))
-        with here() if is_alone else pool as workers:
+        with serial() if is_alone else pool as workers:
             for done in workers.run(SolveBatch(Keep(self.folder), progress if is_alone else None), queue):
                 for number, found, is_failed in self._lost(done.item, queue) if done.result is None else done.result:
                     if isinstance(found, Place):

@@ -12,7 +12,7 @@ from fpsolve.pool import Pool
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.study.simulate import SimulateCurve, simulate_curves, simulation_steps
 from fpsolve.study.simulated import simulated_of, simulation_key, to_record
-from fpsolve.workflow.watch import Advance
+from fpsolve.workflow.progress import Advance
 
 SIMULATED_RECORDS = "records/simulated"
 

@@ -7,8 +7,7 @@ import re
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.cli import main
-from fpsolve.commands import BAD_INPUT, CHECK_FAILED
+from fpsolve.cli import BAD_INPUT, CHECK_FAILED, main
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import claims_from, plain, verdicts
 from fpsolve.workflow.proofs import prove_case

@@ -18,8 +18,7 @@ from scipy.special import eval_gegenbauer, roots_jacobi
 import fpsolve
 from fpsolve.case.case import load_case
 from fpsolve.case.curves import make_curve
-from fpsolve.cli import main
-from fpsolve.commands import BAD_INPUT, NOT_CONVERGED
+from fpsolve.cli import BAD_INPUT, NOT_CONVERGED, main
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.output.proofs import print_proofs

@@ -1,0 +1,102 @@
+"""Signals that end work, and signals that wait until it is whole."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+ENDING = ("SIGHUP", "SIGTERM")
+REPEAT_SECONDS = 0.02
+"""After which an interrupt that Python lost comes again."""
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[list[int]]:
+    """SIGHUP and SIGTERM raise KeyboardInterrupt in the body, as Ctrl-C does; yields a list for the one that came.
+
+    Those that follow change nothing, so that the first one's end can be written and reported. Signals that are ignored,
+    as SIGHUP under nohup, and those that the caller handles are left alone.
+    """
+    received: list[int] = []
+
+    def interrupt(number: int, _: Any) -> None:
+        if not received:
+            received.append(number)
+            raise KeyboardInterrupt
+
+    with _handled(ENDING, interrupt, lambda former: former is signal.SIG_DFL), _interrupts_repeated(received):
+        yield received
+
+
+@contextmanager
+def signals_held() -> Iterator[None]:
+    """Signals that Python handles wait until the body has ended: an import that may crash, files that belong together.
+
+    Signals that are ignored are left alone.
+    """
+    held: list[int] = []
+    try:
+        with _handled(("SIGINT", *ENDING), lambda number, _: held.append(number), callable):
+            yield
+    finally:
+        for number in held:
+            signal.raise_signal(number)
+
+
+@contextmanager
+def _handled(
+    names: Sequence[str], handler: Callable[[int, Any], None], is_replaced: Callable[[Any], bool]
+) -> Iterator[None]:
+    """Handle signals in the body; none outside of the main thread, which alone receives them.
+
+    Args:
+        names: of the signals; those that the system does not have are left out.
+        handler: of them, in the body.
+        is_replaced: whether a former handler gives way.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    known = [getattr(signal, name) for name in names if is_main and hasattr(signal, name)]
+    former = {number: signal.getsignal(number) for number in known if is_replaced(signal.getsignal(number))}
+    try:
+        for number in former:
+            signal.signal(number, handler)
+        yield
+    finally:
+        for number, each in former.items():
+            signal.signal(number, each)
+
+
+@contextmanager
+def _interrupts_repeated(received: list[int]) -> Iterator[None]:
+    """An interrupt that Python loses in the body, as in what runs when an object is freed, comes once more.
+
+    Python gives such an exception to `sys.unraisablehook` and to nothing else.
+
+    Args:
+        received: the signal that ends the body; empty after Ctrl-C. It is received anew when it comes once more.
+    """
+    former, main, timers = sys.unraisablehook, threading.main_thread(), list[threading.Timer]()
+    # pthread_kill also wakes a main thread that waits; Windows does not have it
+    send = partial(signal.pthread_kill, main.ident or 0) if hasattr(signal, "pthread_kill") else signal.raise_signal
+
+    def repeat(unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+            former(unraisable)
+            return
+        timers.append(threading.Timer(REPEAT_SECONDS, lambda: send(received.pop() if received else signal.SIGINT)))
+        timers[-1].daemon = True
+        timers[-1].start()
+
+    sys.unraisablehook = repeat
+    try:
+        yield
+    finally:
+        sys.unraisablehook = former
+        for timer in timers:
+            timer.cancel()
+            timer.join()  # what it has sent already still meets the handlers of the body
