@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fpsolve.errors import NumericalFailure
+
 FloatArray = NDArray[np.float64]
 Coefficient = Callable[[Any], Any]
 """A function of φ or ξ, from an array to an array of the same shape."""
@@ -24,6 +26,13 @@ def one(x: Any) -> Any:
 def identity(x: Any) -> Any:
     """The coefficient x."""
     return x
+
+
+def finite(array: FloatArray) -> FloatArray:
+    """The same array. Raises `NumericalFailure` where a number in it is infinite or NaN."""
+    if not np.isfinite(array).all():
+        raise NumericalFailure("array must not contain infs or NaNs")
+    return array
 
 
 def is_log_spaced(values: Iterable[Any]) -> bool:

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any
 
-
-class Remedy(StrEnum):
-    """What to do about a failure, as it ends a message; those who work with case files are told in their own words."""
-
-    MESH = "use more cells or a wider noise interval, or let the mesh be chosen"
-    CELLS = "use more cells in a given mesh, or a smaller rtol where it is chosen"
-    REACH = "use a mesh that reaches there, or let it be chosen"
-    BUDGET = "use a larger rtol or a larger budget"
-    MESH_FILE = "make one with `write_mesh`"
-    REDUCTION = "or the Ornstein-Uhlenbeck reduction of the noise"
-    NO_REDUCTION = "the unreduced noise keeps Eq. (7)"
-    FOLDER = "choose another folder"
+from fpsolve.messages import Message, message_of
+from fpsolve.messages import Remedy as Remedy
 
 
 class FpsolveError(Exception):
-    """Base of every error that fpsolve raises on purpose; its text says what to do."""
+    """Base of every error that fpsolve raises on purpose; its text says what to do.
+
+    Attributes:
+        message: the text, as data.
+    """
+
+    def __init__(self, reason: str, remedy: str | None = None) -> None:
+        self.message = message_of(reason).advising(remedy) if remedy else message_of(reason)
+        super().__init__(self.message)
 
 
 class NoSuchExponent(FpsolveError):
@@ -45,13 +42,26 @@ class NotConverged(FpsolveError):
     """The eigenvalue iteration did not settle.
 
     Attributes:
-        reason: what happened.
+        reason: what happened, without what to do.
         partial: the best result that was reached, or None where there is none.
     """
 
-    def __init__(self, reason: str, partial: Any = None, remedy: str = "") -> None:
-        super().__init__(f"{reason}; {remedy}" if remedy else reason)
-        self.reason, self.partial = reason, partial
+    def __init__(self, reason: str, partial: Any = None, remedy: str | None = None) -> None:
+        super().__init__(reason, remedy)
+        self.partial = partial
+
+    @property
+    def reason(self) -> Message:
+        """What happened, without what to do."""
+        return self.message.advising(None)
+
+
+class NumericalFailure(ArithmeticError):
+    """Numbers became too large, or are none."""
+
+
+class SingularMatrix(NumericalFailure):
+    """A matrix without LU factors, or one of which no iteration finds an eigenvalue."""
 
 
 @dataclass(frozen=True)

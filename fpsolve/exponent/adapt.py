@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
-from fpsolve.errors import MeshError, NotConverged, Remedy
+from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.corners import corners
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import Solution
@@ -20,6 +20,7 @@ from fpsolve.exponent.rival import comparable, rival
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Discretisation
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.problem import AnyNoise, Problem
@@ -123,7 +124,7 @@ def _search(
         meter.check(chosen)
         try:
             pair = principal_pair(Generator(problem, chosen), p, start=pair)
-        except (MeshError, NotConverged, RuntimeError, np.linalg.LinAlgError) as failure:
+        except (MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError) as failure:
             meter.failure, pair = failure, None
             chosen = doubled(chosen)
             continue
@@ -158,12 +159,11 @@ class _Meter:
         cost = max(SECONDS_PER_UNKNOWN, (elapsed - self.last[0]) / max(self.last[1], 1) ** 1.5 if self.last[1] else 0.0)
         seconds = elapsed + cost * size**1.5
         if size > self.budget.unknowns:
-            self.stop(f"the next mesh has {size} unknowns, more than budget.unknowns = {self.budget.unknowns}")
+            self.stop(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=self.budget.unknowns))
         if seconds > self.budget.seconds:
-            most = f"more than budget.seconds = {self.budget.seconds:g}"
-            self.stop(f"the next mesh needs some {seconds:.2g} s by the clock, {most}")
+            self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.budget.seconds))
         if self.stages >= MAX_STAGES:
-            self.stop(f"{MAX_STAGES} meshes were tried")
+            self.stop(Message(Code.MESHES_SPENT, count=MAX_STAGES))
         self.last, self.stages = (elapsed, size), self.stages + 1
 
     def note(self, solution: Solution, error: float, allowed: float) -> None:
@@ -171,22 +171,18 @@ class _Meter:
         if error / allowed < self.share:
             self.best, self.error, self.share = solution, error, error / allowed
         if solution.pair.rounding > allowed:
-            self.stop(f"rounding alone may change it by {solution.pair.rounding:.1e}: use a larger rtol")
+            self.stop(Message(Code.ROUNDED, size=solution.pair.rounding))
 
-    def stop(self, reason: str) -> None:
-        if self.best is None:
-            text = "no mesh resolved it"
-            if isinstance(self.failure, NotConverged):
-                text += ", as the layers of slow, strong noise are too thin"
-            if self.failure:
-                text += f" ({self.failure.reason if isinstance(self.failure, NotConverged) else self.failure})"
-            raise NotConverged(f"Λ({self.p:g}) did not converge: {reason}; {text}; {Remedy.BUDGET}")
-        best = self.best
-        raise NotConverged(
-            f"Λ({self.p:g}) did not converge: {reason}; best value {best.pair.value:.6g} with an estimated error of "
-            f"{self.error:.1e}, {self.share:.1e} times the tolerance; {Remedy.BUDGET}",
-            best,
-        )
+    def stop(self, reason: Message) -> None:
+        """Raise `NotConverged` with the best solution."""
+        if best := self.best:
+            reached = {"value": best.pair.value, "error": self.error, "size": self.share}
+            told = Message(Code.BUDGET_SPENT, p=self.p, reason=reason, **reached)
+        else:
+            last, is_thin = self.failure, isinstance(self.failure, NotConverged)
+            said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
+            told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
+        raise NotConverged(told, best, Remedy.BUDGET)
 
 
 def fits(generator: Generator, q: float, p: float) -> bool:

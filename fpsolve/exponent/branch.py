@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import MeshError, NotConverged, Remedy
+from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.adapt import WORTH_A_TRY, Budget, fits, resolve, resolve_far
 from fpsolve.exponent.corners import corners
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
@@ -22,6 +22,7 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Discretisation
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem
 
@@ -78,21 +79,20 @@ class Branch:
                     self.known[p] = self._found(p, allowed)
             except NotConverged as failure:
                 if self.is_far:
-                    text = f"{failure}; this moment is carried by rare paths, with noise far out in its tails"
-                    failure = NotConverged(text, failure.partial)
+                    failure = NotConverged(Message(Code.FAR_OUT, reason=failure.message), failure.partial)
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure
                 raise failure from None
             except MeshError as failure:
                 if self.mesh is not None:
                     raise
-                raise NotConverged(f"Λ({p:g}) did not converge: {failure}; {self.remedy}") from failure
+                told = Message(Code.NOT_CONVERGED, p=p, reason=failure.message, remedy=self.remedy)
+                raise NotConverged(told) from failure
             except np.linalg.LinAlgError as failure:
-                raise NotConverged(f"Λ({p:g}) cannot be solved ({failure}); {self.remedy}") from failure
-            except (ArithmeticError, RuntimeError, ValueError) as failure:
-                if not is_numerical(failure):
-                    raise
-                raise NotConverged(f"Λ({p:g}) is beyond floating-point numbers ({failure})") from failure
+                told = Message(Code.NOT_SOLVED, p=p, reason=str(failure), remedy=self.remedy)
+                raise NotConverged(told) from failure
+            except ArithmeticError as failure:
+                raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
         return self.known[p]
 
     @property
@@ -101,9 +101,9 @@ class Branch:
         return Remedy.BUDGET if self.mesh is None else Remedy.MESH
 
     @property
-    def refinement(self) -> str:
+    def refinement(self) -> Remedy:
         """What to do where it should be resolved better."""
-        return "use a smaller rtol" if self.mesh is None else Remedy.MESH
+        return Remedy.SMALLER_RTOL if self.mesh is None else Remedy.MESH
 
     def remedied(self, solve: Callable[[], PrincipalPair]) -> PrincipalPair:
         """A pair; where it is not found, the failure has the remedy of this branch."""
@@ -119,7 +119,7 @@ class Branch:
         try:
             return self.solution(q, tolerance)
         except NotConverged as failure:
-            raise NotConverged(f"p near 0 goes with p = {q:g}: {failure}", failure.partial) from failure
+            raise NotConverged(Message(Code.NEAR_ZERO, p=q, reason=failure.message), failure.partial) from failure
 
     def _found(self, p: float, tolerance: Tolerance) -> Solution:
         """A solution that meets a tolerance, or the one on the given mesh."""
@@ -191,13 +191,6 @@ def _trimmed(solution: Solution, tolerance: Tolerance) -> Discretisation:
     smaller = refined(solution, tolerance(pair.p, pair.value), 0)
     is_better = smaller.unknowns(generator.problem.noise) <= TRIM * generator.size
     return smaller if is_better else generator.chosen
-
-
-def is_numerical(failure: Exception) -> bool:
-    """Whether numbers became too large, or a matrix singular; all else is a fault of the program."""
-    text = str(failure)
-    is_singular = isinstance(failure, RuntimeError) and ("singular" in text or "ARPACK" in text)
-    return isinstance(failure, ArithmeticError) or is_singular or "infs or NaNs" in text
 
 
 def best_order(p: FloatArray) -> Any:

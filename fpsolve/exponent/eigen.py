@@ -17,17 +17,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
-from fpsolve.arrays import FloatArray, dense, one
+from fpsolve.arrays import FloatArray, dense, finite, one
 from fpsolve.data import brief
-from fpsolve.errors import NotConverged
+from fpsolve.errors import NotConverged, SingularMatrix
 from fpsolve.exponent.pictured import Pictured
 from fpsolve.exponent.rounding import rounding_of_entries
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.space import CylinderSpace
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.theory.frozen import eigenvalues_at
 
@@ -119,13 +120,9 @@ def principal_pair(
             return _rightmost(found[-1])
     pair = min(found, key=lambda pair: (pair.residual > BACKWARD_ERROR_LIMIT, min(pair.sign_defects)))
     if not (pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= POSITIVE):
-        raise NotConverged(
-            f"the principal eigenvalue at p = {p:g} was not found on this mesh: backward error {pair.residual:.1e} "
-            f"(at most {BACKWARD_ERROR_LIMIT:g}), and {min(pair.sign_defects):.1e} of the more positive of T and "
-            f"T* has the wrong sign (at most {POSITIVE:g})",
-            pair,
-            "use more cells, in the phase and in the noise",
-        )
+        limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
+        told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=min(pair.sign_defects), **limits)
+        raise NotConverged(told, pair, Remedy.BOTH_AXES)
     return _rightmost(pair)
 
 
@@ -138,12 +135,8 @@ def _rightmost(pair: PrincipalPair) -> PrincipalPair:
     if isinstance(generator.problem.noise, MarkovChain) and generator.size <= SURVEYED_UNKNOWNS:
         rightmost = spectrum(generator, pair.p, 1)[0]
         if abs(rightmost - pair.value) > 1e-6 * max(abs(rightmost), generator.unit_rate):
-            raise NotConverged(
-                f"at p = {pair.p:g} the eigenvalue {rightmost:.6g} lies right of {pair.value:.6g}, though that has "
-                "eigenfunctions of one sign",
-                pair,
-                "use more cells in the phase",
-            )
+            told = Message(Code.LARGER_EIGENVALUE, p=pair.p, rightmost=rightmost.real, value=pair.value)
+            raise NotConverged(told, pair, Remedy.PHASE)
     return pair
 
 
@@ -161,8 +154,8 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
         raise ValueError(f"{size} unknowns; the whole spectrum takes at most {MAX_DENSE_UNKNOWNS}: use a coarser mesh")
     if not 1 <= k <= size:
         raise ValueError(f"k is {k}; it must be from 1 to the number of unknowns, {size}")
-    root = scipy.linalg.cholesky(generator.mass(p).toarray(), lower=True)
-    half = scipy.linalg.solve_triangular(root, generator.matrix(p).toarray(), lower=True)
+    root = scipy.linalg.cholesky(finite(generator.mass(p).toarray()), lower=True)
+    half = scipy.linalg.solve_triangular(root, finite(generator.matrix(p).toarray()), lower=True)
     matrix = scipy.linalg.solve_triangular(root, half.T, lower=True).T
     values = scipy.linalg.eigvals(matrix, overwrite_a=True)
     return values[np.lexsort((values.imag, -values.real))][:k]
@@ -187,7 +180,7 @@ def _simplest(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
     if not generator.chosen.is_killed:
         return space.constant(), space.constant()
     resting = space.xi.mass(lambda xi: p * eigenvalues_at(generator.problem, xi)[0])
-    _, vectors = scipy.linalg.eigh(dense(space.xi_matrix(None) + resting), dense(space.xi_matrix(one)))
+    _, vectors = scipy.linalg.eigh(finite(dense(space.xi_matrix(None) + resting)), dense(space.xi_matrix(one)))
     vector = np.outer(space.phi.constant, vectors[:, -1]).ravel()
     return vector, vector
 
@@ -213,9 +206,9 @@ def _dominant(apply: Any, start: FloatArray, p: float) -> tuple[FloatArray, floa
     try:
         values, vectors = eigs(operator, k=1, v0=start, ncv=min(20, start.size - 1), tol=1e-3, maxiter=200)
     except ArpackNoConvergence as failure:
-        raise NotConverged(
-            f"the Arnoldi iteration for p = {p:g} did not settle; use more or higher-degree cells"
-        ) from failure
+        raise NotConverged(Message(Code.NO_ARNOLDI, p=p), remedy=Remedy.DEGREES) from failure
+    except ArpackError as failure:
+        raise SingularMatrix(*failure.args) from failure
     return vectors[:, 0].real, float(values[0].real)
 
 

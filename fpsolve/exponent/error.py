@@ -25,6 +25,7 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_space import CellSpace, NoiseSpace
 from fpsolve.fem.phase_space import PhaseSpace
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.quantity import UNNAMED, Quantity
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ class Absent:
         reason: why.
     """
 
-    reason: str
+    reason: Message
 
     def __bool__(self) -> bool:
         return False
@@ -105,18 +106,15 @@ class Failure:
     """
 
     p: float | None
-    reason: str
+    reason: Message
 
 
-def checked(estimate: Estimate, remedy: str) -> Estimate:
-    """An estimate whose error leaves it a meaning. Raises `NotConverged`."""
-    name = estimate.quantity.symbol
+def checked(estimate: Estimate, remedy: Remedy, p: float | None = None) -> Estimate:
+    """An estimate, such as that of Λ(p), whose error leaves it a meaning. Raises `NotConverged`."""
     if not estimate.relative_error <= MEANINGLESS:
-        raise NotConverged(
-            f"{name} = {estimate.value:.6g} has an estimated error of {estimate.error_estimate:.1g}, too much to "
-            f"mean anything; {remedy}",
-            estimate,
-        )
+        number = {"value": estimate.value, "size": estimate.error_estimate}
+        symbol = estimate.quantity.symbol if p is None else "Λ(p)"
+        raise NotConverged(Message(Code.MEANINGLESS, p=p, symbol=symbol, **number), estimate, remedy)
     return estimate
 
 

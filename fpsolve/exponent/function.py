@@ -21,6 +21,7 @@ from fpsolve.exponent.error import Absent, Estimate, checked
 from fpsolve.exponent.rival import misplaced
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, missed
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import Code, Message
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.problem import Problem, checked_moments, of_problem_too
 from fpsolve.model.quantity import (
@@ -33,7 +34,6 @@ from fpsolve.model.quantity import (
     parameter_values,
 )
 from fpsolve.theory.far import grows_far_out
-from fpsolve.theory.validity import NO_INDEX
 
 if TYPE_CHECKING:
     import xarray
@@ -203,7 +203,7 @@ def _check(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: Floa
     """Refuse values whose errors leave them no meaning. Raises `NotConverged`."""
     for point, each, bound in zip(p.tolist(), value.tolist(), error.tolist(), strict=True):
         if point != 0:
-            checked(Estimate(each, bound, solver.scale(point), quantity=moment_at(point)), solver.near.remedy)
+            checked(Estimate(each, bound, solver.scale(point), quantity=moment_at(point)), solver.near.remedy, point)
 
 
 def _dataset(function: MomentLyapunovFunction, p: FloatArray) -> xarray.Dataset:
@@ -263,14 +263,11 @@ def _checked_interval(interval: tuple[float, float], problem: Problem) -> tuple[
     if not low < high:
         raise ValueError(f"the interval of p is {interval}; its ends must increase")
     if grows_far_out(problem):
-        raise NotConverged(
-            "Λ(p) is not smooth in p: noise with algebraic tails carries the moment far out for some p; use "
-            "moment_lyapunov, which takes each p by itself"
-        )
+        raise NotConverged(Message(Code.KINKED))
     return low, high
 
 
-def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str | None:
+def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> Message | None:
     """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex."""
     if not pairs:
         return None
@@ -281,19 +278,14 @@ def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> str 
     i, j = np.unravel_index(np.argmin(above + slack), above.shape)
     if not above[i, j] < -slack[i, j]:
         return None
-    return (
-        f"Λ(p) is not convex between p = {p[i]:g} and p = {np.append(p, 0.0)[j]:g}, which the exponent always is: "
-        "a wrong eigenvalue was found"
-    )
+    return Message(Code.NOT_CONVEX, p=p[i], other=np.append(p, 0.0)[j])
 
 
 def _no_root(problem: Problem, interval: tuple[float, float]) -> Absent:
     """That Λ(p) has no root p ≠ 0 in an interval."""
     low, high = np.clip(interval, *problem.noise.moments)
-    text = f"Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]"
     is_bounded = isinstance(problem.noise, MarkovChain) or math.isfinite(problem.noise.half_width)
-    remark = ", and may have none at all: with bounded noise P(sup ‖x‖ > A) may fall faster than any power of A"
-    return Absent(text + remark * is_bounded)
+    return Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=is_bounded))
 
 
 def nonzero_root(
@@ -307,7 +299,7 @@ def nonzero_root(
         NotConverged: some p on the way is not resolved.
     """
     if grows_far_out(solver.problem):
-        return Absent(NO_INDEX)
+        return Absent(Message(Code.NO_INDEX))
     low, high = (float(end) for end in np.clip(interval, *solver.problem.noise.moments))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)
@@ -317,7 +309,7 @@ def nonzero_root(
         tried.add(p)
         ratio, slope, error = solver.ratio(p)
         if not slope > 0:
-            raise NotConverged(f"Λ(p)/p does not increase at p = {p:g}, as convexity demands; {solver.near.refinement}")
+            raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=solver.near.refinement)
         low, high = (p, high) if ratio < 0 else (low, p)
         new = p - ratio / slope
         least = 1e-13 * max(1.0, abs(p))
@@ -329,4 +321,4 @@ def nonzero_root(
         if not low < new < high:
             new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
         p = new
-    raise NotConverged(f"the stability index did not settle, last near p = {p:g}; {solver.near.refinement}")
+    raise NotConverged(Message(Code.INDEX_UNSETTLED, p=p), remedy=solver.near.refinement)

@@ -29,6 +29,7 @@ import sys
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.messages import Code, Message
 from fpsolve.model.direction import Direction
 from fpsolve.model.quantity import CRITICAL_IMPACT_FACTOR, CRITICAL_RESTITUTION, IMPACT_RATE
 from fpsolve.model.vibro_impact import VibroImpactOscillator
@@ -51,7 +52,7 @@ def impact_rate(solver: ExponentSolver) -> Estimate | Absent:
     """
     count = len(solver.problem.system.kicks)
     if count != 1:
-        return Absent(f"the motion has impacts on {count or 'no'} rays, and only on a single one have they a rate")
+        return Absent(Message(Code.NOT_ONE_RAY, count=count or None))
     value, better = map(_flux, solver.at_zero)
     generator = solver.at_zero[1].generator
     usual = generator.unit_rate / math.pi
@@ -70,7 +71,7 @@ def critical_impact_factor(solver: ExponentSolver) -> Estimate | Absent:
     if isinstance(log, Absent):
         return log
     if abs(log.value) > LARGEST_LOG:
-        return Absent(f"its logarithm is {log.value:.3g}, beyond ±{LARGEST_LOG:g}")
+        return Absent(Message(Code.LOG_OUT_OF_RANGE, value=log.value, most=LARGEST_LOG))
     value = math.exp(log.value)
     error = value * math.expm1(min(log.error_estimate, LARGEST_LOG))
     found = Estimate(value, error, value * max(1.0, log.scale), quantity=CRITICAL_IMPACT_FACTOR)
@@ -85,17 +86,17 @@ def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
     """
     oscillator = solver.problem.system
     if not isinstance(oscillator, VibroImpactOscillator):
-        return Absent("the motion has no coefficient of restitution")
+        return Absent(Message(Code.NO_RESTITUTION))
     log = _critical_log_factor(solver)
     if isinstance(log, Absent):
         return log
     if log.value > 0:
         # λ is affine in ln R, and 0 at ln R_c
         lossless = solver.lyapunov_exponent().value * log.value / (log.value - oscillator.log_impact_factor)
-        return Absent(f"almost surely stable for every r in (0, 1], as λ without loss is {lossless:.3g}")
+        return Absent(Message(Code.ALWAYS_STABLE, value=lossless))
     value = oscillator.restitution_of(log.value)
     if value <= 0:
-        return Absent(f"unstable for every r in (0, 1]: it would have to be {value:.3g}")
+        return Absent(Message(Code.ALWAYS_UNSTABLE, value=value))
     slope = oscillator.restitution_slope(log.value)
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
     return checked(Estimate(value, error, scale, quantity=CRITICAL_RESTITUTION), solver.near.remedy)
@@ -114,7 +115,7 @@ def _critical_log_factor(solver: ExponentSolver) -> Estimate | Absent:
     if isinstance(rate, Absent):
         return rate
     if rate.value <= rate.error_estimate:
-        return Absent(f"impacts are too rare to matter, N < {rate.value + rate.error_estimate:.1g}")
+        return Absent(Message(Code.RARE_IMPACTS, most=rate.value + rate.error_estimate))
     exponent, own = solver.lyapunov_exponent(), solver.problem.system.kicks[0].log_factor
     change = exponent.value / rate.value
     size = abs(own) + max(abs(change), exponent.scale / rate.value)

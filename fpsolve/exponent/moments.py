@@ -17,6 +17,7 @@ from fpsolve.exponent.error import Failure
 from fpsolve.exponent.function import MomentLyapunovFunction, broken_convexity
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem, checked_moments, of_problem
 from fpsolve.theory.far import grows_far_out
 
@@ -52,7 +53,7 @@ def moment_lyapunov(
     solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
     result = solve_moments(solver, checked_moments(p, problem))
     if result.failures:
-        raise NotConverged("\n".join(failure.reason for failure in result.failures), result)
+        raise NotConverged(Message(Code.SEVERAL, reasons=[failure.reason for failure in result.failures]), result)
     return result
 
 
@@ -105,7 +106,7 @@ def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], No
     result = solver.moments(p, progress=progress)
     obstacle = None if result.failures else broken_convexity(result.pairs, result.error_estimate)
     if obstacle:
-        return replace(result, failures=(Failure(None, f"{obstacle}; {solver.near.refinement}"),))
+        return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.near.refinement)),))
     return _with_zero(result, p)
 
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fpsolve.errors import Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.theory.far import Place, far_places
 from fpsolve.theory.frozen import frozen_noise
@@ -36,7 +36,7 @@ def rival(pair: PrincipalPair) -> float | None:
     return float(z[far][np.argmax(rate[far])]) if np.any(far) else None
 
 
-def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
+def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
     """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
     if mesh is None:  # then both places have been looked at
         return ()
@@ -44,10 +44,8 @@ def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tupl
     pair, z = next(((pair, z) for pair, z in found if z is not None), (None, None))
     if pair is None:
         return ()
-    cause = "noise with heavy tails" if has_algebraic_tails(pair.generator.problem.noise) else "slow noise"
-    return (
-        f"Λ({pair.p:g}) may be larger: {cause} may carry the moment near {z:.3g} standard deviations; {Remedy.REACH}",
-    )
+    has_tails = has_algebraic_tails(pair.generator.problem.noise)
+    return (Message(Code.CARRIED_ELSEWHERE, p=pair.p, has_tails=has_tails, z=z, remedy=Remedy.REACH),)
 
 
 def _elsewhere(pair: PrincipalPair) -> float | None:

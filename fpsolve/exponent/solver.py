@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, dataset, described
-from fpsolve.errors import MeshError, NoSuchExponent, NotConverged, Remedy
+from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.bordered import second_derivative, slope_rounding
 from fpsolve.exponent.branch import Branch, Tolerance, best_order
@@ -27,12 +27,12 @@ from fpsolve.exponent.rival import far_rivals, is_far_out, misplaced
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
 from fpsolve.theory.far import far_places, grows_far_out, highest_rate, log_tail, refuse_beyond, variance_tail
 from fpsolve.theory.perturbation import Scale, scale_of
-from fpsolve.theory.validity import ALMOST_EVERY
 
 if TYPE_CHECKING:
     import xarray
@@ -63,11 +63,11 @@ class MomentLyapunov(Result):
             bound of rounding, shape (n,).
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
         solver: what solved them.
-        warnings: sentences on p where `error_estimate` exceeds rtol.
+        warnings: on the p where `error_estimate` exceeds rtol.
         root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
         failures: why some p are missing, or none is to be trusted.
         rare: the p at which rare paths, far out in the algebraic tails of the noise, carry the moment, shape (k,).
-        notes: a sentence on them.
+        notes: on them.
     """
 
     p: FloatArray
@@ -76,11 +76,11 @@ class MomentLyapunov(Result):
     error_estimate: FloatArray
     residual: FloatArray
     solver: ExponentSolver
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Message, ...] = ()
     root: float | None = None
     failures: tuple[Failure, ...] = ()
     rare: FloatArray = field(default_factory=lambda: np.zeros(0))
-    notes: tuple[str, ...] = ()
+    notes: tuple[Message, ...] = ()
 
     @property
     def pairs(self) -> tuple[PrincipalPair, ...]:
@@ -140,9 +140,7 @@ class ExponentSolver:
             if not isinstance(getattr(self, name), kind):
                 raise TypeError(f"got {name} = {getattr(self, name)!r}; must be {words}")
         if not math.isfinite(self.problem.noise.standard_deviation):
-            raise NoSuchExponent(
-                "the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"
-            )
+            raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))
         if not (math.isfinite(self.rtol) and self.rtol > 0):
             raise ValueError(f"rtol is {self.rtol!r}; it must be a positive number such as 1e-8")
 
@@ -215,10 +213,10 @@ class ExponentSolver:
             try:
                 solution = self.solution(float(points[i]))
                 if points[i] != 0:  # where Λ = 0 has no scale
-                    checked(self.estimate(solution), self.near.remedy)
+                    checked(self.estimate(solution), self.near.remedy, solution.pair.p)
                 solutions[i] = solution
             except NotConverged as failure:
-                failures.append(Failure(float(points[i]), str(failure)))
+                failures.append(Failure(float(points[i]), failure.message))
             progress()
         return self._result([solutions[i] for i in sorted(solutions)], failures)
 
@@ -246,9 +244,7 @@ class ExponentSolver:
         """
         tail = variance_tail(self.problem)
         if tail < HARDLY_FINITE:
-            raise NoSuchExponent(
-                "Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time"
-            )
+            raise NoSuchExponent(Message(Code.NO_VARIANCE_RATE))
         scale = 2 * self.scales.quadratic
         value, better = map(second_derivative, self.at_zero)
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
@@ -263,7 +259,8 @@ class ExponentSolver:
         try:
             generator = Generator(self.problem, widened(pair.generator).enriched())
         except MeshError as failure:
-            raise NotConverged(f"p = 0 did not converge on a finer mesh: {failure}; {self.near.remedy}") from failure
+            told = Message(Code.ZERO_NOT_FINER, reason=failure.message, remedy=self.near.remedy)
+            raise NotConverged(told) from failure
         with one_thread():
             return pair, self.near.remedied(lambda: principal_pair(generator, 0.0, start=pair))
 
@@ -309,21 +306,19 @@ class ExponentSolver:
         )
 
 
-def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[str, ...]:
+def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
     """A warning about the p at which the estimated error exceeds rtol, or nothing."""
     size = np.where(p == 0, math.inf, np.maximum(np.abs(value), [solver.scale(float(each)) for each in p]))
     shares = error / size
-    if not np.any(shares > solver.rtol):
+    count = np.count_nonzero(shares > solver.rtol)
+    if not count:
         return ()
-    worst = int(np.argmax(shares))
-    remedy = Remedy.MESH if solver.mesh is not None else "as rounding limits it"
-    return (
-        f"rtol = {solver.rtol:g} is not met at {np.count_nonzero(shares > solver.rtol)} of {p.size} moments, worst at "
-        f"p = {p[worst]:g} with an estimated relative error of {shares[worst]:.1e}; {remedy}, or use a larger rtol",
-    )
+    worst, remedy = int(np.argmax(shares)), Remedy.ROUNDING if solver.mesh is None else Remedy.MESH
+    found = {"p": p[worst], "size": shares[worst]}
+    return (Message(Code.RTOL_MISSED, rtol=solver.rtol, count=count, of=p.size, **found, remedy=remedy),)
 
 
-def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[str, ...]:
+def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
     """At which p rare paths carry the moment, and from when on at the first of them, or nothing."""
     far = [pair for pair in pairs if is_far_out(pair)]
     if not far:
@@ -333,12 +328,6 @@ def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> t
     z, density = noise_marginal(pair)
     mean = float(z @ density / density.sum())
     rarity = -log_tail(solver.problem, mean)
-    which = f", at p = {pair.p:g} those" if len(far) > 1 else ", those"
-    text = (
-        f"at p = {', '.join(f'{each.p:g}' for each in far)} rare paths carry the moment{which} with noise around "
-        f"{mean:.3g} standard deviations, of probability 1e-{rarity / math.log(10):.0f}"
-    )
-    if near is None:  # the place nearest to ξ = 0 is that far out
-        return (text,)
-    wait = rarity / (pair.value - near.value)
-    return (f"{text}; for times up to about {wait:.1g} they hardly count, and E‖x‖^p grows at {near.value:.3g}",)
+    wait = {"near": near.value, "wait": rarity / (pair.value - near.value)} if near else {}  # else near is that far out
+    first, decades = pair.p if len(far) > 1 else None, rarity / math.log(10)
+    return (Message(Code.RARE_PATHS, p=[each.p for each in far], first=first, z=mean, decades=decades, **wait),)

@@ -13,6 +13,7 @@ from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray
+from fpsolve.errors import SingularMatrix
 from fpsolve.fem.kronecker import KroneckerSum
 
 MAX_DENSE_UNKNOWNS = 350
@@ -28,6 +29,14 @@ def one_thread() -> Any:
 @cache
 def _pools() -> ThreadpoolController:
     return ThreadpoolController()
+
+
+def sparse_lu(matrix: Any, **options: Any) -> Any:
+    """SuperLU's factors, ordered for a symmetric pattern. Raises `SingularMatrix`."""
+    try:
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", **options)
+    except RuntimeError as failure:
+        raise SingularMatrix(*failure.args) from failure
 
 
 class Factors(Protocol):
@@ -123,13 +132,10 @@ class SparseFactors:
     def __init__(self, operator: KroneckerSum) -> None:
         matrix = operator.tocsc()
         try:
-            self._lu = self._factor(matrix)
-        except RuntimeError:  # singular: the shift is the eigenvalue to the last bit
-            self._lu = self._factor(matrix + 1e-15 * abs(matrix).max() * identity(operator.size, format="csc"))
-
-    @staticmethod
-    def _factor(matrix: Any) -> Any:
-        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01)
+            self._lu = sparse_lu(matrix, diag_pivot_thresh=0.01)
+        except SingularMatrix:  # the shift is the eigenvalue to the last bit
+            shifted = matrix + 1e-15 * abs(matrix).max() * identity(operator.size, format="csc")
+            self._lu = sparse_lu(shifted, diag_pivot_thresh=0.01)
 
     def solve(self, b: FloatArray) -> FloatArray:
         return np.asarray(self._lu.solve(b))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from fpsolve.arrays import Coefficient, one
+from fpsolve.arrays import Coefficient, finite, one
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.phase_space import PhaseSpace
@@ -171,7 +171,7 @@ class Generator:
             growth = float(np.max(fastest(space.xi.support)))
         else:
             driven = space.xi_matrix(None) + space.xi.mass(fastest)
-            growth = float(np.max(scipy.linalg.eigvals(driven, space.xi_matrix(one)).real))
+            growth = float(np.max(scipy.linalg.eigvals(finite(driven), space.xi_matrix(one)).real))
         for kick in system.kicks:
             if isinstance(noise, MarkovChain) and crosses_both_ways(system, kick, space.xi.support):
                 growth += float(-np.min(noise.rates)) * math.expm1(max(0.0, p * kick.log_factor))

@@ -18,6 +18,7 @@ from scipy.special import beta, roots_jacobi
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.errors import MeshError
 from fpsolve.fem.reference import EXTRA_POINTS, Rule, gauss_legendre
+from fpsolve.messages import Code, Message
 
 
 @lru_cache(maxsize=512)
@@ -176,13 +177,10 @@ def _orthogonalised(slopes: FloatArray, measure: FloatArray) -> tuple[FloatArray
     slopes = np.sqrt(measure)[..., None] * slopes
     scale = np.linalg.norm(slopes, axis=1)
     if not np.all(scale > 1e-150):
-        raise MeshError("P_s underflows in a cell of the noise; use a narrower interval")
+        raise MeshError(Message(Code.UNDERFLOW))
     q, r = np.linalg.qr(slopes[:, :, 2:] / scale[:, None, 2:])
     if np.min(np.abs(np.diagonal(r, axis1=1, axis2=2)), initial=1.0) < 1e-14:
-        raise MeshError(
-            f"elements of degree {slopes.shape[2] - 1} are linearly dependent to rounding, as P_s falls too far within "
-            "a cell of the noise; use more or lower-degree cells, or a narrower interval"
-        )
+        raise MeshError(Message(Code.DEPENDENT, degree=slopes.shape[2] - 1))
     inverse = np.linalg.solve(r, np.broadcast_to(np.eye(r.shape[1]), r.shape)) / scale[:, 2:, None]
     transform = np.broadcast_to(np.eye(slopes.shape[2]), (len(slopes), *2 * slopes.shape[2:])).copy()
     transform[:, 2:, 2:] = inverse

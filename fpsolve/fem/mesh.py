@@ -13,6 +13,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
+from fpsolve.messages import Code, Message
 
 MAX_DEGREE = 20
 MAX_CELLS = 1000
@@ -83,10 +84,7 @@ def vertices_at(lines: FloatArray, phase: float) -> Any:
     turns = round((lines[-1] - lines[0]) / math.pi)
     if found.size != turns:
         name = "pi/2" if phase == math.pi / 2 else f"{phase:.6g}"
-        raise MeshError(
-            f"{turns} impact line(s) expected at phi = {name} + k pi, {found.size} found; "
-            "put a line of the mesh at each impact"
-        )
+        raise MeshError(Message(Code.NO_IMPACT_LINE, wanted=turns, place=name, found=found.size))
     return found
 
 

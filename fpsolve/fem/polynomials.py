@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Polynomials:
 
     def rule(self) -> tuple[FloatArray, FloatArray]:
         """Gauss points by the method of Golub and Welsch, and weights, each to its own relative accuracy."""
-        x = eigh_tridiagonal(self.a, self.b[:-1], eigvals_only=True)
+        x = eigh_tridiagonal(finite(self.a), finite(self.b[:-1]), eigvals_only=True)
         return x, 1 / np.sum(self.at(x)[0] ** 2, axis=1)
 
 

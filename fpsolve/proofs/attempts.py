@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from fpsolve.exponent.branch import is_numerical
 from fpsolve.proofs.balls import ball, in_balls
 from fpsolve.proofs.basis import Basis, Core, Whole
 from fpsolve.proofs.bounds import Trial
@@ -93,9 +92,7 @@ def _enlarged(
     while idle < PATIENCE[delta > FAR * abs(value)] and size.unknowns <= MOST_UNKNOWNS:
         try:
             pair, basis = _solved(noise, basis, p, guess, size)
-        except (ArithmeticError, RuntimeError) as failure:
-            if not is_numerical(failure):
-                raise
+        except ArithmeticError:
             return
         value = pair.value
         certificate = _certificate(stated, noise, basis, p, pair)

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 from scipy.special import roots_jacobi
 
 from fpsolve.arrays import FloatArray
+from fpsolve.fem.factors import sparse_lu
 from fpsolve.proofs.balls import balls
 from fpsolve.proofs.basis import Basis, Core
 from fpsolve.proofs.cells import hermite_table
@@ -104,7 +104,7 @@ class Galerkin:
         u[self.waves * self.degrees] = 1.0
         adjoint, value = u, guess
         for _ in range(2):
-            factors = splu((self.matrix - value * self.mass).tocsc(), permc_spec="MMD_AT_PLUS_A")
+            factors = sparse_lu((self.matrix - value * self.mass).tocsc())
             for _ in range(4):
                 u = _normed(factors.solve(self.mass @ u))
                 adjoint = _normed(factors.solve(self.mass @ adjoint, "H"))
@@ -124,7 +124,7 @@ class Galerkin:
         unit[self.waves * self.degrees] = 1.0
         column = sp.csc_matrix(self.mass @ unit).T
         bordered = sp.bmat([[self.matrix, -column], [column.T, None]], format="csc")
-        found = splu(bordered, permc_spec="MMD_AT_PLUS_A").solve(np.append(-load.ravel(), 0.0))
+        found = sparse_lu(bordered).solve(np.append(-load.ravel(), 0.0))
         return Pair(float(found[-1].real), self._table(found[:-1]), 0.0)
 
     def _table(self, u: FloatArray) -> FloatArray:

@@ -26,6 +26,7 @@ from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import message_of
 from fpsolve.model.direction import directions
 from fpsolve.study.results import Comparison, CurveResult, Moments, Solved
 from fpsolve.theory import validity
@@ -119,7 +120,7 @@ def solve_curve(
     solver = ExponentSolver(curve.problem, numerics.mesh, rtol=numerics.rtol, budget=numerics.budget)
     found = solve_moments(solver, wanted.p, progress=progress)
     estimates, unsolved, missing, absent = _solve_indices(solver, wanted.indices, found)
-    failures = found.failures or tuple(Failure(None, text) for text in unsolved)
+    failures = found.failures or tuple(Failure(None, message_of(text)) for text in unsolved)
     pairs, stationary = _functions(solver, without_failed(wanted, found.failures))
     lost = _lost(stationary, solver.near.refinement)
     warnings = [*found.warnings, *missing, *(unsolved if found.failures else ()), *_imprecise(estimates, numerics)]
@@ -134,7 +135,7 @@ def solve_curve(
         warnings=tuple(map(in_words_of_a_case, warnings)),
         sensitivities=slopes,
         notes=tuple(map(in_words_of_a_case, notes)),
-        failures=tuple(replace(each, reason=in_words_of_a_case(each.reason)) for each in failures),
+        failures=tuple(replace(each, reason=message_of(in_words_of_a_case(each.reason))) for each in failures),
         seconds=thread_time() - started,
     )
     return Solved(result, pairs, None if lost else stationary)
@@ -192,7 +193,9 @@ def _solve_indices(
             absent.setdefault(found.reason, []).append(index.symbol)
         elif found.reason != validity.NO_INDEX:  # of which a note tells
             missing.append(f"no stability index: {found.reason}")
-    told = {failure.reason: f"as there is no Λ({failure.p:g})" for failure in moments.failures if failure.p is not None}
+    told: dict[str, str] = {
+        failure.reason: f"as there is no Λ({failure.p:g})" for failure in moments.failures if failure.p is not None
+    }
     failed = {told.get(reason, reason): symbols for reason, symbols in failed.items()}
     unsolved, warnings, notes = (
         [f"no {', '.join(symbols)}: {reason}" for reason, symbols in each.items()]

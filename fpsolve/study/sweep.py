@@ -21,6 +21,7 @@ from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Failure
 from fpsolve.exponent.quantities import INDICES
+from fpsolve.messages import message_of
 from fpsolve.study.results import CurveResult, Moments, Solved
 from fpsolve.study.solve import Numerics, Wanted, solve_curve, solve_functions
 
@@ -123,7 +124,7 @@ def failed(curve: Curve, reason: str) -> CurveResult:
         curve,
         Moments(*[nothing] * 7),
         dict.fromkeys(INDICES),
-        failures=(Failure(None, in_words_of_a_case(reason)),),
+        failures=(Failure(None, message_of(in_words_of_a_case(reason))),),
     )
 
 

@@ -9,7 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 
+from fpsolve.arrays import finite
 from fpsolve.errors import NotConverged
+from fpsolve.messages import Code, Message
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import FURTHEST, FrozenNoise, eigenvalues_at, frozen_noise
@@ -156,7 +158,8 @@ def _held(problem: Problem, p: float, inner: float, outer: float) -> Place:
     growth = p * eigenvalues_at(problem, unit * z[2:-1:2])[0]
     diagonal = growth - np.exp(flux[:-1] - mass) - np.exp(flux[1:] - mass)
     beside = np.exp(flux[1:-1] - 0.5 * (mass[:-1] + mass[1:]))
-    value, vector = scipy.linalg.eigh_tridiagonal(diagonal, beside, select="i", select_range=(POINTS - 1, POINTS - 1))
+    last = (POINTS - 1, POINTS - 1)
+    value, vector = scipy.linalg.eigh_tridiagonal(finite(diagonal), finite(beside), select="i", select_range=last)
     tilted = vector[:, 0] ** 2 / np.exp(size[2:-1:2])
     held = z[2:-1:2][tilted > NEGLIGIBLE * np.max(tilted)]
     return Place(float(value[0]), float(np.min(held)), float(np.max(held)))
@@ -166,7 +169,4 @@ def refuse_beyond(problem: Problem, p: float, reached: float) -> None:
     """Refuse a p where paths that hold the noise beyond all z looked at grow as fast as all others, or faster."""
     beyond = growth_beyond(problem, p)
     if beyond > 0 and beyond >= reached:
-        raise NotConverged(
-            f"Λ({p:g}) did not converge: it is at least {beyond:.3g}, as much as paths grow that hold the noise beyond "
-            f"{FURTHEST:g} standard deviations, and no eigenfunction belongs to them"
-        )
+        raise NotConverged(Message(Code.HELD_BEYOND, p=p, rate=beyond, z=FURTHEST))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import Remedy
+from fpsolve.messages import ALMOST_EVERY, Remedy
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
@@ -41,7 +41,6 @@ def impact_note(oscillator: VibroImpactOscillator) -> str | None:
 
 NO_INDEX = "Λ(p) > 0 for every p ≠ 0, as rare paths that hold the noise far out carry the moments in the end"
 """Why noise with algebraic tails leaves no stability index, see `far_places`."""
-ALMOST_EVERY = "growth rate of almost every path (Furstenberg-Khasminskii)"
 
 
 def heavy_tail_note(problem: Problem, exponent: float | None) -> str | None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_matrix
 
 from fpsolve import (
     MomentLyapunovFunction,
@@ -13,10 +14,12 @@ from fpsolve import (
     stability_index,
 )
 from fpsolve.analysis import adjoint_density, stationary_density
-from fpsolve.errors import MeshError, NotConverged
-from fpsolve.exponent import branch
+from fpsolve.arrays import finite
+from fpsolve.errors import MeshError, NotConverged, NumericalFailure, SingularMatrix
+from fpsolve.exponent import branch, eigen
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.factors import sparse_lu
 
 FIG1 = Problem(
     VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1),
@@ -44,8 +47,8 @@ def test_a_density_that_is_none_is_refused():
     ("failure", "words"),
     [
         (OverflowError("too large"), "beyond floating-point numbers"),
-        (ValueError("array must not contain infs or NaNs"), "beyond floating-point numbers"),
-        (RuntimeError("Factor is exactly singular"), "beyond floating-point numbers"),
+        (NumericalFailure("array must not contain infs or NaNs"), "beyond floating-point numbers"),
+        (SingularMatrix("Factor is exactly singular"), "beyond floating-point numbers"),
         (np.linalg.LinAlgError("singular"), "cannot be solved"),
         (MeshError("P_s underflows"), "did not converge: P_s underflows"),
     ],
@@ -61,6 +64,19 @@ def test_a_fault_of_the_program_is_no_failure_to_converge(monkeypatch, failure):
     monkeypatch.setattr(branch, "resolve", lambda *_, **__: (_ for _ in ()).throw(failure))
     with pytest.raises(type(failure), match=str(failure).split()[0][:3]):
         moment_lyapunov(FIG1, 2.0)
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_what_libraries_raise_on_numbers_has_kinds_of_our_own(size):
+    with pytest.raises(SingularMatrix, match="singular"):
+        sparse_lu(csc_matrix((size, size)))
+    with pytest.raises(NumericalFailure, match="infs or NaNs"):
+        finite(np.full(size, np.nan))
+
+
+def test_a_start_that_is_zero_is_a_failure_of_numbers():
+    with pytest.raises(SingularMatrix, match=r"(?i)arpack|start"):
+        eigen._dominant(lambda v: v, np.zeros(30), 1.0)
 
 
 def test_equal_moments_are_solved_once():

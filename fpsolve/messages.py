@@ -1,0 +1,413 @@
+"""What is said of results, as codes with data, from which words are made for Python or for another audience."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from enum import Enum, StrEnum, unique
+from string import Formatter
+from types import MappingProxyType
+from typing import Any
+
+ALMOST_EVERY = "growth rate of almost every path (Furstenberg-Khasminskii)"
+_RARE = "Λ(p) > 0 for every p ≠ 0, as rare paths that hold the noise far out carry the moments in the end"
+
+
+class Severity(StrEnum):
+    """How much a message means: something failed, its number is limited, or a theory beside it is not valid."""
+
+    FAILURE = "failure"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+class Remedy(StrEnum):
+    """What to do, in the words of Python."""
+
+    MESH = "use more cells or a wider noise interval, or let the mesh be chosen"
+    CELLS = "use more cells in a given mesh, or a smaller rtol where it is chosen"
+    REACH = "use a mesh that reaches there, or let it be chosen"
+    BUDGET = "use a larger rtol or a larger budget"
+    SMALLER_RTOL = "use a smaller rtol"
+    ROUNDING = "as rounding limits it"
+    BOTH_AXES = "use more cells, in the phase and in the noise"
+    PHASE = "use more cells in the phase"
+    DEGREES = "use more or higher-degree cells"
+    MESH_FILE = "make one with `write_mesh`"
+    REDUCTION = "or the Ornstein-Uhlenbeck reduction of the noise"
+    NO_REDUCTION = "the unreduced noise keeps Eq. (7)"
+    FOLDER = "choose another folder"
+    MEMORY = "use a smaller budget, or fewer processes"
+
+
+Audience = Mapping[Enum, str]
+"""Words for remedies, and templates for codes, in place of those for Python."""
+_FAILURE, _WARNING, _NOTE = Severity.FAILURE, Severity.WARNING, Severity.NOTE
+
+
+@unique
+class Code(Enum):
+    """What is said: a name, the severity and the template of its words.
+
+    A template is that of `str.format`. A value that is None is shown as nothing, one of several as a list; after "?" a
+    field has the words for a value that is there and, after "¦", for None or False. A `remedy` that the template does
+    not name ends the message. The datum `size` tells how bad it is.
+    """
+
+    def __init__(self, severity: Severity, template: str) -> None:
+        self.severity, self.template = severity, template
+
+    TEXT = _FAILURE, "{text}"
+    PLACED = _FAILURE, "{place}: {reason}"
+    SEVERAL = _FAILURE, "{reasons}"
+
+    INFINITE = (
+        _FAILURE,
+        "Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only hide it; "
+        "choose p in [{low:g}, {high:g}], r0 <= 1, {remedy}",
+    )
+    INFINITE_ON_RAY = (
+        _FAILURE,
+        "Λ({p:g}) is infinite or out of reach: the noise moves the phase to and fro over the ray at {phase:.6g}, where "
+        "‖x‖^p grows by a factor > {factor:.3g} each time; choose a p nearer to 0, or a ray on which no noise acts",
+    )
+    INFINITE_VARIANCE = (
+        _FAILURE,
+        "the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3",
+    )
+    NO_VARIANCE_RATE = (
+        _FAILURE,
+        "Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time",
+    )
+    RARE_NOWHERE_ZERO = (
+        _FAILURE,
+        "Λ({p:g}) is that of rare paths, which hold the noise far out in its tails, and zero nowhere; choose r0 <= 1, "
+        "{remedy}",
+    )
+    NO_BOUND = (
+        _FAILURE,
+        "got {key} = {value}; for r0 > 1 the noise of Eq. (7) has algebraic tails: Λ(p) is finite for -1 <= p <= 0 "
+        "only, and no trial function is known to prove a bound there; choose r0 <= 1, {remedy}",
+    )
+
+    UNDERFLOW = _FAILURE, "P_s underflows in a cell of the noise; use a narrower interval"
+    DEPENDENT = (
+        _FAILURE,
+        "elements of degree {degree} are linearly dependent to rounding, as P_s falls too far within a cell of the "
+        "noise; use more or lower-degree cells, or a narrower interval",
+    )
+    NO_IMPACT_LINE = (
+        _FAILURE,
+        "{wanted} impact line(s) expected at phi = {place} + k pi, {found} found; put a line of the mesh at each "
+        "impact",
+    )
+
+    NOT_CONVERGED = _FAILURE, "Λ({p:g}) did not converge: {reason}"
+    NOT_SOLVED = _FAILURE, "Λ({p:g}) cannot be solved ({reason})"
+    OUT_OF_RANGE = _FAILURE, "Λ({p:g}) is beyond floating-point numbers ({reason})"
+    FAR_OUT = _FAILURE, "{reason}; this moment is carried by rare paths, with noise far out in its tails"
+    NEAR_ZERO = _FAILURE, "p near 0 goes with p = {p:g}: {reason}"
+    ZERO_NOT_FINER = _FAILURE, "p = 0 did not converge on a finer mesh: {reason}"
+    HELD_BEYOND = (
+        _FAILURE,
+        "Λ({p:g}) did not converge: it is at least {rate:.3g}, as much as paths grow that hold the noise beyond {z:g} "
+        "standard deviations, and no eigenfunction belongs to them",
+    )
+    NO_EIGENVALUE = (
+        _FAILURE,
+        "the principal eigenvalue at p = {p:g} was not found on this mesh: backward error {residual:.1e} (at most "
+        "{limit:g}), and {size:.1e} of the more positive of T and T* has the wrong sign (at most {most:g})",
+    )
+    LARGER_EIGENVALUE = (
+        _FAILURE,
+        "at p = {p:g} the eigenvalue {rightmost:.6g} lies right of {value:.6g}, though that has eigenfunctions of one "
+        "sign",
+    )
+    NO_ARNOLDI = _FAILURE, "the Arnoldi iteration for p = {p:g} did not settle"
+    UNKNOWNS_SPENT = _FAILURE, "the next mesh has {unknowns} unknowns, more than budget.unknowns = {most}"
+    SECONDS_SPENT = (
+        _FAILURE,
+        "the next mesh needs some {seconds:.2g} s by the clock, more than budget.seconds = {most:g}",
+    )
+    MESHES_SPENT = _FAILURE, "{count} meshes were tried"
+    ROUNDED = _FAILURE, "rounding alone may change it by {size:.1e}: use a larger rtol"
+    NOTHING_RESOLVED = (
+        _FAILURE,
+        "Λ({p:g}) did not converge: {reason}; no mesh resolved it"
+        "{is_thin:?, as the layers of slow, strong noise are too thin}{last:? ({last})}",
+    )
+    BUDGET_SPENT = (
+        _FAILURE,
+        "Λ({p:g}) did not converge: {reason}; best value {value:.6g} with an estimated error of {error:.1e}, "
+        "{size:.1e} times the tolerance",
+    )
+    MEANINGLESS = (
+        _FAILURE,
+        "{p:?Λ({p:g})¦{symbol}} = {value:.6g} has an estimated error of {size:.1g}, too much to mean anything",
+    )
+    NOT_CONVEX = (
+        _FAILURE,
+        "Λ(p) is not convex between p = {p:g} and p = {other:g}, which the exponent always is: a wrong eigenvalue was "
+        "found",
+    )
+    KINKED = (
+        _FAILURE,
+        "Λ(p) is not smooth in p: noise with algebraic tails carries the moment far out for some p; use "
+        "moment_lyapunov, which takes each p by itself",
+    )
+    NOT_INCREASING = _FAILURE, "Λ(p)/p does not increase at p = {p:g}, as convexity demands"
+    INDEX_UNSETTLED = _FAILURE, "the stability index did not settle, last near p = {p:g}"
+    NEGATIVE_DENSITY = _FAILURE, "the {name} at p = {p:g} is not resolved, {size:.0%} of it is negative"
+    SIMULATION_OVERFLOWED = _FAILURE, "the simulation overflowed: some ξ is too large for this step; use a smaller step"
+
+    RTOL_MISSED = (
+        _WARNING,
+        "rtol = {rtol:g} is not met at {count} of {of} moments, worst at p = {p:g} with an estimated relative error of "
+        "{size:.1e}; {remedy}, or use a larger rtol",
+    )
+    INDEX_RTOL_MISSED = (
+        _WARNING,
+        "rtol = {rtol:g} is not met by {symbol}: {value:.6g} has an estimated error of {error:.1e}; "
+        "{remedy:?{remedy}, or }use a larger rtol",
+    )
+    CARRIED_ELSEWHERE = (
+        _WARNING,
+        "Λ({p:g}) may be larger: {has_tails:?noise with heavy tails¦slow noise} may carry the moment near {z:.3g} "
+        "standard deviations",
+    )
+    UNREADABLE = (
+        _WARNING,
+        "{name} at p = {p:g} is not resolved, {size:.0%} of it has the wrong sign; its errors have next to no effect "
+        "on Λ, but do not read its picture",
+    )
+    NOTHING_DRAWN = _WARNING, "neither the stationary density nor eigenfunctions are written: {reason}"
+
+    INDEX_FAILED = _FAILURE, "no {symbols}: {reason}"
+    INDEX_MISSING = _WARNING, "no {symbols}: {reason}"
+    INDEX_ABSENT = _NOTE, "no {symbols}: {reason}"
+    NO_MOMENT = _FAILURE, "as there is no Λ({p:g})"
+    NO_INDEX = _NOTE, _RARE
+    NO_ROOT = (
+        _NOTE,
+        "Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded noise "
+        "P(sup ‖x‖ > A) may fall faster than any power of A}",
+    )
+    NOT_ONE_RAY = _NOTE, "the motion has impacts on {count:?{count}¦no} rays, and only on a single one have they a rate"
+    RARE_IMPACTS = _NOTE, "impacts are too rare to matter, N < {most:.1g}"
+    LOG_OUT_OF_RANGE = _NOTE, "its logarithm is {value:.3g}, beyond ±{most:g}"
+    NO_RESTITUTION = _NOTE, "the motion has no coefficient of restitution"
+    ALWAYS_STABLE = _NOTE, "almost surely stable for every r in (0, 1], as λ without loss is {value:.3g}"
+    ALWAYS_UNSTABLE = _NOTE, "unstable for every r in (0, 1]: it would have to be {value:.3g}"
+
+    RARE_PATHS = (
+        _NOTE,
+        "at p = {p:g} rare paths carry the moment{first:?, at p = {first:g} those¦, those} with noise around {z:.3g} "
+        "standard deviations, of probability 1e-{decades:.0f}"
+        "{near:?; for times up to about {wait:.1g} they hardly count, and E‖x‖^p grows at {near:.3g}}",
+    )
+    HEAVY_TAILS = (
+        _NOTE,
+        f"algebraic tails: {_RARE}; there is no stability index, and λ is the {ALMOST_EVERY}"
+        "{is_no_slope:?, not Λ′(0)}",
+    )
+    UNSEEN_TAILS = (
+        _NOTE,
+        f"algebraic tails: {_RARE}; a simulation shows Λ(p) without these paths, and λ is the {ALMOST_EVERY}",
+    )
+    FAR_FROM_GAUSSIAN = (
+        _NOTE,
+        "the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = {departure:.3g} > {most:g}: it gives "
+        "the noise the variance {reduced:.4g} instead of {variance:.4g}, Eq. (10)",
+    )
+    IMPOSSIBLE_BOUNCE = (
+        _NOTE,
+        "1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much; R = {factor:.3g} belongs to the "
+        "delta law alone",
+    )
+    STRONG_NOISE = (
+        _NOTE,
+        "Eq. (37) is for weak noise{is_reduced:?, and here for the reduced one}: from |p| = {first:.3g} on, what it "
+        "leaves out, epsilon^4 and higher, exceeds {most:.0%} of its terms, most at p = {p:.3g}, where it is "
+        "{rest:.3g}, {size:.0%}",
+    )
+    NO_SENSITIVITIES = _NOTE, "no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
+    ONE_SIDED = (
+        _NOTE,
+        "the sensitivities to noise.r0 = 1 are derivatives from below: above, Λ is infinite or another one",
+    )
+
+    NO_PROBLEM = _FAILURE, "no such problem: {reason}"
+    NOWHERE = _NOTE, "{symbol} exists nowhere in the frame"
+    NO_LINE = _NOTE, "no line {line} was found, though {symbol} changes its sign in the frame"
+    ONE_SIGN = _NOTE, "{side} {is_whole:?everywhere¦wherever it exists} in the frame"
+    LINE_ENDS = _NOTE, "the line {line} ends inside of the frame: {reason}"
+    HOLES = _NOTE, "{symbol} is missing in part of the frame: {reason}"
+    NEWTON_UNSETTLED = _FAILURE, "Newton's method does not settle on it"
+    TOO_SHARP = _FAILURE, "it turns too sharply, as where it meets another branch"
+    TOO_LONG = _FAILURE, "it has more than {count} points"
+
+    NO_PATH_VARIANCE = (
+        _WARNING,
+        "no estimate of Λ(p) at p = {p:g}: ‖x‖^p has no variance, as for r0 > 1 the moment of order 2p is infinite; "
+        "use the finite elements",
+    )
+    FEW_PATHS = (
+        _WARNING,
+        "no estimate of Λ(p) at p = {p:g}: too few effective paths carry the mean, {low:.3g}{high:? to {high:.3g}} of "
+        'the {needed} that are needed; use {is_direct:?estimator = "population", or more paths¦more paths}',
+    )
+    TWO_PLACES = (
+        _WARNING,
+        "Λ({p:g}): populations that start in two places differ by {gap:.3g}, {size:.0f} standard errors: the noise is "
+        "too slow to pass between them; the larger value is given",
+    )
+    DRIFTING = (
+        _WARNING,
+        "Λ({p:g}) still drifts: over the simulation it changes by {size:.1f} standard errors, more than {most:g}, "
+        "which its standard error does not cover; use {is_direct:?a longer window¦more time}",
+    )
+    STOPPED = _WARNING, "stopped early, after {share:.0%} of the time"
+    AT_REST = (
+        _WARNING,
+        "no stationary response: λ = {value:.3g} ± {error:.1e} {most:?is not {most:g} standard errors above 0¦is not "
+        "positive}, and with λ < 0 almost every path comes to rest",
+    )
+    RESPONSE_STOPPED = _WARNING, "the response was stopped early, after {time:.3g}"
+    RESPONSE_NOT_REACHED = _WARNING, "no stationary response: stopped before it was reached"
+
+    NO_MEMORY = _FAILURE, "not enough memory"
+    WORKER_DIED = _FAILURE, "its worker died, perhaps for lack of memory; {remedy}, and run it again"
+    FAULT = _FAILURE, "{kind}: {text} (a fault of fpsolve, in {file}:{line})"
+    NOT_MADE = _FAILURE, "{place} cannot be made: {reason}"
+    NOT_WRITABLE = _FAILURE, "{place} cannot be written to"
+    NOT_WRITTEN = _FAILURE, "{place} cannot be written: {reason}"
+    BEING_WRITTEN = _FAILURE, "{place} is being written by another run; wait for it, or {remedy}"
+    NOT_SHARED = _FAILURE, "{place} is not where the workers write: they must share it"
+
+
+class Message(str):
+    """Something that is said: a text in the words of Python that knows its code and its data; it pickles.
+
+    Attributes:
+        code: what is said.
+        data: numbers, texts, further messages (such as a `reason`), tuples of them, and a `remedy` where there is one.
+    """
+
+    code: Code
+    data: Mapping[str, Any]
+
+    def __new__(cls, code: Code, **data: Any) -> Message:
+        """A message of a code; numpy's numbers and arrays become Python's numbers and tuples."""
+        known = {key: _python(value) for key, value in data.items()}
+        made = super().__new__(cls, _words(code, known, {}))
+        made.__dict__.update(code=code, data=MappingProxyType(known))
+        return made
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"a message is not changed: {name}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _remade, (self.code, dict(self.data))
+
+    @property
+    def severity(self) -> Severity:
+        """How much it means."""
+        return self.code.severity
+
+    @property
+    def kind(self) -> tuple[Any, ...]:
+        """What it has in common with messages that differ in numbers only."""
+        return self.code, *((key, _without_numbers(value)) for key, value in self.data.items())
+
+    @property
+    def size(self) -> float | None:
+        """How bad it is, or else the first of its reasons that tells; None where nothing does."""
+        own: float | None = self.data.get("size")
+        return own if own is not None else next((each.size for each in self.reasons() if each.size is not None), None)
+
+    def reasons(self) -> Iterator[Message]:
+        """The messages among its data."""
+        return (value for value in self.data.values() if isinstance(value, Message))
+
+    def words(self, audience: Audience) -> str:
+        """The text in the words of an audience."""
+        return _words(self.code, self.data, audience)
+
+    def advising(self, remedy: str | None) -> Message:
+        """The same with another remedy, or without one."""
+        others = {key: value for key, value in self.data.items() if key != "remedy"}
+        return Message(self.code, **others, **({"remedy": remedy} if remedy else {}))
+
+    def to_data(self) -> dict[str, Any]:
+        """What JSON can hold, from which `from_data` makes it again."""
+        return {"code": self.code.name, "data": {key: _plain(value) for key, value in self.data.items()}}
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> Message:
+        """The inverse of `to_data`. Raises `KeyError` or `TypeError` where it is none."""
+        return cls(Code[data["code"]], **{key: _from_plain(value) for key, value in data["data"].items()})
+
+
+def message_of(text: str) -> Message:
+    """A text as a message; a message as it is."""
+    return text if isinstance(text, Message) else Message(Code.TEXT, text=text)
+
+
+def _remade(code: Code, data: Mapping[str, Any]) -> Message:
+    return Message(code, **data)
+
+
+def _words(code: Code, data: Mapping[str, Any], audience: Audience) -> str:
+    template, writer = audience.get(code, code.template), _Writer(audience)
+    if data.get("remedy") is not None and "{remedy" not in template:
+        template += "; {remedy}"
+    return writer.vformat(template, (), data)
+
+
+class _Writer(Formatter):
+    """Fills templates for an audience."""
+
+    def __init__(self, audience: Audience) -> None:
+        self._audience = audience
+
+    def get_value(self, key: int | str, args: Any, kwargs: Mapping[str, Any]) -> Any:
+        return kwargs.get(str(key))
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        if format_spec.startswith("?"):
+            present, _, absent = format_spec[1:].partition("¦")
+            return absent if value is None or value is False else present
+        if value is None:
+            return ""
+        if isinstance(value, tuple):
+            separator = "\n" if any(isinstance(each, Message) for each in value) else ", "
+            return separator.join(self.format_field(each, format_spec) for each in value)
+        if isinstance(value, Message):
+            return value.words(self._audience)
+        return self._audience.get(value, value.value) if isinstance(value, Remedy) else format(value, format_spec)
+
+
+def _python(value: Any) -> Any:
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return tuple(map(_python, value)) if isinstance(value, list | tuple) else value
+
+
+def _without_numbers(value: Any) -> Any:
+    if isinstance(value, Message):
+        return value.kind
+    if isinstance(value, tuple):
+        return tuple(dict.fromkeys(map(_without_numbers, value)))
+    return "#" if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Message):
+        return value.to_data()
+    if isinstance(value, Remedy):
+        return {"remedy": value.name}
+    return [_plain(each) for each in value] if isinstance(value, tuple) else value
+
+
+def _from_plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return Message.from_data(value) if "code" in value else Remedy[value["remedy"]]
+    return tuple(map(_from_plain, value)) if isinstance(value, list) else value
