@@ -189,20 +189,6 @@ def test_progress_and_rows_are_those_of_the_whole_chart(path):
     assert not any(chart.remarks for chart in partial)  # "no line was found" where none is traced yet
 
 
-@pytest.mark.parametrize(
-    ("overrides", "message"),
-    [
-        (["chart={}"], "chart.x: missing"),
-        (["vary.noise.tau0=[0.5, 1.0]"], "a chart has one set of the other parameters"),
-    ],
-)
-def test_without_a_chart_nothing_is_written(path, tmp_path, capsys, overrides, message):
-    words = [word for text in overrides for word in ("--set", text)]
-    assert main(["chart", str(path), "--out", str(tmp_path / "out"), *words]) == 2
-    assert message in " ".join(capsys.readouterr().err.split())
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_map_and_its_chart_share_a_folder(path, tmp_path):
     """What varies are the two keys of the chart, so that neither removes the other, whichever comes first."""
     sets = ["vary.oscillator.omega=[1.0, 2.0]", "vary.noise.D0=[0.1, 0.2]", "chart.zero=[{moment=2.0}]"]
@@ -224,39 +210,3 @@ def test_a_map_and_its_chart_share_a_folder(path, tmp_path):
     assert traced.is_whole
     [branch] = traced.branches
     assert np.all((branch[0] >= 0.01) & (branch[0] <= 1.0) & (branch[1] >= 0.5) & (branch[1] <= 3.0))
-
-
-def test_a_case_without_a_chart_is_refused(tmp_path, capsys):
-    (tmp_path / "bare.toml").write_text(CASE.partition("[chart]")[0], encoding="utf-8")
-    assert main(["chart", str(tmp_path / "bare.toml"), "--out", str(tmp_path / "out")]) == 2
-    assert "chart: missing; add [chart] with x = {" in " ".join(capsys.readouterr().err.split())
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("overrides", "message"),
-    [
-        (['chart.x.key="oscillator.omeg"'], 'chart.x.key: got "oscillator.omeg"; did you mean "oscillator.omega"?'),
-        (['chart.x.key="oscillator.c2"'], "c2 and c3 are not in the linear theory"),
-        (["chart.x.start=7.0"], "chart.x: got start = 7.0, stop = 3.0; must be start < stop"),
-        (['chart.y.key="oscillator.omega"'], 'chart.y.key: got "oscillator.omega" for both axes'),
-        (["chart.x.start=-1.0"], "chart.x.start: got -1.0; oscillator.omega must be greater than or equal to"),
-        (["chart.y={key='oscillator.c1', start=-1.0, stop=1.0, scale='log'}"], 'must be > 0 where scale = "log"'),
-        (["chart.x.at=[9.0]"], "chart.x.at[0]: got 9.0; must be from start = 0.5 to stop = 3.0"),
-        (["chart.zero=[]"], "chart.zero: got []; must be a list with one entry at least"),
-        (["chart.zero=['lambda']"], 'chart.zero[0]: got "lambda"; must be "lyapunov_exponent"'),
-        (["chart.zero=[{moment=0.0}]"], "chart.zero[0]: got {moment = 0.0}; must be"),
-        (["chart.zero=[{moment=2.0}, {moment=2.0}]"], "chart.zero[1]: got {moment = 2.0} twice"),
-        (['noise.treatment="exact"', "chart.y={key='noise.r0', start=0.5, stop=1.2}"], "noise.r0 reaches 1.2"),
-        (
-            ["chart.x={key='oscillator.epsilon', start=0.1, stop=9.0}", "oscillator.impact='restitution'"],
-            "restitution law",
-        ),
-        (["chart.z=1"], "chart.z: unknown key; known keys: x, y, zero"),
-    ],
-)
-def test_faults_of_a_chart(path, tmp_path, capsys, overrides, message):
-    words = [word for text in overrides for word in ("--set", text)]
-    assert main(["chart", str(path), "--out", str(tmp_path / "out"), *words]) == 2
-    assert message in " ".join(capsys.readouterr().err.split())
-    assert not (tmp_path / "out").exists()
