@@ -18,8 +18,8 @@ from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_IND
 from fpsolve.files import write_text
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.summary import MOST_ROWS, MOST_TABLES, varied_columns
+from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import plain, verdicts
-from fpsolve.proofs.enclosure import Enclosure
 from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.proofs.statement import IMPACT, TREATMENT
 from fpsolve.study.prove import CurveProof

@@ -1,5 +1,5 @@
 from .certificate import Certificate as Certificate
-from .enclosure import Enclosure as Enclosure
+from .certificate import Enclosure as Enclosure
 from .questions import IndexEnclosure as IndexEnclosure
 from .questions import prove as prove
 from .questions import prove_lyapunov_exponent as prove_lyapunov_exponent

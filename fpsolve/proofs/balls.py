@@ -1,7 +1,7 @@
 """Ball arithmetic: real numbers as a midpoint and a radius that holds every rounding, by FLINT's Arb.
 
 F. Johansson, Arb: efficient arbitrary-precision midpoint-radius interval arithmetic, IEEE Trans. Comput. 66, 2017.
-Arrays of `arb` and `acb` are numpy arrays of objects, on which + and * act element by element.
+Arrays of `arb` and `acb` are numpy arrays of objects. On these +, *, np.cos and np.sin act element by element.
 """
 
 from __future__ import annotations
@@ -10,9 +10,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
-from functools import wraps
-from operator import attrgetter, methodcaller
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +22,11 @@ if TYPE_CHECKING:
     from flint import arb
 
 PRECISION = 128
-"""Bits of a midpoint: twice those of the numbers that certificates hold, as what is bounded are differences."""
+"""Bits of a midpoint: twice those of the floats in a certificate, as what is bounded are differences."""
 TINY = 1e-300
 """More than what may be lost below the smallest normal number."""
 Balls = NDArray[Any]
 """Of dtype object."""
-P = ParamSpec("P")
-R = TypeVar("R")
 
 
 class MissingFlint(FpsolveError):
@@ -38,8 +34,8 @@ class MissingFlint(FpsolveError):
 
 
 @contextmanager
-def precision(bits: int = PRECISION) -> Iterator[None]:
-    """Compute with midpoints of so many bits.
+def precision() -> Iterator[None]:
+    """Compute with midpoints of `PRECISION` bits; for a block, or as a decorator for a function.
 
     Raises:
         MissingFlint: python-flint is not installed.
@@ -48,59 +44,41 @@ def precision(bits: int = PRECISION) -> Iterator[None]:
         from flint import ctx
     except ImportError as failure:
         raise MissingFlint("proofs need python-flint; install it with: pip install 'fpsolve[proof]'") from failure
-    with ctx.workprec(bits):
+    with ctx.workprec(PRECISION):
         yield
-
-
-def in_balls(function: Callable[P, R]) -> Callable[P, R]:
-    """Let a function compute with `PRECISION` bits."""
-
-    @wraps(function)
-    def with_precision(*args: P.args, **kwargs: P.kwargs) -> R:
-        with precision():
-            return function(*args, **kwargs)
-
-    return with_precision
 
 
 def ball(number: str | float | Fraction | int) -> arb:
     """What encloses a number: a decimal as text, a fraction, or a float as it stands."""
     from flint import arb, fmpq
 
-    if isinstance(number, str):
-        number = Fraction(number)
-    if isinstance(number, Fraction):
-        return arb(fmpq(number.numerator, number.denominator))
+    if isinstance(number, str | Fraction):
+        exact = Fraction(number)
+        return arb(fmpq(exact.numerator, exact.denominator))
     return arb(number)
+
+
+def each(function: Callable[[Any], Any], numbers: Any) -> Balls:
+    """A function of each element, in the same shape."""
+    found: Balls = np.frompyfunc(function, 1, 1)(numbers)
+    return found
 
 
 def balls(numbers: Any) -> Balls:
     """Floats as exact numbers, in the same shape."""
-    numbers = np.asarray(numbers, dtype=float)
-    return np.array([ball(each) for each in numbers.ravel().tolist()], dtype=object).reshape(numbers.shape)
+    return each(ball, np.asarray(numbers, dtype=float))
 
 
-def mapped(function: str, numbers: Balls) -> Balls:
-    """A method of each ball, such as "cos"."""
-    return _of_each(methodcaller(function), numbers)
-
-
-def field(name: str, numbers: Balls) -> Balls:
-    """An attribute of each ball, such as "real"."""
-    return _of_each(attrgetter(name), numbers)
-
-
-def _of_each(function: Callable[[Any], Any], numbers: Balls) -> Balls:
-    found = np.empty(numbers.size, dtype=object)
-    found[:] = [function(each) for each in numbers.ravel().tolist()]
-    return found.reshape(numbers.shape)
+def roots(count: int) -> Balls:
+    """√0, √1, …, so many of them."""
+    return each(lambda m: ball(m).sqrt(), np.arange(count))
 
 
 def matrix_product(a: Balls, b: Balls) -> Balls:
     """a @ b of real balls."""
     from flint import arb_mat
 
-    left, right = (arb_mat(each.shape[0], each.shape[1], each.ravel().tolist()) for each in (a, b))
+    left, right = (arb_mat(factor.shape[0], factor.shape[1], factor.ravel().tolist()) for factor in (a, b))
     return np.array((left * right).entries(), dtype=object).reshape(a.shape[0], b.shape[1])
 
 
@@ -124,11 +102,9 @@ def _beyond(bound: arb, direction: float) -> float:
 
 def rounded(numbers: Balls) -> tuple[FloatArray, FloatArray]:
     """Floats near real balls, and by how much the balls may differ from them at most."""
-    flat = numbers.ravel().tolist()
-    near = np.array([float(each) for each in flat])
-    radius = np.array([float(each.rad()) for each in flat])
-    off = np.abs(near) * 2.0**-52 + radius * (1 + 2.0**-20) + TINY
-    return near.reshape(numbers.shape), off.reshape(numbers.shape)
+    near = each(float, numbers).astype(float)
+    radius = each(lambda number: float(number.rad()), numbers).astype(float)
+    return near, np.abs(near) * 2.0**-52 + radius * (1 + 2.0**-20) + TINY
 
 
 def magnitudes(numbers: Balls) -> FloatArray:

@@ -2,46 +2,31 @@
 
 Coefficients are arrays (modes, m) of complex balls, modes k = −K … K. Multiplied by a factor D(z) > 0 that clears the
 denominator of b, the mismatch Lu − μu is again a sum of e^{2ikφ} times polynomials of z, by exact formulas.
+
+On cells of z these polynomials are bounded by Taylor's formula about the middles of the cells: for |t| ≤ h,
+|f − f(middle)| ≤ |f′(middle)| h + |f″(middle)| h²/2 + … up to a remainder of order `ORDER`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from math import factorial
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fpsolve.proofs.balls import Balls, ball
+from fpsolve.arrays import FloatArray
+from fpsolve.proofs.balls import Balls, ball, balls, each, magnitudes, matrix_product, raised, roots
 from fpsolve.proofs.statement import Cylinder
 
-
-class Basis(Protocol):
-    """Polynomials of z, by coefficients of those that `cells` encloses."""
-
-    @property
-    def gauge(self) -> float:
-        """β in T = e^{βz} u."""
-
-    def values(self, u: Balls) -> Balls:
-        """u."""
-
-    def slope(self, u: Balls) -> Balls:
-        """u_z."""
-
-    def diffused(self, u: Balls, noise: Cylinder) -> Balls:
-        """D ν (½ ∂zz − b ∂z) of u e^{gauge z}, divided by e^{gauge z}."""
-
-    def cleared(self, u: Balls, noise: Cylinder) -> Balls:
-        """D u."""
-
-    def times_z(self, u: Balls) -> Balls:
-        """z u, one degree more."""
+ORDER = 8
+"""Of Taylor's formula."""
 
 
 def padded(u: Balls, waves: int = 0, degrees: int = 0) -> Balls:
     """With zeros for more modes on both sides and for higher degrees."""
-    found = np.empty((u.shape[0] + 2 * waves, u.shape[1] + degrees), dtype=object)
-    found.fill(ball(0))
+    found = np.full((u.shape[0] + 2 * waves, u.shape[1] + degrees), ball(0), dtype=object)
     found[waves : waves + u.shape[0], : u.shape[1]] = u
     return found
 
@@ -49,10 +34,8 @@ def padded(u: Balls, waves: int = 0, degrees: int = 0) -> Balls:
 def added(*parts: Balls) -> Balls:
     """The sum of coefficients of several degrees and numbers of modes."""
     waves, degrees = (max(part.shape[axis] for part in parts) for axis in (0, 1))
-    found = padded(parts[0], (waves - parts[0].shape[0]) // 2, degrees - parts[0].shape[1])
-    for part in parts[1:]:
-        found = found + padded(part, (waves - part.shape[0]) // 2, degrees - part.shape[1])
-    return found
+    first, *others = (padded(part, (waves - part.shape[0]) // 2, degrees - part.shape[1]) for part in parts)
+    return sum(others, first)
 
 
 def turned(bands: Balls, u: Balls) -> Balls:
@@ -63,41 +46,6 @@ def turned(bands: Balls, u: Balls) -> Balls:
     return found
 
 
-def mismatch(basis: Basis, u: Balls, noise: Cylinder, p: Any, mu: Any) -> Balls:
-    """D (Lu − μu)."""
-    values = basis.values(u)
-    waves = u.shape[0] // 2
-    still, driven = (turned(noise.bands(i, p, waves), values) for i in (0, 1))
-    rest = added(still, basis.times_z(driven), -mu * values)
-    return added(basis.diffused(u, noise), basis.cleared(rest, noise))
-
-
-def drift_mismatch(basis: Basis, f: Balls, noise: Cylinder, mu: Any) -> Balls:
-    """D (q + κh + L(0) f − μ), L(0) without its gauge: how far the drift of ln‖x‖ + f is from μ."""
-    values = basis.values(f)
-    waves = f.shape[0] // 2
-    still, driven = (turned(noise.bands(i, 0 * noise.nu, waves), values) for i in (0, 1))
-    source = [noise.growth(i)[:, None] for i in (0, 1)]
-    source[0][1, 0] -= mu
-    rest = added(still, source[0], basis.times_z(added(driven, source[1])))
-    return added(basis.diffused(f, noise), basis.cleared(rest, noise))
-
-
-def held(basis: Basis, u: Balls, noise: Cylinder, p: Any, mu: Any) -> tuple[Balls, Balls]:
-    """(F₀ + z F₁ + ½ νβ² − μ) u and F₁ u, of which n u and n_z u of `factor` are made; for p None the same of λ."""
-    values, waves = basis.values(u), u.shape[0] // 2
-    exponent = 0 * noise.nu if p is None else p
-    still, driven = (turned(noise.bands(i, exponent, waves), values) for i in (0, 1))
-    if p is None:
-        source = [noise.growth(i)[:, None] for i in (0, 1)]
-        source[0][1, 0] -= mu
-        still, driven = added(still, source[0]), added(driven, source[1])
-    else:
-        beta = ball(basis.gauge)
-        still = added(still, (noise.nu * beta * beta / 2 - mu) * values)
-    return added(still, basis.times_z(driven)), driven
-
-
 @dataclass(frozen=True)
 class Core:
     """Polynomials He_m(y)/√m! of y = (z − centre)/scale, used in the part of the line where the noise mostly is.
@@ -106,22 +54,27 @@ class Core:
         gauge: β in T = e^{βz} u, which levels u.
     """
 
+    kind: ClassVar[Literal["core"]] = "core"
+    is_core: ClassVar[bool] = True
     centre: float
     scale: float
     gauge: float
 
     def values(self, u: Balls) -> Balls:
-        """u."""
+        """u, by coefficients of the polynomials that `taylor` takes."""
         return u
 
     def slope(self, u: Balls) -> Balls:
         """u_z, from d/dy He_m = m He_{m−1}."""
         found = padded(0 * u)
-        found[:, :-1] = u[:, 1:] * _roots(u.shape[1])[1:] / ball(self.scale)
+        found[:, :-1] = u[:, 1:] * roots(u.shape[1])[1:] / ball(self.scale)
         return found
 
     def diffused(self, u: Balls, noise: Cylinder) -> Balls:
-        """D ν (½ u_zz + (β − b) u_z + (½ β² − bβ) u), D b = b′(0) z."""
+        """What D ν (½ ∂zz − b ∂z) makes of u e^{βz}, without the factor e^{βz}; D b = b′(0) z.
+
+        This is D ν (½ u_zz + (β − b) u_z + (½ β² − bβ) u).
+        """
         beta = ball(self.gauge)
         first = added(self.slope(u), beta * u)
         second = added(self.slope(first), beta * first)
@@ -132,22 +85,50 @@ class Core:
         return added(u, -self.times_z(self.times_z(u))) if noise.is_bounded else u
 
     def times_z(self, u: Balls) -> Balls:
-        """z u, from y He_m = He_{m+1} + m He_{m−1}."""
+        """z u, one degree more, from y He_m = He_{m+1} + m He_{m−1}."""
         found = padded(ball(self.centre) * u, degrees=1)
-        roots, scale = _roots(u.shape[1] + 1), ball(self.scale)
-        found[:, 1:] += u * (roots[1:] * scale)
-        found[:, : u.shape[1] - 1] += u[:, 1:] * (roots[1:-1] * scale)
+        root, scale = roots(u.shape[1] + 1), ball(self.scale)
+        found[:, 1:] += u * (root[1:] * scale)
+        found[:, : u.shape[1] - 1] += u[:, 1:] * (root[1:-1] * scale)
         return found
+
+    def places(self, low: FloatArray, high: FloatArray) -> tuple[Balls, Balls]:
+        """The ends of cells in the variable of `taylor`, y."""
+        left, right = ((balls(end) - ball(self.centre)) / ball(self.scale) for end in (low, high))
+        return left, right
+
+    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+        """Derivatives of sums of He_m(y)/√m! at the middles of cells from the zeroth on, and a bound of what remains.
+
+        By the mean value theorem sup|He_m| ≤ |He_m(middle)| + h m sup|He_{m−1}| on a cell.
+        """
+        degrees = parts.shape[1]
+        root = roots(degrees + 1)
+        table = hermite_table(middle, root[:-1])
+        bound = magnitudes(table)
+        for m in range(1, degrees):
+            bound[m] = raised(bound[m] + half * np.sqrt(m) * bound[m - 1], 8)
+        derived = [parts]
+        for _ in range(min(ORDER, degrees - 1)):
+            derived.append(derived[-1][:, 1:] * root[1 : derived[-1].shape[1]])
+        last = derived[-1] if len(derived) > ORDER else derived[-1][:, :0]
+        rest = magnitudes(last) @ bound[: last.shape[1]] * half**ORDER / factorial(ORDER)
+        return (matrix_product(part, table[: part.shape[1]]) for part in derived[:ORDER]), raised(rest, 2 * degrees)
 
 
 @dataclass(frozen=True)
 class Whole:
     """B_0 = 1 and ∫(1 − z²) T_{m−1} dz on the whole support [−1, 1] of bounded noise.
 
-    Both ends have u_z = 0, and b u_z is a polynomial, −b B_m′ = −a z T_{m−1}.
+    Both ends have u_z = 0, and b u_z is a polynomial, −b B_m′ = −a z T_{m−1}. The methods are those of `Core`; nothing
+    needs to be cleared, D = 1.
     """
 
-    gauge: float = 0.0
+    kind: ClassVar[Literal["whole"]] = "whole"
+    is_core: ClassVar[bool] = False
+    centre: ClassVar[float] = 0.0
+    scale: ClassVar[float] = 1.0
+    gauge: ClassVar[float] = 0.0
 
     def values(self, u: Balls) -> Balls:
         """u in Chebyshev polynomials, of two degrees more; ∫T_n = ½ (T_{n+1}/(n + 1) − T_{n−1}/(n − 1))."""
@@ -180,7 +161,7 @@ class Whole:
         return added(second * (noise.nu / 2), self.times_z(inner) * (-noise.nu * noise.slope))
 
     def cleared(self, u: Balls, noise: Cylinder) -> Balls:
-        """u, as nothing needs to be cleared: D = 1."""
+        """u."""
         return u
 
     def times_z(self, u: Balls) -> Balls:
@@ -191,7 +172,28 @@ class Whole:
             found[:, abs(n - 1)] += u[:, n] / 2
         return found
 
+    def places(self, low: FloatArray, high: FloatArray) -> tuple[Balls, Balls]:
+        """The ends of cells in θ, T_m(cos θ) = cos mθ."""
+        right, left = (each(lambda z: z.acos(), balls(end)) for end in (low, high))
+        return left, right
 
-def _roots(count: int) -> Balls:
-    """√0, √1, … as balls."""
-    return np.array([ball(m).sqrt() for m in range(count)], dtype=object)
+    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+        """The same of sums of cos mθ, up to signs."""
+        degrees = np.arange(parts.shape[1])
+        angles = np.outer(degrees, middle)
+        waves = [np.cos(angles), np.sin(angles)]
+        powers = [each(ball, degrees) ** i for i in range(ORDER)]
+        rest = magnitudes(parts) @ (degrees.astype(float)[:, None] * half) ** ORDER / factorial(ORDER)
+        derivatives = (matrix_product(parts * powers[i], waves[i % 2]) for i in range(ORDER))
+        return derivatives, raised(rest, 16 + 2 * len(degrees))
+
+
+Basis = Core | Whole
+
+
+def hermite_table(y: Any, root: Any) -> Any:
+    """He_m(y)/√m!, shape (degrees, *y.shape), from y He_m = He_{m+1} + m He_{m−1}; `root` has √m of each degree."""
+    table = [0 * y + 1, y]
+    for m in range(1, len(root) - 1):
+        table.append((y * table[m] - root[m] * table[m - 1]) / root[m + 1])
+    return np.array(table[: len(root)])

@@ -1,4 +1,4 @@
-"""What a trial function leaves over on cells of z, bounded in balls: the numbers that (*) of `factor` needs."""
+"""What a trial function leaves over on cells of z, bounded in balls: the numbers that (*) of `verify` needs."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
 from fpsolve.proofs.balls import Balls, above, ball, balls, below, raised
-from fpsolve.proofs.basis import Basis, Whole, drift_mismatch, held, mismatch, padded
-from fpsolve.proofs.cells import Cells, Modes
-from fpsolve.proofs.factor import End
-from fpsolve.proofs.phases import Phases
+from fpsolve.proofs.basis import Basis, added, padded, turned
+from fpsolve.proofs.cells import Cells, Modes, Phases, Range
 from fpsolve.proofs.statement import Cylinder
+
+UPPER, LOWER = 1, -1
+"""q of `verify`: of the upper and of the lower bound."""
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -56,25 +58,28 @@ class Trial:
         return self.basis.slope(self._u)
 
     @cached_property
-    def mismatch(self) -> Balls:
-        """D (Lu − μu), or D (q + κh + L(0) f − μ)."""
+    def _turned(self) -> tuple[Balls, Balls]:
+        """(F₀ + z F₁ − μ) u and F₁ u; for λ what is left of q + κh + F f − μ, and what multiplies z in it."""
+        waves, mu, exponent = len(self.cosine) - 1, ball(self.mu), 0 * self.noise.nu if self.p is None else self.p
+        still, driven = (turned(self.noise.bands(i, exponent, waves), self.values) for i in (0, 1))
         if self.p is None:
-            return drift_mismatch(self.basis, self._u, self.noise, ball(self.mu))
-        return mismatch(self.basis, self._u, self.noise, self.p, ball(self.mu))
+            source = [self.noise.growth(i)[:, None] for i in (0, 1)]
+            source[0][1, 0] -= mu
+            still, driven = added(still, source[0]), added(driven, source[1])
+        else:
+            still = added(still, -mu * self.values)
+        return added(still, self.basis.times_z(driven)), driven
+
+    @cached_property
+    def mismatch(self) -> Balls:
+        """D (Lu − μu), or D (q + κh + L(0) f − μ): how far the drift of ln‖x‖ + f is from μ."""
+        return added(self.basis.diffused(self._u, self.noise), self.basis.cleared(self._turned[0], self.noise))
 
     @cached_property
     def held(self) -> tuple[Balls, Balls]:
-        """What n u and n_z u of `factor` are made of, or n and n_z."""
-        return held(self.basis, self._u, self.noise, self.p, ball(self.mu))
-
-    @property
-    def waves(self) -> int:
-        """K."""
-        return len(self.cosine) - 1
-
-
-Range = tuple[FloatArray, FloatArray]
-Pair = tuple[float, float]
+        """(F₀ + z F₁ + ½ νβ² − μ) u and F₁ u, of which n u and n_z u of `verify` are made; or the same of λ."""
+        beta, (rest, driven) = ball(self.basis.gauge), self._turned
+        return added(rest, self.noise.nu * beta * beta / 2 * self.values), driven
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,7 @@ class Bounds:
 
     Attributes:
         mismatch: around Lu/u − μ; infinite where u > 0 is not certain.
-        inward: around B; for λ around b.
+        inward: around B of `verify`; for λ around b.
     """
 
     mismatch: Range
@@ -95,7 +100,7 @@ class Bounds:
         return np.isfinite(self.mismatch[0]) & np.isfinite(self.mismatch[1])
 
     def above(self, sense: int) -> FloatArray:
-        """Above e of `factor`."""
+        """Above e of `verify`, of the upper (1) or the lower bound (−1)."""
         return self.mismatch[1] if sense > 0 else -self.mismatch[0]
 
 
@@ -105,7 +110,7 @@ class HeldBounds:
 
     Attributes:
         steep: around u_z/u; for λ around f_z.
-        mismatch, growth: around n and n_z of `factor`.
+        mismatch, growth: around n and n_z of `verify`.
         drift, slope: below b and b′.
     """
 
@@ -115,12 +120,11 @@ class HeldBounds:
     drift: float
     slope: float
 
-    def end(self, sense: int) -> End:
-        """What counts for the upper or the lower bound."""
-        drop, mismatch, growth = (-self.steep[0], self.mismatch[1], self.growth[1])
-        if sense < 0:
-            drop, mismatch, growth = (self.steep[1], -self.mismatch[0], -self.growth[0])
-        return End(drop, mismatch, growth, self.drift, self.slope)
+    def above(self, sense: int) -> tuple[float, float, float]:
+        """Above what W must drop by, q n and q n_z, of the upper (1) or the lower bound (−1)."""
+        if sense > 0:
+            return -self.steep[0], self.mismatch[1], self.growth[1]
+        return self.steep[1], -self.mismatch[0], -self.growth[0]
 
 
 class Bounder:
@@ -131,7 +135,7 @@ class Bounder:
     """
 
     def __init__(self, trial: Trial, phases: int) -> None:
-        self.trial, self._phases = trial, Phases(phases, trial.waves + 1)
+        self.trial, self._phases = trial, Phases(phases, len(trial.cosine))
 
     def bounds(self, low: FloatArray, high: FloatArray) -> Bounds:
         """On cells [low, high]."""
@@ -139,39 +143,33 @@ class Bounder:
         cells = Cells(trial.basis, low, high)
         divisor = self._divisor(cells)
         mismatch = self._range(cells.modes(trial.mismatch), divisor)
-        if trial.noise.is_bounded and not isinstance(trial.basis, Whole):
+        if trial.noise.is_bounded and trial.basis.is_core:
             mismatch = _divided(mismatch, low, high)
         bend = np.zeros((2, 1))
         if trial.p is not None:
             bend = trial.basis.gauge + np.array(self._range(cells.modes(trial.slope), divisor))
-        drift = [[bound(trial.noise.drift(z)) for z in balls(each)] for bound, each in ((below, low), (above, high))]
+        drift = [[bound(trial.noise.drift(z)) for z in balls(end)] for bound, end in ((below, low), (above, high))]
         slack = 8 * 2.0**-53 * (np.abs(np.array(drift)) + np.abs(bend[::-1]))
         inward = np.array(drift) - bend[::-1]
         return Bounds(mismatch, (inward[0] - slack[0], inward[1] + slack[1]))
 
     def held(self, z: FloatArray, sign: int) -> list[HeldBounds]:
         """Where u may be held, on the right or, with sign −1, on the left."""
-        noise, cells, at = self.trial.noise, Cells(self.trial.basis, z, z), balls(z)
+        trial, cells, at = self.trial, Cells(self.trial.basis, z, z), balls(z)
         divisor = self._divisor(cells)
-        drifts = (noise.drift(at), noise.drift_slope(at))
-        ranges = [self._range(cells.modes(self.trial.slope), divisor)]
-        for part, drift in zip(self.trial.held, drifts, strict=True):
+        drifts = (trial.noise.drift(at), trial.noise.drift_slope(at))
+        ranges = [self._range(cells.modes(trial.slope), divisor)]
+        for part, drift in zip(trial.held, drifts, strict=True):
             modes = cells.modes(part)
-            if self.trial.p is not None:
-                values = cells.modes(padded(self.trial.values, waves=1))
-                modes = modes.minus(noise.nu * ball(self.trial.basis.gauge) * drift, values)
+            if trial.p is not None:
+                values = cells.modes(padded(trial.values, waves=1))
+                modes = modes.minus(trial.noise.nu * ball(trial.basis.gauge) * drift, values)
             ranges.append(self._range(modes, divisor))
-        steep, mismatch, growth = (list(zip(*(each.tolist() for each in pair), strict=True)) for pair in ranges)
-        return [
-            HeldBounds(
-                _mirrored(steep[j], sign),
-                mismatch[j],
-                _mirrored(growth[j], sign),
-                below(sign * drifts[0][j]),
-                below(drifts[1][j]),
-            )
-            for j in range(len(z))
-        ]
+        steep, mismatch, growth = (list(zip(*(end.tolist() for end in pair), strict=True)) for pair in ranges)
+        if sign < 0:
+            steep, growth = ([(-high, -low) for low, high in pairs] for pairs in (steep, growth))
+        drift, slope = ([below(number) for number in numbers] for numbers in (sign * drifts[0], drifts[1]))
+        return [HeldBounds(*bounds) for bounds in zip(steep, mismatch, growth, drift, slope, strict=True)]
 
     def _divisor(self, cells: Cells) -> Range:
         """Around u on every cell of φ and z; 1 for λ, where nothing is divided by f."""
@@ -183,24 +181,24 @@ class Bounder:
         """Around part/u on every cell of z."""
         (low, high), (least, most) = self._phases.bounds(part), divisor
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = [
-                np.where(least > 0, each / np.where(sign * each > 0, least, most), sign * np.inf)
-                for each, sign in ((low, -1), (high, 1))
-            ]
-        least_ratio, most_ratio = ratios[0].min(0), ratios[1].max(0)
-        return least_ratio - raised(np.abs(least_ratio)) * 2.0**-51, most_ratio + raised(np.abs(most_ratio)) * 2.0**-51
+            lows, highs = (
+                np.where(least > 0, end / np.where(sign * end > 0, least, most), sign * np.inf)
+                for end, sign in ((low, -1), (high, 1))
+            )
+        return _widened(lows.min(0), highs.max(0))
 
 
 def _divided(bounds: Range, left: FloatArray, right: FloatArray) -> Range:
     """Bounds of D times a mismatch on cells as those of the mismatch, D = 1 − z² > 0."""
     farthest = np.maximum(np.abs(left), np.abs(right))
     nearest = np.where(left * right > 0, np.minimum(np.abs(left), np.abs(right)), 0.0)
-    least = np.array([below(1 - ball(each) ** 2) for each in farthest.tolist()])
-    most = np.array([above(1 - ball(each) ** 2) for each in nearest.tolist()])
-    low, high = (each / np.where(sign * each > 0, least, most) for each, sign in zip(bounds, (-1, 1), strict=True))
-    return low - 2.0**-51 * raised(np.abs(low)), high + 2.0**-51 * raised(np.abs(high))
+    least, most = (
+        np.array([bound(1 - z**2) for z in balls(place)]) for bound, place in ((below, farthest), (above, nearest))
+    )
+    low, high = (end / np.where(sign * end > 0, least, most) for end, sign in zip(bounds, (-1, 1), strict=True))
+    return _widened(low, high)
 
 
-def _mirrored(pair: Pair, sign: int) -> Pair:
-    """Bounds of a number that changes its sign with z."""
-    return pair if sign > 0 else (-pair[1], -pair[0])
+def _widened(low: FloatArray, high: FloatArray) -> Range:
+    """Bounds after one division more."""
+    return low - raised(np.abs(low)) * 2.0**-51, high + raised(np.abs(high)) * 2.0**-51

@@ -1,39 +1,30 @@
-"""Bounds of f = Σ c_km e^{2ikφ} B_m(z) over cells of z, by Taylor's formula about their middles.
+"""Bounds of f = Σ c_km e^{2ikφ} B_m(z) over cells of z and φ, with the rounding of floats.
 
-For |t| ≤ h, |f − f(middle)| ≤ |f′(middle)| h + |f″(middle)| h²/2 + … up to a remainder of order `ORDER`. For Hermite
-polynomials this is bounded with the mean value theorem, sup|He_m| ≤ |He_m(middle)| + h m sup|He_{m−1}|; for Chebyshev
-polynomials, T_m(cos θ) = cos mθ, the variable is θ.
+A sum of n products of floats, however ordered and whether or not multiplications and additions are fused, is off by
+at most γ_n Σ|a||b| with γ_n = n u/(1 − n u), u = 2⁻⁵³ (N. J. Higham, Accuracy and stability of numerical algorithms,
+SIAM 2002, section 3.1). That products of matrices are such sums, and not by a fast algorithm, is taken for granted.
+Cosines and sines are floats within u of their values.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from math import factorial
-from typing import Any
+from math import factorial, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
-from fpsolve.proofs.balls import (
-    Balls,
-    above,
-    ball,
-    balls,
-    field,
-    magnitudes,
-    mapped,
-    matrix_product,
-    raised,
-    rounded,
-)
-from fpsolve.proofs.basis import Basis, Core
+from fpsolve.proofs.balls import Balls, above, ball, each, magnitudes, raised, rounded
+from fpsolve.proofs.basis import Basis
 
 NARROWEST = 1e-30
 """Half a cell at least, so that none of its powers that are needed is below the smallest float."""
-ORDER, FOLLOWED = 8, 3
-"""Of Taylor's formula; and of how many of its terms the dependence on φ is followed."""
+FOLLOWED = 3
+"""Of how many terms of Taylor's formula in z the dependence on φ is followed."""
+UNIT = 2.0**-53
+Range = tuple[FloatArray, FloatArray]
+"""Arrays below and above."""
 
 
 @dataclass(frozen=True)
@@ -66,20 +57,15 @@ class Cells:
 
     def __init__(self, basis: Basis, low: FloatArray, high: FloatArray) -> None:
         self.basis = basis
-        left, right = balls(low), balls(high)
-        if isinstance(basis, Core):
-            left, right = ((each - ball(basis.centre)) / ball(basis.scale) for each in (left, right))
-        else:
-            left, right = mapped("acos", right), mapped("acos", left)
+        left, right = basis.places(low, high)
         self._middle = (left + right) / 2
-        self._half = np.array([max(above(each), NARROWEST) for each in (right - left) / 2])
+        self._half = np.array([max(above(half), NARROWEST) for half in (right - left) / 2])
 
     def modes(self, u: Balls) -> Modes:
         """Those of a sum with coefficients u of the polynomials; u_{−k} is the conjugate of u_k."""
         half = u[u.shape[0] // 2 :]
-        parts = np.concatenate([field("real", half), field("imag", half)])
-        taylor = self._hermite if isinstance(self.basis, Core) else self._chebyshev
-        derivatives, stray = taylor(parts)
+        parts = np.concatenate([each(lambda c: c.real, half), each(lambda c: c.imag, half)])
+        derivatives, stray = self.basis.taylor(parts, self._middle, self._half)
         terms = []
         for i, derivative in enumerate(derivatives):
             size = self._half**i / factorial(i)
@@ -93,35 +79,47 @@ class Cells:
         both = stray[: len(half)] + stray[len(half) :]
         return Modes(tuple(terms), raised(both[0] + 2 * both[1:].sum(0), 3 * len(half)))
 
-    def _hermite(self, parts: Balls) -> tuple[Iterator[Balls], FloatArray]:
-        """Derivatives at the middles from the zeroth on, and a bound of what comes after."""
-        degrees = parts.shape[1]
-        table = hermite_table(self._middle, degrees, lambda m: ball(m).sqrt())
-        bound = magnitudes(table)
-        for m in range(1, degrees):
-            bound[m] = raised(bound[m] + self._half * np.sqrt(m) * bound[m - 1], 8)
-        derived = [parts]
-        for _ in range(min(ORDER, degrees - 1)):
-            roots = np.array([ball(m).sqrt() for m in range(1, derived[-1].shape[1])], dtype=object)
-            derived.append(derived[-1][:, 1:] * roots)
-        last = derived[-1] if len(derived) > ORDER else derived[-1][:, :0]
-        rest = magnitudes(last) @ bound[: last.shape[1]] * self._half**ORDER / factorial(ORDER)
-        return (matrix_product(each, table[: each.shape[1]]) for each in derived[:ORDER]), raised(rest, 2 * degrees)
 
-    def _chebyshev(self, parts: Balls) -> tuple[Iterator[Balls], FloatArray]:
-        """The same in θ, up to signs."""
-        degrees = np.arange(parts.shape[1])
-        angles = np.outer(degrees, self._middle)
-        waves = [mapped("cos", angles), mapped("sin", angles)]
-        powers = [np.array([ball(int(m) ** i) for m in degrees], dtype=object) for i in range(ORDER)]
-        rest = magnitudes(parts) @ (degrees.astype(float)[:, None] * self._half) ** ORDER / factorial(ORDER)
-        derivatives = (matrix_product(parts * powers[i], waves[i % 2]) for i in range(ORDER))
-        return derivatives, raised(rest, 16 + 2 * len(degrees))
+class Phases:
+    """Equal cells of [0, π).
 
+    Args:
+        count: how many.
+        waves: the highest k of e^{2ikφ}.
+    """
 
-def hermite_table(y: Any, degrees: int, root: Callable[[Any], Any]) -> Any:
-    """He_m(y)/√m!, shape (degrees, *y.shape), from y He_m = He_{m+1} + m He_{m−1}."""
-    table = [0 * y + 1, y]
-    for m in range(1, degrees - 1):
-        table.append((y * table[m] - root(m) * table[m - 1]) / root(m + 1))
-    return np.array(table[:degrees])
+    def __init__(self, count: int, waves: int) -> None:
+        self._half = raised(pi / (2 * count))
+        circle = [ball(i) / count for i in range(2 * count)]  # of π
+        cosines, sines = (np.array([float(getattr(turn, name)()) for turn in circle]) for name in ("cos_pi", "sin_pi"))
+        turns = np.outer(2 * np.arange(count) + 1, np.arange(waves + 1)) % (2 * count)
+        self._cosines, self._sines = cosines[turns], sines[turns]
+
+    def bounds(self, modes: Modes) -> Range:
+        """The least and the largest value, shape (cells of φ, cells of z), each."""
+        value, off = self._about(modes.terms[0], FOLLOWED)
+        for i, term in enumerate(modes.terms[1:], start=1):
+            other, more = self._about(term, FOLLOWED - i)
+            off += np.abs(other) + more
+        off = raised(off + modes.stray, 4 * FOLLOWED)
+        return value - off, value + off
+
+    def _about(self, modes: NDArray[np.complex128], order: int) -> Range:
+        """Σ c_k e^{2ikφ} at the middles, and how much it may differ from that in a cell, by Taylor's formula in φ."""
+        k = np.arange(len(modes))[:, None]
+        weighted = np.where(k > 0, 2.0, 1.0) * modes
+        sizes = np.abs(weighted.real) + np.abs(weighted.imag)
+        rounding = (2 * len(k) + 16) * UNIT
+        value = self._sum(weighted)
+        totals = [((2.0 * k) ** i * sizes).sum(0) for i in range(order + 1)]
+        off = rounding * totals[0]
+        for i in range(1, order):
+            share = self._half**i / factorial(i)
+            off = off + share * (np.abs(self._sum((2j * k) ** i * weighted)) + rounding * totals[i])
+        off = off + self._half**order / factorial(order) * totals[order]
+        return value, raised(np.broadcast_to(off, value.shape), 4 * len(k) + 16 * order)
+
+    def _sum(self, weighted: NDArray[np.complex128]) -> FloatArray:
+        """Σ Re c_k e^{2ikφ} at the middles of the cells."""
+        waves = len(weighted)
+        return self._cosines[:, :waves] @ weighted.real - self._sines[:, :waves] @ weighted.imag

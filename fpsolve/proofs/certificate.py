@@ -1,20 +1,23 @@
-"""Certificates: everything from which a bound follows, so that others can check it without the solver."""
+"""Bounds, and certificates: everything from which a bound follows, so that others can check it without the solver."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.model.vibro_impact import ImpactLaw, VibroImpactOscillator
+from fpsolve.proofs.balls import ball, precision
 from fpsolve.proofs.basis import Basis, Core, Whole
-from fpsolve.proofs.statement import DIRECT, EXACT, IMPACT, NOISE, OSCILLATOR, REDUCED, TREATMENT
+from fpsolve.proofs.statement import DIRECT, EXACT, IMPACT, NOISE, OSCILLATOR, REDUCED, TREATMENT, Parameters
 
 MOMENT = "moment"
 MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 16_384, "values": 2**23}
@@ -49,13 +52,6 @@ class BasisRecord(Record):
     centre: float = 0.0
     scale: Annotated[float, Field(gt=0)] = 1.0
     gauge: float = 0.0
-
-    @classmethod
-    def of(cls, basis: Basis) -> Self:
-        """The record of a basis."""
-        if isinstance(basis, Core):
-            return cls(kind="core", centre=basis.centre, scale=basis.scale, gauge=basis.gauge)
-        return cls(kind="whole")
 
     @property
     def basis(self) -> Basis:
@@ -158,28 +154,105 @@ def _check_parameters(stated: Mapping[str, str]) -> None:
         noise.ou_reduction()
 
 
-def first_fault(failure: ValidationError) -> str:
-    """The first of the faults, with its place."""
-    first = failure.errors(include_url=False)[0]
-    place = ".".join(map(str, first["loc"]))
-    said = re.sub(r"^(Input|List|String) should|^Value error, | after validation", _must, first["msg"])
-    text = _PLAINLY.get(first["type"], said)
-    return f"{place + ': ' if place else ''}{text}"
+@dataclass(frozen=True)
+class Enclosure:
+    """What is proven of a number: lower ≤ it ≤ upper.
+
+    The bounds hold for the floats, and for the decimals that they are printed as.
+
+    Attributes:
+        certificate: from which they follow; None where nothing is proven. A bound that is not proven is infinite.
+        wanted: how far they may be apart.
+    """
+
+    lower: float
+    upper: float
+    certificate: Certificate | None = None
+    wanted: float = math.inf
+
+    @property
+    def width(self) -> float:
+        """upper − lower, rounded up."""
+        return math.nextafter(self.upper - self.lower, math.inf) if self.upper > self.lower else 0.0
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the bounds are as close as they are wanted."""
+        return self.is_proven and self.width <= self.wanted
+
+    @property
+    def is_proven(self) -> bool:
+        """Whether there is a bound."""
+        return self.certificate is not None
+
+    @property
+    def sign(self) -> int:
+        """1 or −1 where that is proven, else 0."""
+        return int(self.lower > 0) - int(self.upper < 0)
+
+    def __str__(self) -> str:
+        return f"[{self.lower!r}, {self.upper!r}]" if self.is_proven else "not proven"
 
 
-def _must(words: re.Match[str]) -> str:
-    return "must" if words[0].endswith("should") else ""
+NOTHING = Enclosure(-math.inf, math.inf)
 
 
-_PLAINLY = {
-    "missing": "is missing",
-    "extra_forbidden": "is no key of a proof",
-    "is_instance_of": "must be a finite number",
-    "model_type": "must be a table",
-    "dict_type": "must be a table",
-    "list_type": "must be a list",
-    "float_type": "must be a number",
-    "string_type": "must be a text",
-    "bool_type": "must be true or false",
-    "int_type": "must be a whole number",
-}
+@precision()
+def enclosure_of(certificate: Certificate) -> Enclosure:
+    """mu − lower.delta and mu + upper.delta, rounded outward; infinite where there is none."""
+    lower, upper = _ends(certificate)
+    return Enclosure(
+        -math.inf if lower is None else _outward(lower, -math.inf),
+        math.inf if upper is None else _outward(upper, math.inf),
+        certificate,
+    )
+
+
+@precision()
+def follows(lower: Fraction | None, upper: Fraction | None, certificate: Certificate) -> bool:
+    """Whether bounds hold if the certificate does; None claims nothing."""
+    low, high = _ends(certificate)
+    if (lower is not None and low is None) or (upper is not None and high is None):
+        return False
+    return (lower is None or bool(ball(lower) <= low)) and (upper is None or bool(ball(upper) >= high))
+
+
+def _ends(certificate: Certificate) -> tuple[Any, Any]:
+    """The bounds of a certificate as balls."""
+    mu, lower, upper = ball(certificate.mu), certificate.lower, certificate.upper
+    return (
+        None if lower is None else mu - ball(lower.delta),
+        None if upper is None else mu + ball(upper.delta),
+    )
+
+
+def _outward(bound: Any, direction: float) -> float:
+    """A float beyond a ball, and so is the decimal that it is printed as."""
+    found = float(bound)
+    while not all((each >= bound) if direction > 0 else (each <= bound) for each in (ball(found), ball(repr(found)))):
+        found = math.nextafter(found, direction)
+    return found
+
+
+def trivial(stated: Parameters) -> Enclosure:
+    """Λ(0) = 0, as T = 1."""
+    side = SideRecord(delta=0.0, nodes=[-0.5, 0.5], values=[0.0, 0.0], tails=[0.0, 0.0])
+    unit = Certificate(
+        quantity="moment",
+        p="0.0",
+        parameters=dict(stated),
+        mu=0.0,
+        basis=BasisRecord(kind="core"),
+        cosine=[[1.0]],
+        sine=[[0.0]],
+        upper=side,
+        lower=side,
+        phases=4,
+    )
+    return enclosure_of(unit)
+
+
+@precision()
+def around(low: str, high: str) -> tuple[float, float]:
+    """Two decimals as floats, rounded outward."""
+    return _outward(ball(low), -math.inf), _outward(ball(high), math.inf)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
@@ -13,8 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, ValidationError
 
-from fpsolve.proofs.certificate import MOMENT, Certificate, MalformedProof, Record, first_fault
-from fpsolve.proofs.enclosure import follows
+from fpsolve.proofs.certificate import MOMENT, Certificate, MalformedProof, Record, follows
 from fpsolve.proofs.statement import IMPACT, TREATMENT
 from fpsolve.proofs.verify import objection
 
@@ -226,3 +226,30 @@ def _are_same(stated: Mapping[str, str], parameters: Stated) -> bool:
     """Whether decimals are those of a curve, which has no others but those that do not matter."""
     read = {key: text if key in (IMPACT, TREATMENT) else Decimal(text) for key, text in stated.items()}
     return set(parameters) - NONLINEAR == set(read) and all(parameters[key] == read[key] for key in read)
+
+
+def first_fault(failure: ValidationError) -> str:
+    """The first of the faults, with its place."""
+    first = failure.errors(include_url=False)[0]
+    place = ".".join(map(str, first["loc"]))
+    said = re.sub(r"^(Input|List|String) should|^Value error, | after validation", _must, first["msg"])
+    text = _PLAINLY.get(first["type"], said)
+    return f"{place + ': ' if place else ''}{text}"
+
+
+def _must(words: re.Match[str]) -> str:
+    return "must" if words[0].endswith("should") else ""
+
+
+_PLAINLY = {
+    "missing": "is missing",
+    "extra_forbidden": "is no key of a proof",
+    "is_instance_of": "must be a finite number",
+    "model_type": "must be a table",
+    "dict_type": "must be a table",
+    "list_type": "must be a list",
+    "float_type": "must be a number",
+    "string_type": "must be a text",
+    "bool_type": "must be true or false",
+    "int_type": "must be a whole number",
+}

@@ -16,121 +16,11 @@ from scipy.special import roots_jacobi
 from fpsolve.arrays import FloatArray
 from fpsolve.fem.factors import sparse_lu
 from fpsolve.proofs.balls import balls
-from fpsolve.proofs.basis import Basis, Core
-from fpsolve.proofs.cells import hermite_table
+from fpsolve.proofs.basis import Basis, hermite_table
 from fpsolve.proofs.statement import Cylinder
 
 REACH = 11.0
 """Standard deviations of the weight that the quadrature covers on either side."""
-
-
-@dataclass(frozen=True)
-class Weighted:
-    """The matrices of the noise: 1, z and ½ν⟨u_z + βu, w_z + βw⟩ for polynomials up to a degree."""
-
-    mass: FloatArray
-    position: FloatArray
-    diffusion: FloatArray
-
-
-def weighted(basis: Basis, noise: Cylinder, degrees: int) -> Weighted:
-    """By Gauss's quadrature."""
-    z, weight = _quadrature(basis, noise, degrees)
-    values, slopes = _tabulated(basis, z, degrees)
-    full = slopes + basis.gauge * values
-    return Weighted(
-        (values * weight) @ values.T,
-        (values * weight * z) @ values.T,
-        float(noise.nu) / 2 * (full * weight) @ full.T,
-    )
-
-
-def _quadrature(basis: Basis, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray]:
-    """z and weights that sum to 1."""
-    a = float(noise.slope)
-    if not isinstance(basis, Core):
-        z, weight = roots_jacobi(2 * degrees + 40, a, a)
-        return z, weight / weight.sum()
-    reach = basis.centre + REACH * basis.scale * np.array([-1.0, 1.0])
-    low, high = np.clip(reach, -1, 1) if noise.is_bounded else reach
-    x, weight = np.polynomial.legendre.leggauss(4 * degrees + 100)
-    z = (low + high) / 2 + (high - low) / 2 * x
-    log = a * np.log1p(-z * z) if noise.is_bounded else -z * z / 2
-    log += 2 * basis.gauge * z
-    weight *= np.exp(log - log.max())
-    return z, weight / weight.sum()
-
-
-def _tabulated(basis: Basis, z: FloatArray, degrees: int) -> tuple[FloatArray, FloatArray]:
-    """B_m(z) and B_m′(z)."""
-    if isinstance(basis, Core):
-        values = hermite_table((z - basis.centre) / basis.scale, degrees, np.sqrt)
-        slopes = np.zeros_like(values)
-        slopes[1:] = np.sqrt(np.arange(1, degrees))[:, None] * values[:-1] / basis.scale
-        return values, slopes
-    unit = balls(np.eye(degrees))
-    return tuple(
-        np.polynomial.chebyshev.chebval(z, part.astype(float).T) for part in (basis.values(unit), basis.slope(unit))
-    )
-
-
-class Galerkin:
-    """The eigenproblem with modes up to `waves` and polynomials below `degrees`."""
-
-    def __init__(self, noise: Cylinder, basis: Basis, p: float | None, waves: int, degrees: int) -> None:
-        self.noise, self.waves, self.degrees = noise, waves, degrees
-        self._noise = weighted(basis, noise, degrees)
-        count = 2 * waves + 1
-        still, driven = (self._turning(i, 0.0 if p is None else p) for i in (0, 1))
-        self.mass = sp.kron(sp.identity(count), self._noise.mass, format="csc")
-        self.matrix = (
-            sp.kron(sp.identity(count), -self._noise.diffusion)
-            + sp.kron(still, self._noise.mass)
-            + sp.kron(driven, self._noise.position)
-        ).tocsc()
-
-    def _turning(self, i: int, p: float) -> sp.csr_matrix:
-        """F_i on the modes −K … K."""
-        from flint import arb
-
-        bands = self.noise.bands(i, arb(p), self.waves).astype(complex)
-        size = bands.shape[1]
-        rows = [sp.diags(bands[d][max(0, 1 - d) : size - max(0, d - 1)], 1 - d, shape=(size, size)) for d in range(3)]
-        return sum(rows[1:], rows[0]).tocsr()
-
-    def pair(self, guess: float) -> Pair:
-        """The eigenvalue nearest to a guess of Λ(p), by inverse iteration from a constant."""
-        u = np.zeros(self.matrix.shape[0], complex)
-        u[self.waves * self.degrees] = 1.0
-        adjoint, value = u, guess
-        for _ in range(2):
-            factors = sparse_lu((self.matrix - value * self.mass).tocsc())
-            for _ in range(4):
-                u = _normed(factors.solve(self.mass @ u))
-                adjoint = _normed(factors.solve(self.mass @ adjoint, "H"))
-            value = float(np.real(np.vdot(adjoint, self.matrix @ u) / np.vdot(adjoint, self.mass @ u)))
-        position = sp.kron(sp.identity(2 * self.waves + 1), self._noise.position)
-        centre = np.real(np.vdot(adjoint, position @ u) / np.vdot(adjoint, self.mass @ u))
-        mean = (self.mass @ u)[self.waves * self.degrees]
-        return Pair(value, self._table(u / mean), float(centre))
-
-    def drift(self) -> Pair:
-        """λ, and f of mean 0 with L(0) f = λ − q − κh."""
-        source = [self.noise.growth(i).astype(complex) for i in (0, 1)]
-        load = np.zeros((2 * self.waves + 1, self.degrees), complex)
-        first = slice(self.waves - 1, self.waves + 2)
-        load[first] = np.outer(source[0], self._noise.mass[0]) + np.outer(source[1], self._noise.position[0])
-        unit = np.zeros(load.size)
-        unit[self.waves * self.degrees] = 1.0
-        column = sp.csc_matrix(self.mass @ unit).T
-        bordered = sp.bmat([[self.matrix, -column], [column.T, None]], format="csc")
-        found = sparse_lu(bordered).solve(np.append(-load.ravel(), 0.0))
-        return Pair(float(found[-1].real), self._table(found[:-1]), 0.0)
-
-    def _table(self, u: FloatArray) -> FloatArray:
-        """Modes −K … K of a real function, shape (modes, degrees)."""
-        table = u.reshape(2 * self.waves + 1, self.degrees)
-        return (table + table[::-1].conj()) / 2
 
 
 @dataclass(frozen=True)
@@ -165,6 +55,90 @@ class Pair:
         return -2 * self.table[len(self.table) // 2 :].imag
 
 
-def _normed(u: FloatArray) -> FloatArray:
-    """With its largest coefficient 1."""
-    return u / u[np.argmax(np.abs(u))]
+class Galerkin:
+    """The eigenproblem with modes up to `waves` and polynomials below `degrees`."""
+
+    def __init__(self, noise: Cylinder, basis: Basis, p: float | None, waves: int, degrees: int) -> None:
+        self.noise, self.waves, self.degrees = noise, waves, degrees
+        z, weight = _quadrature(basis, noise, degrees)
+        values, slopes = _tabulated(basis, z, degrees)
+        full = slopes + basis.gauge * values
+        self._mass, self._position = (values * weight) @ values.T, (values * weight * z) @ values.T
+        diffusion = float(noise.nu) / 2 * (full * weight) @ full.T
+        modes = sp.identity(2 * waves + 1)
+        still, driven = (self._turning(i, 0.0 if p is None else p) for i in (0, 1))
+        self.mass, self.position = sp.kron(modes, self._mass, format="csc"), sp.kron(modes, self._position)
+        self.matrix = (
+            sp.kron(modes, -diffusion) + sp.kron(still, self._mass) + sp.kron(driven, self._position)
+        ).tocsc()
+
+    def _turning(self, i: int, p: float) -> sp.csr_matrix:
+        """F_i on the modes −K … K."""
+        from flint import arb
+
+        bands = self.noise.bands(i, arb(p), self.waves).astype(complex)
+        size = bands.shape[1]
+        rows = [sp.diags(bands[d][max(0, 1 - d) : size - max(0, d - 1)], 1 - d, shape=(size, size)) for d in range(3)]
+        return sum(rows[1:], rows[0]).tocsr()
+
+    def pair(self, guess: float) -> Pair:
+        """The eigenvalue nearest to a guess of Λ(p), by inverse iteration from a constant."""
+        u = np.zeros(self.matrix.shape[0], complex)
+        u[self.waves * self.degrees] = 1.0
+        adjoint, value = u, guess
+        for _ in range(2):
+            factors = sparse_lu((self.matrix - value * self.mass).tocsc())
+            for _ in range(4):
+                u, adjoint = factors.solve(self.mass @ u), factors.solve(self.mass @ adjoint, "H")
+                u, adjoint = (vector / vector[np.argmax(np.abs(vector))] for vector in (u, adjoint))
+            value = float(np.real(np.vdot(adjoint, self.matrix @ u) / np.vdot(adjoint, self.mass @ u)))
+        centre = np.real(np.vdot(adjoint, self.position @ u) / np.vdot(adjoint, self.mass @ u))
+        mean = (self.mass @ u)[self.waves * self.degrees]
+        return Pair(value, self._table(u / mean), float(centre))
+
+    def drift(self) -> Pair:
+        """λ, and f of mean 0 with L(0) f = λ − q − κh."""
+        source = [self.noise.growth(i).astype(complex) for i in (0, 1)]
+        load = np.zeros((2 * self.waves + 1, self.degrees), complex)
+        first = slice(self.waves - 1, self.waves + 2)
+        load[first] = np.outer(source[0], self._mass[0]) + np.outer(source[1], self._position[0])
+        unit = np.zeros(load.size)
+        unit[self.waves * self.degrees] = 1.0
+        column = sp.csc_matrix(self.mass @ unit).T
+        bordered = sp.bmat([[self.matrix, -column], [column.T, None]], format="csc")
+        found = sparse_lu(bordered).solve(np.append(-load.ravel(), 0.0))
+        return Pair(float(found[-1].real), self._table(found[:-1]), 0.0)
+
+    def _table(self, u: FloatArray) -> FloatArray:
+        """Modes −K … K of a real function, shape (modes, degrees)."""
+        table = u.reshape(2 * self.waves + 1, self.degrees)
+        return (table + table[::-1].conj()) / 2
+
+
+def _quadrature(basis: Basis, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss's z and weights that sum to 1."""
+    a = float(noise.slope)
+    if not basis.is_core:
+        z, weight = roots_jacobi(2 * degrees + 40, a, a)
+        return z, weight / weight.sum()
+    reach = basis.centre + REACH * basis.scale * np.array([-1.0, 1.0])
+    low, high = np.clip(reach, -1, 1) if noise.is_bounded else reach
+    x, weight = np.polynomial.legendre.leggauss(4 * degrees + 100)
+    z = (low + high) / 2 + (high - low) / 2 * x
+    log = a * np.log1p(-z * z) if noise.is_bounded else -z * z / 2
+    log += 2 * basis.gauge * z
+    weight *= np.exp(log - log.max())
+    return z, weight / weight.sum()
+
+
+def _tabulated(basis: Basis, z: FloatArray, degrees: int) -> tuple[FloatArray, FloatArray]:
+    """B_m(z) and B_m′(z), (degrees, points) each."""
+    if basis.is_core:
+        root = np.sqrt(np.arange(degrees))
+        values = hermite_table((z - basis.centre) / basis.scale, root)
+        return values, root[:, None] * np.concatenate([0 * values[:1], values[:-1]]) / basis.scale
+    unit = balls(np.eye(degrees))
+    values, slopes = (
+        np.polynomial.chebyshev.chebval(z, part.astype(float).T) for part in (basis.values(unit), basis.slope(unit))
+    )
+    return values, slopes

@@ -12,9 +12,9 @@ from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.quantities import lyapunov_exponent
 from fpsolve.exponent.quantities import stability_index as estimated_index
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.proofs.attempts import enclose
 from fpsolve.proofs.balls import precision
-from fpsolve.proofs.enclosure import NOTHING, Enclosure, around, trivial
+from fpsolve.proofs.certificate import NOTHING, Enclosure, around, trivial
+from fpsolve.proofs.search import enclose
 from fpsolve.proofs.statement import Parameters, cylinder, parameters_of
 from fpsolve.theory.perturbation import scale_of
 

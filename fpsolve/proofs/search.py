@@ -1,151 +1,317 @@
-"""From a trial function to bounds: the cells, the place where u is held, and the least δ for which W exists."""
+"""From problems to certificates: trial functions are enlarged until the bounds that follow from them are close enough.
+
+For each trial function, W of `verify` is sought with the least δ. Nothing here needs to be right: what is found is
+verified.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.proofs.balls import above, below
-from fpsolve.proofs.basis import Core
-from fpsolve.proofs.bounds import Bounder, Bounds, HeldBounds, Trial
-from fpsolve.proofs.factor import LOWER, UPPER, Factor, Rates, Side, march
+from fpsolve.proofs.balls import above, ball, below, precision
+from fpsolve.proofs.basis import Basis, Core, Whole
+from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, HeldBounds, Trial
+from fpsolve.proofs.certificate import NOTHING, BasisRecord, Certificate, Enclosure, SideRecord, enclosure_of
+from fpsolve.proofs.galerkin import Galerkin, Pair
+from fpsolve.proofs.statement import Cylinder, Parameters, cylinder
+from fpsolve.proofs.verify import objection
 
+SMALLEST, GROWTH, MOST_UNKNOWNS = (5, 9), 1.35, 25_000
+"""Modes on either side and polynomials of the first trial, by what one of both grows, and how far."""
+ABSENT = 1e9
+"""What a missing bound counts for."""
+PATIENCE, PROGRESS, FAR = {False: 2, True: 6}, 0.7, 1e-2
+"""Enlargements that do not bring the bounds closer by this factor, after which no more are tried; more of them where
+the bounds are farther apart than this share of the number."""
+WHOLE_BELOW = 6.0
+"""End exponents a below which the ends of the support carry too much weight to be cut off."""
 CELLS, REACH, HELD_FROM, CANDIDATES = 480, 10.0, 3.5, 24
 SLACK = 1e-6
 """Of the mismatch, relative, so that another machine's rounding does not matter."""
+MOST = 1e6
+"""More than W needs to be anywhere; for q = −1 it would grow beyond all bounds."""
+
+
+@precision()
+def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0) -> Enclosure:
+    """Bounds on Λ(p), or on λ where p is None, that are at most `width` apart, if that can be done.
+
+    Args:
+        stated: parameters as decimals.
+        p: the moment as a decimal.
+        guess: Λ(p), about.
+
+    Returns:
+        The closest bounds that were found.
+
+    Raises:
+        NoSuchExponent: the noise has algebraic tails, r₀ > 1.
+    """
+    noise, best, size = cylinder(stated), NOTHING, SMALLEST
+    for basis in bases(noise, p):
+        for found, waves, degrees in _enlarged(stated, noise, basis, p, guess, size):
+            if best.certificate is None or _apart(found) < _apart(best.certificate):
+                best, size = enclosure_of(found), (waves, degrees)
+            if best.width <= width:
+                return best
+    return best
+
+
+def _enlarged(
+    stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, guess: float, size: tuple[int, int]
+) -> Iterator[tuple[Certificate, int, int]]:
+    """Certificates by larger and larger trials, as long as the bounds come closer, and the sizes of the trials."""
+    delta, idle, value, (waves, degrees) = math.inf, 0, math.inf, size
+    while idle < PATIENCE[delta > FAR * abs(value)] and (2 * waves + 1) * degrees <= MOST_UNKNOWNS:
+        try:
+            pair, basis = _solved(noise, basis, p, guess, waves, degrees)
+        except ArithmeticError:
+            return
+        value = pair.value
+        certificate = certificate_of(stated, noise, basis, p, pair)
+        if certificate is not None and not objection(certificate):
+            idle = 0 if _apart(certificate) < PROGRESS * delta else idle + 1
+            delta = min(delta, _apart(certificate))
+            yield certificate, waves, degrees
+        elif delta < math.inf:
+            idle += 1
+        waves, degrees = (
+            math.ceil(GROWTH * n) + 1 if edge > 0.1 * max(pair.edges) else n
+            for n, edge in zip((waves, degrees), pair.edges, strict=True)
+        )
+
+
+def _apart(certificate: Certificate) -> float:
+    """How far the bounds of a certificate are apart; one that is missing counts as far away."""
+    return sum(ABSENT if side is None else side.delta for side in (certificate.upper, certificate.lower))
+
+
+def bases(noise: Cylinder, p: str | None) -> Iterator[Basis]:
+    """What is worth trying, in this order: the whole support, or a core about where the noise is in the moment."""
+    slope = float(noise.slope)
+    if noise.is_bounded and slope < WHOLE_BELOW:
+        yield Whole()
+        return
+    driven = 2 * float(noise.q[1][1].real)
+    gauge = 0.0 if p is None else float(p) * driven / (2 * float(noise.nu) * slope)  # by perturbation theory
+    # z with b(z) = β
+    yield _core(noise, 2 * gauge / (slope + math.hypot(slope, 2 * gauge)) if noise.is_bounded else gauge / slope)
+    if noise.is_bounded and slope < 2 * WHOLE_BELOW:
+        yield Whole()
+
+
+def _core(noise: Cylinder, centre: float) -> Core:
+    """Polynomials about a centre, with the gauge that puts their weight there; none for λ, at 0."""
+    slope = float(noise.slope)
+    if not noise.is_bounded:
+        return Core(centre, 1.0, slope * centre)
+    return Core(centre, 1 / math.sqrt(2 * slope + 3), slope * centre / (1 - centre**2))
+
+
+def _solved(noise: Cylinder, basis: Basis, p: str | None, guess: float, waves: int, degrees: int) -> tuple[Pair, Basis]:
+    """A trial, about the place where the noise is in the moment."""
+    if p is None:
+        return Galerkin(noise, basis, None, waves, degrees).drift(), basis
+    pair = Galerkin(noise, basis, float(p), waves, degrees).pair(guess)
+    if basis.is_core and 0.3 * basis.scale < abs(pair.centre - basis.centre) < 3 * basis.scale:
+        basis = _core(noise, pair.centre)
+        pair = Galerkin(noise, basis, float(p), waves, degrees).pair(guess)
+    return pair, basis
+
+
+def certificate_of(stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, pair: Pair) -> Certificate | None:
+    """The closest bounds that a trial gives, before they are verified; None where there are none."""
+    if not math.isfinite(pair.value):
+        return None
+    trial = Trial(noise, None if p is None else ball(p), pair.value, basis, pair.cosine, pair.sine)
+    phases = max(128, 16 * len(pair.cosine))
+    upper, lower = _sides(trial, phases)
+    if upper is None and lower is None:
+        return None
+    return Certificate(
+        quantity="lyapunov_exponent" if p is None else "moment",
+        p=p,
+        parameters=dict(stated),
+        mu=pair.value,
+        basis=BasisRecord(kind=basis.kind, centre=basis.centre, scale=basis.scale, gauge=basis.gauge),
+        cosine=pair.cosine.tolist(),
+        sine=pair.sine.tolist(),
+        upper=upper,
+        lower=lower,
+        phases=phases,
+    )
 
 
 @dataclass(frozen=True)
-class Found:
-    """W and δ of one bound.
+class Half:
+    """Cells from the middle outward, on the right; the left is mirrored onto it.
 
     Attributes:
-        nodes, values: W at nodes from left to right.
-        tails: the constants beyond both ends, or nothing.
-        delta: δ.
+        nodes: z at the ends of cells, increasing from the middle on; one more than cells.
+        mismatch: above e on each cell.
+        inward: below B on each cell.
+        beta: β.
+        held: what is known at the nodes where u may be held; None where u serves to the end of the support.
+        nu: floats below and above ν.
+        sense: q.
+        square: q in front of W²; 0 for the drift of ln‖x‖.
     """
 
     nodes: FloatArray
-    values: FloatArray
-    tails: tuple[float, float] | None
-    delta: float
+    mismatch: FloatArray
+    inward: FloatArray
+    beta: float
+    held: Mapping[int, HeldBounds] | None
+    nu: tuple[float, float]
+    sense: int
+    square: int
+
+    def over_nu(self, amount: float) -> float:
+        """Below amount/ν."""
+        return amount / self.nu[int(amount > 0)]
+
+    def march(self, delta: float) -> tuple[FloatArray, float] | None:
+        """The largest W ≥ 0 from 0 on that (*) allows for this δ, at nodes to where the tail is safe, and κ beyond.
+
+        Outward W may grow like e^{z²/2}, so that δ need hardly exceed the mean of e under the law of the noise in the
+        moment, and is far below its maximum. None where there is no W; κ is 0 at the end of the support.
+        """
+        values = [0.0]
+        for j, inward in enumerate(self.inward):
+            width = self.nodes[j + 1] - self.nodes[j]
+            value = _step(values[-1], width, self.over_nu(delta - self.mismatch[j]), inward, self.square)
+            if value is None:
+                return None
+            values.append(value)
+            held = None if self.held is None else self.held.get(j + 1)
+            kappa = None if held is None else self._tail(delta, j + 1, value, held)
+            if kappa is not None:
+                return np.array(values), kappa
+        return (np.array(values), 0.0) if self.held is None else None
+
+    def _tail(self, delta: float, j: int, value: float, held: HeldBounds) -> float | None:
+        """κ beyond a node, if there is one."""
+        drop, mismatch, growth = held.above(self.sense)
+        pull, most = held.drift - self.beta, (value - drop) * (1 - 1e-12)
+        least = max(-self.sense * self.beta, max(growth, 0.0) / (self.nu[0] * held.slope)) * (1 + 1e-12)
+        kappa = min(most, max(pull, least)) if self.square > 0 else most
+        if kappa < least or pull <= 0 or self.nodes[j] < 0:
+            return None
+        room = self.over_nu(delta - mismatch) * (1 - 1e-12 if delta > mismatch else 1 + 1e-12)
+        return kappa if room + (1 - 1e-12) * _pull(kappa, pull, self.square) > 0 else None
 
 
-@dataclass(frozen=True)
-class Known:
-    """What is known of a trial on all cells, and where u may be held.
+def _step(value: float, width: float, room: float, inward: float, q: int) -> float | None:
+    """W at the end of a cell from W at its beginning, so that (*) holds at both and between.
 
-    Attributes:
-        nodes: ends of the cells.
-        bounds: on them.
-        middle: the node where W is 0.
-        held: by the number of a node, on the left and on the right; None where u serves on the whole support.
+    For q = −1 its right side is convex; where that matters, −½ q W² ≥ 0 is left out.
     """
+    if not math.isfinite(room):
+        return None
+    found = value + 2 * width * (room + _pull(value, inward, q))
+    if q < 0 and (inward < 0 or found < value):
+        q = 0
+        found = value + 2 * width * (room + value * inward)
+    if _pull(found, inward, q) < _pull(value, inward, q):
+        linear, rest = 1 - 2 * width * inward, value + 2 * width * room
+        square = linear**2 + 4 * width * q * rest
+        if rest < 0 or square < 0 or (linear <= 0 and not q):
+            return None
+        found = min(found, 2 * rest / (linear + math.sqrt(square)))
+    if found < 0 or not math.isfinite(found):
+        return None
+    growth = found - value
+    return min(value + growth * (1 - 1e-12 if growth > 0 else 1 + 1e-12), MOST)
 
-    nodes: FloatArray
-    bounds: Bounds
-    middle: int
-    held: tuple[dict[int, HeldBounds], dict[int, HeldBounds]] | None
+
+def _pull(value: float, inward: float, q: int) -> float:
+    """W B − ½ q W²."""
+    return value * inward - q * value**2 / 2
 
 
-def search(trial: Trial, phases: int) -> tuple[Found | None, Found | None]:
+def _sides(trial: Trial, phases: int) -> tuple[SideRecord | None, SideRecord | None]:
     """The least δ of the upper and of the lower bound, to 1 %, each None where there is none."""
-    nodes, bounder = nodes_for(trial), Bounder(trial, phases)
+    nodes, bounder = _nodes(trial), Bounder(trial, phases)
     bounds = bounder.bounds(nodes[:-1], nodes[1:])
     if not np.any(bounds.is_positive):
         return None, None
     inward = np.maximum(np.abs(bounds.inward[0]), np.abs(bounds.inward[1]))
     middle = int(np.argmin(np.where(bounds.is_positive, inward, np.inf)))
-    held = _held(trial, bounder, nodes, bounds, middle) if isinstance(trial.basis, Core) else None
-    known = Known(nodes, bounds, middle, held)
-    return _least(trial, known, UPPER), _least(trial, known, LOWER)
+    held = _held(bounder, nodes, bounds, middle) if trial.basis.is_core else (None, None)
+    nu, caution = (below(trial.noise.nu), above(trial.noise.nu)), SLACK * 1e-3
+    low, high = (end - sign * caution * (1 + np.abs(end)) for sign, end in zip((1, -1), bounds.inward, strict=True))
+    found = []
+    for q in (UPPER, LOWER):
+        beta, square = (trial.basis.gauge, q) if trial.p is not None else (0.0, 0)
+        excess = bounds.above(q)
+        least = max(float(np.min(excess)), 1e-18)
+        excess = excess + SLACK * np.abs(excess)
+        left = Half(-nodes[middle::-1], excess[:middle][::-1], -high[:middle][::-1], -beta, held[0], nu, q, square)
+        right = Half(nodes[middle:], excess[middle:], low[middle:], beta, held[1], nu, q, square)
+        found.append(_least(left, right, least))
+    return found[0], found[1]
 
 
-def nodes_for(trial: Trial) -> FloatArray:
+def _nodes(trial: Trial) -> FloatArray:
     """Ends of cells: equal ones on the core, or in the angle on the whole support."""
-    if not isinstance(trial.basis, Core):
+    basis = trial.basis
+    if not basis.is_core:
         nodes = np.sin(np.linspace(-math.pi / 2, math.pi / 2, CELLS + 1))
         nodes[0], nodes[-1] = -1.0, 1.0
         return nodes
-    low, high = trial.basis.centre + REACH * trial.basis.scale * np.array([-1.0, 1.0])
+    low, high = basis.centre + REACH * basis.scale * np.array([-1.0, 1.0])
     if trial.noise.is_bounded:
         low, high = max(low, -0.999), min(high, 0.999)
     return np.linspace(low, high, CELLS + 1)
 
 
 def _held(
-    trial: Trial, bounder: Bounder, nodes: FloatArray, bounds: Bounds, middle: int
-) -> tuple[dict[int, HeldBounds], dict[int, HeldBounds]]:
-    """Some nodes on either side, far enough out and with u > 0 up to there."""
-    bad = np.flatnonzero(~bounds.is_positive)
+    bounder: Bounder, nodes: FloatArray, bounds: Bounds, middle: int
+) -> tuple[Mapping[int, HeldBounds], Mapping[int, HeldBounds]]:
+    """Some nodes on either side, by their distance from the middle, far enough out and with u > 0 up to there."""
+    basis, bad = bounder.trial.basis, np.flatnonzero(~bounds.is_positive)
     first = bad[bad < middle].max(initial=-1) + 1
     last = bad[bad >= middle].min(initial=len(nodes) - 1)
-    far = np.abs(nodes - trial.basis.centre) > HELD_FROM * trial.basis.scale  # type: ignore[attr-defined]
+    far = np.abs(nodes - basis.centre) > HELD_FROM * basis.scale
     inside = np.flatnonzero(far & (np.arange(len(nodes)) >= first) & (np.arange(len(nodes)) <= last))
-    found = []
+    found: list[dict[int, HeldBounds]] = []
     for sign, chosen in ((-1, inside[inside < middle]), (1, inside[inside > middle])):
         picked = np.unique(chosen[np.linspace(0, len(chosen) - 1, CANDIDATES).astype(int)]) if len(chosen) else chosen
         held = bounder.held(nodes[picked], sign) if len(picked) else []
-        found.append(dict(zip(picked.tolist(), held, strict=True)))
+        found.append(dict(zip((sign * (picked - middle)).tolist(), held, strict=True)))
     return found[0], found[1]
 
 
-def _least(trial: Trial, known: Known, sense: int) -> Found | None:
-    """The least δ of one bound."""
-    noise = trial.noise
-    rates = Rates(above(noise.nu), below(noise.nu), sense, trial.p is not None)
-    sides = _sides(trial, known, sense)
-    excess = known.bounds.above(sense)
-    high = max(float(np.min(excess)), 1e-18)
-    while not _both(sides, rates, high):
+def _least(left: Half, right: Half, least: float) -> SideRecord | None:
+    """The bound with the least δ, from a guess, by bisection."""
+
+    def both(delta: float) -> tuple[tuple[FloatArray, float], tuple[FloatArray, float]] | None:
+        halves = left.march(delta)
+        others = right.march(delta) if halves is not None else None
+        return (halves, others) if halves is not None and others is not None else None
+
+    high = least
+    while (found := both(high)) is None:
         high *= 10
         if not high < 1e6:
             return None
     low = high / 10
     while high > 1.01 * low:
         between = math.sqrt(low * high)
-        if _both(sides, rates, between):
-            high = between
-        else:
+        closer = both(between)
+        if closer is None:
             low = between
-    both = _both(sides, rates, high)
-    return None if both is None else _joined(sides, *both, high)
-
-
-def _sides(trial: Trial, known: Known, sense: int) -> tuple[Side, Side]:
-    """The left, mirrored, and the right."""
-    middle, nodes = known.middle, known.nodes
-    excess = known.bounds.above(sense)
-    excess = excess + SLACK * np.abs(excess)
-    beta = trial.basis.gauge if trial.p is not None else 0.0
-    low, high = known.bounds.inward
-    ends = (None, None) if known.held is None else [{j: h.end(sense) for j, h in side.items()} for side in known.held]
-    left = None if ends[0] is None else {middle - j: end for j, end in ends[0].items()}
-    right = None if ends[1] is None else {j - middle: end for j, end in ends[1].items()}
-    return (
-        Side(-nodes[middle::-1], excess[:middle][::-1], _cautious(-high[:middle][::-1]), -beta, left),
-        Side(nodes[middle:], excess[middle:], _cautious(low[middle:]), beta, right),
+        else:
+            high, found = between, closer
+    (before, left_tail), (after, right_tail) = found
+    return SideRecord(
+        delta=high * (1 + 1e-9),
+        nodes=np.concatenate([-left.nodes[: len(before)][:0:-1], right.nodes[: len(after)]]).tolist(),
+        values=np.concatenate([-before[:0:-1], after]).tolist(),
+        tails=None if right.held is None else [-left_tail, right_tail],
     )
-
-
-def _cautious(inward: FloatArray) -> FloatArray:
-    return inward - SLACK * 1e-3 * (1 + np.abs(inward))
-
-
-def _both(sides: tuple[Side, Side], rates: Rates, delta: float) -> tuple[Factor, Factor] | None:
-    """Both halves of W."""
-    left = march(sides[0], rates, delta)
-    right = march(sides[1], rates, delta) if left is not None else None
-    return (left, right) if left is not None and right is not None else None
-
-
-def _joined(sides: tuple[Side, Side], left: Factor, right: Factor, delta: float) -> Found:
-    """One function from left to right."""
-    count = len(left.values)
-    nodes = np.concatenate([-sides[0].nodes[:count][:0:-1], sides[1].nodes[: len(right.values)]])
-    values = np.concatenate([-left.values[:0:-1], right.values])
-    tails = None if left.tail is None or right.tail is None else (-left.tail, right.tail)
-    return Found(nodes, values, tails, delta * (1 + 1e-9))

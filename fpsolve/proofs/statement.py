@@ -41,28 +41,11 @@ Parameters = Mapping[str, str]
 
 
 @dataclass(frozen=True)
-class Wave:
-    """mean + cosine cos 2φ + sine sin 2φ."""
-
-    mean: Any
-    cosine: Any
-    sine: Any
-
-    @property
-    def coefficients(self) -> tuple[Any, Any, Any]:
-        """Of e^{2idφ}, d = −1, 0, 1."""
-        from flint import acb
-
-        half = self.cosine / 2, self.sine / 2
-        return acb(half[0], half[1]), acb(self.mean), acb(half[0], -half[1])
-
-
-@dataclass(frozen=True)
 class Cylinder:
     """Eq. (19) between impacts, gauged, in balls.
 
     Attributes:
-        h, q: phase speed and growth rate, h₀ and h₁, q₀ and q₁.
+        h, q: phase speed and growth rate, h₀ and h₁, q₀ and q₁, each by its coefficients of e^{2idφ}, d = −1, 0, 1.
         kappa: κ = ln R/π.
         nu: ν.
         slope: b′(0), ½ or a.
@@ -70,8 +53,8 @@ class Cylinder:
         unit: of ξ, so that ξ = unit · z.
     """
 
-    h: tuple[Wave, Wave]
-    q: tuple[Wave, Wave]
+    h: tuple[Balls, Balls]
+    q: tuple[Balls, Balls]
     kappa: arb
     nu: arb
     slope: arb
@@ -88,21 +71,21 @@ class Cylinder:
 
     def bands(self, i: int, p: arb, waves: int) -> Balls:
         """F_i from mode k to mode k + d, shape (3, 2 waves + 1), d = −1, 0, 1 and k = −waves … waves."""
-        h, q = self.h[i].coefficients, self.q[i].coefficients
-        turns = np.array([_turn(k) + p * self.kappa for k in range(-waves, waves + 1)], dtype=object)
-        return np.array([h[d] * turns + p * q[d] for d in range(3)], dtype=object)
+        from flint import acb
+
+        turns = np.array([acb(0, 2 * k) + p * self.kappa for k in range(-waves, waves + 1)], dtype=object)
+        return np.outer(self.h[i], turns) + p * self.q[i][:, None]
 
     def growth(self, i: int) -> Balls:
         """q_i + κ h_i, the derivative of F_i 1 by p, at the modes −1, 0, 1."""
-        return np.array(
-            [q + self.kappa * h for h, q in zip(self.h[i].coefficients, self.q[i].coefficients, strict=True)]
-        )
+        return self.q[i] + self.kappa * self.h[i]
 
 
-def _turn(k: int) -> Any:
+def _wave(mean: arb, cosine: arb, sine: arb) -> Balls:
+    """Coefficients of mean + cosine cos 2φ + sine sin 2φ."""
     from flint import acb
 
-    return acb(0, 2 * k)
+    return np.array([acb(cosine / 2, sine / 2), acb(mean), acb(cosine / 2, -sine / 2)], dtype=object)
 
 
 def parameters_of(problem: Problem) -> Parameters:
@@ -137,8 +120,8 @@ def cylinder(stated: Parameters) -> Cylinder:
     still, driven = square * c1 / 2, epsilon * unit / 2
     zero = ball(0)
     return Cylinder(
-        h=(Wave(omega, zero, still), Wave(zero, zero, driven)),
-        q=(Wave(still, -still, zero), Wave(driven, -driven, zero)),
+        h=(_wave(omega, zero, still), _wave(zero, zero, driven)),
+        q=(_wave(still, -still, zero), _wave(driven, -driven, zero)),
         kappa=log_factor / zero.pi(),
         nu=nu,
         slope=slope,

@@ -23,38 +23,64 @@ motion, chapter XI). LT may tend to −∞ there for the upper bound, to +∞ fo
 λ₋ ≤ q + L(0) f with convex kinks, q + L(0) f ≤ λ₊ with concave ones. Then ln‖x‖ + f − ∫ (q + L(0) f) dt less the local
 times is a martingale whose bracket is at most C t, hence o(t), and so is f: λ₋ ≤ λ ≤ λ₊ for almost every path.
 
-What is verified are the inequalities of `factor`, from which those of the theorem follow for T = R^{ps} e^{βz ± ψ} u,
-the upper and the lower bound each with a ψ of its own.
+*What is verified* are inequalities from which those of the theorem follow for T = R^{ps} e^{βz ± ψ} u. Let u > 0, z be
+noise, β the gauge of u and W = ψ′. The upper bound has q = 1 and T = e^{ψ}u, the lower one q = −1 and T = e^{−ψ}u, each
+with a ψ of its own. With e = q (Lu/u − μ) and B = b(z) − β − u_z/u
+
+    q (LT/T − μ) = e + ν (½ W′ + ½ q W² − W B),
+
+so that LT ≤ (μ + δ) T, or LT ≥ (μ − δ) T, as soon as
+
+    ½ W′ ≤ (δ − e)/ν + W B − ½ q W².                                                                            (*)
+
+Outward from W = 0 where the noise mostly is, W may grow like e^{z²/2}, so that δ need hardly exceed the mean of e under
+the law of the noise in the moment, and is far below its maximum. Where W jumps downward, ψ has a concave kink and −ψ a
+convex one, which only helps: the local time at the kink enters with the sign of the inequality (Itô-Tanaka).
+
+Where u serves only between two ends, it is held there: T = e^{βz ± ψ} u(φ, end) beyond. At the right end the slope of
+ln T loses r = u_z/u, so that its kink is concave for q = 1 if W drops by max(−r) at least, and convex for q = −1 if W
+drops by max r at least. Beyond, W is a constant κ ≥ max(0, −qβ), which keeps T from 0 for q = 1 and bounded for
+q = −1, with
+
+    0 ≤ (δ − q n)/ν + κ (b − β) − ½ q κ²,      n(φ, z) = (F₀ + z F₁ + ½ νβ² − νβ b(z) − μ) u/u,
+
+which holds beyond an end if it holds there and νκ b′ ≥ max(q n_z) there: b′ does not decrease, for bounded noise with
+z ≥ 0, and with it the slope of the right side grows by (κ + qβ) Δb′ ≥ 0. The left end is mirrored onto the right one,
+z → −z, β → −β, W → −W.
+
+The drift of ln‖x‖ + f ± ψ is bounded in the same way, with e = q (its drift − μ), without W² and with B = b, β = 0 and
+r = f_z.
+
 Coefficients are in balls; floats are rounded outward.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.proofs.balls import ball, in_balls
-from fpsolve.proofs.bounds import Bounder, Bounds, Trial
+from fpsolve.proofs.balls import ball, precision
+from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, Trial
 from fpsolve.proofs.certificate import MOMENT, Certificate, SideRecord
-from fpsolve.proofs.factor import LOWER, UPPER, End
 from fpsolve.proofs.statement import Cylinder, cylinder
 
-if TYPE_CHECKING:
-    from flint import arb
 
-
-@in_balls
+@precision()
 def objection(certificate: Certificate) -> str:
     """Why the bounds of a certificate need not hold; empty where they are proven."""
     sides = [(q, side) for q, side in ((UPPER, certificate.upper), (LOWER, certificate.lower)) if side is not None]
     if certificate.p is not None and Fraction(certificate.p) == 0:  # Λ(0) = 0, as T = 1
         return "" if all(q * Fraction(certificate.mu) + Fraction(side.delta) >= 0 for q, side in sides) else "Λ(0) = 0"
-    trial = trial_of(certificate)
+    trial = Trial(
+        noise=cylinder(certificate.parameters),
+        p=None if certificate.p is None else ball(certificate.p),
+        mu=certificate.mu,
+        basis=certificate.basis.basis,
+        cosine=np.array(certificate.cosine),
+        sine=np.array(certificate.sine),
+    )
     for _, side in sides:
         misplaced = _misplaced(certificate, trial.noise, side)
         if misplaced:
@@ -62,21 +88,11 @@ def objection(certificate: Certificate) -> str:
     bounder = Bounder(trial, certificate.phases)
     cells = sorted({cell for _, side in sides for cell in pairwise(side.nodes)})
     low, high = np.array(cells).T
-    found, places = bounder.bounds(low, high), {cell: j for j, cell in enumerate(cells)}
-    if not np.all(found.is_positive):
-        return f"u > 0 is not certain near z = {low[np.argmin(found.is_positive)]:.6g}"
-    return "".join(_objection(certificate, bounder, q, side, found, places) for q, side in sides)
-
-
-def trial_of(certificate: Certificate) -> Trial:
-    """The trial function of a certificate."""
-    return Trial(
-        noise=cylinder(certificate.parameters),
-        p=None if certificate.p is None else ball(certificate.p),
-        mu=certificate.mu,
-        basis=certificate.basis.basis,
-        cosine=np.array(certificate.cosine),
-        sine=np.array(certificate.sine),
+    bounds, places = bounder.bounds(low, high), {cell: j for j, cell in enumerate(cells)}
+    if not np.all(bounds.is_positive):
+        return f"u > 0 is not certain near z = {low[np.argmin(bounds.is_positive)]:.6g}"
+    return "".join(
+        _objection_within(bounds, places, trial, q, side) or _objection_beyond(bounder, q, side) for q, side in sides
     )
 
 
@@ -94,57 +110,45 @@ def _misplaced(certificate: Certificate, noise: Cylinder, side: SideRecord) -> s
     return ""
 
 
-def _objection(
-    certificate: Certificate, bounder: Bounder, q: int, side: SideRecord, found: Bounds, places: Mapping[Any, int]
+def _objection_within(
+    bounds: Bounds, places: dict[tuple[float, float], int], trial: Trial, q: int, side: SideRecord
 ) -> str:
-    """Why one of the bounds need not hold."""
-    noise, square = bounder.trial.noise, q if certificate.quantity == MOMENT else 0
-    excess, name = found.above(q), "upper" if q > 0 else "lower"
+    """Why (*) need not hold on a cell.
+
+    Its right side is W B − ½ q W² but for a constant. Over all W between two values and B between two others it is
+    least, for W of one sign, where W B is, at one end of B; then at an end of W, or for q = −1 at W = −B.
+    """
+    square, excess = q if trial.p is not None else 0, bounds.above(q)
     for cell, values in zip(pairwise(side.nodes), pairwise(side.values), strict=True):
         j = places[cell]
         left, right, start, stop = map(ball, (*cell, *values))
-        room = (ball(side.delta) - ball(float(excess[j]))) / noise.nu
-        inward = (float(found.inward[0][j]), float(found.inward[1][j]))
-        if not all((stop - start) / (2 * (right - left)) <= room + pull for pull in _pulls(values, inward, square)):
-            return f"{name} bound: the mismatch near z = {cell[0]:.6g} is not made up for; "
-    for sign, j in ((-1, 0), (1, -1)):
-        if side.tails is None:
-            break
-        (held,) = bounder.held(np.array([side.nodes[j]]), sign)
-        tail = (sign * certificate.basis.gauge, sign * side.values[j], sign * side.tails[j], side.delta)
-        if not _holds_beyond(noise, held.end(q), q, square, *map(ball, tail)):
-            return f"{name} bound: the trial function does not serve beyond z = {side.nodes[j]:.6g}; "
+        room = (ball(side.delta) - ball(float(excess[j]))) / trial.noise.nu
+        inward = (float(bounds.inward[0][j]), float(bounds.inward[1][j]))
+        least = [(w, inward[0] if w > 0 else inward[1]) for w in (*values, *[0.0] * (min(values) < 0 < max(values)))]
+        if square < 0:
+            least += [(-bound, bound) for bound in inward if min(values) < -bound < max(values)]
+        pulls = (ball(w) * ball(b if w else 0.0) - square * (ball(w) * ball(w)) / 2 for w, b in least)
+        if not all((stop - start) / (2 * (right - left)) <= room + pull for pull in pulls):
+            return f"{_NAMES[q]} bound: the mismatch near z = {cell[0]:.6g} is not made up for; "
     return ""
 
 
-def _pulls(values: tuple[float, float], inward: tuple[float, float], square: int) -> Iterator[arb]:
-    """Numbers of which one is below W B − ½ q W² for all W between two values and B between two others.
+def _objection_beyond(bounder: Bounder, q: int, side: SideRecord) -> str:
+    """Why u may not be held at an end of the core, the left one mirrored onto the right one."""
+    noise, square = bounder.trial.noise, q if bounder.trial.p is not None else 0
+    for sign, j, tail in zip((-1, 1), (0, -1), side.tails or (), strict=False):
+        (held,) = bounder.held(np.array([side.nodes[j]]), sign)
+        drop, mismatch, growth, drift, slope = map(ball, (*held.above(q), held.drift, held.slope))
+        beta, value, kappa = (ball(sign * each) for each in (bounder.trial.basis.gauge, side.values[j], tail))
+        if not (
+            kappa <= value - drop
+            and kappa >= -q * beta
+            and kappa >= 0  # as b and b′ are bounded from below
+            and noise.nu * slope * kappa >= growth
+            and (ball(side.delta) - mismatch) / noise.nu + kappa * (drift - beta) - square * (kappa * kappa) / 2 >= 0
+        ):
+            return f"{_NAMES[q]} bound: the trial function does not serve beyond z = {side.nodes[j]:.6g}; "
+    return ""
 
-    For W of one sign it is least where W B is, at one end of B; then at an end of W, or for q = −1 at W = −B.
-    """
-    places = [*values, 0.0] if values[0] * values[1] < 0 else list(values)
-    for value in places:
-        yield _pull(value, inward[0] if value > 0 else inward[1], square)
-    for bound in inward if square < 0 else ():
-        if min(values) < -bound < max(values):
-            yield _pull(-bound, bound, square)
 
-
-def _pull(value: float, inward: float, square: int) -> arb:
-    """W B − ½ q W²."""
-    w = ball(value)
-    return w if value == 0 else w * ball(inward) - square * (w * w) / 2
-
-
-def _holds_beyond(
-    noise: Cylinder, end: End, q: int, square: int, beta: arb, value: arb, kappa: arb, delta: arb
-) -> bool:
-    """Whether u may be held at the right end, mirrored onto it if it is the left one."""
-    drop, mismatch, growth, drift, slope = map(ball, asdict(end).values())
-    return bool(
-        kappa <= value - drop
-        and kappa >= -q * beta
-        and kappa >= 0  # as b and b′ are bounded from below
-        and noise.nu * slope * kappa >= growth
-        and (delta - mismatch) / noise.nu + kappa * (drift - beta) - square * (kappa * kappa) / 2 >= 0
-    )
+_NAMES = {UPPER: "upper", LOWER: "lower"}

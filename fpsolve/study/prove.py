@@ -11,8 +11,8 @@ from fpsolve.case.curves import Curve
 from fpsolve.case.sections import Sweep
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
+from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import verdicts
-from fpsolve.proofs.enclosure import Enclosure
 from fpsolve.proofs.questions import (
     IndexEnclosure,
     check_width,

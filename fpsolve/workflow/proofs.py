@@ -12,9 +12,8 @@ from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.files import writable
 from fpsolve.output.proofs import write_proof
 from fpsolve.pool import Pool, serial
-from fpsolve.proofs.certificate import MalformedProof
+from fpsolve.proofs.certificate import Enclosure, MalformedProof
 from fpsolve.proofs.claims import Claims, claims_from
-from fpsolve.proofs.enclosure import Enclosure
 from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.study.prove import CurveProof, Plan, answer, refuse_unprovable_case
 from fpsolve.workflow.folders import ANEW, PROVEN, own_folder, saying_if_interrupted

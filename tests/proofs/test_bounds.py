@@ -9,10 +9,8 @@ from numpy.polynomial import chebyshev, hermite_e
 
 from fpsolve.proofs.balls import above, ball, below, precision, rounded
 from fpsolve.proofs.basis import Core, Whole
-from fpsolve.proofs.bounds import Bounder, Trial
-from fpsolve.proofs.cells import Cells
-from fpsolve.proofs.factor import LOWER, UPPER
-from fpsolve.proofs.phases import Phases
+from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Trial
+from fpsolve.proofs.cells import Cells, Phases
 from fpsolve.proofs.statement import cylinder
 
 OSCILLATOR = {
@@ -177,9 +175,8 @@ def test_what_is_left_where_u_is_held(name, sign):
         assert low <= expected.min() <= expected.max() <= high + 1e-9
     assert held.drift == pytest.approx(sign * float(noise.drift(ball(z))))
     assert held.slope == pytest.approx(float(noise.drift(ball(z + 1e-6)) - noise.drift(ball(z - 1e-6))) / 2e-6)
-    upper, lower = held.end(UPPER), held.end(LOWER)
-    assert (upper.drop, upper.mismatch, upper.growth) == (-held.steep[0], held.mismatch[1], held.growth[1])
-    assert (lower.drop, lower.mismatch, lower.growth) == (held.steep[1], -held.mismatch[0], -held.growth[0])
+    assert held.above(UPPER) == (-held.steep[0], held.mismatch[1], held.growth[1])
+    assert held.above(LOWER) == (held.steep[1], -held.mismatch[0], -held.growth[0])
 
 
 def test_floats_beside_balls():

@@ -22,8 +22,7 @@ from fpsolve.cli import BAD_INPUT, NOT_CONVERGED, main
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.output.proofs import print_proofs
-from fpsolve.proofs.certificate import Certificate
-from fpsolve.proofs.enclosure import Enclosure
+from fpsolve.proofs.certificate import Certificate, Enclosure
 from fpsolve.study.prove import CurveProof, Plan
 from tests.conftest import heed_signals
 from tests.oracles.moment_hierarchy import rates_of_monomials
