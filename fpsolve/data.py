@@ -1,16 +1,18 @@
-"""Results as data: labelled arrays of xarray, tables of pandas, pictures, and what notebooks show."""
+"""Results as data: the quantities that they hold, labelled arrays of xarray, tables of pandas, pictures."""
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from html import escape
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from fpsolve import __version__
 from fpsolve.errors import FpsolveError
-from fpsolve.pictures import canvas_of, draw
+from fpsolve.pictures import canvas_of, draw, title_of
 
 if TYPE_CHECKING:  # each takes some tenths of a second to import
     import pandas
@@ -19,16 +21,93 @@ if TYPE_CHECKING:  # each takes some tenths of a second to import
 
 LONGEST = 100
 """Characters of a `repr`."""
-Variable = tuple[str | Sequence[str], Any, Mapping[str, str]]
-"""The dimensions of a variable of xarray, its values and its attributes."""
 Parameters = Mapping[str, float | str]
 """Parameters of a problem by their keys, such as "noise.D0"."""
 
 
-def described(long_name: str, symbol: str = "", units: str = "1", **more: str) -> dict[str, str]:
-    """The attributes of a variable of xarray: what it is, its symbol in LaTeX, its units, and more; no empty ones."""
-    known = {"long_name": long_name, "symbol": symbol, "units": units, **more}
-    return {name: text for name, text in known.items() if text}
+@dataclass(frozen=True)
+class Quantity:
+    """Something that is computed of a problem, or that this depends on: a row of the table in `model.quantity`.
+
+    Attributes:
+        name: in case files, JSON, CSV and labelled arrays.
+        symbol: in sentences and terminal tables.
+        words: what it is, in small letters.
+        latex: its symbol on an axis, with dollars.
+        unit: "1" for none, "unknown" where it depends on a motion of which nothing more is known.
+        dims: the names of the quantities that it is a function of.
+        equation: what defines it: the number of an equation of the paper, or an equation.
+        closed_form: the number of its perturbation theory in the paper; empty where there is none.
+        error_source: what its error is estimated from; empty where there is no estimate.
+    """
+
+    name: str
+    symbol: str
+    words: str
+    latex: str = ""
+    unit: str = "1"
+    dims: tuple[str, ...] = ()
+    equation: str = ""
+    closed_form: str = ""
+    error_source: str = ""
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Those of a variable of xarray: long_name, symbol, units and equation."""
+        known = {"long_name": self.words, "symbol": self.latex, "units": self.unit, "equation": self.equation}
+        return {name: text for name, text in known.items() if text}
+
+    @property
+    def title(self) -> str:
+        """The label of an axis, in LaTeX, with the unit."""
+        return title_of(self.attributes)
+
+    def timed(self, unit: str) -> Self:
+        """The same with a unit of time: "1/s" instead of "1/time"."""
+        return replace(self, unit=re.sub(r"\btime\b", unit, self.unit))
+
+    def stated(self, value: float | str) -> str:
+        r"""A value of it in a figure: "$D_0$ = 0.1/time", "impact = delta"."""
+        name = self.latex or self.name.rpartition(".")[2]
+        if isinstance(value, str):
+            return f"{name} = {value}"
+        unit = "" if self.unit in ("1", "unknown") else f" {self.unit}"
+        return f"{name} = {value:g}{unit.removeprefix(' 1')}"
+
+    def error(self, kind: str = "estimated error") -> Quantity:
+        """Its error, of a kind such as "standard error"."""
+        return replace(_plain(self), name=f"{self.name}_error", words=f"{kind} of the {self.words}")
+
+    @property
+    def perturbation(self) -> Quantity:
+        """What perturbation theory makes of it."""
+        name, words = f"{self.name}_perturbation", f"{self.words} by perturbation theory"
+        return replace(_plain(self), name=name, words=words, equation=self.closed_form)
+
+    def by(self, other: Quantity) -> Quantity:
+        """Its partial derivative by another one."""
+        return Quantity(
+            name=f"{self.name}_by_{other.name}",
+            symbol=f"∂{self.symbol}/∂{other.symbol}",
+            words=f"derivative of the {self.words} by {other.name}",
+            latex=rf"$\partial {self.latex.strip('$')}/\partial {other.latex.strip('$')}$" if other.latex else "",
+            unit=_over(self.unit, other.unit),
+            dims=(*self.dims, *other.dims),
+        )
+
+
+def _plain(quantity: Quantity) -> Quantity:
+    """The same without what a subclass adds."""
+    return Quantity(**{each.name: getattr(quantity, each.name) for each in fields(Quantity)})
+
+
+def _over(unit: str, other: str) -> str:
+    """The unit of a ratio."""
+    if "unknown" in (unit, other):
+        return "unknown"
+    if other == "1" or unit == other:
+        return unit if other == "1" else "1"
+    return f"{unit}/{other if other.isidentifier() else f'({other})'}"
 
 
 def brief(thing: object, text: str) -> str:
@@ -40,8 +119,8 @@ def brief(thing: object, text: str) -> str:
 def dataset(
     title: str,
     method: str,
-    variables: Mapping[str, Variable],
-    coordinates: Mapping[str, Variable],
+    numbers: Mapping[Quantity, Any],
+    coordinates: Mapping[Quantity, Any],
     parameters: Parameters,
     **more: float | str | Sequence[str],
 ) -> xarray.Dataset:
@@ -50,7 +129,7 @@ def dataset(
     Args:
         title: what the numbers are.
         method: what they come from, such as "finite elements".
-        variables, coordinates: each with its dimensions and its attributes.
+        numbers, coordinates: the values of each quantity, over its `dims`.
         parameters: of the problem, as far as they are known.
         more: what else is known; of sentences that are none nothing is kept.
     """
@@ -59,7 +138,11 @@ def dataset(
     joined = {name: value if isinstance(value, int | float | str) else "\n".join(value) for name, value in more.items()}
     known = {name: value for name, value in joined.items() if value != ""}
     about = {"title": f"{title} by {method}", "method": method, **parameters, **known, "fpsolve_version": __version__}
-    return xarray.Dataset(dict(variables), dict(coordinates), about)
+    variables, places = (
+        {each.name: (each.dims, values, each.attributes) for each, values in some.items()}
+        for some in (numbers, coordinates)
+    )
+    return xarray.Dataset(variables, places, about)
 
 
 class Result(ABC):

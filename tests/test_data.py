@@ -196,7 +196,7 @@ def test_numbers_of_moments(results):
     assert found.attrs["oscillator.omega"] == 1.0
     assert found.attrs["oscillator.impact"] == "delta"
     assert found.attrs["noise.alpha"] == REDUCED.alpha
-    assert found.moment.attrs == {**MOMENT.attributes, "equation": "(37)", "units": "1/time"}
+    assert found.moment.attrs == {**MOMENT.attributes, "equation": "(1), (19)", "units": "1/time"}
     assert results["no moment"].to_xarray().attrs["failures"] == "it is too large"
 
 

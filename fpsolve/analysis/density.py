@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.data import Result, dataset, described
+from fpsolve.data import Quantity, Result, dataset
 from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
 from fpsolve.model.plane import growth_rate, phase_speed
-from fpsolve.model.quantity import NOISE, PHASE, Quantity, density_unit, noise_of, parameter_values
+from fpsolve.model.quantity import NOISE, PHASE, density_unit, noise_of, parameter_values
 from fpsolve.pictures import draw_plane
 
 if TYPE_CHECKING:
@@ -52,15 +52,14 @@ class Density(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The density over φ and ξ, and the weights for integrals."""
-        unit, weight = density_unit(self.noise), "weight of the rule for integrals"
-        variables = {"density": (("phi", "xi"), self.values, described("density", units=unit))}
+        density = Quantity("density", "ρ", "density", unit=density_unit(self.noise), dims=("phi", "xi"))
         coordinates = {
-            **PHASE.variable(self.phi, "phi"),
-            **self.noise.variable(self.xi, "xi"),
-            "phi_weights": ("phi", self.phi_weights, described(weight, units=PHASE.unit)),
-            "xi_weights": ("xi", self.xi_weights, described(weight, units=self.noise.unit)),
+            PHASE: self.phi,
+            self.noise: self.xi,
+            weights_of(PHASE): self.phi_weights,
+            weights_of(self.noise): self.xi_weights,
         }
-        return dataset(self.name, "finite elements", variables, coordinates, self.parameters)
+        return dataset(self.name, "finite elements", {density: self.values}, coordinates, self.parameters)
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
         draw_plane(axes, found.density, **{"shading": "gouraud", **kwargs})
@@ -89,6 +88,11 @@ class Density(Result):
     def xi_marginal(self) -> FloatArray:
         """∫ρ dφ at `xi`, shape (n,)."""
         return self.phi_weights @ self.values
+
+
+def weights_of(axis: Quantity) -> Quantity:
+    """The weights of the rule at the points of an axis."""
+    return Quantity(f"{axis.name}_weights", "w", "weight of the rule for integrals", unit=axis.unit, dims=axis.dims)
 
 
 def stationary_density(pair: PrincipalPair) -> Density:

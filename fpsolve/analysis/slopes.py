@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.data import Result, Variable, dataset, described
+from fpsolve.data import Result, dataset
 from fpsolve.exponent.error import Estimate
 from fpsolve.model.quantity import (
     LYAPUNOV_EXPONENT,
@@ -57,22 +57,20 @@ class Sensitivities(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The derivatives over p and θ, and their errors; NaN where there is none."""
-        variables = dict(_labelled(MOMENT, [*self.moments], self.theta, "p", "parameter"))
+        numbers = _labelled(MOMENT, self.moments, self.theta)
         for name, record in RECORDS.items():
             if name in self.indices:
-                variables |= _labelled(record, self.indices[name], self.theta, "parameter")
+                numbers |= _labelled(record, [self.indices[name]], self.theta)
         names, units = ([getattr(parameter_of(key), of) for key in self.theta] for of in ("name", "unit"))
         coordinates = {
-            **P.variable(self.p, "p"),
-            "parameter": (
-                "parameter",
-                np.array(names, dtype=str),
-                described("key of a parameter"),
+            P: self.p,
+            replace(THETA, name="parameter", words="key of a parameter", latex="", unit="1"): np.array(
+                names, dtype=str
             ),
-            **THETA.variable(np.array([*self.theta.values()], dtype=float), "parameter"),
-            "theta_unit": ("parameter", np.array(units, dtype=str), described("unit of theta")),
+            THETA: np.array([*self.theta.values()], dtype=float),
+            replace(THETA, name="theta_unit", words="unit of theta", latex="", unit="1"): np.array(units, dtype=str),
         }
-        return dataset("sensitivities", "finite elements", variables, coordinates, self.theta, notes=self.notes)
+        return dataset("sensitivities", "finite elements", numbers, coordinates, self.theta, notes=self.notes)
 
     def shown(self) -> Mapping[str, tuple[float, Slopes]]:
         """What pictures show: by their symbols λ, as p = 0, and Λ of some p, each with its derivatives."""
@@ -97,16 +95,14 @@ class Sensitivities(Result):
         return f"of {', '.join(what) or 'nothing'} by {len(self.theta)} parameters"
 
 
-def _labelled(
-    record: Quantity, slopes: Slopes | list[Slopes], theta: Mapping[str, float], *dims: str
-) -> Mapping[str, Variable]:
-    """Derivatives by θ and their errors, as variables of xarray."""
-    rows = slopes if isinstance(slopes, list) else [slopes]
-    shape = (len(rows), len(theta)) if len(dims) == 2 else (len(theta),)
+def _labelled(record: Quantity, rows: Sequence[Slopes], theta: Mapping[str, float]) -> dict[Quantity, FloatArray]:
+    """Derivatives by θ and their errors; without p there is one row."""
+    slope = record.by(THETA)
+    shape = (len(rows), len(theta))[2 - len(slope.dims) :]
 
     def array(of: Callable[[Estimate], float]) -> FloatArray:
         numbers = [of(row[key]) if key in row else np.nan for row in rows for key in theta]
         return np.array(numbers, dtype=float).reshape(shape)
 
     values, errors = array(lambda each: each.value), array(lambda each: each.error_estimate)
-    return record.by(THETA).with_error(values, errors, *dims)
+    return {slope: values, slope.error(): errors}

@@ -21,12 +21,12 @@ from fpsolve.analysis.scan import Row, Scan, ScannedRow, rows_of, scan_row, scan
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
 from fpsolve.analysis.zero import Axis, Quantity, Zero, check_axes, zero_of
 from fpsolve.arrays import FloatArray, real_number
-from fpsolve.data import Result, brief, dataset, described
+from fpsolve.data import Result, brief, dataset
 from fpsolve.exponent.adapt import Budget
 from fpsolve.model.direction import Family
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import parameter_of, parameter_values
+from fpsolve.model.quantity import POINTS, parameter_of, parameter_values
 from fpsolve.pictures import add_legend, coloured, label_of, plain_numbers
 
 if TYPE_CHECKING:
@@ -239,23 +239,21 @@ def _dataset(line: Boundary) -> xarray.Dataset:
     columns = [np.concatenate([np.zeros(0), *(getattr(each, of) for each in branches)]) for of in ("x", "y", "width")]
     labels = np.array([label for branch in branches for label in branch.labels], dtype=str)
     sides = [parameter_of(axis.key) for axis in (line.x, line.y)]
-    far = described("how far the line may be off, as a share of the sides of the frame")
-    variables = {
-        "x": ("point", columns[0], {**sides[0].attributes, "key": line.x.key}),
-        "y": ("point", columns[1], {**sides[1].attributes, "key": line.y.key}),
-        "width": ("point", columns[2], far),
-    }
+    x, y = (replace(side, name=name, dims=("point",)) for side, name in zip(sides, "xy", strict=True))
+    variables = {x: columns[0], y: columns[1], POINTS["width"]: columns[2]}
     coordinates = {
-        "line": ("point", np.full(numbers.size, line.zero.name), described("what is zero")),
-        "branch": ("point", numbers, described("number of the branch")),
-        "label": ("point", labels, described("what is special about the point")),
+        POINTS["line"]: np.full(numbers.size, line.zero.name),
+        POINTS["branch"]: numbers,
+        POINTS["label"]: labels,
     }
     original = line.family.original
     values = dict(parameter_values(line.family.problem, original))
     held = {key: value for key, value in values.items() if key not in (line.x.key, line.y.key)}
     closed = [str(number) for number, branch in enumerate(branches, start=1) if branch.closed]
     more = {"line": line.zero.equation, "closed_branches": ", ".join(closed), "remark": line.remark()}
-    return dataset("line of stability", "finite elements", variables, coordinates, held, **more)
+    found = dataset("line of stability", "finite elements", variables, coordinates, held, **more)
+    found.x.attrs["key"], found.y.attrs["key"] = line.x.key, line.y.key
+    return found
 
 
 def _draw_lines(line: Boundary, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:

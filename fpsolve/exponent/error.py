@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.data import Result, brief, dataset, described
+from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.corners import Corner, corners, left_on_mesh, slow_shares
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
@@ -26,7 +26,7 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_space import CellSpace, NoiseSpace
 from fpsolve.fem.phase_space import PhaseSpace
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.quantity import UNNAMED, Quantity
+from fpsolve.model.quantity import UNNAMED
 
 if TYPE_CHECKING:
     import xarray
@@ -65,11 +65,9 @@ class Estimate(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The number and its error, without dimensions."""
-        variables = {
-            **self.quantity.with_error(self.value, self.error_estimate),
-            "scale": ((), self.scale, described("size of the terms of the sum", units=self.quantity.unit)),
-        }
-        return dataset(self.quantity.words, "finite elements", variables, {}, {}, meaning=self.meaning)
+        scale = Quantity("scale", "scale", "size of the terms of the sum", unit=self.quantity.unit)
+        numbers = {self.quantity: self.value, self.quantity.error(): self.error_estimate, scale: self.scale}
+        return dataset(self.quantity.words, "finite elements", numbers, {}, {}, meaning=self.meaning)
 
 
 @dataclass(frozen=True, repr=False)

@@ -208,15 +208,14 @@ def _check(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: Floa
 
 def _dataset(function: MomentLyapunovFunction, p: FloatArray) -> xarray.Dataset:
     """What a function is at some p."""
-    variables = {
-        **MOMENT.with_error(function(p), function.error_estimate(p), "p"),
-        **DERIVATIVE.variable(function.derivative(p), "p"),
-        **SECOND_DERIVATIVE.variable(function.second_derivative(p), "p"),
+    numbers = {
+        MOMENT: function(p),
+        MOMENT.error(): function.error_estimate(p),
+        DERIVATIVE: function.derivative(p),
+        SECOND_DERIVATIVE: function.second_derivative(p),
     }
     solver, method = function.solver, "finite elements and interpolation"
-    return dataset(
-        MOMENT.words, method, variables, P.variable(p, "p"), parameter_values(solver.problem), rtol=solver.rtol
-    )
+    return dataset(MOMENT.words, method, numbers, {P: p}, parameter_values(solver.problem), rtol=solver.rtol)
 
 
 def _nodes_needed(count: int, last: float, error: float, allowed: float) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_number
-from fpsolve.data import Result, dataset, described
+from fpsolve.data import Result, dataset
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.bordered import second_derivative, slope_rounding
@@ -93,16 +93,13 @@ class MomentLyapunov(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p), Λ′(p), their errors and residuals over p."""
-        variables = {
-            **quantity.MOMENT.with_error(self.value, self.error_estimate, "p"),
-            **quantity.DERIVATIVE.variable(self.derivative, "p"),
-            **quantity.RESIDUAL.variable(self.residual, "p"),
-            "rare": ("p", np.isin(self.p, self.rare), described("whether rare paths carry the moment")),
-        }
+        columns = ("value", "error_estimate", "derivative", "residual")
+        numbers = {quantity.MOMENTS[name]: getattr(self, name) for name in columns}
+        numbers[quantity.RARE] = np.isin(self.p, self.rare)
         failures, values = [each.reason for each in self.failures], quantity.parameter_values(self.solver.problem)
         more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
-        title, places = quantity.MOMENT.words, quantity.P.variable(self.p, "p")
-        return dataset(title, "finite elements", variables, places, values, rtol=self.solver.rtol, **more)
+        title, places = quantity.MOMENT.words, {quantity.P: self.p}
+        return dataset(title, "finite elements", numbers, places, values, rtol=self.solver.rtol, **more)
 
     def _said(self) -> str:
         if not self.p.size:

@@ -2,119 +2,111 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from textwrap import wrap
-from typing import Any, Self
 
 from pydantic.fields import FieldInfo
 
-from fpsolve.data import Variable, described
+from fpsolve.data import Quantity as Quantity
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.model.parameters import symbol_of, unit_of
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.pictures import title_of
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Something that is computed of a problem, or that this depends on.
-
-    Attributes:
-        name: in case files and results.
-        symbol: in sentences and tables.
-        words: what it is, in small letters.
-        latex: its symbol on an axis, with dollars.
-        unit: "1" for none.
-        equation: the number of its perturbation theory; empty where there is none.
-    """
-
-    name: str
-    symbol: str
-    words: str
-    latex: str
-    unit: str = "1"
-    equation: str = ""
-
-    @property
-    def attributes(self) -> dict[str, str]:
-        """Those of a variable of xarray: long_name, symbol, units and equation."""
-        return described(self.words, self.latex, self.unit, equation=self.equation)
-
-    @property
-    def title(self) -> str:
-        """Of an axis, in LaTeX, with the unit."""
-        return title_of(self.attributes)
-
-    def timed(self, unit: str) -> Self:
-        """The same with a unit of time: "1/s" instead of "1/time"."""
-        return replace(self, unit=re.sub(r"\btime\b", unit, self.unit))
-
-    def stated(self, value: float | str) -> str:
-        r"""A value of it in a figure: "$D_0$ = 0.1/time", "impact = delta"."""
-        name = self.latex or self.name.rpartition(".")[2]
-        if isinstance(value, str):
-            return f"{name} = {value}"
-        unit = "" if self.unit in ("1", "unknown") else f" {self.unit}"
-        return f"{name} = {value:g}{unit.removeprefix(' 1')}"
-
-    def variable(self, values: Any, *dims: str) -> Mapping[str, Variable]:
-        """A variable of xarray, by its name."""
-        return {self.name: (dims, values, self.attributes)}
-
-    def with_error(self, values: Any, errors: Any, *dims: str, kind: str = "error estimate") -> Mapping[str, Variable]:
-        """Two variables of xarray: the values by its name, and their errors, of a kind, by `<name>_error`."""
-        about = described(f"{kind} of the {self.words}", units=self.unit)
-        return {**self.variable(values, *dims), f"{self.name}_error": (dims, errors, about)}
-
-    def by(self, other: Quantity) -> Quantity:
-        """Its partial derivative by another one."""
-        return Quantity(
-            name=f"{self.name}_by_{other.name}",
-            symbol=f"∂{self.symbol}/∂{other.symbol}",
-            words=f"derivative of the {self.words} by {other.name}",
-            latex=rf"$\partial {self.latex.strip('$')}/\partial {other.latex.strip('$')}$" if other.latex else "",
-            unit=_over(self.unit, other.unit),
-        )
-
-
-def _over(unit: str, other: str) -> str:
-    """The unit of a ratio."""
-    if "unknown" in (unit, other):
-        return "unknown"
-    if other == "1" or unit == other:
-        return unit if other == "1" else "1"
-    return f"{unit}/{other if other.isidentifier() else f'({other})'}"
-
 
 LINE = 90
 """Letters of a line of parameters at most."""
 UNNAMED = Quantity("value", "value", "number", "", "unknown")
 """Of a number of which nothing more is known."""
-P = Quantity("p", "p", "order of the moment", "$p$")
-PHASE = Quantity("phi", "φ", "phase", r"$\varphi$", "rad")
-NOISE = Quantity("xi", "ξ", "noise", r"$\xi$", "1/time")
-MOMENT = Quantity("moment", "Λ(p)", "moment Lyapunov exponent", r"$\Lambda(p)$", "1/time", "(37)")
+P = Quantity("p", "p", "order of the moment", "$p$", dims=("p",))
+PHASE = Quantity("phi", "φ", "phase", r"$\varphi$", "rad", ("phi",))
+NOISE = Quantity("xi", "ξ", "noise", r"$\xi$", "1/time", ("xi",))
+_MODES = "the highest modes of the cells, the ends of a noise interval, rounding"
+_FINER, _RATIO = "the difference from a finer or wider discretisation, rounding", "the errors of λ and N"
+_ROOT = "the error of Λ(p)/p at p = δ_p over its slope"
+MOMENT = Quantity(
+    "moment", "Λ(p)", "moment Lyapunov exponent", r"$\Lambda(p)$", "1/time", ("p",), "(1), (19)", "(37)", _MODES
+)
 DERIVATIVE = Quantity(
-    "derivative", "Λ′(p)", "slope of the moment Lyapunov exponent", r"$\Lambda'(p)$", "1/time", "(37)"
+    "derivative", "Λ′(p)", "slope of the moment Lyapunov exponent", r"$\Lambda'(p)$", "1/time", ("p",), "(19)", "(37)"
 )
-SECOND_DERIVATIVE = Quantity(
-    "second_derivative", "Λ″(p)", "curvature of the moment Lyapunov exponent", r"$\Lambda''(p)$", "1/time", "(37)"
+SECOND_DERIVATIVE = replace(
+    DERIVATIVE,
+    name="second_derivative",
+    symbol="Λ″(p)",
+    words="curvature of the moment Lyapunov exponent",
+    latex=r"$\Lambda''(p)$",
 )
-RESIDUAL = Quantity("residual", "residual", "backward error of the eigenpair", "")
-LYAPUNOV_EXPONENT = Quantity("lyapunov_exponent", "λ", "largest Lyapunov exponent", r"$\lambda$", "1/time", "(39)")
-STABILITY_INDEX = Quantity("stability_index", "δ_p", "stability index", r"$\delta_p$", equation="(38)")
-VARIANCE_RATE = Quantity("variance_rate", "Λ″(0)", "growth rate of the variance", r"$\Lambda''(0)$", "1/time", "(37)")
-IMPACT_RATE = Quantity("impact_rate", "N", "impact rate", r"$N = \partial\lambda/\partial\ln R$", "1/time", "(39)")
-CRITICAL_IMPACT_FACTOR = Quantity("critical_impact_factor", "R_c", "critical impact factor", "$R_c$", equation="(39)")
+RESIDUAL = Quantity("residual", "residual", "backward error of the eigenpair", dims=("p",))
+EFFECTIVE_PATHS = Quantity(
+    "effective_paths", "effective paths", "effective number of paths that carry the mean", dims=("p",)
+)
+IMPACTS = Quantity("impacts", "impacts", "number of impacts of the paths without weights")
+SECONDS = Quantity("seconds", "seconds", "time of the processor", unit="s")
+RARE = Quantity("rare", "rare", "whether rare paths carry the moment", dims=("p",))
+LYAPUNOV_EXPONENT = Quantity(
+    "lyapunov_exponent", "λ", "largest Lyapunov exponent", r"$\lambda$", "1/time", (), "(2)", "(39)", _MODES
+)
+STABILITY_INDEX = Quantity(
+    "stability_index", "δ_p", "stability index", r"$\delta_p$", "1", (), "Λ(δ_p) = 0", "(38)", _ROOT
+)
+VARIANCE_RATE = Quantity(
+    "variance_rate", "Λ″(0)", "growth rate of the variance", r"$\Lambda''(0)$", "1/time", (), "(19)", "(37)", _FINER
+)
+IMPACT_RATE = Quantity(
+    "impact_rate",
+    "N",
+    "impact rate",
+    r"$N = \partial\lambda/\partial\ln R$",
+    "1/time",
+    (),
+    "N = ∂λ/∂ln R",
+    "(39)",
+    _FINER,
+)
+CRITICAL_IMPACT_FACTOR = Quantity(
+    "critical_impact_factor", "R_c", "critical impact factor", "$R_c$", "1", (), "λ = 0 at R = R_c", "(39)", _RATIO
+)
 CRITICAL_RESTITUTION = Quantity(
-    "critical_restitution", "r_c", "critical coefficient of restitution", "$r_c$", equation="(39)"
+    "critical_restitution",
+    "r_c",
+    "critical coefficient of restitution",
+    "$r_c$",
+    "1",
+    (),
+    "λ = 0 at r = r_c",
+    "(39)",
+    _RATIO,
 )
-THETA = Quantity("theta", "θ", "parameter", r"$\theta$", "theta_unit")
+THETA = Quantity("theta", "θ", "parameter", r"$\theta$", "theta_unit", ("parameter",))
 """Any parameter; its unit is a variable beside it."""
+POINTS = {
+    name: Quantity(name, name, words, dims=("point",))
+    for name, words in {
+        "line": "what is zero",
+        "branch": "number of the branch",
+        "width": "how far the line may be off, as a share of the sides of the frame",
+        "label": "what is special about the point",
+    }.items()
+}
+"""What is known of a point of a line of stability besides the two parameters."""
+MOMENTS: Mapping[str, Quantity] = {
+    "p": P,
+    "value": MOMENT,
+    "derivative": DERIVATIVE,
+    "perturbation": MOMENT.perturbation,
+    "error_estimate": MOMENT.error(),
+    "residual": RESIDUAL,
+}
+"""The columns of a table over p, by their names in moments.csv, in summary.json and as attributes of results."""
+STORED_MOMENTS = {
+    "value": MOMENT,
+    "error_estimate": MOMENT.error(),
+    "derivative": replace(DERIVATIVE, name="moment_derivative"),
+    "perturbation": MOMENT.perturbation,
+}
+"""Those of them that results.nc holds, by the same names, as they are called there."""
 _FIELDS: Mapping[str, FieldInfo] = {
     f"{half}.{name}": field
     for half, kinds in (("oscillator", [VibroImpactOscillator]), ("noise", [NonGaussianNoise, OrnsteinUhlenbeck]))
@@ -125,7 +117,7 @@ _FIELDS: Mapping[str, FieldInfo] = {
 
 def moment_at(p: float) -> Quantity:
     """Λ at one p."""
-    return replace(MOMENT, symbol=f"Λ({p:g})", latex=rf"$\Lambda({p:g})$")
+    return replace(MOMENT, symbol=f"Λ({p:g})", latex=rf"$\Lambda({p:g})$", dims=())
 
 
 def parameter_of(key: str) -> Quantity:

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.vary import PARAMETERS
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.files import atomic
-from fpsolve.model.quantity import DERIVATIVE, P, parameter_of
+from fpsolve.model.quantity import SECONDS, STORED_MOMENTS, P, Quantity, parameter_of
 from fpsolve.output.tables import asked
 from fpsolve.study.results import CurveResult, Status
 
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
 SET = "set"
 """The dimension of parameter sets that are no product."""
 RESULTS = "results.nc"
-_COLUMNS = {"value": "", "error_estimate": "_error", "derivative": "_derivative", "perturbation": "_perturbation"}
-"""Of Λ(p), and the endings of the names of their variables."""
 _STATUS = {
     "long_name": "what became of the parameter set",
     "flag_values": np.array([int(each) for each in Status], dtype=np.int8),
@@ -53,8 +52,7 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
     columns = _Columns(case)
     for result in results:
         columns.add(result)
-    variables = {name: (dimensions, values, attributes) for name, dimensions, values, attributes in columns.variables()}
-    found = xr.Dataset(variables, _coordinates(case), _attributes(case, facts))
+    found = xr.Dataset(columns.variables(), _coordinates(case), _attributes(case, facts))
     return found.assign_attrs(complete=int(not np.any(columns.status == Status.MISSING)))
 
 
@@ -65,7 +63,7 @@ class _Columns:
         self.case, self.names = case, asked(case)
         self.places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.output.quantities else {}
         size = case.planned, len(self.places)
-        self.moments = {name: np.full(size, math.nan) for name in _COLUMNS}
+        self.moments = {name: np.full(size, math.nan) for name in STORED_MOMENTS}
         self.estimates = {name: np.full((3, case.planned), math.nan) for name in self.names}
         self.status = np.full(case.planned, Status.MISSING, dtype=np.int8)
         self.seconds = np.full(case.planned, math.nan)
@@ -82,32 +80,28 @@ class _Columns:
                 values[:, row] = estimate.value, estimate.error_estimate, theory
         self.status[row], self.seconds[row] = result.status, result.seconds
 
-    def variables(self) -> Iterable[tuple[str, tuple[str, ...], Any, dict[str, Any]]]:
-        """The name, the dimensions, the values and the attributes of each."""
+    def variables(self) -> dict[str, tuple[tuple[str, ...], Any, Mapping[str, Any]]]:
+        """The dimensions, the values and the attributes of each, by its name."""
         over = _dimensions(self.case)
         shape = tuple(len(self.case.vary.values(key)) for key in over) if over != (SET,) else (self.case.planned,)
-        if self.places:
-            for ending, values in zip(_COLUMNS.values(), self.moments.values(), strict=True):
-                attributes = DERIVATIVE.attributes if ending == "_derivative" else _described(MOMENT.attributes, ending)
-                yield f"moment{ending}", (*over, "p"), values.reshape(*shape, -1), attributes
-        for name, values in self.estimates.items():
-            for ending, column in zip(("", "_error", "_perturbation"), values, strict=True):
-                yield f"{name}{ending}", over, column.reshape(shape), _described(INDICES[name].attributes, ending)
-        yield "status", over, self.status.reshape(shape), _STATUS
-        seconds = {"long_name": "time of the processor", "units": "s"}
-        yield "seconds", over, self.seconds.reshape(shape), seconds
+        columns: dict[Quantity, FloatArray] = {
+            STORED_MOMENTS[name]: values for name, values in self.moments.items() if self.places
+        }
+        for name, (value, error, theory) in self.estimates.items():
+            index = INDICES[name]
+            columns |= {index: value, index.error(): error, index.perturbation: theory}
+        found: dict[str, tuple[tuple[str, ...], Any, Mapping[str, Any]]] = {
+            each.name: ((*over, *each.dims), values.reshape(shape + values.shape[1:]), each.attributes)
+            for each, values in columns.items()
+        }
+        found["status"] = over, self.status.reshape(shape), _STATUS
+        return found | {SECONDS.name: (over, self.seconds.reshape(shape), SECONDS.attributes)}
 
 
 def _dimensions(case: Case) -> tuple[str, ...]:
     if not case.vary:
         return ()
     return case.vary.keys if case.vary.mode == "product" else (SET,)
-
-
-def _described(attributes: Mapping[str, str], ending: str) -> dict[str, Any]:
-    """The attributes of a quantity for its error, or for what perturbation theory makes of it."""
-    words = {"": "{}", "_error": "estimated error of the {}", "_perturbation": "{} by perturbation theory"}[ending]
-    return {**attributes, "long_name": words.format(attributes["long_name"])}
 
 
 def _coordinates(case: Case) -> dict[str, Any]:

@@ -51,7 +51,7 @@ def write_figure(
         over = P if x == "p" else parameter_of(x)
         axes = axes_of(figure, over.timed(setting.time_unit), y.timed(setting.time_unit))
         axes.axhline(0, color="0.6", linewidth=0.8 * share_of(figure), zorder=0)
-        equation = y.equation + (", reduced noise" if is_reduced else "")
+        equation = y.closed_form + (", reduced noise" if is_reduced else "")
         draw = draw_many if len(series) > MOST_NAMED else _draw_few
         entries = draw(figure, axes, series, equation, setting.time_unit)
         axes.margins(x=0.03)

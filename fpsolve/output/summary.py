@@ -132,7 +132,7 @@ def _index(index: Index, rank: int) -> Shown:
 def _theory(index: Index, *, is_exact: bool) -> Shown:
     """Its closed form."""
     return Shown(
-        theory_heading(index.equation, is_exact=is_exact),
+        theory_heading(index.closed_form, is_exact=is_exact),
         None,
         lambda result: f"{index.theory(result.curve.problem):.6g}",
         rank=1,

@@ -204,7 +204,7 @@ def _deviation(value: float, error: float, exact: float) -> str:
 def _moment_grid(case: Case, result: CurveResult) -> Grid:
     """p, Λ(p), Eq. (37) and the difference."""
     is_exact = result.curve.is_exact
-    theory = Column(theory_heading(MOMENT.equation, is_exact=is_exact), 1)
+    theory = Column(theory_heading(MOMENT.closed_form, is_exact=is_exact), 1)
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
     grid = Grid(case.heading(result.curve), columns, remark=STAR if is_exact else "")
     moments = result.moments

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.data import Result, dataset, described
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE, P
+from fpsolve.data import Result, dataset
+from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE, P
 from fpsolve.pictures import draw_dots, finish
 from fpsolve.simulation.setup import Estimator
 
@@ -87,14 +87,17 @@ def _dataset(found: MonteCarlo) -> xarray.Dataset:
         for name in ("p", "value", "standard_error", "effective_paths")
     )
     kind = "standard error"
-    variables = {
-        **MOMENT.with_error(value, error, "p", kind=kind),
-        "effective_paths": ("p", effective, described("effective number of paths that carry the mean")),
-        **LYAPUNOV_EXPONENT.with_error(found.lyapunov_exponent, found.lyapunov_exponent_error, kind=kind),
-        **VARIANCE_RATE.with_error(found.variance_rate, found.variance_rate_error, kind=kind),
-        "impacts": ((), found.impacts, described("number of impacts of the paths without weights")),
+    numbers = {
+        MOMENT: value,
+        MOMENT.error(kind): error,
+        EFFECTIVE_PATHS: effective,
+        LYAPUNOV_EXPONENT: found.lyapunov_exponent,
+        LYAPUNOV_EXPONENT.error(kind): found.lyapunov_exponent_error,
+        VARIANCE_RATE: found.variance_rate,
+        VARIANCE_RATE.error(kind): found.variance_rate_error,
+        IMPACTS: found.impacts,
     }
     settings = {name: getattr(found, name) for name in ("paths", "time", "step", "seed")}
     estimator = found.estimates[0].estimator if found.estimates else ""
     more = {**settings, "estimator": estimator, "interrupted": int(found.interrupted), "warnings": found.warnings}
-    return dataset(MOMENT.words, "Monte Carlo", variables, P.variable(p, "p"), found.parameters, **more)
+    return dataset(MOMENT.words, "Monte Carlo", numbers, {P: p}, found.parameters, **more)

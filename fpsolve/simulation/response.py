@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.data import Result, Variable, dataset, described
+from fpsolve.data import Quantity, Result, dataset
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import IMPACT_RATE, parameter_values
 from fpsolve.model.vibro_impact import VibroImpactOscillator
@@ -102,39 +102,36 @@ class Response(Result):
         return f"mean amplitude {mean:.6g} ± {error:.0e}, {self.density.size} cells"
 
 
-_LENGTH, _VELOCITY = "length", "length/time"
-_UNITS = dict(zip(MEANS, (_LENGTH, "length²", "length²/time²", _LENGTH, "length²/time²"), strict=True))
+_UNITS = dict(zip(MEANS, ("length", "length²", "length²/time²", "length", "length²/time²"), strict=True))
+X, V = (
+    Quantity("x", "x", "displacement", "$x$", "length", ("x",)),
+    Quantity("v", "v", "velocity", r"$\dot{x}$", "length/time", ("v",)),
+)
+AMPLITUDE = Quantity("amplitude", "A", "amplitude", r"$A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", "length", ("amplitude",))
+DENSITY = Quantity("density", "ρ", "density", r"of $(x, \dot{x})$", "time/length²", ("x", "v"))
+AMPLITUDE_DENSITY = Quantity("amplitude_density", "ρ(A)", "density of the amplitude", "$A$", "1/length", ("amplitude",))
+OUTSIDE = Quantity("outside", "outside", "share of the counts outside of the cells")
 
 
 def _dataset(found: Response) -> xarray.Dataset:
     """The densities and the means of a response."""
-    density = described("density", r"of $(x, \dot{x})$", "time/length²")
-    radial, error = described("density of the amplitude", "$A$", "1/length"), "standard error of the"
-    about = described(f"{error} density of the amplitude", units="1/length")
-    variables: dict[str, Variable] = {
-        "density": (("x", "v"), found.density, density),
-        "amplitude_density": ("amplitude", found.amplitude_density, radial),
-        "amplitude_density_error": ("amplitude", found.amplitude_error, about),
+    kind = "standard error"
+    numbers: dict[Quantity, Any] = {
+        DENSITY: found.density,
+        AMPLITUDE_DENSITY: found.amplitude_density,
+        AMPLITUDE_DENSITY.error(kind): found.amplitude_error,
     }
     for name, (value, deviation) in found.means.items():
-        unit = _UNITS[name]
-        variables[f"mean_{name}"] = ((), value, described(f"stationary mean of {name}", units=unit))
-        variables[f"mean_{name}_error"] = ((), deviation, described(f"{error} mean of {name}", units=unit))
-    variables["impact_rate"] = ((), found.impact_rate, described(IMPACT_RATE.words, units=IMPACT_RATE.unit))
-    variables["outside"] = ((), found.outside, described("share of the counts outside of the cells"))
-    amplitude = described("amplitude", r"$A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", _LENGTH)
-    sides = {
-        "x": (found.x_edges, described("displacement", "$x$", _LENGTH)),
-        "v": (found.v_edges, described("velocity", r"$\dot{x}$", _VELOCITY)),
-        "amplitude": (found.amplitude_edges, amplitude),
-    }
-    coordinates: dict[str, Variable] = {}
-    for name, (edges, words) in sides.items():
-        coordinates[name] = (name, (edges[1:] + edges[:-1]) / 2, words)
-        ends = described(f"edges of the cells of {name}", units=words["units"])
-        coordinates[f"{name}_edges"] = (f"{name}_edges", edges, ends)
+        mean = Quantity(f"mean_{name}", f"⟨{name}⟩", f"stationary mean of {name}", unit=_UNITS[name])
+        numbers |= {mean: value, mean.error(kind): deviation}
+    numbers |= {replace(IMPACT_RATE, latex="", equation=""): found.impact_rate, OUTSIDE: found.outside}
+    coordinates: dict[Quantity, FloatArray] = {}
+    for side, edges in ((X, found.x_edges), (V, found.v_edges), (AMPLITUDE, found.amplitude_edges)):
+        name, words = f"{side.name}_edges", f"edges of the cells of {side.name}"
+        ends = Quantity(name, name, words, unit=side.unit, dims=(name,))
+        coordinates |= {side: (edges[1:] + edges[:-1]) / 2, ends: edges}
     more = {"time": found.time, "interrupted": int(found.interrupted)}
-    return dataset("stationary response", "Monte Carlo", variables, coordinates, found.parameters, **more)
+    return dataset("stationary response", "Monte Carlo", numbers, coordinates, found.parameters, **more)
 
 
 class _Batch:

@@ -11,11 +11,11 @@ from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.curves import Curve
 from fpsolve.case.sections import Expectation, Varied
-from fpsolve.data import Result, dataset, described
+from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
-from fpsolve.model.quantity import DERIVATIVE, MOMENT, P
+from fpsolve.model.quantity import MOMENT, MOMENTS, P
 
 if TYPE_CHECKING:  # which take half a second to import
     import xarray
@@ -105,18 +105,14 @@ class CurveResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
         found = self.moments
-        theory = described("moment Lyapunov exponent by perturbation theory", units=MOMENT.unit, equation="(37)")
-        variables = {
-            **MOMENT.with_error(found.value, found.error_estimate, "p"),
-            **DERIVATIVE.variable(found.derivative, "p"),
-            "moment_perturbation": ("p", found.perturbation, theory),
-        }
+        columns = ("value", "error_estimate", "derivative", "perturbation")
+        numbers: dict[Quantity, Any] = {MOMENTS[name]: getattr(found, name) for name in columns}
         for name, each in self.estimates.items():
             if each:
-                variables |= INDICES[name].with_error(each.value, each.error_estimate)
-        title, places = f"{MOMENT.words}, {self.curve.label}".removesuffix(", "), P.variable(found.p, "p")
+                numbers |= {INDICES[name]: each.value, INDICES[name].error(): each.error_estimate}
+        title, places = f"{MOMENT.words}, {self.curve.label}".removesuffix(", "), {P: found.p}
         more = {"warnings": self.warnings, "notes": self.notes, "failures": [each.reason for each in self.failures]}
-        return dataset(title, "finite elements", variables, places, self.curve.parameters, **more)
+        return dataset(title, "finite elements", numbers, places, self.curve.parameters, **more)
 
     def _said(self) -> str:
         found, exponent = self.moments, self.lyapunov_exponent

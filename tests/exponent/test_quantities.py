@@ -20,7 +20,7 @@ def test_every_name_of_a_case_has_a_record():
     assert set(get_args(DrawnName)) < set(QUANTITIES)
     for name, quantity in QUANTITIES.items():
         assert quantity.name == name
-        assert all((quantity.symbol, quantity.title, quantity.equation))
+        assert all((quantity.symbol, quantity.title, quantity.equation, quantity.closed_form, quantity.error_source))
     assert {"moment", *INDICES} == set(QUANTITIES)
 
 

@@ -58,7 +58,10 @@ def test_a_product_has_a_dimension_for_each_key(tmp_path):
     for name, variable in found.data_vars.items():
         assert variable.attrs["long_name"], name
         assert variable.attrs["units"], name
-    assert found.moment.attrs["equation"] == "(37)"
+    assert found.moment.attrs["equation"] == "(1), (19)"
+    assert found.moment_perturbation.attrs["equation"] == "(37)"
+    assert found.lyapunov_exponent.attrs["equation"] == "(2)"
+    assert found.stability_index_perturbation.attrs["equation"] == "(38)"
     assert found["noise.D0"].attrs == {"long_name": "noise intensity", "symbol": "$D_0$", "units": "1/time"}
 
 
