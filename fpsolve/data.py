@@ -11,8 +11,8 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, Self
 
 from fpsolve import __version__
+from fpsolve.drawing import canvas_of, draw, title_of
 from fpsolve.errors import FpsolveError
-from fpsolve.pictures import canvas_of, draw, title_of
 
 if TYPE_CHECKING:  # each takes some tenths of a second to import
     import pandas

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
+from fpsolve.drawing import QUARTERS, draw_plane
 from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
 from fpsolve.model.plane import growth_rate, phase_speed
 from fpsolve.model.quantity import NOISE, PHASE, density_unit, noise_of, parameter_values
-from fpsolve.pictures import draw_plane
 
 if TYPE_CHECKING:
     import xarray
@@ -63,7 +63,7 @@ class Density(Result):
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
         draw_plane(axes, found.density, **{"shading": "gouraud", **kwargs})
-        axes.set_xticks(np.pi * np.arange(5) / 2, ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
+        axes.set_xticks(*QUARTERS)
         seen = self.xi[self.xi_marginal() > UNSEEN * self.xi_marginal().max()]
         axes.set(xlim=(0, 2 * np.pi), ylim=(seen.min(), seen.max()))
 

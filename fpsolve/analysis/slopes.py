@@ -10,6 +10,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
+from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.exponent.error import Estimate
 from fpsolve.model.quantity import (
     LYAPUNOV_EXPONENT,
@@ -22,7 +23,6 @@ from fpsolve.model.quantity import (
     moment_at,
     parameter_of,
 )
-from fpsolve.pictures import add_legend, draw_bars
 
 if TYPE_CHECKING:
     import xarray

@@ -22,12 +22,12 @@ from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_
 from fpsolve.analysis.zero import Axis, Quantity, Zero, check_axes, zero_of
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, brief, dataset
+from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
 from fpsolve.exponent.adapt import Budget
 from fpsolve.model.direction import Family
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import POINTS, parameter_of, parameter_values
-from fpsolve.pictures import add_legend, coloured, label_of, plain_numbers
 
 if TYPE_CHECKING:
     import xarray
@@ -265,11 +265,9 @@ def _draw_lines(line: Boundary, found: xarray.Dataset, axes: Axes, **kwargs: Any
         style.pop("label", None)
     if "label" in style:
         axes.plot([], [], **style)
-    axes.set(xlabel=label_of(found.x), ylabel=label_of(found.y), xscale=line.x.scale, yscale=line.y.scale)
-    axes.set(xlim=(line.x.start, line.x.stop), ylim=(line.y.start, line.y.stop))
+    label_axes(axes, found.x.attrs, found.y.attrs)
     for side, axis in ((axes.xaxis, line.x), (axes.yaxis, line.y)):
-        if axis.scale == "log":
-            plain_numbers(side, axis.start, axis.stop)
+        scale_axis(side, axis.scale, (axis.start, axis.stop))
     add_legend(axes)
 
 

@@ -22,7 +22,7 @@ from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator
 from fpsolve.arrays import FloatArray, dense, finite, one
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, SingularMatrix
-from fpsolve.exponent.pictured import Pictured
+from fpsolve.exponent.eigenfunction_plot import EigenfunctionPlot
 from fpsolve.exponent.rounding import rounding_of_entries
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.generator import Generator
@@ -49,7 +49,7 @@ SURVEYED_UNKNOWNS = 600
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PrincipalPair(Pictured):
+class PrincipalPair(EigenfunctionPlot):
     """Λ(p) with its eigenfunctions on a mesh.
 
     Attributes:

@@ -20,11 +20,10 @@ from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.case.figure import fixed
 from fpsolve.case.sections import Varied
+from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
 from fpsolve.files import write_csv, write_json
 from fpsolve.model.quantity import parameter_of
-from fpsolve.output.frame import Size, add_heading, add_legend, canvas
 from fpsolve.output.tables import head
-from fpsolve.pictures import COLOURS, plain_numbers
 from fpsolve.study.chart import Chart, charted
 
 _TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
@@ -45,29 +44,27 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
 
 def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
     """chart.png and chart.pdf: the lines, their closed forms dashed, and the regions with their names."""
-    x, y = charted(case).x.axis, charted(case).y.axis
-    unit = case.figure.time_unit
-    with canvas([folder / "chart.png", folder / "chart.pdf"], Size(height=4.7)) as figure:
-        names = (parameter_of(key).timed(unit).title for key in (x.key, y.key))
-        axes = figure.add_subplot(**dict(zip(("xlabel", "ylabel"), names, strict=True)))
-        axes.set(xscale=x.scale, yscale=y.scale, xlim=(x.start, x.stop), ylim=(y.start, y.stop))
-        for side, frame in ((axes.xaxis, x), (axes.yaxis, y)):
-            if frame.scale == "log":
-                plain_numbers(side, frame.start, frame.stop)
-        small = {} if chart.regions is None else _shade(axes, chart.regions, (x, y))
-        entries = {}
+    frame, unit = (charted(case).x.axis, charted(case).y.axis), case.figure.time_unit
+    keys = frame[0].key, frame[1].key
+    held = held_in_words(case.curve({}), keys, unit)
+    paths = [folder / "chart.png", folder / "chart.pdf"]
+    with figure_for(paths, case.headline, held, Format(height=4.0)) as figure:
+        axes = figure.add_subplot()
+        label_axes(axes, *(parameter_of(key).timed(unit).attributes for key in keys))
+        for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
+            scale_axis(axis, side.scale, (side.start, side.stop))
+        small = {} if chart.regions is None else _shade(axes, chart.regions, frame)
         for i, line in enumerate(chart.lines):
+            _draw_line(axes, line, COLOURS[i % len(COLOURS)])
             for branch in chart.closed_forms[i]:
                 axes.plot(branch[:, 0], branch[:, 1], **_CLOSED_FORM)
-            entries[_legend(line.zero)] = _draw(axes, line, COLOURS[i % len(COLOURS)])
-        entries["closed form, Eqs. (38)-(39)"] = axes.plot([], [], **_CLOSED_FORM)[0]
+        axes.plot([], [], label="closed form, Eqs. (38)-(39)", **_CLOSED_FORM)
         labels = [label for line in chart.lines for branch in line.branches for label in branch.labels]
         for start, (name, marker) in _SPECIAL.items():
             if any(start in label for label in labels):
-                entries[name] = axes.plot([], [], marker, color="0.35", markersize=7, markerfacecolor="none")[0]
-        entries |= small
-        add_legend(figure, list(entries.items()))
-        add_heading(figure, case.headline, held_in_words(case.curve({}), (x.key, y.key), unit))
+                axes.plot([], [], marker, label=name, color="0.35", markersize=7, markerfacecolor="none")
+        for name, letter in small.items():
+            axes.plot([], [], marker=f"${letter}$", label=name, markersize=8, **_LETTER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +155,7 @@ def _line(line: Boundary) -> dict[str, Any]:
     return {
         "line": line.zero.name,
         "equation": line.zero.equation,
-        "appears": P_BIFURCATIONS.get(line.zero.p) if line.zero.kind == "stability_index" else None,
+        "appears": _appears(line.zero),
         "scan": scan,
         "branches": [
             {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
@@ -167,43 +164,42 @@ def _line(line: Boundary) -> dict[str, Any]:
     }
 
 
-def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, Any]:
-    """A tint for each region, and its name, or where that has no room a letter; what the legend says of these."""
+def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, str]:
+    """Draw a tint for each region, and its name, or where that has no room a letter; the letters by the names."""
     from matplotlib.colors import ListedColormap
 
     x, y = frame
     edges = np.linspace(0, 1, regions.index.shape[0] + 1)
     unstable = [sum(sign > 0 for sign in each.signs.values()) for each in regions.each]
     tints = np.array([*unstable, np.nan])[regions.index]
-    colours, most = ListedColormap(_TINTS), len(_TINTS) - 1
-    axes.pcolormesh(x.value(edges), y.value(edges), tints.T, cmap=colours, vmin=-0.5, vmax=most + 0.5, rasterized=True)
-    letters, small = iter(ascii_lowercase), {}
+    style: dict[str, Any] = {"cmap": ListedColormap(_TINTS), "vmin": -0.5, "vmax": len(_TINTS) - 0.5}
+    axes.pcolormesh(x.value(edges), y.value(edges), tints.T, rasterized=True, **style)
+    letters, small = iter(ascii_lowercase), dict[str, str]()
     for each in regions.each:
         name = each.name.replace("δ_p", r"$\delta_p$")
         place = x.value(each.at[0]), y.value(each.at[1])
+        middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15"}
         if each.share > _ROOMY:
-            axes.text(*place, "\n".join(name.split(", ")), ha="center", va="center", fontsize=9.5, color="0.15")
+            axes.text(*place, "\n".join(name.split(", ")), fontsize=9.5, **middle)
         elif each.share > _NAMED:
-            letter = next(letters, "z")
-            axes.text(*place, letter, ha="center", va="center", fontsize=12, weight="bold", color="0.15")
-            small[name] = axes.plot(
-                [], [], linestyle="none", marker=f"${letter}$", markersize=8, markeredgewidth=0, color="0.15"
-            )[0]
+            small[name] = next(letters, "z")
+            axes.text(*place, small[name], fontsize=12, weight="bold", **middle)
     return small
 
 
-def _draw(axes: Any, line: Boundary, colour: str) -> Any:
-    """A line with its special points; what the legend shows of it."""
+def _draw_line(axes: Any, line: Boundary, colour: str) -> None:
+    """A line with its special points; its name is λ = 0, or what appears at a value of δ_p."""
     for branch in line.branches:
         path = (np.append(each, each[:1]) if branch.closed else each for each in (branch.x, branch.y))
         axes.plot(*path, color=colour, linewidth=2)
         for start, (_, marker) in _SPECIAL.items():
             chosen = np.array([start in label for label in branch.labels])
             axes.plot(branch.x[chosen], branch.y[chosen], marker, color=colour, markersize=7, markerfacecolor="white")
-    return axes.plot([], [], color=colour, linewidth=2)[0]
+    appears = _appears(line.zero)
+    name = f"{line.zero.latex}: {appears}" if appears else line.zero.latex
+    axes.plot([], [], color=colour, linewidth=2, label=name)
 
 
-def _legend(zero: Zero) -> str:
-    """λ = 0, or what appears at a value of δ_p, in LaTeX."""
-    appears = P_BIFURCATIONS.get(zero.p) if zero.kind == "stability_index" else None
-    return f"{zero.latex}: {appears}" if appears else zero.latex
+def _appears(zero: Zero) -> str | None:
+    """Which bifurcation a value of δ_p is, if one."""
+    return P_BIFURCATIONS.get(zero.p) if zero.kind == "stability_index" else None

@@ -13,14 +13,16 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.figure import MOST_NAMED, MomentAt, map_key
 from fpsolve.case.sections import Value, Varied, same
+from fpsolve.drawing import Format, draw_bars, figure_for
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import parameter_of
 from fpsolve.output.charts import held_in_words, read_line
+from fpsolve.output.curves import write_figure
 from fpsolve.output.maps import Plane, write_map
-from fpsolve.output.plots import write_bars, write_figure, write_response_figure
 from fpsolve.output.series import Series
+from fpsolve.simulation.response import Response
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory.perturbation import scale_of, second_order
 
@@ -69,7 +71,11 @@ def _draw_sensitivities(case: Case, result: CurveResult, folder: Path) -> None:
         bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
     pictures = [folder / f"sensitivities{result.curve.suffix}.{ending}" for ending in ("png", "pdf")]
     held = held_in_words(result.curve, (), case.figure.time_unit)
-    write_bars(bars, [parameter_of(key).latex for key in found.theta], case.headline, pictures, held)
+    with figure_for(pictures, case.headline, held) as figure:
+        axes = figure.add_subplot(
+            xlabel=r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
+        )
+        draw_bars(axes, bars, [parameter_of(key).latex for key in found.theta])
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
@@ -79,6 +85,17 @@ def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
     pictures = [folder / f"response{simulated.curve.suffix}.{ending}" for ending in ("png", "pdf")]
     held = held_in_words(simulated.curve, (), "time")
     write_response_figure(simulated.response, case.headline, pictures, held)
+
+
+def write_response_figure(
+    response: Response, title: str, paths: Sequence[Path], parameters: Sequence[str] = ()
+) -> None:
+    """Draw the stationary response: the joint density of x and ẋ, and the density of the amplitude with its errors."""
+    with figure_for(paths, title, parameters, Format(width=10.5)) as figure:
+        plane, radial = figure.subplots(1, 2)
+        response.plot(plane)
+        figure.get_layout_engine().set(wspace=0.1)
+        response.plot_amplitude(radial)
 
 
 def _over_p(case: Case, pairs: Sequence[Pair]) -> list[Series]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.data import Result, dataset
+from fpsolve.drawing import draw_dots, finish, label_axes
 from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE, P
-from fpsolve.pictures import draw_dots, finish
 from fpsolve.simulation.setup import Estimator
 
 if TYPE_CHECKING:
@@ -72,7 +72,8 @@ class MonteCarlo(Result):
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
         label = {"label": f"{found.attrs['method']} ± 2 standard errors"}
-        draw_dots(axes, found.moment, found.moment_error, **{**label, **kwargs})
+        draw_dots(axes, found.p.values, found.moment.values, found.moment_error.values, **{**label, **kwargs})
+        label_axes(axes, found.p.attrs, found.moment.attrs)
         finish(axes, **{**label, **kwargs})
 
     def _said(self) -> str:

@@ -12,10 +12,10 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
+from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import IMPACT_RATE, parameter_values
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.pictures import canvas_of, draw_line, draw_plane, finish
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.kernels import advance_and_count
 from fpsolve.simulation.setup import BATCHES, simulated_parts

@@ -8,17 +8,17 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from fpsolve import scenes
+from fpsolve import surfaces
 from fpsolve.errors import OutputError
-from fpsolve.exponent import pictured
+from fpsolve.exponent import eigenfunction_plot
+from fpsolve.exponent.eigenfunction_plot import FIELDS, surface_of
 from fpsolve.exponent.fields import fields
-from fpsolve.exponent.pictured import FIELDS, surface_of
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
-from fpsolve.scenes import can_render, flat_figure
+from fpsolve.surfaces import can_render, flat_figure
 from tests.conftest import FIG1, UNIT_NOISE
 
 HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.5)
@@ -35,8 +35,8 @@ def probe(monkeypatch):
     """Replaces what the child process does."""
 
     def replace(code, patience=60.0):
-        monkeypatch.setattr(scenes, "PROBE", code)
-        monkeypatch.setattr(scenes, "PATIENCE", patience)
+        monkeypatch.setattr(surfaces, "PROBE", code)
+        monkeypatch.setattr(surfaces, "PATIENCE", patience)
         can_render.cache_clear()
 
     yield replace
@@ -68,9 +68,9 @@ def test_it_finds_out_once(probe, tmp_path):
 def test_who_draws(pair, monkeypatch, answer):
     """Where nothing can be rendered the plane is drawn, and of a cylinder a warning tells how to get it."""
     drawn = []
-    monkeypatch.setattr(pictured, "can_render", lambda: answer)
-    monkeypatch.setattr(pictured, "picture_in_space", lambda *_, cylinder: drawn.append(f"space {cylinder}"))
-    monkeypatch.setattr(pictured, "flat_picture", lambda *_: drawn.append("plane"))
+    monkeypatch.setattr(eigenfunction_plot, "can_render", lambda: answer)
+    monkeypatch.setattr(eigenfunction_plot, "picture_in_space", lambda *_, cylinder: drawn.append(f"space {cylinder}"))
+    monkeypatch.setattr(eigenfunction_plot, "flat_picture", lambda *_: drawn.append("plane"))
     pair.plot()
     if answer:
         pair.plot(cylinder=True)
@@ -129,7 +129,7 @@ def assert_not_blank(picture, shape):
 
 
 def test_picture_of_the_plane(pair, monkeypatch, tmp_path):
-    monkeypatch.setattr(pictured, "can_render", lambda: False)
+    monkeypatch.setattr(eigenfunction_plot, "can_render", lambda: False)
     picture = pair.plot("tilted_density", cmap="magma")
     assert_not_blank(picture, (750, 1080, 3))
     assert picture.save(tmp_path / "picture.png").read_bytes() == picture.png == picture._repr_png_()

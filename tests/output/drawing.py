@@ -81,7 +81,7 @@ def tick_labels(figure):
 
 def texts(figure):
     """All that is written."""
-    yield from figure.texts
+    yield from (text for each in (figure, *figure.subfigs) for text in each.texts)
     yield from (text for legend in legends(figure) for text in legend.get_texts())
     yield from (label for labels in tick_labels(figure) for label in labels)
     for axes in figure.axes:

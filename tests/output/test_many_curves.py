@@ -7,11 +7,11 @@ import time
 import numpy as np
 import pytest
 
+from fpsolve.drawing import label_of
 from fpsolve.output.datasets import dataset_of
 from fpsolve.output.figures import draw
 from fpsolve.output.maps import Plane
 from fpsolve.output.series import Telling
-from fpsolve.pictures import label_of
 from fpsolve.theory.perturbation import second_order
 from tests.output.drawing import case_of, drawn_case, results_of, texts, tick_labels, words
 
@@ -130,7 +130,8 @@ def test_many_values_side_by_side_are_numbered(drawn, tmp_path):
 
 def test_the_parameters_that_are_held_stand_below_the_title(drawn, tmp_path):
     drawn_case(tmp_path, [intensities(9), "oscillator.omega=2.0", "figure.time_unit='s'", "figure.title='Mine'"])
-    title, told = (text.get_text() for text in drawn[0].texts)
+    headings = [drawn[0].texts[0], drawn[0].subfigs[0].texts[0]]
+    title, told = (text.get_text() for text in headings)
     assert title.startswith("Mine\nwith vary.noise.D0 = ")
     assert "oscillator.omega = 2.0" in " ".join(title.split())
     shown = [
@@ -144,7 +145,7 @@ def test_the_parameters_that_are_held_stand_below_the_title(drawn, tmp_path):
     assert [text for text in shown if text not in told] == []
     assert "D_0" not in told
     assert len(told.splitlines()) <= 2
-    assert [each.get_fontsize() for each in drawn[0].texts][1] >= 11
+    assert headings[1].get_fontsize() >= 11
     assert not [text.get_text() for text in texts(drawn[0]) if "/time" in text.get_text()]
 
 
@@ -199,8 +200,8 @@ def test_a_parameter_is_called_alike_in_all_figures(drawn, tmp_path):
         drawn[0].axes[0].get_ylabel(), drawn[1].axes[0].get_xlabel(), drawn[2].axes[1].get_ylabel(),
     )  # fmt: skip
     found = dataset_of(case, results_of(case), {})
-    assert {along, over_it, bar, label_of(found["noise.D0"])} == {"noise intensity $D_0$ (1/time)"}
-    assert drawn[2].axes[0].get_xlabel() == label_of(found["p"]) == "order of the moment $p$"
+    assert {along, over_it, bar, label_of(found["noise.D0"].attrs)} == {"noise intensity $D_0$ (1/time)"}
+    assert drawn[2].axes[0].get_xlabel() == label_of(found["p"].attrs) == "order of the moment $p$"
 
 
 def test_a_map_is_centred_at_zero_and_has_its_line(drawn, tmp_path):

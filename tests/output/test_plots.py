@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_hex
 
 from fpsolve.case.case import load_case
 from fpsolve.exponent.quantities import MOMENT
-from fpsolve.output.figures import draw
-from fpsolve.output.plots import write_figure, write_response_figure
+from fpsolve.output.curves import write_figure
+from fpsolve.output.figures import draw, write_response_figure
 from fpsolve.output.series import Series
 from fpsolve.simulation.response import MEANS, Response
 from tests.solving import solve_case
@@ -58,8 +60,12 @@ def test_legend_tells_that_markers_are_left_out(drawn, tmp_path, count, words):
 
 def marks(figure):
     """x, y and colour of the marks of stability indices."""
-    lines = [line for line in figure.axes[0].lines if line.get_marker() == "|" and line.get_xdata().size]
-    return [(*line.get_xydata()[0], line.get_color()) for line in lines]
+    found = [each for each in figure.axes[0].collections if isinstance(each, PathCollection)]
+    return [
+        (*place, to_hex(colour).upper())
+        for each in found
+        for place, colour in zip(each.get_offsets().tolist(), each.get_facecolors(), strict=True)
+    ]
 
 
 def test_stability_index_is_marked_on_the_zero_line(drawn, tmp_path):

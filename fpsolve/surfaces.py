@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.pictures import SIZE, STYLE, title_of
+from fpsolve.drawing import QUARTERS, SIZE, STYLE, draw_colours, label_axes
 from fpsolve.signals import signals_held
 
 if TYPE_CHECKING:
@@ -43,7 +43,8 @@ WALLS = ((0, 1, 0), (0, 1, 1), (1, 1, 1), (1, 0, 1), (1, 0, 0)), ((1, 1, 0), (1,
 """Lines of the box that stand behind the surface, in its edges."""
 SIDES = ("left", "right", "right", "left")
 """How the words at the quarters of the rim are justified."""
-QUARTERS = ("0", "pi/2", "pi", "3 pi/2", "2 pi")
+RIM = ("0", "pi/2", "pi", "3 pi/2", "2 pi")
+"""Words at the quarters of the rim, in ASCII."""
 RED = "#C8102E"
 NEXT_TO_ZERO = 0.05
 """A least value below this share of the maximum is drawn as 0, which rounding and small errors miss."""
@@ -140,16 +141,15 @@ def flat_figure(surface: Surface, cmap: str) -> Figure:
     from matplotlib.figure import Figure
 
     low, high = surface.limits
-    style: dict[str, Any] = {"shading": "gouraud", "rasterized": True, "cmap": cmap, "vmin": low, "vmax": high}
+    style: dict[str, Any] = {"shading": "gouraud", "cmap": cmap, "vmin": low, "vmax": high}
     with rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.add_subplot()
-        colours = axes.pcolormesh(surface.phi.ravel(), surface.xi, surface.values.T, **style)
-        figure.colorbar(colours, ax=axes, label=title_of(surface.about["values"]))
+        draw_colours(axes, surface.phi.ravel(), surface.xi, surface.values.T, surface.about["values"], **style)
         for impact in surface.impacts:
             axes.axvline(impact, color=RED, linewidth=1.2)
-        axes.set_xticks(np.pi * np.arange(5) / 2, ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
-        axes.set(xlabel=title_of(surface.about["phi"]), ylabel=title_of(surface.about["xi"]))
+        axes.set_xticks(*QUARTERS)
+        label_axes(axes, surface.about["phi"], surface.about["xi"])
         figure.suptitle(surface.title, parse_math=False)
         axes.set_title("\n".join(surface.lines), fontsize=9, parse_math=False)
     return figure
@@ -236,7 +236,7 @@ def _labels_of_box(surface: Surface) -> Iterator[Label]:
     def at(phi: float, xi: float, value: float, *shift: float) -> FloatArray:
         return surface.placed(phi, xi, value, cylinder=False) + shift
 
-    for k, words in enumerate(QUARTERS):
+    for k, words in enumerate(RIM):
         yield words, at(k * math.pi / 2, start, low, 0, -0.05, 0), "left"
     yield surface.label("phi"), at(1.1 * math.pi, start, low, 0, -0.17, 0), "left"
     for xi in _ticks(start, end):
@@ -250,7 +250,7 @@ def _labels_of_cylinder(surface: Surface) -> Iterator[Label]:
     """φ around the upper rim, and ξ at both ends, on the side that has no colour bar."""
     high, phi, start, end = surface.limits[1], surface.phi.ravel(), float(surface.xi[0]), float(surface.xi[-1])
     impacts = {round(impact / (math.pi / 2), 9) for impact in surface.impacts}
-    for k, words in enumerate(QUARTERS[:4]):
+    for k, words in enumerate(RIM[:4]):
         rim = surface.values[np.argmin(np.abs(phi - k * math.pi / 2)), -1] if k < 2 else high
         place = surface.placed(k * math.pi / 2, end, rim, cylinder=True) * (1.1, 1.1, 1)
         text = f"{words}: impact" if k in impacts else words

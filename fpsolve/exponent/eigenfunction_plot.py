@@ -9,7 +9,7 @@ from typing import Literal
 from fpsolve.exponent.fields import Pair
 from fpsolve.exponent.nodes import Nodes
 from fpsolve.model.quantity import PHASE, Quantity, density_unit, noise_of, parameter_lines, parameter_values
-from fpsolve.scenes import Picture, Surface, can_render, flat_picture, picture_in_space
+from fpsolve.surfaces import Picture, Surface, can_render, flat_picture, picture_in_space
 
 FINER = 2
 """So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
@@ -22,7 +22,7 @@ FIELDS = {
 """By the names that they have in files for ParaView: those among `Fields`, and what they are."""
 
 
-class Pictured:
+class EigenfunctionPlot:
     """A mixin of a `Pair`."""
 
     def plot(self: Pair, field: Field = "T", *, cylinder: bool = False, cmap: str = "viridis") -> Picture:

@@ -1,0 +1,333 @@
+"""Drawing in one style: axes with units, lines with errors, dots, planes, bars, legends; into notebooks and files."""
+
+from __future__ import annotations
+
+import logging
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import fill, wrap
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray, is_log_spaced
+from fpsolve.files import atomic
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
+STYLE: dict[Any, Any] = {"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12}
+SIZE = (7.2, 5.0)
+"""Inches of a figure of `plot`."""
+MARKED = 40
+"""Points up to which each point of a line has a marker."""
+QUARTERS = np.pi * np.arange(5) / 2, ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"]
+"""Ticks of a phase, and what they say."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """How large a figure in a file is.
+
+    Attributes:
+        width: of the figure, in inches.
+        height: of its axes, in inches; heading, labels and legend come on top of it.
+        scale: of letters, lines and marks.
+        dpi: pixels of an inch.
+    """
+
+    width: float = SIZE[0]
+    height: float = 3.8
+    scale: float = 1.0
+    dpi: int = 160
+
+    @property
+    def style(self) -> dict[Any, Any]:
+        """Settings of matplotlib."""
+        sizes = {
+            **{"font.size": 13, "axes.titlesize": 11, "figure.titlesize": 12.5, "legend.fontsize": 11},
+            **{"lines.linewidth": 1.6, "lines.markersize": 7, "lines.markeredgewidth": 1.6, "axes.linewidth": 0.9},
+            **{f"{side}tick.major.{what}": size for side in "xy" for what, size in (("size", 4), ("width", 0.9))},
+            **{f"{side}tick.minor.{what}": size for side in "xy" for what, size in (("size", 2.2), ("width", 0.7))},
+        }
+        scaled = {name: self.scale * value for name, value in sizes.items()}
+        return {**STYLE, **scaled, "legend.frameon": False, "pdf.fonttype": 42}
+
+
+DOUBLE_COLUMN = Format()
+FORMATS = {"double column": DOUBLE_COLUMN, "single column": Format(3.5, 2.1, 0.61, 300)}
+
+
+@contextmanager
+def canvas_of(ax: Axes | None) -> Iterator[Axes]:
+    """The axes themselves, or those of a new figure of pyplot."""
+    if ax is not None:
+        yield ax
+        return
+    from matplotlib import pyplot, rc_context
+
+    figure = pyplot.figure(figsize=SIZE, layout="constrained")  # before the style, whose end undoes what notebooks set
+    with rc_context(STYLE):
+        new = figure.subplots()
+        new.tick_params(labelsize=STYLE["font.size"])  # which later ticks would take from another style
+        yield new
+
+
+@contextmanager
+def figure_for(
+    paths: Sequence[Path], title: str, parameters: Sequence[str] = (), form: Format = DOUBLE_COLUMN
+) -> Iterator[Any]:
+    """An empty figure, which gets a heading and a legend of all that has a label, and is written to files in the end.
+
+    Args:
+        paths: .png, .pdf or what else matplotlib writes.
+        title: the heading, without mathematics.
+        parameters: what holds for all of the figure; stands below the title in smaller letters.
+        form: how large it is.
+    """
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
+    with rc_context(form.style):
+        layout = ConstrainedLayoutEngine(h_pad=0.07 * form.scale)
+        figure = Figure(figsize=(form.width, 1.3 * form.height), dpi=form.dpi, layout=layout)
+        FigureCanvasAgg(figure)
+        body = figure.subfigures()
+        yield body
+        _add_heading(figure, body, title, parameters)
+        _add_legend(figure)
+        figure.set_figheight(4 * form.height)  # has room for everything, so that the layout tells what is left
+        layout.execute(figure)
+        figure.set_figheight(5 * form.height - figure.axes[0].bbox.height / figure.dpi)
+        figure.draw_without_rendering()  # lays it out, once for all formats
+        figure.set_layout_engine("none")
+        for path in paths:
+            with atomic(path) as temporary:
+                figure.savefig(temporary, metadata={"CreationDate": None} if path.suffix == ".pdf" else None)
+
+
+def _add_heading(figure: Any, body: Any, title: str, parameters: Sequence[str]) -> None:
+    """The title, each of its lines in as many as fit, and the parameters."""
+    room = 0.96 * figure.get_figwidth()
+    large, small = (_font_size(f"{which}.titlesize") for which in ("figure", "axes"))
+    words = [[part for word in line.split(" ") for part in wrap(word, 40)] for line in title.splitlines()]
+    if title:
+        lines = "\n".join(in_lines(figure, line, " ", large, room) for line in words)
+        figure.suptitle(lines, parse_math=False)
+    if parameters:
+        body.suptitle(in_lines(figure, parameters, ", ", small, room), fontsize=small, color="0.3")
+
+
+def _add_legend(figure: Any) -> None:
+    """A legend below the axes of what has a label, in as many columns as fit."""
+    found = [each.get_legend_handles_labels() for each in figure.axes if each.get_legend() is None]
+    handles, labels = ([item for each in found for item in each[k]] for k in (0, 1))
+    if not labels:
+        return
+    room, letters = 0.98 * figure.get_figwidth(), _font_size("legend.fontsize")
+    labels = [in_lines(figure, label.split(", "), ", ", letters, room - letters / 18) for label in labels]
+    for columns, share in [(columns, share) for columns in (4, 3, 2) for share in (1.0, 0.9)] + [(1, 1.0)]:
+        if columns <= len(labels):
+            style = {"ncols": columns, "columnspacing": 1.2, "handlelength": 1.8, "fontsize": share * letters}
+            legend = figure.legend(handles, labels, loc="outside lower center", **style)
+            if columns == 1 or legend.get_window_extent(figure.canvas.get_renderer()).width <= room * figure.dpi:
+                return
+            legend.remove()
+
+
+def in_lines(figure: Any, pieces: Sequence[str], mark: str, size: float, room: float) -> str:
+    """Pieces with a mark between them in as few lines as fit, these of like lengths, none of the pieces broken.
+
+    Args:
+        figure: in which they are drawn.
+        pieces, mark: words and " ", or parts of a list and ", ".
+        size: of the letters, in points.
+        room: for a line, in inches.
+    """
+    from matplotlib.font_manager import FontProperties
+
+    measure = figure.canvas.get_renderer().get_text_width_height_descent
+    font, gap = FontProperties(size=size), 0.3 * len(mark) * size / 72
+    widths = [measure(piece, font, "$" in piece)[0] / figure.dpi + gap for piece in pieces]
+
+    def lines(room: float) -> list[str]:
+        found, used = list[list[str]](), math.inf
+        for piece, width in zip(pieces, widths, strict=True):
+            if used + width > room:
+                found, used = [*found, []], 0.0
+            found[-1].append(piece)
+            used += width
+        return [mark.join(each) for each in found]
+
+    fewest = lines(room)
+    like = next(each for share in (0.6, 0.7, 0.8, 0.9, 1.0) if len(each := lines(share * room)) == len(fewest))
+    return f"{mark.rstrip()}\n".join(like)
+
+
+def title_of(attributes: Mapping[str, Any]) -> str:
+    r"""A variable on an axis, from its attributes: "largest Lyapunov exponent $\lambda$ (1/time)"."""
+    unit = "" if attributes["units"] == "1" else f"({attributes['units']})"
+    return " ".join(part for part in (attributes["long_name"], attributes.get("symbol", ""), unit) if part)
+
+
+def label_of(attributes: Mapping[str, Any], letters: int = 40) -> str:
+    """The same in several lines, of at most so many letters, where it is long."""
+    words, rest = str(attributes["long_name"]), title_of({**attributes, "long_name": ""})
+    drawn = re.sub(r"\\[A-Za-z]+ ?", "x", rest).translate(dict.fromkeys(map(ord, "${}^_")))
+    return f"{fill(words, letters)}{' ' if len(words) + len(drawn) < letters else chr(10)}{rest}".strip()
+
+
+def label_axes(axes: Axes, x: Mapping[str, Any], y: Mapping[str, Any]) -> None:
+    """Name both axes by the attributes of two variables."""
+    axes.set(xlabel=label_of(x, 56), ylabel=label_of(y))
+
+
+def scale_of(values: FloatArray) -> Literal["linear", "log"]:
+    """The scale of an axis on which values are spread evenly."""
+    return "log" if is_log_spaced(values) else "linear"
+
+
+def scale_axis(axis: Any, scale: str, limits: tuple[float, float] | None = None) -> None:
+    """Set the scale of an axis, "linear" or "log", its ends, and numbers such as 0.5, 1, 2 where it is logarithmic."""
+    axes, side = axis.axes, axis.axis_name
+    axes.set(**{f"{side}scale": scale}, **({f"{side}lim": limits} if limits else {}))
+    if scale == "log":
+        plain_numbers(axis)
+
+
+def plain_numbers(axis: Any) -> None:
+    """Numbers such as 0.5, 1, 2 on a logarithmic axis of a few decades; fewer of them in a small figure."""
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
+
+    start, stop = axis.get_view_interval()
+    decades, is_large = math.log10(stop / start), points(1) > 0.7
+    if decades < 4:
+        few = MaxNLocator(5 if is_large else 4)
+        many = LogLocator(subs=(1, 2, 5) if decades < (2.5 if is_large else 1.8) else (1,))
+        axis.set_major_locator(few if decades < 0.7 else many)
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_minor_formatter(NullFormatter())
+
+
+def _font_size(name: str) -> float:
+    """A size of letters of the style, in points."""
+    from matplotlib import rcParams
+
+    sizes: Mapping[Any, Any] = rcParams
+    return float(sizes[name])
+
+
+def points(size: float) -> float:
+    """A width of lines or a size of marks, in points, in proportion to the letters of the style that is set."""
+    return size * _font_size("font.size") / float(STYLE["font.size"])
+
+
+def draw(found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    """Draw the first variable of a dataset with its error: a point, a line or colours, by its dimensions."""
+    main = next(iter(found.data_vars.values()))
+    error = found.get(f"{main.name}_error")
+    label = {"label": found.attrs["method"]}
+    if main.ndim == 0:
+        draw_point(axes, main, error, **kwargs)
+    elif main.ndim == 1:
+        draw_line(axes, main, error, **{**label, **kwargs})
+    else:
+        draw_plane(axes, main, **kwargs)
+    finish(axes, **kwargs)
+
+
+def draw_line(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
+    """A variable over its coordinate, in a band of ± its error."""
+    x = main[main.dims[0]]
+    order = np.argsort(x.values, kind="stable")
+    places, values = x.values[order], main.values[order]
+    marker = {"marker": "o", "markersize": 4} if places.size <= MARKED else {}
+    [line] = axes.plot(places, values, **{"linewidth": 1.6, **marker, **coloured(axes, kwargs)})
+    if error is not None:
+        low, high = values - error.values[order], values + error.values[order]
+        axes.fill_between(places, low, high, color=line.get_color(), alpha=0.3, linewidth=0)
+    label_axes(axes, x.attrs, main.attrs)
+
+
+def draw_dots(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, **kwargs: Any) -> None:
+    """Dots with bars of ± two standard errors."""
+    style = {"linestyle": "none", "marker": "o", "markersize": 5, "elinewidth": 1.3, "capsize": 4}
+    axes.errorbar(x, y, 2 * error, **{**style, **coloured(axes, kwargs)})
+
+
+def draw_point(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
+    """One number with a bar of ± its error, above its symbol; several stand side by side."""
+    name = str(main.attrs.get("symbol", main.name))
+    size = None if error is None else [error.item()]
+    style = {"linestyle": "none", "marker": "o", "markersize": 6, "elinewidth": 1.3, "capsize": 5}
+    axes.errorbar([name], [main.item()], size, **{**style, **coloured(axes, kwargs)})
+    axes.set_ylabel(label_of(main.attrs))
+    mark_zero(axes)
+    axes.margins(x=0.3)
+
+
+def draw_plane(axes: Axes, main: xarray.DataArray, **kwargs: Any) -> None:
+    """A variable over two coordinates, the first to the right, in colours, with a colour bar."""
+    x, y = (main[name] for name in main.dims)
+    draw_colours(axes, x.values, y.values, main.values.T, main.attrs, **kwargs)
+    label_axes(axes, x.attrs, y.attrs)
+
+
+def draw_colours(axes: Axes, x: FloatArray, y: FloatArray, values: Any, about: Mapping[str, Any], **kwargs: Any) -> Any:
+    """Values over a plane, shape (y, x), in colours, with a colour bar that their attributes name; the bar."""
+    style = {"cmap": "viridis", "rasterized": True, "shading": "nearest", **kwargs}
+    return axes.figure.colorbar(axes.pcolormesh(x, y, values, **style), ax=axes, pad=0.02, label=label_of(about, 34))
+
+
+def draw_bars(
+    axes: Axes, bars: Mapping[str, Sequence[float] | FloatArray], names: Sequence[str], **kwargs: Any
+) -> None:
+    """Groups of horizontal bars, one group for each name, and in it one bar for each label."""
+    axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
+    height, middles = 0.8 / max(len(bars), 1), np.arange(len(names))
+    for i, (label, values) in enumerate(bars.items()):
+        places = middles + (i - 0.5 * (len(bars) - 1)) * height
+        style = {"color": COLOURS[i % len(COLOURS)], "label": label, **kwargs}
+        axes.barh(places, values, 0.9 * height, **style)
+    axes.set_yticks(middles, names)
+    axes.invert_yaxis()
+
+
+def coloured(axes: Axes, kwargs: Mapping[str, Any]) -> dict[str, Any]:
+    """What matplotlib is told of a line, with a colour that no other line has unless it has one."""
+    from matplotlib.cbook import normalize_kwargs
+    from matplotlib.colors import to_hex
+    from matplotlib.lines import Line2D
+
+    taken = {to_hex(line.get_color()).upper() for line in axes.lines}
+    free = next((colour for colour in COLOURS if colour not in taken), COLOURS[0])
+    return {"color": free, **normalize_kwargs(dict(kwargs), Line2D)}
+
+
+def mark_zero(axes: Axes) -> None:
+    """The zero line, once."""
+    if not any(line.get_gid() == "zero" for line in axes.lines):
+        axes.axhline(0, color="0.6", linewidth=points(0.8), zorder=0, gid="zero")
+
+
+def finish(axes: Axes, **kwargs: Any) -> None:
+    """The zero line, where it is seen, and a legend, where it tells things apart or was asked for by a `label`."""
+    low, high = axes.get_ylim()
+    if low < 0 < high:
+        mark_zero(axes)
+    if "label" in kwargs or len(set(axes.get_legend_handles_labels()[1])) > 1:
+        add_legend(axes)
+
+
+def add_legend(axes: Axes) -> None:
+    """A legend in letters a little smaller than those of the axes."""
+    axes.legend(frameon=False, fontsize=0.85 * float(axes.xaxis.label.get_fontsize()))
