@@ -34,23 +34,25 @@ WORDS = {1: "grows", -1: "decays", 0: "open"}
 def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_whole: bool) -> None:
     """proof.json: for each curve its parameters, and every bound with the certificate from which it follows."""
     head = {"fpsolve": __version__, "case": case.name, "complete": is_whole}
-    lines = [f" {json.dumps(key)}: {json.dumps(value)},\n" for key, value in head.items()]
+    lines = ",\n".join(f" {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items())
     curves = ",\n".join(map(_curve_text, proofs))
-    write_text(folder / PROOF, "".join(["{\n", *lines, ' "curves": [\n', curves, "\n ]\n}\n"]))
+    write_text(folder / PROOF, f'{{\n{lines},\n "curves": [\n{curves}\n ]\n}}\n')
 
 
 def _curve_text(proof: CurveProof) -> str:
-    """A curve as JSON, a line for each bound."""
+    """A curve as JSON, a line for each bound; numbers among its parameters as the decimals of which the bounds hold."""
+    written = {key: _line(value) for key, value in proof.curve.parameters.items()}
+    written |= {key: text for key, text in proof.stated.items() if key not in (IMPACT, TREATMENT)}
     moments = ",\n".join(f"    {_moment(p, found)}" for p, found in proof.moments)
-    index = proof.index
-    others = {
+    parts = {
+        "parameters": f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in written.items())}}}",
+        "moments": f"[\n{moments}\n   ]",
         "lyapunov_exponent": "null" if proof.exponent is None else _line(_bound(proof.exponent)),
-        "stability_index": "null" if index is None else _index(index),
+        "stability_index": "null" if proof.index is None else _index(proof.index),
         "verdicts": _line(proof.verdicts),
     }
-    rest = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in others.items())
-    parameters = f'   "parameters": {_parameters(proof)}'
-    return f'  {{\n{parameters},\n   "moments": [\n{moments}\n   ],\n{rest}\n  }}'
+    text = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in parts.items())
+    return f"  {{\n{text}\n  }}"
 
 
 def _bound(found: Enclosure | None) -> dict[str, Any]:
@@ -71,13 +73,6 @@ def _index(found: IndexEnclosure) -> str:
     ends = (found.lower, found.upper) if found.is_proven else (None, None)
     moments = ", ".join(_moment(p, each) for p, each in found.moments)
     return f'{{"lower": {_line(ends[0])}, "upper": {_line(ends[1])}, "moments": [{moments}]}}'
-
-
-def _parameters(proof: CurveProof) -> str:
-    """All parameters of a curve, numbers as the decimals of which the bounds hold."""
-    written = {key: _line(value) for key, value in proof.curve.parameters.items()}
-    numbers = {key: text for key, text in proof.stated.items() if key not in (IMPACT, TREATMENT)}
-    return f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in (written | numbers).items())}}}"
 
 
 def _line(data: Any) -> str:
@@ -172,11 +167,8 @@ def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:
     known = [end for end in (found.lower, found.upper) if math.isfinite(end)]
     size, digits = (found.upper - found.lower, 2) if len(known) > 1 else (abs(known[0]) or 1.0, 5)
     step = Decimal(1).scaleb(math.floor(math.log10(size)) + 1 - digits)
-    ends = ((found.lower, ROUND_FLOOR), (found.upper, ROUND_CEILING))
-    low, high = (_end(end, step, rounding) for end, rounding in ends)
+    low, high = (
+        f"{Decimal(repr(end)).quantize(step, rounding)}" if math.isfinite(end) else f"{end}".replace("inf", "∞")
+        for end, rounding in ((found.lower, ROUND_FLOOR), (found.upper, ROUND_CEILING))
+    )
     return low, high
-
-
-def _end(end: float, step: Decimal, rounding: str) -> str:
-    """A bound in steps, or that there is none."""
-    return f"{Decimal(repr(end)).quantize(step, rounding)}" if math.isfinite(end) else f"{end}".replace("inf", "∞")

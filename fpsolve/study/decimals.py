@@ -20,7 +20,9 @@ def literals_of(case: Case, keys: Iterable[str]) -> Mapping[str, Literals]:
     found = list(_leaves(tomllib.loads(case.text, parse_float=Decimal)))
     for override in case.overrides:
         with suppress(ValueError):  # a bare word
-            found = _replaced(found, override)
+            new = list(_leaves(tomllib.loads(override, parse_float=Decimal)))
+            ((replaced, _),) = _leaves(tomllib.loads(f"{override.partition('=')[0]} = 0"))
+            found = [each for each in found if not _is_in(each[0], replaced)] + new
     places = {key: f"vary.{key}" if key in case.vary.keys else key for key in keys}
     return {
         key: {float(number) + 0.0: f"{number}" for path, number in found if _is_in(path, place)}
@@ -35,19 +37,8 @@ def decimal_of(value: float, literals: Literals) -> str:
     return text if DECIMAL.fullmatch(text) and Decimal(text) != Decimal(shortest) else shortest
 
 
-Leaf = tuple[str, Decimal | int]
-"""A number, with the dotted keys of the tables in which it stands."""
-
-
-def _replaced(found: Iterable[Leaf], override: str) -> list[Leaf]:
-    """What a `key=value` of the command line makes of the numbers: those that stood there go."""
-    new = list(_leaves(tomllib.loads(override, parse_float=Decimal)))
-    ((path, _),) = _leaves(tomllib.loads(f"{override.partition('=')[0]} = 0"))
-    return [each for each in found if not _is_in(each[0], path)] + new
-
-
-def _leaves(data: Any, path: str = "") -> Iterator[Leaf]:
-    """The finite numbers in tables and lists."""
+def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, Decimal | int]]:
+    """The finite numbers in tables and lists, each after the dotted keys of the tables in which it stands."""
     if isinstance(data, dict):
         for name, inner in data.items():
             yield from _leaves(inner, f"{path}.{name}" if path else name)

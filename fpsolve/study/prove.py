@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cached_property
+from typing import Any, cast
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
@@ -63,39 +65,15 @@ class CurveProof:
     index: IndexEnclosure | None = None
 
     @property
-    def bounds(self) -> tuple[Enclosure, ...]:
-        """All on Λ(p) and λ."""
-        return tuple(each for each in (*(found for _, found in self.moments), self.exponent) if each is not None)
-
-    @property
     def is_met(self) -> bool:
-        """Whether all are as close as wanted."""
-        return all(each.is_met for each in self.bounds)
+        """Whether all bounds on Λ(p) and λ that were tried are as close as wanted."""
+        return all(each is None or each.is_met for each in (*(found for _, found in self.moments), self.exponent))
 
     @property
     def verdicts(self) -> list[str]:
         """What is proven of paths and moments."""
         signs = [(p, 0 if found is None else found.sign) for p, found in self.moments]
         return verdicts(signs, 0 if self.exponent is None else self.exponent.sign)
-
-
-def refuse_unprovable_case(case: Case, width: float | None) -> None:
-    """Refuse a width that is none, and a case some curve of which cannot be proven.
-
-    Raises:
-        FpsolveError: with the curve and the reason.
-    """
-    try:
-        check_width(width)
-    except ValueError as failure:
-        raise FpsolveError(f"--width: {failure}") from None
-    literals = _literals(case)
-    for curve in case.curves():
-        try:
-            refuse_unprovable(_stated(curve, literals))
-        except NoSuchExponent as failure:
-            place = f"with {curve.label}: " if curve.varied else ""
-            raise NoSuchExponent(f"{case.path}: {place}{failure}") from None
 
 
 @dataclass(frozen=True)
@@ -125,31 +103,57 @@ class Plan:
         """How many questions there are."""
         return self.each * self.case.planned
 
+    @cached_property
+    def _literals(self) -> Mapping[str, Literals]:
+        return literals_of(self.case, (*OSCILLATOR, *NOISE, ORDERS))
+
+    @cached_property
+    def _orders(self) -> list[str]:
+        """All p as decimals: as the case states them, or of a range the floats as they stand."""
+        if isinstance(self.case.moments.p, Sweep):
+            return [str(Decimal(p)) for p in self.case.p.tolist()]
+        return [decimal_of(p, self._literals[ORDERS]) for p in self.case.p.tolist()]
+
+    def stated(self, curve: Curve) -> Parameters:
+        """The parameters of the linear motion as the decimals that the case states."""
+        stated = {key: decimal_of(float(curve.parameters[key]), self._literals[key]) for key in (*OSCILLATOR, *NOISE)}
+        return stated | {key: str(curve.parameters[key]) for key in (IMPACT, TREATMENT)}
+
     def questions(self) -> Iterator[Question]:
         """All of them, curve by curve."""
-        literals = _literals(self.case)
-        orders = self._orders(literals)
         for curve in self.case.curves():
-            stated = _stated(curve, literals)
-            yield from (Question(curve, MOMENT.name, stated, p, self.width) for p in orders)
+            stated = self.stated(curve)
+            yield from (Question(curve, MOMENT.name, stated, p, self.width) for p in self._orders)
             yield from (Question(curve, name, stated, width=self.width) for name in self.indices)
 
     def gathered(self, answers: Sequence[Enclosure | IndexEnclosure]) -> list[CurveProof]:
         """What is proven of each curve, from the first answers, in the order of the questions."""
-        found, literals = [], _literals(self.case)
-        orders = self._orders(literals)
-        for number, curve in enumerate(self.case.curves(stop=-(-len(answers) // self.each))):
-            given = answers[number * self.each : (number + 1) * self.each]
-            padded = [*given, *[None] * (self.each - len(given))]
-            stated = _stated(curve, literals)
-            found.append(_proof(curve, stated, orders, self.indices, padded))
+        found, rest = [], iter(answers)
+        for curve in self.case.curves(stop=-(-len(answers) // self.each)):
+            moments = tuple((p, cast("Enclosure | None", next(rest, None))) for p in self._orders)
+            indices: dict[str, Any] = {name: next(rest, None) for name in self.indices}
+            exponent, index = (indices.get(each.name) for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX))
+            found.append(CurveProof(curve, self.stated(curve), moments, exponent, index))
         return found
 
-    def _orders(self, literals: Mapping[str, Literals]) -> list[str]:
-        """All p as decimals: as the case states them, or of a range the floats as they stand."""
-        if isinstance(self.case.moments.p, Sweep):
-            return [str(Decimal(p)) for p in self.case.p.tolist()]
-        return [decimal_of(p, literals[ORDERS]) for p in self.case.p.tolist()]
+
+def refuse_unprovable_case(case: Case, width: float | None) -> None:
+    """Refuse a width that is not positive, and a case some curve of which cannot be proven.
+
+    Raises:
+        FpsolveError: with the curve and the reason.
+    """
+    try:
+        check_width(width)
+    except ValueError as failure:
+        raise FpsolveError(f"--width: {failure}") from None
+    plan = Plan(case, width)
+    for curve in case.curves():
+        try:
+            refuse_unprovable(plan.stated(curve))
+        except NoSuchExponent as failure:
+            place = f"with {curve.label}: " if curve.varied else ""
+            raise NoSuchExponent(f"{case.path}: {place}{failure}") from None
 
 
 def answer(question: Question) -> Enclosure | IndexEnclosure:
@@ -160,33 +164,3 @@ def answer(question: Question) -> Enclosure | IndexEnclosure:
     if question.quantity == LYAPUNOV_EXPONENT.name:
         return prove_exponent(problem, question.stated, question.width)
     return prove_index(problem, question.stated)
-
-
-def _proof(
-    curve: Curve,
-    stated: Parameters,
-    p: Sequence[str],
-    indices: Sequence[str],
-    given: Sequence[Enclosure | IndexEnclosure | None],
-) -> CurveProof:
-    """The answers to the questions of one curve."""
-    moments = [each if isinstance(each, Enclosure) else None for each in given[: len(p)]]
-    others = dict(zip(indices, given[len(p) :], strict=True))
-    exponent, index = (others.get(each.name) for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX))
-    return CurveProof(
-        curve,
-        stated,
-        tuple(zip(p, moments, strict=True)),
-        exponent if isinstance(exponent, Enclosure) else None,
-        index if isinstance(index, IndexEnclosure) else None,
-    )
-
-
-def _stated(curve: Curve, literals: Mapping[str, Literals]) -> Parameters:
-    """The parameters of the linear motion as the decimals that a case states."""
-    stated = {key: decimal_of(float(curve.parameters[key]), literals[key]) for key in (*OSCILLATOR, *NOISE)}
-    return stated | {key: str(curve.parameters[key]) for key in (IMPACT, TREATMENT)}
-
-
-def _literals(case: Case) -> Mapping[str, Literals]:
-    return literals_of(case, (*OSCILLATOR, *NOISE, ORDERS))

@@ -59,9 +59,21 @@ def prove_case(
     refuse_unprovable_case(case, width)
     plan = Plan(case, width)
     answers: list[Enclosure | IndexEnclosure] = []
+
+    def kept() -> str:
+        text = f" after {len(answers)} of {plan.total} bounds"
+        return f"{text}; what was done is kept in {folder}" if answers else text
+
+    def write() -> list[CurveProof]:
+        proofs = plan.gathered(answers)
+        if proofs:
+            with writable(folder):
+                write_proof(plan.case, proofs, folder, is_whole=len(answers) == plan.total)
+        return proofs
+
     with (
         own_folder(case, out, (PROVEN,)) as folder,
-        saying_if_interrupted(lambda: _kept(plan, len(answers), folder), ANEW),
+        saying_if_interrupted(kept, ANEW),
         watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
         pool or serial() as workers,
     ):
@@ -71,19 +83,10 @@ def prove_case(
                 answers.append(found)
                 progress(failed=not found.is_proven)
                 if monotonic() - written > EVERY and len(answers) % plan.each == 0:
-                    _write(plan, answers, folder)
+                    write()
                     written = monotonic()
         finally:
-            proofs = _write(plan, answers, folder)
-    return proofs
-
-
-def _write(plan: Plan, answers: Sequence[Enclosure | IndexEnclosure], folder: Path) -> list[CurveProof]:
-    """What is proven so far, also into its file."""
-    proofs = plan.gathered(answers)
-    if proofs:
-        with writable(folder):
-            write_proof(plan.case, proofs, folder, is_whole=len(answers) == plan.total)
+            proofs = write()
     return proofs
 
 
@@ -101,9 +104,3 @@ def check_proof(path: Path) -> Checked:
     except MalformedProof as failure:
         raise MalformedProof(f"{path}: {failure}; make one with `fpsolve prove`") from None
     return Checked(claims, tuple(claims.objections()))
-
-
-def _kept(plan: Plan, done: int, folder: Path) -> str:
-    """How much is proven, and where it is."""
-    text = f" after {done} of {plan.total} bounds"
-    return f"{text}; what was done is kept in {folder}" if done else text
