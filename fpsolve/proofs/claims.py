@@ -24,7 +24,6 @@ SMALLEST, MOST_DIGITS = -400, 2000
 """Of such a number: the least power of ten, and how many digits it may have; it must be a finite float, too."""
 NONLINEAR = {"oscillator.c2", "oscillator.c3"}
 """Parameters of the motion far from rest, on which no exponent depends."""
-Place = tuple[str, ...]
 Stated = Mapping[str, Decimal | str]
 """The parameters of a curve."""
 
@@ -99,23 +98,19 @@ class CurveClaims(Record):
     stability_index: IndexBound | None
     verdicts: list[str]
 
-    def objections(self) -> Iterator[tuple[Place, str]]:
-        """What does not follow, and where it stands."""
+    def objections(self) -> Iterator[str]:
+        """What does not follow, after the place where it stands."""
+        exponent, index = self.lyapunov_exponent, self.stability_index
         for i, moment in enumerate(self.moments):
-            for text in moment.objections(MOMENT, moment.p, self.parameters):
-                yield ("moments", str(i)), text
-        if self.lyapunov_exponent:
-            for text in self.lyapunov_exponent.objections("lyapunov_exponent", None, self.parameters):
-                yield ("lyapunov_exponent",), text
-        if self.stability_index:
-            for text in self.stability_index.objections(self.parameters):
-                yield ("stability_index",), text
-        exponent = self.lyapunov_exponent
+            yield from (f"moments.{i}: {text}" for text in moment.objections(MOMENT, moment.p, self.parameters))
+        if exponent:
+            found = exponent.objections("lyapunov_exponent", None, self.parameters)
+            yield from (f"lyapunov_exponent: {text}" for text in found)
+        if index:
+            yield from (f"stability_index: {text}" for text in index.objections(self.parameters))
         signs = [(str(each.p), each.sign) for each in self.moments]
         proven = verdicts(signs, 0 if exponent is None else exponent.sign)
-        for text in self.verdicts:
-            if text not in proven:
-                yield ("verdicts",), f"{text!r} does not follow"
+        yield from (f"verdicts: {text!r} does not follow" for text in self.verdicts if text not in proven)
 
 
 class Claims(Record):
@@ -129,17 +124,13 @@ class Claims(Record):
     @property
     def count(self) -> int:
         """How many numbers are bounded."""
-        found = 0
-        for curve in self.curves:
-            bounds = [*curve.moments, curve.lyapunov_exponent, curve.stability_index]
-            found += sum(each is not None and each.lower is not None for each in bounds)
-        return found
+        bounds = [each for it in self.curves for each in (*it.moments, it.lyapunov_exponent, it.stability_index)]
+        return sum(each is not None and each.lower is not None for each in bounds)
 
     def objections(self) -> Iterator[str]:
-        """What does not follow, and where it stands."""
+        """What does not follow, after the place where it stands."""
         for i, curve in enumerate(self.curves):
-            for place, text in curve.objections():
-                yield f"{'.'.join(('curves', str(i), *place))}: {text}"
+            yield from (f"curves.{i}.{text}" for text in curve.objections())
 
 
 def claims_from(text: str) -> Claims:
@@ -153,7 +144,7 @@ def claims_from(text: str) -> Claims:
             _numbers(json.loads(text, parse_float=_number, parse_int=_whole, object_pairs_hook=_table))
         )
     except ValidationError as failure:
-        raise MalformedProof(first_fault(failure)) from None
+        raise MalformedProof(_first_fault(failure)) from None
     except RecursionError:
         raise MalformedProof("lists are nested too deeply") from None
     except ValueError as failure:
@@ -228,17 +219,12 @@ def _are_same(stated: Mapping[str, str], parameters: Stated) -> bool:
     return set(parameters) - NONLINEAR == set(read) and all(parameters[key] == read[key] for key in read)
 
 
-def first_fault(failure: ValidationError) -> str:
+def _first_fault(failure: ValidationError) -> str:
     """The first of the faults, with its place."""
     first = failure.errors(include_url=False)[0]
     place = ".".join(map(str, first["loc"]))
-    said = re.sub(r"^(Input|List|String) should|^Value error, | after validation", _must, first["msg"])
-    text = _PLAINLY.get(first["type"], said)
-    return f"{place + ': ' if place else ''}{text}"
-
-
-def _must(words: re.Match[str]) -> str:
-    return "must" if words[0].endswith("should") else ""
+    said = re.sub(r"^Value error, | after validation", "", re.sub(r"^(Input|List|String) should", "must", first["msg"]))
+    return f"{place + ': ' if place else ''}{_PLAINLY.get(first['type'], said)}"
 
 
 _PLAINLY = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from fpsolve.errors import NotConverged
@@ -74,13 +74,13 @@ def prove(problem: Problem, p: float, *, width: float | None = None) -> Enclosur
         ValueError: p is not finite, or the width not positive.
         MissingFlint: python-flint is not installed.
     """
-    return prove_moment(problem, parameters_of(problem), repr(float(p)), width)
+    return prove_bounds(problem, parameters_of(problem), repr(float(p)), width)
 
 
 @of_problem
 def prove_lyapunov_exponent(problem: Problem, *, width: float | None = None) -> Enclosure:
     """Bounds on the largest Lyapunov exponent λ that hold for almost every path; as `prove`."""
-    return prove_exponent(problem, parameters_of(problem), width)
+    return prove_bounds(problem, parameters_of(problem), None, width)
 
 
 @of_problem
@@ -101,30 +101,28 @@ def refuse_unprovable(stated: Parameters) -> None:
         cylinder(stated)
 
 
-def prove_moment(problem: Problem, stated: Parameters, p: str, width: float | None) -> Enclosure:
-    """Bounds on Λ(p), with parameters and p as decimals."""
-    order = float(p)
-    if not math.isfinite(order):
+def prove_bounds(problem: Problem, stated: Parameters, p: str | None, width: float | None) -> Enclosure:
+    """Bounds on Λ(p), or on λ where p is None, with parameters and p as decimals."""
+    order = math.nan if p is None else float(p)
+    if p is not None and not math.isfinite(order):
         raise ValueError(f"got p = {p}; must be finite")
     check_width(width)
     refuse_unprovable(stated)
     if order == 0:
         return trivial(stated)
-    guess = _guess(lambda rtol: float(moment_lyapunov(problem, [order], rtol=rtol).value[0]))
-    scale = max(abs(guess or 0.0), float(scale_of(problem).moment(order)))
+    guess = None
+    for rtol in (1e-8, 1e-3):  # what finite elements find, at a smaller accuracy if need be
+        with suppress(NotConverged):
+            if p is None:
+                guess = lyapunov_exponent(problem, rtol=rtol).value
+            else:
+                guess = float(moment_lyapunov(problem, [order], rtol=rtol).value[0])
+            break
+    theory = scale_of(problem)
+    scale = max(abs(guess or 0.0), float(theory.linear if p is None else theory.moment(order)))
     wanted = SHARE * scale if width is None else width
-    found = NOTHING if guess is None else enclose(stated, p, wanted, guess)
+    found = NOTHING if p is not None and guess is None else enclose(stated, p, wanted, guess or 0.0)
     return replace(found, wanted=wanted)
-
-
-def prove_exponent(problem: Problem, stated: Parameters, width: float | None) -> Enclosure:
-    """Bounds on λ, with parameters as decimals."""
-    check_width(width)
-    refuse_unprovable(stated)
-    guess = _guess(lambda rtol: lyapunov_exponent(problem, rtol=rtol).value)
-    scale = max(abs(guess or 0.0), float(scale_of(problem).linear))
-    wanted = SHARE * scale if width is None else width
-    return replace(enclose(stated, None, wanted), wanted=wanted)
 
 
 def prove_index(problem: Problem, stated: Parameters) -> IndexEnclosure:
@@ -141,18 +139,8 @@ def prove_index(problem: Problem, stated: Parameters) -> IndexEnclosure:
     for _ in range(WIDENINGS):
         if half < abs(found.value):
             sides = [repr(float(f"{found.value + sign * half:.12g}")) for sign in (-1, 1)]
-            moments = tuple((p, prove_moment(problem, stated, p, slope * half / 2)) for p in sides)
+            moments = tuple((p, prove_bounds(problem, stated, p, slope * half / 2)) for p in sides)
             if moments[0][1].sign * moments[1][1].sign < 0:
                 return IndexEnclosure(*around(*sides), moments)
         half *= 10
     return NO_INDEX
-
-
-def _guess(solve: Callable[[float], float]) -> float | None:
-    """What finite elements find, at a smaller accuracy if need be."""
-    for rtol in (1e-8, 1e-3):
-        try:
-            return solve(rtol)
-        except NotConverged:
-            continue
-    return None

@@ -18,9 +18,8 @@ from fpsolve.proofs.claims import verdicts
 from fpsolve.proofs.questions import (
     IndexEnclosure,
     check_width,
-    prove_exponent,
+    prove_bounds,
     prove_index,
-    prove_moment,
     refuse_unprovable,
 )
 from fpsolve.proofs.statement import IMPACT, NOISE, OSCILLATOR, TREATMENT, Parameters
@@ -36,14 +35,14 @@ class Question:
     Attributes:
         quantity: the name of Λ(p), λ or δ_p.
         stated: the parameters of the curve as decimals.
-        p: the moment as a decimal.
+        p: the moment as a decimal; None for λ and δ_p.
         width: wanted upper − lower; a share of the scale if None.
     """
 
     curve: Curve
     quantity: str
     stated: Parameters
-    p: str = ""
+    p: str | None = None
     width: float | None = None
 
 
@@ -159,8 +158,6 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
 def answer(question: Question) -> Enclosure | IndexEnclosure:
     """The task: proves what is asked."""
     problem = question.curve.problem
-    if question.quantity == MOMENT.name:
-        return prove_moment(problem, question.stated, question.p, question.width)
-    if question.quantity == LYAPUNOV_EXPONENT.name:
-        return prove_exponent(problem, question.stated, question.width)
-    return prove_index(problem, question.stated)
+    if question.quantity == STABILITY_INDEX.name:
+        return prove_index(problem, question.stated)
+    return prove_bounds(problem, question.stated, question.p, question.width)
