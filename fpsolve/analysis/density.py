@@ -141,7 +141,7 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
                 return np.maximum(sign * phase_speed(system, xi)(phi), 0)
 
             density = np.sum(traces @ table, axis=0)
-            growth += space.turns * kick.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant()))
+            growth += space.turns * kick.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant))
     return growth
 
 

@@ -35,8 +35,8 @@ from fpsolve.case.sections import (
 from fpsolve.case.set_file import FileVary
 from fpsolve.case.vary import WORDS, Vary, assignments
 from fpsolve.errors import MeshError, NoSuchExponent
+from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.space import Discretisation, noise_space
 from fpsolve.model.noise import NonGaussianNoise, check_existence
 from fpsolve.simulation.setup import obstacles
 from fpsolve.theory.perturbation import second_order
@@ -133,7 +133,7 @@ def _misfit(mesh: CylinderMesh, valid: Known) -> str:
             continue
         judged.add(shape)
         chosen = Discretisation.on(mesh, noise)
-        size, most = chosen.unknowns(noise), valid["budget"].unknowns
+        size, most = chosen.size, valid["budget"].unknowns
         if size > most:
             return (
                 f"{_with(varied)}makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
@@ -141,9 +141,10 @@ def _misfit(mesh: CylinderMesh, valid: Known) -> str:
             )
         try:
             for each in (chosen, chosen.enriched().enriched()):  # the finer one tells the error
-                noise_space(noise, each, 0.0)
+                each.axes([noise], 0.0)
         except MeshError as failure:
-            return f"{_with(varied)}from xi = {chosen.z_lines[0]:g} to {chosen.z_lines[-1]:g} {failure}"
+            lines = chosen.noise.lines
+            return f"{_with(varied)}from xi = {lines[0]:g} to {lines[-1]:g} {failure}"
     return ""
 
 

@@ -15,15 +15,15 @@ from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.corners import corners
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.refine import doubled, first, first_far, refined
+from fpsolve.exponent.refine import first, first_far, refined
 from fpsolve.exponent.rival import comparable, rival
+from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.space import Discretisation
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT, parameter
-from fpsolve.model.problem import AnyNoise, Problem
+from fpsolve.model.problem import Problem
 from fpsolve.theory.far import far_places
 from fpsolve.theory.frozen import frozen_noise
 
@@ -77,7 +77,7 @@ def resolve(
         NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
             `Solution`, or None.
     """
-    meter = _Meter(problem.noise, p, budget)
+    meter = _Meter(p, budget)
     frozen = frozen_noise(problem)
     center = frozen.center(p) if frozen else 0.0
     found = _search(problem, start or first(problem, p, center, rtol), tolerance, meter)
@@ -101,7 +101,7 @@ def resolve_far(
 
     Paths that leave the interval of the noise are killed, which makes Λ(p) smaller, but by no more than the tolerance.
     """
-    meter = _Meter(problem.noise, p, budget)
+    meter = _Meter(p, budget)
     places = far_places(problem, p)
     enough = comparable(max(place.rate for place in places))
     wanted = [place for place in places if place.rate > enough]
@@ -126,7 +126,7 @@ def _search(
             pair = principal_pair(Generator(problem, chosen), p, start=pair)
         except (MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError) as failure:
             meter.failure, pair = failure, None
-            chosen = doubled(chosen)
+            chosen = chosen.doubled()
             continue
         solution = Solution(pair)
         allowed = tolerance(pair.value)
@@ -142,7 +142,6 @@ def _search(
 class _Meter:
     """What a search for a discretisation has cost, and the best it has found."""
 
-    noise: AnyNoise
     p: float
     budget: Budget
     started: float = field(default_factory=time.thread_time)
@@ -155,7 +154,7 @@ class _Meter:
 
     def check(self, chosen: Discretisation) -> None:
         """Refuse a stage beyond the budget, and count it."""
-        size, elapsed = chosen.unknowns(self.noise), time.thread_time() - self.started
+        size, elapsed = chosen.size, time.thread_time() - self.started
         cost = max(SECONDS_PER_UNKNOWN, (elapsed - self.last[0]) / max(self.last[1], 1) ** 1.5 if self.last[1] else 0.0)
         seconds = elapsed + cost * size**1.5
         if size > self.budget.unknowns:
@@ -192,8 +191,8 @@ def fits(generator: Generator, q: float, p: float) -> bool:
     frozen = frozen_noise(generator.problem)
     if generator.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
         return False
-    if frozen is None or not generator.chosen.polynomials:
+    if frozen is None or generator.chosen.noise.kind != "polynomials":
         return True
     if corners(generator.problem, p):
         return False
-    return abs(frozen.tilt(frozen.center(p)) - generator.chosen.slope * p) <= MOST_TILT_AWAY
+    return abs(frozen.tilt(frozen.center(p)) - generator.chosen.noise.slope * p) <= MOST_TILT_AWAY

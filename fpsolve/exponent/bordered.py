@@ -7,7 +7,7 @@ from functools import cached_property
 
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.fem.factors import Factors, factorised, one_thread
+from fpsolve.fem.factors import Factors, one_thread
 
 REFINEMENTS = 3
 """Of T′, by each of which its error falls to 1e-6 of a rate over the gap of the spectrum."""
@@ -25,12 +25,12 @@ class Bordered:
     def __init__(self, pair: PrincipalPair) -> None:
         self.pair, self._weighed = pair, (pair.space.weighed(pair.right), pair.space.weighed(pair.left))
         self.norm = float(pair.left @ self._weighed[0])
-        self._whole = pair.generator.matrix(pair.p)
-        self._operator = self._whole.shifted(pair.value)
+        self._pencil = pair.generator.at(pair.p)
+        self._operator = self._pencil.matrix.shifted(pair.value)
 
     @cached_property
     def _factor(self) -> Factors:
-        return factorised(self._whole.shifted(self.pair.value + 1e-6 * self.pair.generator.unit_rate))
+        return self._pencil.factorised(self.pair.value + 1e-6 * self.pair.generator.unit_rate)
 
     def solve(self, source: FloatArray, *, adjoint: bool = False) -> FloatArray:
         """v from the load f."""

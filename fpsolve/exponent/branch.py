@@ -18,10 +18,10 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.refine import refined
 from fpsolve.exponent.rival import is_far_out, rival
+from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.space import Discretisation
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem
@@ -189,7 +189,7 @@ def _trimmed(solution: Solution, tolerance: Tolerance) -> Discretisation:
     if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
         return generator.chosen
     smaller = refined(solution, tolerance(pair.p, pair.value), 0)
-    is_better = smaller.unknowns(generator.problem.noise) <= TRIM * generator.size
+    is_better = smaller.size <= TRIM * generator.size
     return smaller if is_better else generator.chosen
 
 

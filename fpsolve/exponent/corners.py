@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.fem.space import Discretisation
+from fpsolve.fem.discretisation import Cells, Discretisation, PhaseCells
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import Diffusion
 from fpsolve.model.plane import is_steady, turning_noise
@@ -107,9 +107,9 @@ def resolving(
     """
     lower, upper = _interval(noise, center)
     even = np.linspace(lower, upper, math.ceil((upper - lower) / WIDTH) + 1)
-    z_lines = _with(chosen.z_lines if chosen.z_lines.size else even, _z(found))
-    degrees = np.minimum(DEGREE, chosen.phi_degrees)
-    cells = replace(chosen, phi_degrees=degrees, polynomials=0, slope=0.0, z_lines=z_lines, xi_degree=DEGREE)
+    lines = _with(chosen.noise.lines if chosen.noise.lines.size else even, _z(found))
+    phase = replace(chosen.phase, degrees=np.minimum(DEGREE, chosen.phase.degrees))
+    cells = Discretisation(phase, (Cells(lines, DEGREE),))
     to_end = noise.half_width / noise.standard_deviation - np.max(np.abs(_z(found)))
     levels = max(math.ceil(math.log2(WIDTH / min(to_end, WIDTH))), *(corner.levels(rtol) for corner in found))
     return _graded(found, cells, levels, levels)
@@ -130,8 +130,8 @@ def slow_shares(found: Sequence[Corner], chosen: Discretisation, degrees: tuple[
         degrees: of the cells of φ, and of ξ, two arrays.
     """
     return (
-        _slow(chosen.phi_lines, _rays(found, chosen.phi_lines), degrees[0], _order(found) / 3),
-        _slow(chosen.z_lines, _z(found), degrees[1], _order(found)),
+        _slow(chosen.phase.lines, _rays(found, chosen.phase.lines), degrees[0], _order(found) / 3),
+        _slow(chosen.noise.lines, _z(found), degrees[1], _order(found)),
     )
 
 
@@ -189,9 +189,10 @@ def _are(lines: FloatArray, places: FloatArray) -> Any:
 
 def _graded(found: Sequence[Corner], chosen: Discretisation, in_phi: int, in_z: int) -> Discretisation:
     """With cells that get smaller so often towards the corners."""
-    phi, phi_cells = _towards(chosen.phi_lines, _rays(found, chosen.phi_lines), CUBED, in_phi)
-    z, _ = _towards(chosen.z_lines, _z(found), RATIO, in_z)
-    return replace(chosen, phi_lines=phi, phi_degrees=chosen.phi_degrees[phi_cells], z_lines=z)
+    phase, part = chosen.phase, chosen.noise
+    phi, phi_cells = _towards(phase.lines, _rays(found, phase.lines), CUBED, in_phi)
+    z, _ = _towards(part.lines, _z(found), RATIO, in_z)
+    return Discretisation(PhaseCells(phi, phase.degrees[phi_cells]), (replace(part, lines=z),))
 
 
 def _towards(lines: FloatArray, places: FloatArray, ratio: float, levels: int) -> tuple[FloatArray, Any]:

@@ -24,10 +24,9 @@ from fpsolve.data import brief
 from fpsolve.errors import NotConverged, SingularMatrix
 from fpsolve.exponent.eigenfunction_plot import EigenfunctionPlot
 from fpsolve.exponent.rounding import rounding_of_entries
-from fpsolve.fem.factors import Factors, factorised
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.kronecker import KroneckerSum
-from fpsolve.fem.space import CylinderSpace
+from fpsolve.fem.axis import TensorSpace
+from fpsolve.fem.factors import Factors
+from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.theory.frozen import eigenvalues_at
@@ -79,7 +78,7 @@ class PrincipalPair(EigenfunctionPlot):
         return brief(self, f"Λ{of_p}{self.value:.10g}, Λ′{of_p}{self.derivative:.10g}, {self.right.size} unknowns")
 
     @property
-    def space(self) -> CylinderSpace:
+    def space(self) -> TensorSpace:
         """The functions that the coefficients are of."""
         return self.generator.space(self.p)
 
@@ -115,7 +114,7 @@ def principal_pair(
             vectors = search()
         except NotConverged:  # the other searches may still find it
             continue
-        found.append(_rayleigh_iteration(generator, p, *vectors))
+        found.append(_pair(generator, *rayleigh_iteration(generator.at(p), *vectors)))
         if found[-1].residual <= BACKWARD_ERROR_LIMIT and min(found[-1].sign_defects) <= SURELY_POSITIVE:
             return _rightmost(found[-1])
     pair = min(found, key=lambda pair: (pair.residual > BACKWARD_ERROR_LIMIT, min(pair.sign_defects)))
@@ -178,20 +177,20 @@ def _simplest(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
     """T = T*/P_s = 1 of weak noise, Eqs. (26) and (28); where paths are killed those of noise that rests."""
     space = generator.space(p)
     if not generator.chosen.is_killed:
-        return space.constant(), space.constant()
+        return space.constant, space.constant
     resting = space.xi.mass(lambda xi: p * eigenvalues_at(generator.problem, xi)[0])
-    _, vectors = scipy.linalg.eigh(finite(dense(space.xi_matrix(None) + resting)), dense(space.xi_matrix(one)))
-    vector = np.outer(space.phi.constant, vectors[:, -1]).ravel()
+    _, vectors = scipy.linalg.eigh(finite(dense(space.xi.matrix(None) + resting)), dense(space.xi.matrix(one)))
+    vector = space.product([space.phi.constant, vectors[:, -1]])
     return vector, vector
 
 
 def _from_the_right(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
     """Right and left vectors near the principal ones, from shifts that start at an upper bound of Λ(p)."""
-    space, operator = generator.space(p), generator.matrix(p)
+    pencil, space = generator.at(p), generator.space(p)
     shift = generator.upper_bound(p) + 0.25 * generator.unit_rate
     right, left = _simplest(generator, p)
     for _ in range(2):
-        factor = factorised(operator.shifted(shift))
+        factor = pencil.factorised(shift)
         right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, p)
         shift -= 0.95 / inverse_distance
     for _ in range(4):
@@ -212,7 +211,7 @@ def _dominant(apply: Any, start: FloatArray, p: float) -> tuple[FloatArray, floa
     return vectors[:, 0].real, float(values[0].real)
 
 
-class _Iterate(NamedTuple):
+class Iterate(NamedTuple):
     """A two-sided Rayleigh quotient, the larger of the two backward errors, and both vectors, of length 1."""
 
     value: float
@@ -222,14 +221,14 @@ class _Iterate(NamedTuple):
 
 
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # a start may be useless, as its residual tells then
-def _rayleigh_iteration(generator: Generator, p: float, x: FloatArray, y: FloatArray) -> PrincipalPair:
+def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> tuple[Pencil, Iterate]:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
-    space, operator = generator.space(p), generator.matrix(p)
-    best = _Iterate(float(y @ (operator @ x) / (y @ space.weighed(x))), math.inf, x, y)
+    space, operator = pencil.space, pencil.matrix
+    best = Iterate(float(y @ (operator @ x) / (y @ space.weighed(x))), math.inf, x, y)
     size, stalls = operator.norm(), 0
     for _ in range(MAX_ITERATIONS):
         shift, last = best.value, best.residual
-        factor = factorised(operator.shifted(shift))
+        factor = pencil.factorised(shift)
         for _ in range(STEPS_PER_FACTOR):
             new = _improved(factor, space, shift, size, best)
             if not new.residual < 0.5 * best.residual:
@@ -242,12 +241,13 @@ def _rayleigh_iteration(generator: Generator, p: float, x: FloatArray, y: FloatA
         if best.residual <= BACKWARD_ERROR_GOAL or stalls > may_stall or not math.isfinite(best.value):
             break
     # the value from the forcing is linear in the error of T; beside thin cells residuals look smaller than they are
-    if best.residual > 1e-3 * BACKWARD_ERROR_GOAL or generator.chosen.xi_kind == "cells":
+    has_cells = any(axis.is_local and axis.cells.max() >= 0 for axis in space.axes[1:])
+    if best.residual > 1e-3 * BACKWARD_ERROR_GOAL or has_cells:
         best = _improved(factor, space, shift, size, best)
-    return _pair(generator, p, operator, size, best)
+    return pencil, best
 
 
-def _improved(factor: Factors, space: CylinderSpace, shift: float, size: float, old: _Iterate) -> _Iterate:
+def _improved(factor: Factors, space: TensorSpace, shift: float, size: float, old: Iterate) -> Iterate:
     """One step of inverse iteration; of (L − σM) x₁ = M x₀ the images L x₁ need no product with L."""
     images, vectors = [], []
     for vector, solve in ((old.x, factor.solve), (old.y, factor.solve_transposed)):
@@ -259,17 +259,17 @@ def _improved(factor: Factors, space: CylinderSpace, shift: float, size: float, 
     weighed = [space.weighed(vector) for vector in vectors]
     distance = float(vectors[1] @ images[0] / (vectors[1] @ weighed[0]))
     errors = [np.linalg.norm(image - distance * each) for image, each in zip(images, weighed, strict=True)]
-    return _Iterate(shift + distance, float(max(errors) / size), *vectors)
+    return Iterate(shift + distance, float(max(errors) / size), *vectors)
 
 
-def _pair(generator: Generator, p: float, operator: KroneckerSum, size: float, found: _Iterate) -> PrincipalPair:
+def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair:
     """Normalise both vectors, judge their signs, and take Λ from the formula that rounding harms less."""
-    space = generator.space(p)
+    p, space, operator = pencil.p, pencil.space, pencil.matrix
     images = operator @ found.x, operator.T @ found.y
     weighed = space.weighed(found.x), space.weighed(found.y)
     value = float(found.y @ images[0] / (found.y @ weighed[0]))  # without what elimination rounds off
     errors = [np.linalg.norm(image - value * each) for image, each in zip(images, weighed, strict=True)]
-    constant = space.constant()
+    constant = space.constant
     weight, norm = space.weighed(constant), 1 / space.turns
     x = found.x * ((constant @ weight) / (weight @ found.x))
     y = found.y * (norm / (found.y @ space.weighed(x)))
@@ -278,7 +278,7 @@ def _pair(generator: Generator, p: float, operator: KroneckerSum, size: float, f
         rounding += rounding_of_entries(generator, p, x, y) / norm
     if generator.keeps_constants:
         forcing, total = generator.matrix(p, orders=slice(1, None)), weight @ x
-        of_noise = np.outer(space.phi.constant, space.xi.generator_of_one()).ravel()
+        of_noise = space.product([space.phi.constant, space.xi.generator_of_one()])
         doubtful = abs(x) + generator.loss * abs(x - constant)
         bound = _EPS * float((constant @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total)
         if bound < rounding:
@@ -291,14 +291,14 @@ def _pair(generator: Generator, p: float, operator: KroneckerSum, size: float, f
         right=x,
         left=y,
         derivative=float(y @ (generator.matrix(p, derivative=1) @ x) / norm),
-        residual=float(max(errors) / size),
+        residual=float(max(errors) / operator.norm()),
         rounding=float(rounding),
         sign_defects=_sign_defects(space, x, y),
         generator=generator,
     )
 
 
-def _sign_defects(space: CylinderSpace, x: FloatArray, y: FloatArray) -> tuple[float, float]:
+def _sign_defects(space: TensorSpace, x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Shares of T and of T* that are not positive, by their own size or by |T T*|, whichever is larger.
 
     T T* looks where the tilted density lives: a strong tilt hides the sign change of another pair from P_s.

@@ -13,18 +13,18 @@ import sys
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.corners import Corner, corners, left_on_mesh, slow_shares
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.fem.discretisation import ModeEffects
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.noise_space import CellSpace, NoiseSpace
-from fpsolve.fem.phase_space import PhaseSpace
+from fpsolve.fem.kronecker import along
+from fpsolve.fem.noise_axes import CellAxis
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.quantity import UNNAMED
 
@@ -129,7 +129,7 @@ class Solution:
     finer: PrincipalPair | None = None
 
     @cached_property
-    def effects(self) -> tuple[ModeEffects, ModeEffects | None]:
+    def effects(self) -> tuple[ModeEffects | None, ...]:
         """Those of φ, and those of ξ if it has elements."""
         return mode_effects(self.pair)
 
@@ -170,85 +170,43 @@ class Solution:
 
     def _beside(self, finer: PrincipalPair) -> float:
         """What is missing, by that of a finer pair."""
-        degrees = (int(np.max(pair.generator.chosen.phi_degrees)) for pair in (self.pair, finer))
+        degrees = (int(np.max(pair.generator.chosen.phase.degrees)) for pair in (self.pair, finer))
         return abs(finer.value - self.pair.value) * left_on_mesh(self._corners, *degrees)
 
 
-@dataclass(frozen=True, eq=False)
-class ModeEffects:
-    """How much of Λ each cell of one direction owes to its highest modes.
-
-    Attributes:
-        degrees: of the cells, shape (cells,).
-        two, four: the effects of the two and of the four highest modes, shape (cells,).
-        slowest: the least share of the effect of two modes that is thought to be left.
-        corners: that of the cells in which T is singular, 0 for others, shape (cells,); None if there are none.
-    """
-
-    degrees: Any
-    two: FloatArray
-    four: FloatArray
-    slowest: float = 0.0
-    corners: FloatArray | None = None
-
-    @property
-    def of_cells(self) -> FloatArray:
-        """Estimate of what each cell lacks, half way from the effect of two modes to what its fall predicts."""
-        left = np.sqrt(self.two / np.maximum(self.four, 1e-300))
-        shares = np.clip(left, self.slowest, 1.0)
-        return self.two * (shares if self.corners is None else np.maximum(shares, self.corners))
-
-    @property
-    def at_corners(self) -> Any:
-        """Which cells T is singular in, shape (cells,)."""
-        return np.zeros_like(self.degrees, dtype=bool) if self.corners is None else self.corners > 0
-
-    @property
-    def error(self) -> float:
-        return float(np.sum(self.of_cells))
-
-    @property
-    def fall(self) -> FloatArray:
-        """By how much the logarithm of the effect falls with each degree, shape (cells,)."""
-        return np.maximum(0.5 * np.log(np.maximum(self.four, 1e-300) / np.maximum(self.two, 1e-300)), 0.3)
-
-    def needed(self, tolerance: float) -> FloatArray:
-        """The degree at which each cell would lack `tolerance`, shape (cells,)."""
-        return self.degrees + np.log(np.maximum(self.of_cells, 1e-300) / tolerance) / self.fall
-
-
-def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects, ModeEffects | None]:
-    """The effects along φ, and along ξ unless that has states."""
+def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
+    """The effects along every axis; None along one that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
     operator = pair.generator.matrix(pair.p).shifted(pair.value)
-    tables = space.table(pair.right), space.table(pair.left)
-    found: list[ModeEffects | None] = []
-    lines: tuple[PhaseSpace | NoiseSpace, ...] = (space.phi, space.xi)
-    for axis, line in enumerate(lines):
-        inner, count = line.cells >= 0, int(line.cells.max()) + 1
+    tables, found = (space.table(pair.right), space.table(pair.left)), list[ModeEffects | None]()
+    for at, axis in enumerate(space.axes):
+        inner, count = axis.cells >= 0, int(axis.cells.max()) + 1
         if count == 0:
             found.append(None)
             continue
         degrees = np.zeros(count, dtype=int)
-        np.maximum.at(degrees, line.cells[inner], line.modes[inner])
-        effects, (right, left) = [], tables if axis == 0 else tuple(map(space.xi.nested, tables))
+        np.maximum.at(degrees, axis.cells[inner], axis.modes[inner])
+        nested = [axis.nested if k == at else None for k in range(len(space.axes))]
+        effects, (right, left) = [], (along(nested, table) for table in tables)
         for depth in (2, 4):
-            high = inner & (line.modes > degrees[line.cells] - depth)
-            mask = high[:, None] if axis == 0 else high
+            high = inner & (axis.modes > degrees[axis.cells] - depth)
+            mask = high.reshape([-1 if k == at else 1 for k in range(len(space.axes))])
             image = space.table(operator @ np.ravel(right * mask))
-            shares = np.abs(left * mask * image).sum(axis=1 - axis)[high]
-            effects.append(np.bincount(line.cells[high], shares, minlength=count) / abs(norm))
-        found.append(ModeEffects(degrees, effects[0], effects[1], axis * space.xi.slowest))
-    return _with_corners(pair, *found)  # type: ignore[arg-type]
+            others = tuple(k for k in range(len(space.axes)) if k != at)
+            shares = np.abs(left * mask * image).sum(axis=others)[high]
+            effects.append(np.bincount(axis.cells[high], shares, minlength=count) / abs(norm))
+        found.append(ModeEffects(degrees, effects[0], effects[1], axis.slowest))
+    return _with_corners(pair, found)
 
 
-def _with_corners(
-    pair: PrincipalPair, phi: ModeEffects, xi: ModeEffects | None
-) -> tuple[ModeEffects, ModeEffects | None]:
+def _with_corners(pair: PrincipalPair, effects: list[ModeEffects | None]) -> tuple[ModeEffects | None, ...]:
     """The same where T is singular in some cells."""
-    chosen, found = pair.generator.chosen, corners(pair.generator.problem, pair.p)
-    if xi is None or not (found and chosen.z_lines.size):
-        return phi, xi
+    (phi, *others), chosen = effects, pair.generator.chosen
+    if phi is None or others[0] is None or not chosen.noise.lines.size:
+        return tuple(effects)
+    found, xi = corners(pair.generator.problem, pair.p), others[0]
+    if not found:
+        return tuple(effects)
     slow = slow_shares(found, chosen, (phi.degrees, xi.degrees))
     return replace(phi, corners=slow[0]), replace(xi, corners=slow[1])
 
@@ -256,12 +214,12 @@ def _with_corners(
 def truncation(pair: PrincipalPair) -> tuple[float, float]:
     """Bounds on what the two ends of an interval of cells change in Λ: ½σ² ∫ P_s |T_z| T* dφ / ∫ T T* there."""
     xi = pair.space.xi
-    if not isinstance(xi, CellSpace):
+    if not isinstance(xi, CellAxis):
         return 0.0, 0.0
     return _end_effect(pair, xi, 0), _end_effect(pair, xi, -1)
 
 
-def _end_effect(pair: PrincipalPair, xi: CellSpace, end: int) -> float:
+def _end_effect(pair: PrincipalPair, xi: CellAxis, end: int) -> float:
     """½σ² P_s |∂T| T* at an end; the slope is the largest in the last cell, as no flux makes it 0 at the end itself.
 
     Where paths are killed T and T* are 0 at the end, and ½σ² P_s |∂T ∂T*| times the last cell bounds what it hides.
@@ -272,4 +230,4 @@ def _end_effect(pair: PrincipalPair, xi: CellSpace, end: int) -> float:
     adjoint = left[1] * (lines[1] - lines[0]) / (z[1] - z[0]) if xi.is_killed else left[0]
     slope = np.max(np.abs(np.diff(right @ adjoint) / np.diff(z)))
     norm = pair.left @ space.weighed(pair.right)
-    return float(xi.rate * xi.weight(z[:1])[0] * slope / abs(norm))
+    return float(xi.rate(z[:1])[0] * xi.weight(z[:1])[0] * slope / abs(norm))

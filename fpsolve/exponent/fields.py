@@ -7,9 +7,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.noise_space import Samples
-from fpsolve.fem.space import CylinderSpace
+from fpsolve.fem.noise_axes import Samples
 
 MOST_TILT = 1.5
 UNRESOLVED, MOST_NEGATIVE = 0.1, 0.02
@@ -40,7 +40,7 @@ class Pair(Protocol):
         """What was solved."""
 
     @property
-    def space(self) -> CylinderSpace:
+    def space(self) -> TensorSpace:
         """The functions that the coefficients are of."""
 
 

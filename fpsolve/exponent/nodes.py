@@ -16,8 +16,8 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import OutputError
 from fpsolve.exponent.fields import Fields, Pair, fields, xi_marginal
-from fpsolve.fem.noise_space import LineNoiseSpace, Samples
-from fpsolve.fem.phase_space import PhaseSpace
+from fpsolve.fem.noise_axes import LineAxis, Samples
+from fpsolve.fem.phase import PhaseAxis
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.noise import has_algebraic_tails
 
@@ -56,7 +56,7 @@ class Nodes:
         order = min(MAX_ORDER, max(degrees))
         tall = math.ceil(np.max(np.diff(lines) / _resolution(pair, lines)) - 1e-9)
         phi = _nodes(_phi_breaks(space.phi), order, finer * _parts(degrees[0], order))
-        z = _nodes(lines, order, finer * max(tall, _parts(pair.generator.chosen.xi_degree, order)))
+        z = _nodes(lines, order, finer * max(tall, _parts(pair.generator.chosen.noise.degree, order)))
         return cls(phi, z, pair.generator.problem.noise.standard_deviation, order)
 
     @property
@@ -101,7 +101,7 @@ class Nodes:
         return corners.reshape(-1, 1) + i * self.z.size + j
 
 
-def _phi_breaks(phi: PhaseSpace) -> FloatArray:
+def _phi_breaks(phi: PhaseAxis) -> FloatArray:
     """0, 2π and the φ-lines between them, those of a half circle repeated."""
     lines = np.sort(np.mod(phi.lines[:-1], phi.span))
     lines = np.concatenate([lines + k * phi.span for k in range(round(2 * math.pi / phi.span))])
@@ -115,8 +115,8 @@ def _z_lines(pair: Pair) -> FloatArray:
     Outside it P_s and the tilted density are below `FAINT` of their largest values.
     """
     xi, noise = _on_a_line(pair), pair.generator.problem.noise
-    if pair.generator.chosen.z_lines.size or isinstance(noise, MarkovChain):
-        return pair.generator.chosen.z_lines
+    if pair.generator.chosen.noise.lines.size or isinstance(noise, MarkovChain):
+        return pair.generator.chosen.noise.lines
     end = noise.half_width / noise.standard_deviation
     reach = min(end, 12.0 + abs(xi.center))
     z = np.linspace(-reach, reach, 2001)[1:-1]
@@ -134,9 +134,9 @@ def _resolution(pair: Pair, lines: FloatArray) -> FloatArray:
     return np.maximum(1.0, np.minimum(abs(lines[:-1]), abs(lines[1:])) / 6)
 
 
-def _on_a_line(pair: Pair) -> LineNoiseSpace:
+def _on_a_line(pair: Pair) -> LineAxis:
     """The functions of ξ of a pair. Raises `OutputError` where the noise has states."""
-    if not isinstance(pair.space.xi, LineNoiseSpace):
+    if not isinstance(pair.space.xi, LineAxis):
         raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
     return pair.space.xi
 

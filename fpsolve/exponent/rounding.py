@@ -7,8 +7,8 @@ import sys
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.space import CylinderSpace
 
 
 def rounding_of_entries(generator: Generator, p: float, x: FloatArray, y: FloatArray) -> float:
@@ -24,11 +24,11 @@ def rounding_of_entries(generator: Generator, p: float, x: FloatArray, y: FloatA
     for drive in generator.problem.system.drives:
         size = generator.problem.system.epsilon**drive.order
         q, h = (size * (abs(each.mean) + each.amplitude) for each in (drive.q, drive.h))
-        total += float(np.sum(left * ((p * q * right + h * slopes) @ abs(space.xi_matrix(drive.g)))))
+        total += float(np.sum(left * ((p * q * right + h * slopes) @ abs(space.xi.matrix(drive.g)))))
     return sys.float_info.epsilon * total
 
 
-def _summed(space: CylinderSpace, coefficients: FloatArray) -> FloatArray:
+def _summed(space: TensorSpace, coefficients: FloatArray) -> FloatArray:
     """Sums of absolute values over the functions of each cell of φ, shape (cells, xi.size)."""
     starts = np.flatnonzero(np.diff(space.phi.cells, prepend=-1))
     return np.add.reduceat(np.abs(space.table(coefficients)), starts, axis=0)

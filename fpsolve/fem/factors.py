@@ -53,7 +53,7 @@ def factorised(operator: KroneckerSum) -> Factors:
     """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted."""
     if operator.size <= MAX_DENSE_UNKNOWNS and not operator.is_sparse:
         return DenseFactors(operator.toarray())
-    m, n = operator.shape
+    m, n = operator.halves
     if not operator.is_sparse and m <= MAX_BLOCK and operator.band <= MAX_BAND < n:
         return BlockFactors(operator)
     return SparseFactors(operator)
@@ -87,10 +87,10 @@ class DenseFactors:
 
 
 class BlockFactors:
-    """Block elimination over the functions of ξ, from the last, where the noise relaxes fastest, to the first."""
+    """Block elimination over the functions of the last axis, from the last, where noise relaxes fastest, on."""
 
     def __init__(self, operator: KroneckerSum) -> None:
-        self._shape, band = operator.shape, operator.band
+        self._shape, band = operator.halves, operator.band
         self._steps: list[tuple[DenseFactors, list[tuple[int, FloatArray, FloatArray]]]] = []
         blocks = {offset: operator.blocks(offset) for offset in range(-band, band + 1)}
         for i in range(self._shape[1] - 1, -1, -1):

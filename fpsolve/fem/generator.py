@@ -3,27 +3,47 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.linalg
 
-from fpsolve.arrays import Coefficient, finite, one
+from fpsolve.arrays import finite, one
+from fpsolve.fem.axis import TensorSpace
+from fpsolve.fem.discretisation import Discretisation
+from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.phase_space import PhaseSpace
-from fpsolve.fem.space import CylinderSpace, Discretisation, noise_space
-from fpsolve.fem.terms import OfMoment, Term, changed_terms, power_of_epsilon, terms_of
+from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.direction import Direction
 from fpsolve.model.markov_chain import MarkovChain
 from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rate, phase_speed
 from fpsolve.model.problem import Problem
 
-_ALL = slice(None)
 KEPT_SPACES = 16
 MOST_FOR_A_BOUND = 300
 """Functions of ξ up to which the sharper bound of Λ is used; beyond, that of noise that rests at an end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pencil:
+    """L(p) − σM for one p: what is solved.
+
+    Attributes:
+        p: the moment.
+        space: the trial and test functions.
+        matrix: that of L(p), its first term with the matrices of noise that `space.mass` has.
+    """
+
+    p: float
+    space: TensorSpace
+    matrix: KroneckerSum
+
+    def factorised(self, shift: float) -> Factors:
+        """LU factors of L(p) − σM: dense, by blocks along the last axis, or sparse."""
+        return factorised(self.matrix.shifted(shift))
 
 
 class Generator:
@@ -40,12 +60,12 @@ class Generator:
     def __init__(self, problem: Problem, chosen: Discretisation | CylinderMesh) -> None:
         if isinstance(chosen, CylinderMesh):
             chosen = Discretisation.on(chosen, problem.noise)
-        self.problem, self.chosen = problem, chosen
-        self.phi = PhaseSpace(chosen.phi_lines, chosen.phi_degrees)
+        self.problem, self.chosen, self.size = problem, chosen, chosen.size
+        self.phi = chosen.phase.axis()
+        self._spaces: dict[float, TensorSpace] = {}
+        self._changes: dict[Direction, tuple[Term, ...]] = {}
         for kick in problem.system.kicks:
             self.phi.vertices_at(kick.phase)
-        self._spaces: dict[float, CylinderSpace] = {}
-        self._changes: dict[Direction, tuple[Term, ...]] = {}
         self.space(0.0)  # refuses a mesh that cannot be used
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -56,29 +76,28 @@ class Generator:
         lines = [f"  {power_of_epsilon(term.order):<2}  {term.text}" for term in self.terms()]
         return "\n".join(["L(p), Eq. (19), the sum of", *lines])
 
-    def space(self, p: float) -> CylinderSpace:
+    def space(self, p: float) -> TensorSpace:
         """Trial and test functions; the tilt of those of ξ moves with p."""
-        key = p if self.chosen.slope else 0.0
+        key = p if self.chosen.is_tilted else 0.0
         if key not in self._spaces:
             if len(self._spaces) >= KEPT_SPACES:
                 del self._spaces[next(iter(self._spaces))]
-            self._spaces[key] = CylinderSpace(self.phi, noise_space(self.problem.noise, self.chosen, p))
+            self._spaces[key] = TensorSpace([self.phi, *self.chosen.axes([self.problem.noise], p)])
         return self._spaces[key]
+
+    def at(self, p: float) -> Pencil:
+        """What is solved at p."""
+        return Pencil(p, self.space(p), self.matrix(p))
 
     def enriched(self) -> Generator:
         """That of the next finer discretisation."""
         return Generator(self.problem, self.chosen.enriched())
 
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return self.chosen.unknowns(self.problem.noise)
-
     def terms(self) -> tuple[Term, ...]:
         """L(p) term by term."""
-        return tuple(terms_of(self.problem.system, self.space(0.0)))
+        return tuple(Terms(self.problem.system, self.space(0.0)).whole())
 
-    def matrix(self, p: float, *, derivative: int = 0, orders: slice = _ALL) -> KroneckerSum:
+    def matrix(self, p: float, *, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
         """The matrix of dᵏL/dpᵏ in the space for p, from the terms of some orders in ε, the ξ-matrix of 1 first.
 
         Args:
@@ -86,20 +105,19 @@ class Generator:
             derivative: k; the tilt is held.
             orders: slice(1, None) leaves out L₀.
         """
-        space = self.space(p)
-        return KroneckerSum([(phase, space.xi_matrix(g)) for g, phase in self._phases(p, derivative, orders).items()])
+        return self._sum.matrix(self.space(p), p, derivative, orders)
 
     def changed(self, by: Direction, p: float, *, derivative: int = 0) -> KroneckerSum:
         """The matrix of ∂/∂θ dᵏL/dpᵏ, the functions of φ and ξ held; that of P_s, and so of `mass`, is in it."""
-        space = self.space(p)
+        xi = self.space(p).xi
         if by not in self._changes:
-            self._changes[by] = tuple(changed_terms(self.problem.system, self.space(0.0), by))
+            self._changes[by] = tuple(Terms(self.problem.system, self.space(0.0)).changed(by))
         sizes = [(term.of_p(p, derivative), term) for term in self._changes[by]]
-        parts = [(size * term.phase, space.xi_matrix(term.g)) for size, term in sizes if size]
+        parts = [(size * term.phase, xi.matrix(term.noises[0])) for size, term in sizes if size]
         if by.noise is not None:
-            phases = self._phases(p, derivative)
-            parts += [(phase, space.xi.changed(by.noise, g)) for g, phase in phases.items()]
-        return KroneckerSum(parts or [(0.0 * self.phi.identity, space.xi_matrix(one))])
+            phases = self._sum.phases(p, derivative)
+            parts += [(phase, xi.changed(by.noise, g)) for (g,), phase in phases.items()]
+        return KroneckerSum(parts or [(0.0 * self.phi.identity, xi.matrix(one))])
 
     def changed_mass(self, by: Direction, p: float) -> KroneckerSum | None:
         """∂/∂θ of `mass`; None where the noise does not change."""
@@ -107,33 +125,13 @@ class Generator:
             return None
         return KroneckerSum([(self.phi.identity, self.space(p).xi.changed(by.noise, one))])
 
-    def _phases(self, p: float, derivative: int, orders: slice = _ALL) -> dict[Coefficient | None, Any]:
-        """For each function of ξ the matrix of φ; the first is that of 1."""
-        phases: dict[Coefficient | None, Any] = {one: 0.0 * self.phi.identity}
-        last = max(order for parts in self._parts.values() for order, _, _ in parts)
-        wanted = range(1 + last)[orders]
-        for g, parts in self._parts.items():
-            for order, of_p, phase in parts:
-                size = of_p(p, derivative) if order in wanted else 0.0
-                if size:
-                    phases[g] = phases[g] + size * phase if g in phases else size * phase
-        return phases
-
     def mass(self, p: float) -> KroneckerSum:
         """∫ P_s w T."""
-        return KroneckerSum([(self.phi.identity, self.space(p).xi_matrix(one))])
+        return self.space(p).mass
 
     @cached_property
-    def _parts(self) -> dict[Coefficient | None, list[tuple[int, OfMoment, Any]]]:
-        """For each function of ξ the sums of the φ-matrices of all terms with the same order and coefficient."""
-        sums: dict[tuple[Coefficient | None, int, OfMoment], Any] = {}
-        for term in self.terms():
-            key = term.g, term.order, term.of_p
-            sums[key] = sums[key] + term.phase if key in sums else term.phase
-        parts: dict[Coefficient | None, list[tuple[int, OfMoment, Any]]] = {}
-        for (g, order, of_p), phase in sums.items():
-            parts.setdefault(g, []).append((order, of_p, phase))
-        return parts
+    def _sum(self) -> TermSum:
+        return TermSum(self.terms())
 
     @property
     def unit_rate(self) -> float:
@@ -170,8 +168,8 @@ class Generator:
         if space.xi.size > MOST_FOR_A_BOUND:
             growth = float(np.max(fastest(space.xi.support)))
         else:
-            driven = space.xi_matrix(None) + space.xi.mass(fastest)
-            growth = float(np.max(scipy.linalg.eigvals(finite(driven), space.xi_matrix(one)).real))
+            driven = space.xi.matrix(None) + space.xi.mass(fastest)
+            growth = float(np.max(scipy.linalg.eigvals(finite(driven), space.xi.matrix(one)).real))
         for kick in system.kicks:
             if isinstance(noise, MarkovChain) and crosses_both_ways(system, kick, space.xi.support):
                 growth += float(-np.min(noise.rates)) * math.expm1(max(0.0, p * kick.log_factor))

@@ -17,7 +17,7 @@ from scipy.special import beta, roots_jacobi
 
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.reference import EXTRA_POINTS, Rule, gauss_legendre
+from fpsolve.fem.polynomials import EXTRA_POINTS, Rule, gauss_legendre
 from fpsolve.messages import Code, Message
 
 
@@ -104,7 +104,7 @@ class LineSpace:
 
     def mass(self, f: Coefficient = one) -> csr_matrix:
         """∫ w f u v."""
-        return self._mass if f is one else self._form(self._values, f, self._values)
+        return self._mass if f == one else self._form(self._values, f, self._values)
 
     @cached_property
     def _mass(self) -> csr_matrix:

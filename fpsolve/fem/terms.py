@@ -14,18 +14,20 @@ impact is exactly a point load, for which θ must be |v|.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.sparse import diags, issparse
 
 from fpsolve.arrays import Coefficient, FloatArray, one
-from fpsolve.fem.space import CylinderSpace
+from fpsolve.fem.axis import TensorSpace
+from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.model.direction import Direction
 from fpsolve.model.plane import Drive, Harmonics, Kick, System, phase_speed
+
+ALL_ORDERS = slice(None)
 
 
 @dataclass(frozen=True)
@@ -70,125 +72,184 @@ OfMoment = Power | Jump | JumpSlope
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """One term of L(p): a coefficient of p times an operator Φ ⊗ ∫P_s g.
+    """One term of L(p): a coefficient of p times an operator with a factor for each axis.
 
     Attributes:
         order: the power of ε with which it begins; the power itself is in the operator.
         of_p: the coefficient.
         phase: the matrix of φ.
-        g: the function of ξ; None for L_ξ.
+        noises: for each noise the g of ∫P_s g u v, or None for its generator, ∫P_s v L_ξ u.
         text: the term as a reader would write it.
     """
 
     order: int
     of_p: OfMoment
     phase: Any
-    g: Coefficient | None
+    noises: tuple[Coefficient | None, ...]
     text: str
 
 
-def terms_of(system: System, space: CylinderSpace) -> Iterator[Term]:
-    """L(p) of Eq. (19), term by term; those of φ alone are the same with any tilt."""
-    yield Term(0, Power(0), space.phi.identity, None, "L_ξ, the generator of the noise")
-    is_exact, direction = _upwind(system, space)
-    for drive in system.drives:
-        yield from _driven(drive, system.epsilon, space, direction)
-    yield from _penalties(system, space, is_exact, direction)
-    for kick in system.kicks:
-        text = f"(R^p − 1) |dφ/dt| δ(φ − {kick.phase:.6g} mod π), R = {math.exp(kick.log_factor):.6g}"
-        for load, sign in _loads(system, space, kick):
-            size, flux = _flux_over(system, space, kick, sign)
-            yield Term(2, Jump(kick.log_factor), size * load, flux, text)
+class TermSum:
+    """A sum of terms, in which those with the same functions of the noises, order and coefficient are added up once."""
+
+    def __init__(self, terms: Iterable[Term]) -> None:
+        sums: dict[tuple[Any, int, OfMoment], Any] = {}
+        for term in terms:
+            key = term.noises, term.order, term.of_p
+            sums[key] = sums[key] + term.phase if key in sums else term.phase
+        self._parts = sums
+
+    def phases(self, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> dict[Any, Any]:
+        """For each function of the noises the matrix of φ; the first is that of 1."""
+        (first, *_), count = self._parts.values(), len(next(iter(self._parts))[0])
+        phases: dict[Any, Any] = {(one,) * count: 0.0 * first}
+        wanted = range(1 + max(order for _, order, _ in self._parts))[orders]
+        for (noises, order, of_p), phase in self._parts.items():
+            size = of_p(p, derivative) if order in wanted else 0.0
+            if size:
+                phases[noises] = phases[noises] + size * phase if noises in phases else size * phase
+        return phases
+
+    def matrix(self, space: TensorSpace, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
+        """The sum in a space for p; its first term has ∫ P_s u v of every noise."""
+        return KroneckerSum(
+            [
+                (phase, *(axis.matrix(g) for axis, g in zip(space.axes[1:], noises, strict=True)))
+                for noises, phase in self.phases(p, derivative, orders).items()
+            ]
+        )
 
 
-def changed_terms(system: System, space: CylinderSpace, by: Direction) -> Iterator[Term]:
-    """∂L(p)/∂θ of the same terms where the motion and its kicks change with θ.
+class Terms:
+    """L(p) of a system, and ∂L(p)/∂θ, term by term; what is of φ alone is the same with any tilt.
 
-    Where θ is the size of the speed for the typical ξ it is held: [T] = 0 there but for the error of the elements.
+    Args:
+        system: what is driven.
+        space: the trial and test functions.
+        noise: the axis of the noise that drives it; the functions of others stand by.
     """
-    vertices, jump, text = space.phi.lines[:-1], _jump(space), "∂/∂θ"
-    is_exact, direction = _upwind(system, space)
-    for drive in by.drives:
-        yield from _driven(drive, system.epsilon, space, direction)
-    moved = Moved(system.epsilon, by.drives)
-    for j in np.flatnonzero(is_exact & (direction == 0)):
-        slope = partial(_change_of_size, system=system, moved=moved, phi=float(vertices[j]))
-        yield Term(0, Power(0), -0.5 * jump[[j]].T @ jump[[j]], slope, text)
-    for kick, change in zip(system.kicks, by.kicks or np.zeros(len(system.kicks)), strict=True):
-        for load, sign in _loads(system, space, kick):
-            if change:
-                size, flux = _flux_over(system, space, kick, sign)
-                yield Term(2, JumpSlope(kick.log_factor), change * size * load, flux, text)
-            if by.drives:
-                slope = partial(_change_of_flux, system=system, moved=moved, phi=kick.phase, sign=sign)
-                yield Term(2, Jump(kick.log_factor), load, slope, text)
 
+    def __init__(self, system: System, space: TensorSpace, noise: int = 1) -> None:
+        self.system, self._count, self._noise = system, len(space.axes) - 1, noise
+        self.phi, self.xi = space.phi, space.axes[noise]
+        self._vertices, self._jump = self.phi.lines[:-1], self.phi.right_trace - self.phi.left_trace
+        is_exact = np.full(self._vertices.size, self.xi.is_local)  # where θ = |v|
+        for kick in system.kicks:
+            is_exact[self.phi.vertices_at(kick.phase)] = True
+        speed = phase_speed(system, self.xi.support[:, None])(self._vertices)
+        # the sign of v at those of these vertices where it is the same for all ξ, otherwise 0
+        direction = np.where(is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0), 0.0)
+        self._is_exact, self._two_way = is_exact, np.flatnonzero(is_exact & (direction == 0))
+        # nothing is left of the other side: where ξ is large that would count
+        self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - _rows(0.5 * direction, self._jump)
 
-def _driven(drive: Drive, epsilon: float, space: CylinderSpace, direction: FloatArray) -> Iterator[Term]:
-    """h ∂φ with the loads at the φ-vertices, and p q."""
-    phi, jump = space.phi, _jump(space)
-    mean = 0.5 * (phi.right_trace + phi.left_trace)
-    trace = mean - _rows(0.5 * direction, jump)  # nothing is left of the other side: where ξ is large that would count
-    size, text = epsilon**drive.order, _prefix(drive)
-    if not drive.h.vanishes:
-        along = size * (phi.convection(drive.h) + trace.T @ _rows(drive.h(phi.lines[:-1]), jump))
-        yield Term(drive.order, Power(0), along, drive.g, f"{text}{_written(drive.h)} ∂φ")
-    if not drive.q.vanishes:
-        yield Term(drive.order, Power(1), size * phi.mass(drive.q), drive.g, f"p {text}{_written(drive.q)}")
+    def _term(self, order: int, of_p: OfMoment, phase: Any, g: Coefficient | None, text: str) -> Term:
+        noises = tuple(g if axis == self._noise else one for axis in range(1, self._count + 1))
+        return Term(order, of_p, phase, noises, text)
 
+    def whole(self) -> Iterator[Term]:
+        """L(p) of Eq. (19)."""
+        yield self._term(0, Power(0), self.phi.identity, None, "L_ξ, the generator of the noise")
+        for drive in self.system.drives:
+            yield from self._driven(drive)
+        yield from self._penalties()
+        for kick in self.system.kicks:
+            text = f"(R^p − 1) |dφ/dt| δ(φ − {kick.phase:.6g} mod π), R = {math.exp(kick.log_factor):.6g}"
+            for load, sign in self._loads(kick):
+                size, flux = self._flux(kick, sign)
+                yield self._term(2, Jump(kick.log_factor), size * load, flux, text)
 
-def _jump(space: CylinderSpace) -> Any:
-    """T(φ⁺) − T(φ⁻) at the φ-vertices."""
-    return space.phi.right_trace - space.phi.left_trace
+    def changed(self, by: Direction) -> Iterator[Term]:
+        """∂L(p)/∂θ of the same terms where the motion and its kicks change with θ.
 
+        Where θ is the size of the speed for the typical ξ it is held: [T] = 0 there but for the error of the elements.
+        """
+        text, moved = "∂/∂θ", Moved(self.system.epsilon, by.drives)
+        for drive in by.drives:
+            yield from self._driven(drive)
+        for j in self._two_way:
+            yield self._term(
+                0,
+                Power(0),
+                -0.5 * self._jump[[j]].T @ self._jump[[j]],
+                self._faster(moved, float(self._vertices[j])),
+                text,
+            )
+        for kick, change in zip(self.system.kicks, by.kicks or np.zeros(len(self.system.kicks)), strict=True):
+            for load, sign in self._loads(kick):
+                if change:
+                    size, flux = self._flux(kick, sign)
+                    yield self._term(2, JumpSlope(kick.log_factor), change * size * load, flux, text)
+                if by.drives:
+                    yield self._term(2, Jump(kick.log_factor), load, self._more_flux(moved, kick, sign), text)
 
-def _upwind(system: System, space: CylinderSpace) -> tuple[Any, FloatArray]:
-    """At which φ-vertices θ = |v|, and the sign of v at those of them where it is the same for all ξ, otherwise 0."""
-    vertices = space.phi.lines[:-1]
-    is_exact = np.full(vertices.size, space.xi.is_local)
-    for kick in system.kicks:
-        is_exact[space.phi.vertices_at(kick.phase)] = True
-    speed = phase_speed(system, space.xi.support[:, None])(vertices)
-    return is_exact, np.where(is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0), 0.0)
+    def _driven(self, drive: Drive) -> Iterator[Term]:
+        """h ∂φ with the loads at the φ-vertices, and p q."""
+        size, text = self.system.epsilon**drive.order, _prefix(drive)
+        if not drive.h.vanishes:
+            loads = self._trace.T @ _rows(drive.h(self._vertices), self._jump)
+            along = size * (self.phi.convection(drive.h) + loads)
+            yield self._term(drive.order, Power(0), along, drive.g, f"{text}{_written(drive.h)} ∂φ")
+        if not drive.q.vanishes:
+            along = size * self.phi.mass(drive.q)
+            yield self._term(drive.order, Power(1), along, drive.g, f"p {text}{_written(drive.q)}")
 
+    def _penalties(self) -> Iterator[Term]:
+        """−½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|."""
+        text, jump, vertices = "upwind loads between cells", self._jump, self._vertices
+        if not np.all(self._is_exact):
+            typical = np.where(self._is_exact, 0.0, self.typical_speed())
+            yield self._term(0, Power(0), -0.5 * jump.T @ _rows(typical, jump), one, text)
+        for j in self._two_way:
+            yield self._term(0, Power(0), -0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(vertices[j])), text)
 
-def _penalties(system: System, space: CylinderSpace, is_exact: Any, direction: FloatArray) -> Iterator[Term]:
-    """−½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|."""
-    vertices, jump, text = space.phi.lines[:-1], _jump(space), "upwind loads between cells"
-    if not np.all(is_exact):
-        typical = np.where(is_exact, 0.0, _typical_speed(system, space))
-        yield Term(0, Power(0), -0.5 * jump.T @ _rows(typical, jump), one, text)
-    for j in np.flatnonzero(is_exact & (direction == 0)):
-        size = partial(_size_of_speed, system=system, phi=float(vertices[j]))
-        yield Term(0, Power(0), -0.5 * jump[[j]].T @ jump[[j]], size, text)
+    def typical_speed(self) -> FloatArray:
+        """θ at the φ-vertices for the typical ξ, shape (m,)."""
+        xi, constant = self.xi, self.xi.constant
+        total = constant @ (xi.matrix(one) @ constant)
+        steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
+        for drive in self.system.drives:
+            speed = self.system.epsilon**drive.order * drive.h(self._vertices)
+            if drive.g == one:
+                steady += speed
+            else:
+                square = xi.mass(lambda xi, g=drive.g: g(xi) ** 2)
+                driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
+        return np.asarray(abs(steady) + driven)
 
+    def _loads(self, kick: Kick) -> Iterator[tuple[Any, int]]:
+        """A kick's loads beyond continuity: w(φ⁻) T(φ⁺) where the phase runs forward, 1, else w(φ⁺) T(φ⁻), −1."""
+        at = self.phi.vertices_at(kick.phase)
+        left, right = self.phi.left_trace[at], self.phi.right_trace[at]
+        speed = self._speed(kick.phase)(self.xi.support)
+        for load, sign in ((left.T @ right, 1), (right.T @ left, -1)):
+            if np.any(sign * speed > 0):
+                yield load, sign
 
-def _typical_speed(system: System, space: CylinderSpace) -> FloatArray:
-    """θ at the φ-vertices for the typical ξ, shape (m,)."""
-    vertices, constant = space.phi.lines[:-1], space.xi.constant()
-    total, steady, driven = (
-        constant @ (space.xi_matrix(one) @ constant),
-        np.zeros(vertices.size),
-        np.zeros(vertices.size),
-    )
-    for drive in system.drives:
-        speed = system.epsilon**drive.order * drive.h(vertices)
-        if drive.g is one:
-            steady += speed
-        else:
-            square = space.xi.mass(lambda xi, g=drive.g: g(xi) ** 2)  # type: ignore[misc]
-            driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
-    return abs(steady) + driven
+    def _speed(self, phi: float) -> Coefficient:
+        """dφ/dt at φ."""
+        return lambda xi: phase_speed(self.system, xi)(phi)
 
+    def _size_of_speed(self, phi: float) -> Coefficient:
+        """|dφ/dt| at φ."""
+        return lambda xi: np.abs(phase_speed(self.system, xi)(phi))
 
-def _size_of_speed(xi: Any, system: System, phi: float) -> Any:
-    """|dφ/dt| at φ."""
-    return np.abs(phase_speed(system, xi)(phi))
+    def _faster(self, moved: Moved, phi: float) -> Coefficient:
+        """∂|dφ/dt|/∂θ at φ."""
+        return lambda xi: np.sign(phase_speed(self.system, xi)(phi)) * phase_speed(moved, xi)(phi)
 
+    def _flux(self, kick: Kick, sign: int) -> tuple[float, Coefficient]:
+        """max(± dφ/dt, 0) at a kick: a number, times a function of ξ."""
+        at = self._speed(kick.phase)
+        speed = at(self.xi.support)
+        if np.ptp(speed) <= 1e-12 * np.max(np.abs(speed)):
+            return abs(float(speed[0])), one
+        return 1.0, lambda xi: np.maximum(sign * at(xi), 0)
 
-def _change_of_size(xi: Any, system: System, moved: Moved, phi: float) -> Any:
-    """∂|dφ/dt|/∂θ at φ."""
-    return np.sign(phase_speed(system, xi)(phi)) * phase_speed(moved, xi)(phi)
+    def _more_flux(self, moved: Moved, kick: Kick, sign: int) -> Coefficient:
+        """Its ∂/∂θ."""
+        at = self._speed(kick.phase)
+        return lambda xi: np.where(sign * at(xi) > 0, sign * phase_speed(moved, xi)(kick.phase), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,34 +259,6 @@ class Moved:
     epsilon: float
     drives: tuple[Drive, ...]
     kicks: tuple[Kick, ...] = ()
-
-
-def _loads(system: System, space: CylinderSpace, kick: Kick) -> Iterator[tuple[Any, int]]:
-    """A kick's point loads beyond continuity: w(φ⁻) T(φ⁺) where the phase runs forward, 1, else w(φ⁺) T(φ⁻), −1."""
-    at = space.phi.vertices_at(kick.phase)
-    left, right = space.phi.left_trace[at], space.phi.right_trace[at]
-    speed = phase_speed(system, space.xi.support)(kick.phase)
-    for load, sign in ((left.T @ right, 1), (right.T @ left, -1)):
-        if np.any(sign * speed > 0):
-            yield load, sign
-
-
-def _flux_over(system: System, space: CylinderSpace, kick: Kick, sign: int) -> tuple[float, Coefficient]:
-    """max(± dφ/dt, 0) at a kick: a number, times a function of ξ."""
-    speed = phase_speed(system, space.xi.support)(kick.phase)
-    if np.ptp(speed) <= 1e-12 * np.max(np.abs(speed)):
-        return abs(float(speed[0])), one
-    return 1.0, partial(_flux, system=system, phi=kick.phase, sign=sign)
-
-
-def _flux(xi: Any, system: System, phi: float, sign: int) -> Any:
-    """max(± dφ/dt, 0) at φ."""
-    return np.maximum(sign * phase_speed(system, xi)(phi), 0)
-
-
-def _change_of_flux(xi: Any, system: System, moved: Moved, phi: float, sign: int) -> Any:
-    """∂/∂θ of `_flux`."""
-    return np.where(sign * phase_speed(system, xi)(phi) > 0, sign * phase_speed(moved, xi)(phi), 0.0)
 
 
 def _rows(factors: FloatArray, matrix: Any) -> Any:
@@ -241,7 +274,7 @@ def power_of_epsilon(order: int) -> str:
 def _prefix(drive: Drive) -> str:
     """ε^n g(ξ)."""
     power = f"{power_of_epsilon(drive.order)} " if drive.order else ""
-    g = "" if drive.g is one else "ξ " if drive.g.__name__ == "identity" else f"{drive.g.__name__}(ξ) "
+    g = "" if drive.g == one else "ξ " if drive.g.__name__ == "identity" else f"{drive.g.__name__}(ξ) "
     return power + g
 
 

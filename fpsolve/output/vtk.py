@@ -86,7 +86,7 @@ def write_density(
     `lyapunov_exponent`, λ; `p` and `Lambda`, which are 0; and the parameters as in `write_eigenfunctions`.
     """
     grid, space = Nodes.of(stationary), stationary.space
-    over_xi = space.table(stationary.left) @ (space.xi.mass() @ space.xi.constant())
+    over_xi = space.table(stationary.left) @ (space.xi.mass() @ space.xi.constant)
     data = {
         "stationary_density": grid.fields(stationary).adjoint,
         "phi_marginal": grid.phase_table(stationary) @ over_xi[:, None],

@@ -297,14 +297,14 @@ def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
     if p is None:
         return None
     generator = known[p].pair.generator
-    chosen, noise = generator.chosen, generator.problem.noise
-    interval = {"xi_min": float(chosen.z_lines[0]), "xi_max": float(chosen.z_lines[-1])} if chosen.z_lines.size else {}
+    phase, noise = generator.chosen.phase, generator.chosen.noise
+    interval = {"xi_min": float(noise.lines[0]), "xi_max": float(noise.lines[-1])} if noise.lines.size else {}
     return {
-        "phi_cells": chosen.phi_lines.size - 1,
-        "phi_degrees": [int(degree) for degree in chosen.phi_degrees],
-        "xi": chosen.xi_kind,
-        "xi_size": chosen.xi_size(noise),
+        "phi_cells": phase.lines.size - 1,
+        "phi_degrees": [int(degree) for degree in phase.degrees],
+        "xi": noise.kind,
+        "xi_size": noise.size,
         **interval,
-        "tilt": chosen.slope * p,
+        "tilt": noise.slope * p,
         "unknowns": generator.size,
     }

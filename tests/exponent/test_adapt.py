@@ -12,9 +12,9 @@ from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import truncation
 from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.fem.space import Discretisation
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
@@ -104,7 +104,8 @@ def test_fast_noise_tends_to_white_noise(tau0):
 def test_the_tilt_changes_nothing_but_the_cost(tilt):
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.8, c1=0.1, epsilon=0.1)
     noise = NonGaussianNoise(D0=1.0, tau0=20.0, r0=0.95).ou_reduction()
-    chosen = Discretisation(make_mesh(phi_cells=2).phi_lines, np.array([12, 12]), polynomials=40, slope=tilt / 15)
+    phase = PhaseCells(make_mesh(phi_cells=2).phi_lines, np.array([12, 12]))
+    chosen = Discretisation(phase, (Polynomials(40, tilt / 15),))
     oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(oscillator, noise), p=15.0, harmonics=8, hermite=200)
     assert principal_pair(Generator(Problem(oscillator, noise), chosen), 15.0).value == pytest.approx(oracle, rel=1e-9)
 

@@ -156,8 +156,8 @@ def test_corners_near_the_end_of_the_noise(excess):
 def test_cells_are_never_thin_by_rounding(phase):
     problem = Problem(replace(SYSTEM, kicks=[Kick(phase, math.log(0.8))]), NOISE)
     chosen = ExponentSolver(problem, rtol=1e-6).solution(1.0).pair.generator.chosen
-    assert np.diff(chosen.z_lines).min() > 1e-3
-    assert np.diff(chosen.phi_lines).min() > 1e-6
+    assert np.diff(chosen.noise.lines).min() > 1e-3
+    assert np.diff(chosen.phase.lines).min() > 1e-6
 
 
 def test_a_mesh_of_ones_own():
@@ -195,9 +195,9 @@ def test_a_discretisation_for_another_p_is_not_taken_where_there_is_a_corner():
     problem = Problem(replace(SYSTEM, epsilon=0.5), OrnsteinUhlenbeck(alpha=0.3, sigma=1.2))
     assert [len(corners(problem, p)) for p in (12.0, 1.0)] == [0, 1]
     solver = ExponentSolver(problem, rtol=1e-5)
-    assert solver.solution(12.0).pair.generator.chosen.polynomials
+    assert solver.solution(12.0).pair.generator.chosen.noise.kind == "polynomials"
     alone, after = ExponentSolver(problem, rtol=1e-5).solution(1.0), solver.solution(1.0)
-    assert not after.pair.generator.chosen.polynomials
+    assert after.pair.generator.chosen.noise.kind == "cells"
     assert abs(after.pair.value - alone.pair.value) <= alone.error + after.error
 
 
@@ -206,4 +206,4 @@ def test_what_is_known_of_a_problem_close_by_is_not_taken():
     close = Problem(replace(SYSTEM, epsilon=1.05), NOISE)
     starts = {1.0: ExponentSolver(close, rtol=1e-5).solution(1.0)}
     found = ExponentSolver(PROBLEM, rtol=1e-5, starts=starts).solution(1.0).pair.generator.chosen
-    assert np.min(np.abs(found.z_lines - TURN)) < 1e-12
+    assert np.min(np.abs(found.noise.lines - TURN)) < 1e-12

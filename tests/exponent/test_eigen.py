@@ -68,7 +68,7 @@ def test_pair_solves_both_eigenproblems_and_is_normalised(fig1_solver):
     assert np.linalg.norm(operator @ pair.right - pair.value * (mass @ pair.right)) < 1e-12
     assert np.linalg.norm(operator.T @ pair.left - pair.value * (mass @ pair.left)) < 1e-12
     assert pair.left @ (mass @ pair.right) * 2 == pytest.approx(1, rel=1e-13)  # twice the half circle
-    one = pair.space.constant()
+    one = pair.space.constant
     assert one @ (mass @ pair.right) == pytest.approx(one @ (mass @ one), rel=1e-13)
     assert pair.sign_defects == (0, 0)
 

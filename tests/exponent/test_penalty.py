@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fpsolve.exponent.eigen import principal_pair, spectrum
-from fpsolve.fem import terms
+from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.space import Discretisation
+from fpsolve.fem.terms import Terms
 from fpsolve.model.noise import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.vibro_impact import VibroImpactOscillator
@@ -29,14 +29,14 @@ def random_space(rng, slope):
     steps = rng.uniform(0.6, 1.4, rng.integers(2, 5))
     lines = np.pi / 2 + np.pi * np.append(0.0, np.cumsum(steps)) / np.sum(steps)
     degrees, slope = rng.integers(4, 8, lines.size - 1), slope * rng.uniform(0.5, 1.5)
-    return Discretisation(lines, degrees, polynomials=int(rng.integers(6, 11)), slope=slope)
+    return Discretisation(PhaseCells(lines, degrees), (Polynomials(int(rng.integers(6, 11)), slope),))
 
 
 @pytest.mark.parametrize("regime", REGIMES)
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
 def test_nothing_lies_right_of_the_principal_eigenvalue(monkeypatch, rng, regime, factor):
-    problem, typical = REGIMES[regime], terms._typical_speed
-    monkeypatch.setattr(terms, "_typical_speed", lambda *args: factor * typical(*args))
+    problem, typical = REGIMES[regime], Terms.typical_speed
+    monkeypatch.setattr(Terms, "typical_speed", lambda terms: factor * typical(terms))
     frozen = frozen_noise(problem)
     slope = frozen.tilt(frozen.center(1.0))
     for _ in range(SPACES):

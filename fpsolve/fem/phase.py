@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, one
+from fpsolve.fem.axis import Axis
 from fpsolve.fem.mesh import vertices_at
-from fpsolve.fem.reference import legendre, orthonormal
+from fpsolve.fem.polynomials import legendre, orthonormal
 from fpsolve.model.plane import Harmonics
 
 MAX_DENSE_UNKNOWNS = 600
 """Matrices of φ, and of ξ, are NumPy arrays for so many unknowns, and sparse beyond."""
 
 
-class PhaseSpace:
+class PhaseAxis(Axis):
     """Discontinuous elements on the circle or half circle; in each cell the basis is orthonormal, by degree.
 
     Args:
@@ -25,14 +27,14 @@ class PhaseSpace:
         degrees: the degree in each cell, from 1 on, shape (m,).
 
     Attributes:
-        size: number of unknowns.
-        cells, modes: the cell of each unknown, and the degree of its polynomial, shape (size,).
         points, weights: a quadrature rule, shape (n,).
+        span: π or 2π.
         left_trace, right_trace: T(φⱼ⁻) and T(φⱼ⁺) at the vertices lines[:-1], shape (m, size); the left trace at the
             seam comes from the last cell.
     """
 
     def __init__(self, lines: FloatArray, degrees: Any) -> None:
+        super().__init__()
         self.lines, self.degrees = np.asarray(lines, dtype=float), np.asarray(degrees, dtype=int)
         self._sizes, self._table = np.diff(self.lines), orthonormal(int(self.degrees.max()))
         kept = np.arange(self.degrees.max() + 1) <= self.degrees[:, None]
@@ -43,31 +45,22 @@ class PhaseSpace:
         local, weights = self._table.rule
         self._grid = self.lines[:-1, None] + self._sizes[:, None] * local
         self._local_weights = weights
+        self.points, self.weights = self._grid.ravel(), (self._sizes[:, None] * weights).ravel()
+        self.constant = np.where(self.modes == 0, np.sqrt(self._sizes)[self.cells], 0.0)
+        self.span = float(self.lines[-1] - self.lines[0])
+        self.turns = round(2 * math.pi / self.span)
         self.right_trace, self.left_trace = (
             self._scattered(np.arange(kept.shape[0]) + shift, self._table.ends[side] / np.sqrt(self._sizes)[:, None])
             for side, shift in ((0, 0), (1, 1))
         )
 
-    @property
-    def points(self) -> FloatArray:
-        return self._grid.ravel()
-
-    @property
-    def weights(self) -> FloatArray:
-        return (self._sizes[:, None] * self._local_weights).ravel()
-
-    @property
-    def span(self) -> float:
-        """π or 2π."""
-        return float(self.lines[-1] - self.lines[0])
-
     def vertices_at(self, phase: float) -> Any:
         """The indices of the φ-lines lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
         return vertices_at(self.lines, phase)
 
-    def mass(self, f: Harmonics) -> Any:
-        """∫ f u v."""
-        return self._combined(f, self._masses)
+    def mass(self, f: Any = one) -> Any:
+        """∫ f u v of `Harmonics` f, or of 1."""
+        return self.identity if f == one else self._combined(f, self._masses)
 
     def convection(self, f: Harmonics) -> Any:
         """∫ f u′ v, cell by cell."""
@@ -77,11 +70,6 @@ class PhaseSpace:
     def identity(self) -> Any:
         """∫ u v."""
         return self._assembled(np.broadcast_to(np.eye(self._pairs.shape[1]), self._pairs.shape))
-
-    @cached_property
-    def constant(self) -> FloatArray:
-        """Coefficients of the function 1, shape (size,)."""
-        return np.where(self.modes == 0, np.sqrt(self._sizes)[self.cells], 0.0)
 
     def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Any:
         """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).
@@ -106,7 +94,7 @@ class PhaseSpace:
         """The basis functions at five points inside each cell, shape (5 m, size)."""
         return self.at((self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel())
 
-    def projection(self, other: PhaseSpace) -> Any:
+    def projection(self, other: PhaseAxis) -> Any:
         """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
         return self.values.T @ (diags(self.weights) @ other.at(self.points))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fpsolve.fem.line import LineSpace
-from fpsolve.fem.noise_space import CellSpace, PolynomialSpace
+from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
 from fpsolve.fem.polynomials import gegenbauer, hermite, stieltjes
 from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
 
@@ -53,7 +53,7 @@ def test_stieltjes_finds_the_hermite_polynomials_of_a_moved_gaussian():
 @pytest.mark.parametrize("tilt", TILTS)
 def test_ornstein_uhlenbeck_matrices_in_closed_form(tilt):
     """exp(−sz) L_ξ exp(sz) is −α(N + sY + s²) in the Hermite polynomials about 2s, ξ = std (Y + 2s)."""
-    space, n = PolynomialSpace(OU, 9, tilt), np.arange(9.0)
+    space, n = PolynomialAxis(OU, 9, tilt), np.arange(9.0)
     y = np.diag(np.sqrt(n[1:]), 1) + np.diag(np.sqrt(n[1:]), -1)
     np.testing.assert_allclose(space.mass(), np.eye(9), atol=1e-13)
     np.testing.assert_allclose(space.mass(identity), OU.standard_deviation * (y + 2 * tilt * np.eye(9)), atol=1e-12)
@@ -64,7 +64,7 @@ def test_ornstein_uhlenbeck_matrices_in_closed_form(tilt):
 @pytest.mark.parametrize("tilt", TILTS)
 @pytest.mark.parametrize("noise", BOUNDED, ids=lambda noise: f"r0={noise.r0}")
 def test_bounded_noise_has_banded_matrices_and_the_right_weight(noise, tilt):
-    space = PolynomialSpace(noise, 14, tilt)
+    space = PolynomialAxis(noise, 14, tilt)
     assert spread(space.mass()) <= 2
     assert spread(space.mass(identity)) <= 3
     assert spread(space.generator()) <= 2
@@ -81,20 +81,20 @@ def test_bounded_noise_has_banded_matrices_and_the_right_weight(noise, tilt):
 @pytest.mark.parametrize("noise", [OU, *BOUNDED])
 def test_the_generator_is_minus_the_energy_of_smooth_functions(noise):
     """⟨v, L_ξ u⟩ for u = exp(a z), v = exp(b z), the factor of the space among them."""
-    space, a = PolynomialSpace(noise, 30, 0.5), 0.3
+    space, a = PolynomialAxis(noise, 30, 0.5), 0.3
     u = np.linalg.solve(space.mass(), space.values.T @ (space.measure * np.exp(a * space.points)))
-    energy = space.rate * (a + 0.5) ** 2 * (space.measure @ np.exp(2 * a * space.points))
+    energy = (a + 0.5) ** 2 * (space.measure * space.rate(space.points) @ np.exp(2 * a * space.points))
     assert u @ space.generator() @ u == pytest.approx(-energy, rel=1e-9)
     assert space.generator_of_one() @ u == pytest.approx(space.generator()[0] @ u, rel=1e-12)
 
 
 @pytest.mark.parametrize("noise", [OU, *BOUNDED])
 def test_functions_are_carried_between_tilts_sizes_and_cells(noise):
-    rough, fine = PolynomialSpace(noise, 6, 0.2), PolynomialSpace(noise, 40, -0.3)
+    rough, fine = PolynomialAxis(noise, 6, 0.2), PolynomialAxis(noise, 40, -0.3)
     u = np.array([1.0, 0.3, -0.2, 0.1, 0.0, 0.05])
     np.testing.assert_allclose(rough.projection(fine) @ (fine.projection(rough) @ u), u, atol=1e-8)
     end = min(6.0, noise.half_width / noise.standard_deviation)
-    cells = CellSpace(noise, np.linspace(-end, end, 7), 9)
+    cells = CellAxis(noise, np.linspace(-end, end, 7), 9)
     z = np.linspace(-2, 2, 9) if end > 2 else np.linspace(-0.9, 0.9, 9) * end
     on_cells, first = cells.at(z), rough.at(z)
     carried = on_cells.values @ (cells.projection(rough) @ u)
@@ -102,7 +102,7 @@ def test_functions_are_carried_between_tilts_sizes_and_cells(noise):
 
 
 def test_samples_integrate_densities():
-    at = PolynomialSpace(OU, 8, 0.7).samples()
+    at = PolynomialAxis(OU, 8, 0.7).samples()
     assert at.measure @ at.weight == pytest.approx(1, rel=1e-12)
     shares = at.weight / at.factor**2 / OU.density(at.xi)  # the weight is P_s times the square of the factor
     np.testing.assert_allclose(shares, shares[0], rtol=1e-10)

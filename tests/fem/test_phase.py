@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fpsolve.fem.phase_space import MAX_DENSE_UNKNOWNS, PhaseSpace
+from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS, PhaseAxis
 from fpsolve.model.plane import Harmonics
 
 LINES = np.array([np.pi / 2, 2.0, 3.1, 4.0, 3 * np.pi / 2])
@@ -12,7 +12,7 @@ WAVE = Harmonics(0.3, -0.4, 0.7)
 
 @pytest.fixture
 def space():
-    return PhaseSpace(LINES, [3, 7, 1, 2])
+    return PhaseAxis(LINES, [3, 7, 1, 2])
 
 
 def fine_rule(lines):
@@ -64,14 +64,14 @@ def test_traces_are_limits_from_either_side(space):
 
 
 def test_projection_keeps_what_both_hold(space):
-    coarse = PhaseSpace(LINES[[0, 2, 4]], [1, 1])
+    coarse = PhaseAxis(LINES[[0, 2, 4]], [1, 1])
     there, back = space.projection(coarse), coarse.projection(space)
     np.testing.assert_allclose(back @ there, np.eye(coarse.size), atol=1e-13)
 
 
 def test_large_spaces_are_sparse_and_the_same():
     lines = np.linspace(np.pi / 2, 3 * np.pi / 2, 61)
-    large = PhaseSpace(lines, np.full(60, 10))
+    large = PhaseAxis(lines, np.full(60, 10))
     assert large.size > MAX_DENSE_UNKNOWNS
     phi, weights = fine_rule(lines)
     values = large.at(phi).toarray()
@@ -81,11 +81,11 @@ def test_large_spaces_are_sparse_and_the_same():
 
 
 def test_sparse_and_dense_spaces_are_carried_into_each_other():
-    large = PhaseSpace(np.linspace(np.pi / 2, 3 * np.pi / 2, 61), np.full(60, 10))
-    small = PhaseSpace(LINES, [3, 4, 1, 2])
+    large = PhaseAxis(np.linspace(np.pi / 2, 3 * np.pi / 2, 61), np.full(60, 10))
+    small = PhaseAxis(LINES, [3, 4, 1, 2])
     u = np.linspace(-1, 1, small.size)
     phi, _ = fine_rule(LINES)
-    there = large.projection(PhaseSpace(LINES[[0, -1]], [6])) @ np.arange(7.0)
-    expected = PhaseSpace(LINES[[0, -1]], [6]).at(phi) @ np.arange(7.0)
+    there = large.projection(PhaseAxis(LINES[[0, -1]], [6])) @ np.arange(7.0)
+    expected = PhaseAxis(LINES[[0, -1]], [6]).at(phi) @ np.arange(7.0)
     np.testing.assert_allclose(large.at(phi) @ there, expected, atol=1e-10)
     assert (small.projection(large) @ (large.projection(small) @ u)).shape == u.shape

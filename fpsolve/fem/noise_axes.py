@@ -2,7 +2,7 @@
 
 Where P_s falls fast, or ends, they are its orthogonal polynomials: one element on the whole support. On a given
 interval, and for algebraic tails, they are continuous elements in z = ξ/std. A Markov chain has a value for each state.
-The noise's part of the generator is −½σ²∫P_s u′v′: constants are in its kernel in every space.
+The noise's part of the generator is −½∫P_s σ²(ξ) u′v′: constants are in its kernel in every space.
 
 With a tilt s every function carries the factor exp(s (z − c)): where T ~ exp(s z) the polynomials stand for what is
 left of it. The products of two functions are then weighted by P_s exp(2s z), which for Ornstein-Uhlenbeck noise is P_s
@@ -12,13 +12,14 @@ moved by 2s, however far that is.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
-from fpsolve.fem.phase_space import MAX_DENSE_UNKNOWNS
+from fpsolve.fem.axis import Axis
+from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS
 from fpsolve.fem.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 from fpsolve.model.direction import NoiseChange
 from fpsolve.model.markov_chain import MarkovChain
@@ -28,7 +29,9 @@ FAR = 50.0
 """Noise units beyond which OU noise does not come."""
 SHARP_ENDS = 50.0
 """Exponents from which on P_s leaves next to nothing at the ends of its support."""
-EXTRA_POINTS = 16
+NEAR_END, VANISHES = 1e-9, 1e-6
+"""σ² vanishes at the ends of the support where so near to one it is less than this share of that at ξ = 0."""
+MORE_POINTS = 16
 """Quadrature points beyond the number of polynomials."""
 
 
@@ -50,7 +53,7 @@ class Samples(NamedTuple):
     factor: FloatArray
 
 
-class NoiseSpace:
+class NoiseAxis(Axis):
     """What the generator and its users ask of the functions of ξ; matrices are arrays, or sparse where they are large.
 
     Attributes:
@@ -59,72 +62,45 @@ class NoiseSpace:
         support: ξ between whose extremes the noise lives, as far as it matters, or its states.
         values: the functions at the points of a quadrature rule, or at the states, without factor, shape (n, size).
         measure: ∫ of the weight at those points, shape (n,).
-        cells: for each unknown the cell that it belongs to, -1 for none or two, shape (size,).
-        modes: for each unknown the degree of its polynomial, shape (size,).
         is_local: whether the functions can follow a kink in ξ.
-        slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
     """
 
-    tilt, center, slowest, is_local = 0.0, 0.0, 0.0, True
+    tilt, center, is_local = 0.0, 0.0, True
     support: FloatArray
     values: Any
     measure: FloatArray
-    cells: Any
-    modes: Any
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return int(self.values.shape[1])
-
-    def mass(self, g: Coefficient = one) -> Any:
-        """∫ P_s g(ξ) u v."""
-        raise NotImplementedError
-
-    def generator(self) -> Any:
-        """∫ P_s v L_ξ u, L_ξ the generator of the noise."""
-        raise NotImplementedError
 
     def changed(self, change: NoiseChange, g: Coefficient | None) -> Any:
         """∂/∂θ of `mass(g)`, for None of `generator()`, where the noise changes and the functions of ξ do not."""
         raise NotImplementedError
 
     def generator_of_one(self) -> FloatArray:
-        """The same with v the function 1, times the factor; shape (size,)."""
+        """`generator` with v the function 1, times the factor; shape (size,)."""
         return np.zeros(self.size)
-
-    def constant(self) -> FloatArray:
-        """Coefficients of the function 1, times the factor, shape (size,)."""
-        raise NotImplementedError
-
-    def nested(self, table: FloatArray) -> FloatArray:
-        """Coefficients, along the last axis, of modes whose sums by degree are all functions of a lower degree."""
-        return table
 
     def samples(self) -> Samples:
         """At the points of the rule, or at the states."""
         raise NotImplementedError
 
-    def projection(self, other: Any) -> FloatArray:
-        """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
-        raise NotImplementedError
 
-
-class LineNoiseSpace(NoiseSpace):
+class LineAxis(NoiseAxis):
     """What functions on the line of a diffusion share.
 
     Attributes:
         unit: ξ/z.
-        rate: ½σ²/std², the diffusion of z.
         points: z of a quadrature rule, shape (n,).
     """
 
     points: FloatArray
 
     def __init__(self, noise: Diffusion, tilt: float = 0.0) -> None:
-        self.unit, self.tilt = noise.standard_deviation, tilt
-        self.rate = 0.5 * (noise.diffusion / self.unit) ** 2
-        self._log_density, self._log_weight = noise.log_density, -math.log(self.unit)
+        super().__init__()
+        self.noise, self.unit, self.tilt, self._log_weight = noise, noise.standard_deviation, tilt, 0.0
+        self._log_weight -= math.log(self.unit)
+
+    def rate(self, z: FloatArray) -> FloatArray:
+        """½σ²/std², the diffusion of z."""
+        return 0.5 * squared_diffusion(self.noise, self.unit * z) / self.unit**2
 
     def values_at(self, z: FloatArray) -> Any:
         """The functions at any z, shape (len(z), size)."""
@@ -132,7 +108,7 @@ class LineNoiseSpace(NoiseSpace):
 
     def weight(self, z: FloatArray) -> FloatArray:
         """P_s exp(2s z) as a density of z: its integral is 1."""
-        return np.exp(self._log_density(self.unit * z) + 2 * self.tilt * z - self._log_weight)
+        return np.exp(self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self._log_weight)
 
     def at(self, z: FloatArray) -> Samples:
         """At any z; the measure is 0."""
@@ -145,17 +121,20 @@ class LineNoiseSpace(NoiseSpace):
         factor = np.exp(np.clip(self.tilt * (z - self.center), -600, 600))
         return Samples(self.unit * z, self.weight(z) / self.unit, measure, values, factor)
 
-    def projection(self, other: LineNoiseSpace) -> FloatArray:
+    def projection(self, other: LineAxis) -> FloatArray:
         exponent = other.tilt * (self.points - other.center) - self.tilt * (self.points - self.center)
         scaled = (self.measure * np.exp(np.clip(exponent, -600, 600)))[:, None] * dense(other.values_at(self.points))
-        return np.asarray(np.linalg.solve(dense(self.mass()), self.values.T @ scaled))
+        return np.asarray(np.linalg.solve(dense(self.matrix(one)), self.values.T @ scaled))
 
 
-class PolynomialSpace(LineNoiseSpace):
-    """The orthogonal polynomials of P_s exp(2s z), over 1 − (ξ/ξ_s)² where the noise ends at ±ξ_s.
+class PolynomialAxis(LineAxis):
+    """Orthogonal polynomials: with P_s ~ (1 − x²)^a, x = ξ/ξ_s, and σ² ~ (1 − x²)^b at the ends of the noise those of
 
-    All matrices are banded: for Ornstein-Uhlenbeck noise that of 1 is the identity, that of L_ξ without a tilt is
-    diagonal, and that of ξ has one diagonal on each side. Near ξ_s expansions converge only like powers.
+        P_s σ² exp(2s z)/(1 − x²),
+
+    whose weight has the exponent a + b − 1: their derivatives are orthogonal in P_s σ². All matrices are banded: for
+    Ornstein-Uhlenbeck noise, on the whole line, that of 1 is the identity, that of L_ξ without a tilt is diagonal, and
+    that of ξ has one diagonal on each side. Near ±ξ_s expansions converge only like powers.
 
     Args:
         noise: the noise; P_s must end, or fall like a Gaussian.
@@ -167,61 +146,62 @@ class PolynomialSpace(LineNoiseSpace):
 
     def __init__(self, noise: Diffusion, count: int, tilt: float = 0.0) -> None:
         super().__init__(noise, tilt)
-        end, self._end_exponent = noise.half_width / self.unit, noise.end_exponent
+        end = noise.half_width / self.unit
         if math.isinf(end):
             self._polynomials, x, self.values, slopes, self.measure = _hermite_table(count)
             self._shift, self._scale, self._log_weight = 2 * tilt, 1.0, self._log_weight + 2 * tilt**2
             self.points = x + self._shift
         else:
             self._shift, self._scale, self.slowest = 0.0, end, 1.0
+            middle, near = squared_diffusion(noise, noise.half_width * np.array([0.0, 1 - NEAR_END]))
+            missing = 0.0 if near < VANISHES * middle else 1.0  # 1 − b: by so much more does P_s fall at the ends
             more = min(abs(tilt) * end, 4 * tilt**2)
-            points = 16 * math.ceil((2 * count + EXTRA_POINTS + more) / 16)  # few rules serve many spaces
-            x, weights = _gegenbauer_rule(points, noise.end_exponent - 1)
-            self.points, damping = end * x, 1 - x**2
+            points = 16 * math.ceil((2 * count + MORE_POINTS + more) / 16)  # few rules serve many spaces
+            x, weights = _gegenbauer_rule(points, noise.end_exponent - missing)
+            self.points, damping = end * x, (1 - x**2) ** missing
             logs = np.log(weights) + 2 * tilt * self.points
             tilted = np.exp(logs - logs.max())
-            self._polynomials = stieltjes(x, tilted, count) if tilt else gegenbauer(count, noise.end_exponent - 1)
+            own = gegenbauer(count, noise.end_exponent - missing)
+            self._polynomials = stieltjes(x, tilted, count) if tilt else own
             self.values, slopes = self._polynomials.at(x)
             self.measure = tilted * damping / (tilted @ damping)
             self._log_weight += math.log((tilted @ damping) / (weights @ damping)) + float(logs.max())
         self._slopes = slopes / self._scale + tilt * self.values
+        self._flux = self.measure * self.rate(self.points)
         self.center = float(self.measure @ self.points)
         self.support = self.unit * min(end, FAR) * np.array([-1.0, 1.0])
-        self.cells, self.modes = np.zeros(count, dtype=int), np.arange(count)
+        self.size, self.cells, self.modes = count, np.zeros(count, dtype=int), np.arange(count)
+        self.constant = np.eye(1, count)[0]
 
     def mass(self, g: Coefficient = one) -> FloatArray:
-        measure = self.measure if g is one else self.measure * g(self.unit * self.points)
-        return _form(self.values, measure)
+        return _form(self.values, self.measure if g == one else self.measure * g(self.unit * self.points))
 
     def generator(self) -> FloatArray:
-        """−½σ² ∫ P_s (u′ + s u)(v′ + s v)."""
-        return np.asarray(-self.rate * _form(self._slopes, self.measure))
+        """−½ ∫ P_s σ² (u′ + s u)(v′ + s v)."""
+        return -_form(self._slopes, self._flux)
 
     def changed(self, change: NoiseChange, g: Coefficient | None) -> FloatArray:
-        measure = self.measure * self._log_change(change)
+        logs = self._log_change(change)
         if g is not None:
-            return _form(self.values, measure * g(self.unit * self.points))
-        return np.asarray(2 * change.log_diffusion * self.generator() - self.rate * _form(self._slopes, measure))
+            return _form(self.values, self.measure * logs * g(self.unit * self.points))
+        return 2 * change.log_diffusion * self.matrix(None) - _form(self._slopes, self._flux * logs)
 
     def _log_change(self, change: NoiseChange) -> FloatArray:
         """∂ ln P_s/∂θ at the points, without its mean; no rule of Gauss takes its ln(1 − x²) near ±1 as it stands."""
-        logs, a = change.log_density(self.unit * self.points), self._end_exponent
+        logs, a = change.log_density(self.unit * self.points), self.noise.end_exponent
         if change.end_exponent and a < SHARP_ENDS:
             x = self.points / self._scale
             logs = logs + change.end_exponent * (logarithm(x, a, x.size) - np.log1p(-(x**2)))
         return np.asarray(logs - self.measure @ logs)
 
     def generator_of_one(self) -> FloatArray:
-        return np.asarray(-self.rate * self.tilt * (self.measure @ self._slopes))
-
-    def constant(self) -> FloatArray:
-        return np.eye(1, self.size)[0]
+        return np.asarray(-self.tilt * (self._flux @ self._slopes))
 
     def values_at(self, z: FloatArray) -> FloatArray:
         return self._polynomials.at((z - self._shift) / self._scale)[0]
 
 
-class CellSpace(LineNoiseSpace):
+class CellAxis(LineAxis):
     """Continuous elements on an interval, for given meshes and algebraic tails.
 
     Args:
@@ -253,15 +233,16 @@ class CellSpace(LineNoiseSpace):
             inner[self.line.ends] = False
         self._inner = np.flatnonzero(inner)
         self.points, self.measure, self.values = self.line.points, self.line.measure, self.line.values[:, self._inner]
-        self.cells, self.modes = self.line.cells[inner], self.line.modes[inner]
+        self.size, self.cells, self.modes = self._inner.size, self.line.cells[inner], self.line.modes[inner]
+        self.constant = self.line.constant()[self._inner]  # where paths are killed it falls to 0 at the ends
         self.support = self.unit * lines[[0, -1]]
 
     def mass(self, g: Coefficient = one) -> Any:
-        return self._form(self.line.mass() if g is one else self.line.mass(lambda z: g(self.unit * z)))
+        return self._form(self.line.mass() if g == one else self.line.mass(lambda z: g(self.unit * z)))
 
     def generator(self) -> Any:
-        """−½σ² ∫ P_s u′v′; at the ends no probability flux is the natural condition."""
-        return self._form(-self.rate * self.line.stiffness())
+        """−½ ∫ P_s σ² u′v′; at the ends no probability flux is the natural condition."""
+        return self._form(-self.line.stiffness(self.rate))
 
     def changed(self, change: NoiseChange, g: Coefficient | None) -> Any:
         mean = float(self.measure @ change.log_density(self.unit * self.points) / np.sum(self.measure))
@@ -271,29 +252,29 @@ class CellSpace(LineNoiseSpace):
 
         if g is not None:
             return self._form(self.line.mass(lambda z: log_change(z) * g(self.unit * z)))
-        return 2 * change.log_diffusion * self.generator() - self._form(self.rate * self.line.stiffness(log_change))
+        stiffness = self.line.stiffness(lambda z: self.rate(z) * log_change(z))
+        return 2 * change.log_diffusion * self.matrix(None) - self._form(stiffness)
 
-    def constant(self) -> FloatArray:
-        """Coefficients of the function 1, shape (size,); where paths are killed it falls to 0 at the ends."""
-        return self.line.constant()[self._inner]
-
-    def nested(self, table: FloatArray) -> FloatArray:
-        return np.asarray((self.line.nested[self._inner][:, self._inner] @ table.T).T)
+    @cached_property
+    def nested(self) -> Any:
+        return self.line.nested[self._inner][:, self._inner]
 
     def values_at(self, z: FloatArray) -> Any:
         return self.line.at(z)[:, self._inner]
 
     def _form(self, matrix: Any) -> Any:
         """Without the functions at killed ends; sparse where it is large."""
-        return _small(matrix[self._inner][:, self._inner] if self.is_killed else matrix)
+        inner = matrix[self._inner][:, self._inner] if self.is_killed else matrix
+        return inner.toarray() if inner.shape[0] <= MAX_DENSE_UNKNOWNS else inner
 
 
-class ChainSpace(NoiseSpace):
+class StateAxis(NoiseAxis):
     """One value for each state of a Markov chain: ∫ P_s becomes a sum over the states with their probabilities."""
 
     def __init__(self, noise: MarkovChain) -> None:
+        super().__init__()
         self.support, self.measure, self._rates = np.array(noise.states), noise.probabilities, np.array(noise.rates)
-        self.values = np.eye(self.support.size)
+        self.size, self.constant, self.values = self.support.size, np.ones(self.support.size), np.eye(self.support.size)
         self.cells, self.modes = np.full(self.size, -1), np.zeros(self.size, dtype=int)
 
     def mass(self, g: Coefficient = one) -> FloatArray:
@@ -303,21 +284,22 @@ class ChainSpace(NoiseSpace):
         """diag(π) Q."""
         return self.measure[:, None] * self._rates
 
-    def constant(self) -> FloatArray:
-        return np.ones(self.size)
-
     def samples(self) -> Samples:
-        ones = np.ones(self.size)
-        return Samples(self.support, self.measure, ones, self.values, ones)
+        return Samples(self.support, self.measure, np.ones(self.size), self.values, np.ones(self.size))
 
-    def projection(self, other: ChainSpace) -> FloatArray:
+    def projection(self, other: StateAxis) -> FloatArray:
         return np.eye(self.size)
+
+
+def squared_diffusion(noise: Diffusion, xi: FloatArray) -> FloatArray:
+    """σ²(ξ)."""
+    return np.full_like(xi, noise.diffusion**2)
 
 
 @lru_cache(maxsize=64)
 def _hermite_table(count: int) -> tuple[Polynomials, FloatArray, FloatArray, FloatArray, FloatArray]:
     """The polynomials, points of a rule, values and slopes there, weights."""
-    x, weights = hermite(count + EXTRA_POINTS).rule()
+    x, weights = hermite(count + MORE_POINTS).rule()
     polynomials = hermite(count)
     return polynomials, x, *polynomials.at(x), weights
 
@@ -332,8 +314,3 @@ def _form(values: FloatArray, measure: FloatArray) -> FloatArray:
     matrix = (values * measure[:, None]).T @ values
     matrix[np.abs(matrix) < 1e-13 * np.max(np.abs(matrix))] = 0.0
     return matrix
-
-
-def _small(matrix: Any) -> Any:
-    """A sparse matrix as an array unless it is large."""
-    return matrix.toarray() if matrix.shape[0] <= MAX_DENSE_UNKNOWNS else matrix

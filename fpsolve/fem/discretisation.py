@@ -1,0 +1,393 @@
+"""How many functions of φ and of each noise there are, and which; and finer ones.
+
+How fast the effect of a cell's modes falls with their degree is how fast the cell converges, and decides between a
+higher degree and smaller cells.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import MeshError
+from fpsolve.fem.axis import Axis
+from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
+from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
+from fpsolve.fem.phase import PhaseAxis
+from fpsolve.model.markov_chain import MarkovChain
+
+HALVING = 2 * math.log(2)
+"""By how much more the logarithm of an effect falls with each degree in half a cell."""
+MAX_POLYNOMIALS = 200
+LEAST_DEGREE, SPLIT_DEGREE, MOST_DEGREE = 4, 6, 14
+THIRDS = 3
+"""Into how many parts a cell of φ is cut for a place far out: where the phase rests must not come to lie on a line."""
+LARGEST_RATIO = 1.4
+"""Of the z of two lines there."""
+OPEN, OPENED = 3.0, np.array([1.0, 2.5, 5.0, 10.0])
+"""z from which on paths may come and go, and lines that then are added on both sides."""
+NO_LINES = np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False)
+class ModeEffects:
+    """How much of Λ each cell of one axis owes to its highest modes.
+
+    Attributes:
+        degrees: of the cells, shape (cells,).
+        two, four: the effects of the two and of the four highest modes, shape (cells,).
+        slowest: the least share of the effect of two modes that is thought to be left.
+        corners: that of the cells in which T is singular, 0 for others, shape (cells,); None if there are none.
+    """
+
+    degrees: Any
+    two: FloatArray
+    four: FloatArray
+    slowest: float = 0.0
+    corners: FloatArray | None = None
+
+    @property
+    def of_cells(self) -> FloatArray:
+        """Estimate of what each cell lacks, half way from the effect of two modes to what its fall predicts."""
+        left = np.sqrt(self.two / np.maximum(self.four, 1e-300))
+        shares = np.clip(left, self.slowest, 1.0)
+        return self.two * (shares if self.corners is None else np.maximum(shares, self.corners))
+
+    @property
+    def at_corners(self) -> Any:
+        """Which cells T is singular in, shape (cells,)."""
+        return np.zeros_like(self.degrees, dtype=bool) if self.corners is None else self.corners > 0
+
+    @property
+    def error(self) -> float:
+        return float(np.sum(self.of_cells))
+
+    @property
+    def fall(self) -> FloatArray:
+        """By how much the logarithm of the effect falls with each degree, shape (cells,)."""
+        return np.maximum(0.5 * np.log(np.maximum(self.four, 1e-300) / np.maximum(self.two, 1e-300)), 0.3)
+
+    def needed(self, tolerance: float) -> FloatArray:
+        """The degree at which each cell would lack `tolerance`, shape (cells,)."""
+        return self.degrees + np.log(np.maximum(self.of_cells, 1e-300) / tolerance) / self.fall
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseCells:
+    """Elements of φ.
+
+    Attributes:
+        lines: the vertices, shape (m + 1,).
+        degrees: the degree in each cell, shape (m,).
+    """
+
+    lines: FloatArray
+    degrees: Any
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(np.sum(self.degrees + 1))
+
+    def axis(self) -> PhaseAxis:
+        """The functions."""
+        return PhaseAxis(self.lines, self.degrees)
+
+    def enriched(self) -> PhaseCells:
+        """Two degrees more; where there are none left, cells are halved."""
+        if np.max(self.degrees) + 2 > MAX_DEGREE:
+            return self.doubled()
+        return replace(self, degrees=self.degrees + 2)
+
+    def doubled(self, parts: int = 2) -> PhaseCells:
+        """Cells cut into two; or, where they are cut into three, a higher degree first."""
+        if parts == 2:
+            return PhaseCells(halved(self.lines), np.repeat(self.degrees, 2))
+        lines, most = self.lines, int(np.max(self.degrees))
+        if most >= MOST_DEGREE - 2:
+            lines = np.interp(np.arange(parts * lines.size - parts + 1) / parts, np.arange(lines.size), lines)
+        return PhaseCells(lines, np.full(lines.size - 1, min(most + 4, MOST_DEGREE)))
+
+    def raised(self) -> PhaseCells:
+        """One degree more."""
+        return replace(self, degrees=np.minimum(self.degrees + 1, MAX_DEGREE))
+
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool, parts: int) -> PhaseCells:
+        """Cells that all together should lack no more than a share."""
+        return PhaseCells(*_split(self.lines, effects, share, may_coarsen, parts))
+
+
+class NoisePart:
+    """What a discretisation has for one noise.
+
+    Attributes:
+        kind: what the functions are.
+        lines: the vertices of cells in z; none for others.
+        degree: of cells; 0 for others.
+        slope: s/p of the factor exp(s z) that goes with polynomials.
+        is_killed: whether paths that leave the cells are killed.
+    """
+
+    kind: ClassVar[Literal["polynomials", "cells", "states"]]
+    lines: FloatArray
+    degree: int
+    slope: float
+    is_killed: bool
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        raise NotImplementedError
+
+    def axis(self, noise: Any, p: float) -> NoiseAxis:
+        """The functions for one p. Raises `MeshError`."""
+        raise NotImplementedError
+
+    def enriched(self) -> NoisePart:
+        """The next finer one."""
+        return self
+
+    def doubled(self) -> NoisePart:
+        """About twice as many functions, where nothing is known yet."""
+        return self
+
+    def raised(self) -> NoisePart:
+        """One function more in each cell, where what a cell lacks harms others."""
+        return self
+
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> NoisePart:
+        """One that all together should lack no more than a share."""
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Polynomials(NoisePart):
+    """Orthogonal polynomials of the noise.
+
+    Attributes:
+        count: their number.
+        slope: s/p of the factor exp(s z) that goes with them.
+    """
+
+    count: int
+    slope: float = 0.0
+
+    kind, lines, degree, is_killed = "polynomials", NO_LINES, 0, False
+
+    @property
+    def size(self) -> int:
+        return self.count
+
+    def axis(self, noise: Any, p: float) -> PolynomialAxis:
+        return PolynomialAxis(noise, self.count, self.slope * p)
+
+    def enriched(self) -> Polynomials:
+        return replace(self, count=self.count + max(3, self.count // 8))
+
+    def doubled(self) -> Polynomials:
+        return replace(self, count=min(2 * self.count, MAX_POLYNOMIALS))
+
+    def raised(self) -> Polynomials:
+        return replace(self, count=min(self.count + 2, MAX_POLYNOMIALS))
+
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Polynomials:
+        needed = math.ceil(float(effects.needed(share)[0]) + 1.3)
+        least = max(self.count // 2, 3) if may_coarsen else self.count
+        return replace(self, count=max(least, min(needed, 3 * self.count // 2 + 3, MAX_POLYNOMIALS)))
+
+
+@dataclass(frozen=True, eq=False)
+class Cells(NoisePart):
+    """Continuous elements on an interval of z.
+
+    Attributes:
+        lines: the vertices, shape (n + 1,).
+        degree: of the elements.
+        is_killed: whether T = 0 at the ends, as paths that leave are killed.
+    """
+
+    lines: FloatArray
+    degree: int
+    is_killed: bool = False
+
+    kind, slope = "cells", 0.0
+
+    @property
+    def size(self) -> int:
+        return (self.lines.size - 1) * self.degree + 1 - 2 * self.is_killed
+
+    def axis(self, noise: Any, p: float) -> CellAxis:
+        return CellAxis(noise, self.lines, self.degree, self.is_killed)
+
+    def enriched(self) -> Cells:
+        return self.doubled() if self.degree + 2 > MAX_DEGREE else replace(self, degree=self.degree + 2)
+
+    def doubled(self) -> Cells:
+        return replace(self, lines=halved(self.lines))
+
+    def raised(self) -> Cells:
+        return replace(self, degree=min(self.degree + 1, MAX_DEGREE))
+
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Cells:
+        lines, degrees = _split(self.lines, effects, share, may_coarsen)
+        return replace(self, lines=lines, degree=int(np.max(degrees)))
+
+    def reaching(self, excess: tuple[float, float], log_density: Callable[[FloatArray], FloatArray]) -> Cells:
+        """With further cells at each end whose effect exceeds its share, by these factors."""
+        if self.is_killed:
+            return self._less_killed(excess, log_density)
+        below = [1.6 * self.lines[0]] if excess[0] > 1 else []
+        above = [1.6 * self.lines[-1]] if excess[1] > 1 else []
+        return replace(self, lines=np.concatenate([below, self.lines, above]))
+
+    def _less_killed(self, excess: tuple[float, float], log_density: Callable[[FloatArray], FloatArray]) -> Cells:
+        """The same for the ends of a place far out; close to ξ = 0 paths are no longer killed, and return freely.
+
+        Inwards the effect of killing falls like 1/P_s, outwards faster.
+        """
+        side = math.copysign(1.0, self.lines[0])
+        lines = np.sort(side * self.lines)
+        inner, outer = excess if side > 0 else excess[::-1]
+        if outer > 1:
+            lines = np.append(lines, 1.6 * lines[-1])
+        if inner > 1:
+            steps = lines[0] / LARGEST_RATIO ** np.arange(1, 200)
+            gain = log_density(side * steps) - log_density(side * lines[:1])
+            enough = int(np.argmax(gain > math.log(inner))) + 1 if math.log(inner) < gain[-1] else steps.size
+            if steps[enough - 1] < OPEN:
+                lines = np.concatenate([-OPENED[::-1], [0.0], OPENED[0.8 * lines[0] > OPENED], lines])
+                return replace(self, lines=np.sort(side * lines), is_killed=False)
+            lines = np.concatenate([steps[:enough][::-1], lines])
+        return replace(self, lines=np.sort(side * lines))
+
+
+@dataclass(frozen=True, eq=False)
+class States(NoisePart):
+    """A value for each state of the noise: nothing is left to be refined.
+
+    Attributes:
+        count: their number.
+    """
+
+    count: int
+
+    kind, lines, degree, slope, is_killed = "states", NO_LINES, 0, 0.0, False
+
+    @property
+    def size(self) -> int:
+        return self.count
+
+    def axis(self, noise: Any, p: float) -> StateAxis:
+        return StateAxis(noise)
+
+
+@dataclass(frozen=True, eq=False)
+class Discretisation:
+    """The functions of φ, and those of each noise.
+
+    Attributes:
+        phase: elements of φ.
+        noises: a part for each noise.
+    """
+
+    phase: PhaseCells
+    noises: tuple[NoisePart, ...]
+
+    @classmethod
+    def on(cls, mesh: CylinderMesh, noise: Any) -> Discretisation:
+        """The elements of a mesh, which is cut off at the end of the noise's support.
+
+        Raises:
+            MeshError: the mesh has lines where the noise has states, or none where it has a line.
+        """
+        has_states = isinstance(noise, MarkovChain)
+        if has_states == bool(mesh.z_lines.size):
+            raise MeshError("noise with states needs a mesh without z_lines, and noise on a line one with them")
+        phase = PhaseCells(mesh.phi_lines, np.full(mesh.phi_lines.size - 1, mesh.phi_degree))
+        if has_states:
+            return cls(phase, (States(len(noise.states)),))
+        mesh = mesh.within(noise.half_width / noise.standard_deviation)
+        return cls(phase, (Cells(mesh.z_lines, mesh.xi_degree),))
+
+    @property
+    def noise(self) -> Any:
+        """The part of the noise of a problem with one."""
+        return self.noises[0]
+
+    def with_noise(self, part: NoisePart) -> Discretisation:
+        """The same with another part for the noise of a problem with one."""
+        return replace(self, noises=(part,))
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.phase.size * math.prod(part.size for part in self.noises)
+
+    @property
+    def is_tilted(self) -> bool:
+        """Whether the functions move with p."""
+        return any(part.slope for part in self.noises)
+
+    @property
+    def is_killed(self) -> bool:
+        """Whether paths that leave an interval of a noise are killed."""
+        return any(part.is_killed for part in self.noises)
+
+    @property
+    def parts_of_phase(self) -> int:
+        """Into how many parts a cell of φ is cut."""
+        return THIRDS if self.is_killed else 2
+
+    def enriched(self) -> Discretisation:
+        """A finer one: two degrees more each way; where there are none left, cells are halved."""
+        return Discretisation(self.phase.enriched(), tuple(part.enriched() for part in self.noises))
+
+    def doubled(self) -> Discretisation:
+        """Twice as many functions each way, where nothing is known yet."""
+        phase = self.phase.doubled(self.parts_of_phase)
+        return Discretisation(phase, tuple(part.doubled() for part in self.noises))
+
+    def raised(self) -> Discretisation:
+        """One more function each way, where what a cell lacks harms others."""
+        return Discretisation(self.phase.raised(), tuple(part.raised() for part in self.noises))
+
+    def refined(self, effects: Sequence[ModeEffects | None], share: float, may_coarsen: bool) -> Discretisation:
+        """One on which every cell should lack no more than its share; the effects are those of every axis."""
+        of_phase, *of_noises = effects
+        assert of_phase is not None
+        phase = self.phase.refined(of_phase, share, may_coarsen, self.parts_of_phase)
+        pairs = zip(self.noises, of_noises, strict=True)
+        return Discretisation(
+            phase, tuple(part if each is None else part.refined(each, share, may_coarsen) for part, each in pairs)
+        )
+
+    def axes(self, noises: Sequence[Any], p: float) -> list[Axis]:
+        """The functions of the noises for one p. Raises `MeshError`."""
+        return [part.axis(noise, p) for part, noise in zip(self.noises, noises, strict=True)]
+
+
+def _split(
+    lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool, parts: int = 2
+) -> tuple[FloatArray, Any]:
+    """Lines and a degree for each cell with which all together should lack no more than a share.
+
+    A cell is halved, or cut into other parts, where halves take fewer unknowns: in them the effects fall faster. Those
+    at corners are left as they are.
+    """
+    rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
+    if not may_coarsen:
+        needed = np.maximum(needed, effects.degrees)
+    needed = np.where(effects.at_corners, effects.degrees - 0.2, needed)  # they are graded instead
+    in_half = needed * rate / (rate + HALVING)
+    is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)
+    is_split |= needed > MOST_DEGREE
+    degrees = np.ceil(np.where(is_split, in_half, needed) + 0.2)
+    degrees = np.clip(degrees, np.maximum(LEAST_DEGREE, effects.degrees - 4), effects.degrees + 4)
+    counts = np.where(is_split, parts, 1)
+    new = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(lines[:-1], lines[1:], counts, strict=True)]
+    return np.concatenate([*new, lines[-1:]]), np.repeat(np.minimum(degrees, MOST_DEGREE).astype(int), counts)
