@@ -1,117 +1,207 @@
-"""Results as plain data and back, exactly: numbers, texts, lists and tables, which JSON can hold."""
+"""Results as plain data, which JSON can hold, and back to the last bit.
+
+How a value becomes plain data follows from the annotation of its attribute: a dataclass is a list of its attributes,
+an array a compressed text; nan and inf, which JSON has not, are texts.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
-from typing import Any
+import math
+import zlib
+from base64 import b64decode, b64encode
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from functools import cache, lru_cache
+from types import NoneType, UnionType
+from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from fpsolve.analysis.sensitivity import Sensitivities, Slopes
+from fpsolve.arrays import FloatArray
 from fpsolve.case.curves import Curve
-from fpsolve.exponent.error import Estimate, Failure
-from fpsolve.model.quantity import UNNAMED, Quantity
-from fpsolve.study.results import CurveResult, Moments
+from fpsolve.case.sections import MonteCarloSection
+from fpsolve.data import Quantity
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import Message, message_of
+from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Numerics, Wanted
 
-RESULT_VERSION = 2
+RESULT_VERSION = 3
 """Of what is computed from the same parameters; records of another one are computed anew."""
 Record = dict[str, Any]
-_FORM = [field.name for kind in (CurveResult, Moments, Estimate, Failure, Sensitivities) for field in fields(kind)]
-"""What a record holds; those of another form are not read."""
 
 
 def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
-    """What a record is found by: a digest of all that its numbers and sentences follow from."""
+    """What the record of a result is found by: a digest of all that its numbers and sentences follow from."""
     mesh, budget = numerics.mesh, numerics.budget
-    content = {
-        "form": _FORM,
-        "parameters": dict(curve.parameters),
-        "p": wanted.p.tolist(),
-        "wanted": [wanted.indices, wanted.shown, wanted.density, wanted.differentiated],
-        "numerics": [numerics.rtol, budget.unknowns, budget.seconds, None if mesh is None else _plain(mesh)],
-    }
-    return digest(content)
+    return _digest(
+        CurveResult,
+        parameters=dict(curve.parameters),
+        p=wanted.p.tolist(),
+        wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated],
+        numerics=[numerics.rtol, budget.unknowns, budget.seconds, mesh and codec(CylinderMesh).plain(mesh)],
+    )
 
 
-def digest(content: Record) -> str:
-    """A key from what results follow from, and from their version."""
-    text = json.dumps({"version": RESULT_VERSION, **content}, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
+    """What the record of a simulation is found by."""
+    parameters, settings = dict(curve.parameters), setting.model_dump(mode="json")
+    return _digest(SimulatedCurve, parameters=parameters, orders=list(orders), setting=settings)
 
 
-def record_of(result: CurveResult) -> Record:
+def record_of(result: CurveResult | SimulatedCurve) -> Record:
     """All of a result but its curve."""
-    slopes = result.sensitivities
-    return {
-        "moments": _plain(result.moments),
-        "estimates": {name: each and _estimated(each) for name, each in result.estimates.items()},
-        "discretisation": result.discretisation,
-        "warnings": list(result.warnings),
-        "notes": list(result.notes),
-        "failures": [[failure.p, failure.reason] for failure in result.failures],
-        "sensitivities": None if slopes is None else _sensitivities(slopes),
-        "seconds": result.seconds,
-    }
+    return {name: each.plain(getattr(result, name)) for name, each in _recorded(type(result)).items()}
 
 
 def result_of(record: Mapping[str, Any], curve: Curve) -> CurveResult:
-    """The result of a curve, from its record. Raises `KeyError` or `TypeError` where it is none."""
-    slopes = record["sensitivities"]
-    return CurveResult(
-        curve=curve,
-        moments=Moments(**{name: np.array(values, dtype=float) for name, values in record["moments"].items()}),
-        estimates={name: row and _estimate(row) for name, row in record["estimates"].items()},
-        discretisation=record["discretisation"],
-        warnings=tuple(record["warnings"]),
-        notes=tuple(record["notes"]),
-        failures=tuple(Failure(p, reason) for p, reason in record["failures"]),
-        sensitivities=None if slopes is None else _differentiated(slopes),
-        seconds=record["seconds"],
+    """The result of a curve from its record. Raises `ValueError` where that has another form."""
+    return CurveResult(curve, **_made(CurveResult, record))
+
+
+def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
+    """The simulation of a curve from its record. Raises `ValueError` where that has another form."""
+    return SimulatedCurve(curve, **_made(SimulatedCurve, record))
+
+
+def _made(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
+    """The attributes that a record holds."""
+    try:
+        return {name: each.made(record[name]) for name, each in _recorded(kind).items()}
+    except (LookupError, TypeError, AttributeError, ValueError, zlib.error) as failure:
+        raise ValueError(f"this is no record of a {kind.__name__}: {failure!r}") from failure
+
+
+def _digest(kind: type, **content: Any) -> str:
+    """A key from what results of a kind follow from, from their form and their version."""
+    form = {name: each.form for name, each in _recorded(kind).items()}
+    text = json.dumps({"version": RESULT_VERSION, "form": form, **content}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+class Codec(NamedTuple):
+    """Makes plain data of the values of one kind, and values of plain data.
+
+    Attributes:
+        form: what the plain data look like; it changes with the attributes of a dataclass, and with those in it.
+        plain: gives what JSON can hold.
+        made: the inverse. Raises TypeError, ValueError or LookupError where the data have another form.
+    """
+
+    form: Any
+    plain: Callable[[Any], Any]
+    made: Callable[[Any], Any]
+
+
+@cache
+def codec(kind: Any) -> Codec:
+    """For the values of an attribute with an annotation."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if kind in _SIMPLE:
+        return _SIMPLE[kind]
+    if kind is Quantity:
+        return _codec_of_quantities()
+    if is_dataclass(kind):
+        return _codec_of_rows(kind)
+    if origin is np.ndarray:
+        return Codec("array", _packed, _array)
+    if origin is Literal:
+        return Codec(parts, str, lambda data: parts[parts.index(data)])
+    if origin is UnionType and NoneType in parts:
+        [inner] = [codec(part) for part in parts if part is not NoneType]
+        return Codec(
+            ["none", inner.form],
+            lambda value: None if value is None else inner.plain(value),
+            lambda data: None if data is None else inner.made(data),
+        )
+    if origin is tuple and parts[1:] == (...,):
+        inner = codec(parts[0])
+        return Codec(
+            [inner.form],
+            lambda value: [inner.plain(each) for each in value],
+            lambda data: tuple(map(inner.made, _checked(data, list))),
+        )
+    if origin is tuple:
+        each = [codec(part) for part in parts]
+        return Codec(
+            [one.form for one in each],
+            lambda value: [one.plain(part) for one, part in zip(each, value, strict=True)],
+            lambda data: tuple(one.made(part) for one, part in zip(each, _checked(data, list), strict=True)),
+        )
+    if origin in (dict, Mapping):
+        inner = codec(parts[1])
+        return Codec(
+            {"": inner.form},
+            lambda value: {key: inner.plain(each) for key, each in value.items()},
+            lambda data: {key: inner.made(each) for key, each in _checked(data, dict).items()},
+        )
+    raise TypeError(f"values of {kind} cannot be recorded")
+
+
+@cache
+def _recorded(kind: Any) -> Mapping[str, Codec]:
+    """Of each attribute of a result but its curve."""
+    hints = _annotations(kind)
+    return {each.name: codec(hints[each.name]) for each in fields(kind) if each.name != "curve"}
+
+
+def _annotations(kind: Any) -> Mapping[str, Any]:
+    """The types of the attributes of a dataclass; what needs numba is imported for simulations only."""
+    if kind is not SimulatedCurve:
+        return get_type_hints(kind)
+    from fpsolve.simulation import MonteCarlo, Response
+
+    return get_type_hints(kind, localns={"MonteCarlo": MonteCarlo, "Response": Response})
+
+
+def _codec_of_rows(kind: Any) -> Codec:
+    """Of a dataclass: a list of its attributes."""
+    hints = _annotations(kind)
+    names = [each.name for each in fields(kind)]
+    each = [codec(hints[name]) for name in names]
+    return Codec(
+        [kind.__name__, *([name, one.form] for name, one in zip(names, each, strict=True))],
+        lambda value: [one.plain(getattr(value, name)) for name, one in zip(names, each, strict=True)],
+        lambda data: kind(*[one.made(part) for one, part in zip(each, _checked(data, list), strict=True)]),
     )
 
 
-def _plain(data: Any) -> Record:
-    """The fields of a dataclass, arrays as lists."""
-    values = {field.name: getattr(data, field.name) for field in fields(data)}
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
-
-
-def _estimated(estimate: Estimate) -> list[Any]:
-    """The numbers of an estimate, and its quantity where it has a name."""
-    *numbers, quantity = asdict(estimate).values()
-    return numbers if estimate.quantity == UNNAMED else [*numbers, quantity]
-
-
-def _estimate(row: Sequence[Any]) -> Estimate:
-    value, error, scale, meaning, *named = row
-    return Estimate(value, error, scale, meaning, *(Quantity(**each) for each in named))
-
-
-def _sensitivities(found: Sensitivities) -> Record:
-    def rows(slopes: Slopes) -> Record:
-        return {key: _estimated(each) for key, each in slopes.items()}
-
-    return {
-        "theta": dict(found.theta),
-        "p": found.p.tolist(),
-        "moments": [rows(slopes) for slopes in found.moments],
-        "indices": {name: rows(slopes) for name, slopes in found.indices.items()},
-        "notes": list(found.notes),
-    }
-
-
-def _differentiated(record: Mapping[str, Any]) -> Sensitivities:
-    def slopes(rows: Mapping[str, Any]) -> Slopes:
-        return {key: _estimate(row) for key, row in rows.items()}
-
-    return Sensitivities(
-        theta=record["theta"],
-        p=np.array(record["p"], dtype=float),
-        moments=tuple(slopes(rows) for rows in record["moments"]),
-        indices={name: slopes(rows) for name, rows in record["indices"].items()},
-        notes=tuple(record["notes"]),
+def _codec_of_quantities() -> Codec:
+    """Of what numbers are called: a text for each, as there are few of them and many numbers."""
+    rows = _codec_of_rows(Quantity)
+    plain, made = (
+        lru_cache(lambda value: json.dumps(rows.plain(value))),
+        lru_cache(lambda text: rows.made(json.loads(text))),
     )
+    return Codec(rows.form, plain, lambda data: made(_checked(data, str)))
+
+
+def _checked(data: Any, kind: Any) -> Any:
+    """Plain data of a kind. Raises TypeError where they are of another one."""
+    if not isinstance(data, kind) or (isinstance(data, bool) and kind is not bool):
+        raise TypeError(f"{data!r} is of another kind than {kind}")
+    return data
+
+
+def _packed(value: FloatArray) -> Record:
+    data = np.ascontiguousarray(value, dtype="<f8").tobytes()
+    return {"shape": list(value.shape), "data": b64encode(zlib.compress(data)).decode("ascii")}
+
+
+def _array(packed: Mapping[str, Any]) -> FloatArray:
+    data = zlib.decompress(b64decode(packed["data"], validate=True))
+    return np.frombuffer(data, dtype="<f8").reshape(tuple(packed["shape"])).astype(float)
+
+
+_SIMPLE: Mapping[Any, Codec] = {
+    Any: Codec("any", lambda value: value, lambda data: data),
+    str: Codec("text", str, lambda data: data if type(data) is str else _checked(data, str)),
+    bool: Codec("bool", bool, lambda data: _checked(data, bool)),
+    int: Codec("int", int, lambda data: _checked(data, int)),
+    float: Codec("float", lambda value: float(value) if math.isfinite(value) else str(float(value)), float),
+    float | str: Codec("number or text", lambda value: value, lambda data: _checked(data, float | str)),
+    Message: Codec("message", lambda value: message_of(value).to_data(), Message.from_data),
+}
+"""For what has no parts."""

@@ -9,9 +9,9 @@ from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.output.records import Place, Records, append
 from fpsolve.pool import Pool
+from fpsolve.study.records import record_of, simulated_of, simulation_key
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.study.simulate import SimulateCurve, simulate_curves, simulation_steps
-from fpsolve.study.simulated import simulated_of, simulation_key, to_record
 from fpsolve.workflow.progress import Advance
 
 SIMULATED_RECORDS = "records/simulated"
@@ -54,7 +54,7 @@ class Simulations:
             found = self._by_pool(pool, progress)
         for simulated in found:
             if not simulated.interrupted and not self._is_known(simulated.curve):
-                append(self.records.folder, self._key(simulated.curve), to_record(simulated))
+                append(self.records.folder, self._key(simulated.curve), record_of(simulated))
             yield simulated
 
     def _by_pool(self, pool: Pool, progress: Callable[[int], None]) -> Iterator[SimulatedCurve]:

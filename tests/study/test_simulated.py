@@ -3,7 +3,7 @@
 import json
 import math
 import pickle
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -11,9 +11,9 @@ import pytest
 from fpsolve import load_case
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import BINS, MEANS, Response
+from fpsolve.study.records import record_of, simulated_of
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.study.simulate import simulate_curve, simulate_curves
-from fpsolve.study.simulated import simulated_of, to_record
 
 CASE = """
 title = "Records"
@@ -80,7 +80,7 @@ def curve(case):
 
 def through_json(simulated):
     """Made again from strict JSON, in which nan is no number."""
-    text = json.dumps(to_record(simulated), allow_nan=False)
+    text = json.dumps(record_of(simulated), allow_nan=False)
     return simulated_of(json.loads(text), simulated.curve)
 
 
@@ -128,7 +128,7 @@ def test_a_simulation_comes_back_and_is_small(case):
     again = through_json(simulated)
     check_same(simulated.result, again.result)
     check_same(simulated.response, again.response)
-    assert len(json.dumps(to_record(simulated))) < 50_000
+    assert len(json.dumps(record_of(simulated))) < 50_000
 
 
 def test_a_curve_is_a_small_task(case, curve):
@@ -144,20 +144,29 @@ def test_a_curve_is_a_small_task(case, curve):
 @pytest.mark.parametrize(
     "change",
     [
-        {"result": {}},
-        {"result": None},
-        {"result": asdict(RESULT) | {"time": "soon"}},
-        {"result": asdict(RESULT) | {"estimates": [{}]}},
-        {"response": {}},
-        {"response": {"density": {"shape": [2], "data": "AAAA"}}},
-        {"warnings": None},
+        {"result": lambda row: {}},
+        {"result": lambda row: None},
+        {"result": lambda row: row[:-1]},
+        {"result": lambda row: [*row, 0]},
+        {"result": lambda row: ["soon" if value == RESULT.time else value for value in row]},
+        {"result": lambda row: [str(value) if value is RESULT.paths else value for value in row]},
+        {"result": lambda row: [[{}], *row[1:]]},
+        {"result": lambda row: [[[9.0, 0.0, 0.0, "guessed", 1.0]], *row[1:]]},
+        {"response": lambda none: {}},
+        {"response": lambda none: [{"shape": [2], "data": "AAAA"}] * 12},
+        {"warnings": lambda texts: None},
+        {"warnings": lambda texts: "a text"},
+        {"warnings": lambda texts: [1]},
+        {"interrupted": lambda flag: 1},
     ],
 )
 def test_what_is_no_record_is_refused(curve, change):
-    record = to_record(SimulatedCurve(curve, RESULT, None, ()))
-    with pytest.raises(ValueError, match="this is no record of a simulation: "):
-        simulated_of(record | change, curve)
-    with pytest.raises(ValueError, match="this is no record of a simulation: "):
+    record = json.loads(json.dumps(record_of(SimulatedCurve(curve, RESULT, None, ()))))
+    assert simulated_of(record, curve).result.time == RESULT.time
+    [(name, other)] = change.items()
+    with pytest.raises(ValueError, match="this is no record of a SimulatedCurve: "):
+        simulated_of(record | {name: other(record[name])}, curve)
+    with pytest.raises(ValueError, match="this is no record of a SimulatedCurve: "):
         simulated_of({}, curve)
 
 
@@ -172,11 +181,12 @@ def test_what_is_no_record_is_refused(curve, change):
     ],
 )
 def test_a_damaged_array_is_refused(curve, change, rng):
-    record = to_record(SimulatedCurve(curve, RESULT, response(rng), ()))
-    packed = record["response"]["amplitude_density"]
+    record = record_of(SimulatedCurve(curve, RESULT, response(rng), ()))
+    place = [each.name for each in fields(Response)].index("amplitude_density")
+    packed = record["response"][place]
     assert simulated_of(record, curve).response.amplitude_density.shape == (3,)
-    record["response"]["amplitude_error"] = packed | {
+    record["response"][place] = packed | {
         key: value(packed["data"]) if callable(value) else value for key, value in change.items()
     }
-    with pytest.raises(ValueError, match="this is no record of a simulation: "):
+    with pytest.raises(ValueError, match="this is no record of a SimulatedCurve: "):
         simulated_of(record, curve)
