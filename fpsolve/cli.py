@@ -178,7 +178,7 @@ def run(
             print(" ".join(line.strip() for line in lines))
         else:
             what = done_of(case, len(outcome.results), sum(bool(each.failures) for each in outcome.results))
-            print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known))
+            print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known, outcome.outdated))
         if outcome.interruption:
             return INTERRUPTED
         if outcome.failures:
@@ -227,7 +227,7 @@ def simulate(
         if outcome.interruption:
             print_error(outcome.interruption)
         what = done_of(case, sum(not each.interrupted for each in outcome.simulated))
-        print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known))
+        print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known, outcome.outdated))
         if outcome.interruption:
             return INTERRUPTED
     return 0

@@ -22,7 +22,7 @@ from typing import Any, overload
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.errors import OutputError, Remedy
-from fpsolve.study.records import result_of
+from fpsolve.study.records import is_current, result_of
 from fpsolve.study.results import CurveResult
 
 SHARED_SECONDS = 60.0
@@ -32,7 +32,7 @@ _NAMES: dict[int, str] = {}
 
 
 @dataclass(frozen=True)
-class Place:
+class Address:
     """Where a record is: its file, where it begins in it, and how long it is, in bytes."""
 
     file: str
@@ -45,7 +45,7 @@ class Records:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._places: dict[str, Place] = {}
+        self._places: dict[str, Address] = {}
         self._seen: dict[str, int] = {}
 
     def look(self) -> Records:
@@ -61,11 +61,16 @@ class Records:
         """Whether there is one at least."""
         return bool(self._places)
 
-    def place(self, key: str) -> Place | None:
+    @property
+    def outdated(self) -> int:
+        """How many another version of fpsolve has written; they are not read."""
+        return sum(not is_current(key) for key in self._places)
+
+    def place(self, key: str) -> Address | None:
         """Where the record of a key is, if there is one."""
         return self._places.get(key)
 
-    def expect(self, place: Place) -> None:
+    def expect(self, place: Address) -> None:
         """Wait for the file of a record, which a network may show late. Raises `OutputError` where it does not come."""
         until = monotonic() + SHARED_SECONDS
         while place.file not in self._seen and not (self.folder / place.file).exists():
@@ -74,7 +79,7 @@ class Records:
             sleep(0.5)
         self._seen.setdefault(place.file, 0)
 
-    def read(self, place: Place) -> dict[str, Any]:
+    def read(self, place: Address) -> dict[str, Any]:
         """A record. Raises OSError or ValueError where there is none."""
         with (self.folder / place.file).open("rb") as file:
             file.seek(place.start)
@@ -105,14 +110,25 @@ class Results(Sequence[CurveResult]):
 
     def __init__(self, case: Case, records: Records) -> None:
         self._case, self._records = case, records
-        self._found: dict[int, Place | CurveResult] = {}
+        self._found: dict[int, Address | CurveResult] = {}
         self._order: list[int] = []
 
-    def add(self, number: int, found: Place | CurveResult) -> None:
+    def add(self, number: int, found: Address | CurveResult) -> None:
         """Curve `number`, from 1 on."""
         if number not in self._found:
             insort(self._order, number)
         self._found[number] = found
+
+    def find(self, curve: Curve, key: str) -> bool:
+        """Take the result of a curve from the record of a key; whether there is one that can be read."""
+        if (address := self._records.place(key)) is None:
+            return False
+        try:
+            result_of(self._records.read(address), curve)
+        except (OSError, ValueError):
+            return False
+        self.add(curve.number, address)
+        return True
 
     def has(self, curve: Curve) -> bool:
         """Whether there is a result of a curve; it is not read."""
@@ -141,10 +157,10 @@ class Results(Sequence[CurveResult]):
 
     def _result(self, curve: Curve) -> CurveResult:
         found = self._found[curve.number]
-        return result_of(self._records.read(found), curve) if isinstance(found, Place) else found
+        return result_of(self._records.read(found), curve) if isinstance(found, Address) else found
 
 
-def append(folder: Path, key: str, record: dict[str, Any]) -> Place:
+def append(folder: Path, key: str, record: dict[str, Any]) -> Address:
     """Add a record to the file of this process in a folder.
 
     Raises:
@@ -166,7 +182,7 @@ def append(folder: Path, key: str, record: dict[str, Any]) -> Place:
             raise
     finally:
         os.close(handle)
-    return Place(path.name, start, len(line))
+    return Address(path.name, start, len(line))
 
 
 def _own_name() -> str:
@@ -177,14 +193,14 @@ def _own_name() -> str:
     return _NAMES[number]
 
 
-def _lines(path: Path, start: int) -> Iterator[tuple[str, Place]]:
+def _lines(path: Path, start: int) -> Iterator[tuple[str, Address]]:
     """The keys and places of the whole records of a file, from a byte on."""
     with path.open("rb") as file:
         file.seek(start)
         for line in file:
             found = _parsed(line)
             if found is not None:
-                yield found[0], Place(path.name, start, len(line))
+                yield found[0], Address(path.name, start, len(line))
             start += len(line)
 
 

@@ -75,10 +75,15 @@ def _made(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _digest(kind: type, **content: Any) -> str:
-    """A key from what results of a kind follow from, from their form and their version."""
+    """A key from what results of a kind follow from and from their form; it begins with their version."""
     form = {name: each.form for name, each in _recorded(kind).items()}
-    text = json.dumps({"version": RESULT_VERSION, "form": form, **content}, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+    text = json.dumps({"form": form, **content}, sort_keys=True)
+    return f"{RESULT_VERSION}-{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def is_current(key: str) -> bool:
+    """Whether a key is that of a record of this version."""
+    return key.startswith(f"{RESULT_VERSION}-")
 
 
 class Codec(NamedTuple):

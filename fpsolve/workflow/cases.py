@@ -46,6 +46,7 @@ class Outcome:
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty where none came.
         comparisons: what it expects beside what was computed.
         known: how many of its curves an earlier run had done.
+        outdated: how many records of its curves another version has written, which are not used.
     """
 
     results: Sequence[CurveResult] = ()
@@ -53,6 +54,7 @@ class Outcome:
     interruption: str = ""
     comparisons: tuple[Comparison, ...] = ()
     known: int = 0
+    outdated: int = 0
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -138,7 +140,7 @@ def run_case(
                 with watch.bar(Phase(case.name, "figures")), writable(folder):
                     draw(case, sweep.results, simulated, folder)
                     draw_sensitivities(case, sweep.results, folder)
-    return Outcome(sweep.results, tuple(simulated), interruption, known=sweep.known)
+    return Outcome(sweep.results, tuple(simulated), interruption, known=sweep.known, outdated=sweep.records.outdated)
 
 
 def simulate_case(
@@ -174,7 +176,7 @@ def simulate_case(
         simulations = Simulations(case, folder, is_fresh=is_fresh)
         interruption = _simulate(simulations, watch, simulated, pool)
         watch.simulated(case, simulated, ())
-    return Outcome((), tuple(simulated), interruption, known=simulations.known)
+    return Outcome((), tuple(simulated), interruption, known=simulations.known, outdated=simulations.records.outdated)
 
 
 def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = None, watch: Watch = SILENT) -> Chart:

@@ -11,7 +11,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.provenance import Run
-from fpsolve.output.records import Place, Records, Results, append
+from fpsolve.output.records import Address, Records, Results, append
 from fpsolve.output.tables import write_results
 from fpsolve.output.vtk import write_curves, write_functions
 from fpsolve.pool import Pool, serial
@@ -21,7 +21,7 @@ from fpsolve.study.solve import Numerics, Wanted, everything, without_failed
 from fpsolve.study.sweep import Batch, Order, SolveBatch, batches, lost
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
-Found = tuple[int, Place | CurveResult | None, bool]
+Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
 SOLVED_RECORDS = "records/solved"
 GROWTH = 2
@@ -65,8 +65,7 @@ class Sweep:
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished and not told of."""
         for curve in self.case.curves() if self.records.look().are_there else ():
-            if place := self.records.place(self._key(curve)):
-                self.results.add(curve.number, place)
+            if self.results.find(curve, self._key(curve)):
                 self._settled += not self._wanted(curve).draws
 
     @property
@@ -86,7 +85,7 @@ class Sweep:
         with serial() if is_alone else pool as workers:
             for done in workers.run(SolveBatch(Keep(self.folder), progress if is_alone else None), queue):
                 for number, found, is_failed in self._lost(done.item, queue) if done.result is None else done.result:
-                    if isinstance(found, Place):
+                    if isinstance(found, Address):
                         self.records.expect(found)
                     if found is not None:
                         self.results.add(number, found)

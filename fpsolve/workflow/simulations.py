@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.output.records import Place, Records, append
+from fpsolve.output.records import Records, append
 from fpsolve.pool import Pool
 from fpsolve.study.records import record_of, simulated_of, simulation_key
 from fpsolve.study.results import SimulatedCurve
@@ -32,7 +32,7 @@ class Simulations:
         if is_fresh:
             self.records.remove()
         are_there = self.records.look().are_there
-        self._known = {curve.number for curve in case.curves() if self._place(curve)} if are_there else set[int]()
+        self._known = {curve.number for curve in case.curves() if self._found(curve)} if are_there else set[int]()
 
     @property
     def known(self) -> int:
@@ -78,11 +78,12 @@ class Simulations:
         return curve.number in self._known
 
     def _found(self, curve: Curve) -> SimulatedCurve | None:
-        place = self._place(curve) if self._is_known(curve) else None
-        return None if place is None else simulated_of(self.records.read(place), curve)
-
-    def _place(self, curve: Curve) -> Place | None:
-        return self.records.place(self._key(curve))
+        """Its simulation, if that is known; a record of another form is none."""
+        address = self.records.place(self._key(curve))
+        try:
+            return None if address is None else simulated_of(self.records.read(address), curve)
+        except ValueError:
+            return None
 
     def _key(self, curve: Curve) -> str:
         return simulation_key(curve, self.task.orders, self.task.setting)

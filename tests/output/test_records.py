@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fpsolve.case.case import load_case
+from fpsolve.cli import main
 from fpsolve.errors import OutputError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import make_mesh
@@ -151,3 +152,46 @@ def test_a_key_follows_from_all_that_changes_a_result(tmp_path, monkeypatch):
     assert keys[0] == key_of(curve, wanted, numerics)
     monkeypatch.setattr(plain, "RESULT_VERSION", 0)
     assert key_of(curve, wanted, numerics) not in keys
+
+
+def rewritten(folder, change):
+    """All records of a folder, each with its key and its content changed; checksums are right."""
+    [path] = (folder / "records/solved").glob("*.jsonl")
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    path.unlink()
+    for line in lines:
+        append(path.parent, *change(line["key"], line["record"]))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda record: {},
+        lambda record: record | {"moments": record["moments"][:-1]},
+        lambda record: record | {"estimates": {"lyapunov_exponent": [0.0, 0.0]}},
+        lambda record: record | {"seconds": "soon"},
+        lambda record: record | {"warnings": "none"},
+    ],
+)
+def test_a_record_of_another_form_is_solved_anew(tmp_path, capsys, change):
+    (tmp_path / "test.toml").write_text(TEXT, encoding="utf-8")
+    command = ["run", str(tmp_path / "test.toml"), "--out", str(tmp_path)]
+    assert main([*command, "--quiet"]) == 0
+    moments = (tmp_path / "test/moments.csv").read_bytes()
+    rewritten(tmp_path / "test", lambda key, record: (key, change(record)))
+    capsys.readouterr()
+    assert main([*command, "--quiet"]) == 0
+    assert "known" not in capsys.readouterr().out
+    assert (tmp_path / "test/moments.csv").read_bytes() == moments
+    assert main([*command, "--quiet"]) == 0
+    assert "1 of 1 known from an earlier run" in capsys.readouterr().out
+
+
+def test_records_of_another_version_are_named(tmp_path, capsys):
+    (tmp_path / "test.toml").write_text(TEXT, encoding="utf-8")
+    command = ["run", str(tmp_path / "test.toml"), "--out", str(tmp_path), "--quiet"]
+    assert main(command) == 0
+    rewritten(tmp_path / "test", lambda key, record: (key.partition("-")[2], record))
+    capsys.readouterr()
+    assert main(command) == 0
+    assert "; 1 record of another version not used)" in " ".join(capsys.readouterr().out.split())
