@@ -13,11 +13,11 @@ from .exponent.quantities import stability_index as stability_index
 from .exponent.solver import ExponentSolver as ExponentSolver
 from .fem.mesh import CylinderMesh as CylinderMesh
 from .fem.mesh import make_mesh as make_mesh
-from .model.noise import NonGaussianNoise as NonGaussianNoise
-from .model.noise import OrnsteinUhlenbeck as OrnsteinUhlenbeck
-from .model.plane import PlaneSystem as PlaneSystem
+from .model.noises.non_gaussian import NonGaussianNoise as NonGaussianNoise
+from .model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .model.problem import Problem as Problem
-from .model.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
+from .model.systems.plane_system import PlaneSystem as PlaneSystem
+from .model.systems.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
 from .output.datasets import open_results as open_results
 from .proofs.questions import prove as prove
 from .simulation.estimators import simulate as simulate

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from dataclasses import dataclass
 from decimal import Decimal
 from numbers import Real
 from typing import Any
@@ -18,14 +19,26 @@ Coefficient = Callable[[Any], Any]
 """A function of φ or ξ, from an array to an array of the same shape."""
 
 
-def one(x: Any) -> Any:
-    """The constant coefficient 1."""
-    return np.ones_like(x)
+@dataclass(frozen=True)
+class Constant:
+    """The coefficient c."""
+
+    value: float = 1.0
+
+    def __call__(self, x: Any) -> Any:
+        return np.full_like(np.asarray(x, dtype=float), self.value)
 
 
-def identity(x: Any) -> Any:
+@dataclass(frozen=True)
+class Linear:
     """The coefficient x."""
-    return x
+
+    def __call__(self, x: Any) -> Any:
+        return x
+
+
+one, identity, nothing = Constant(), Linear(), Constant(0.0)
+"""The coefficients 1, x and 0."""
 
 
 def finite(array: FloatArray) -> FloatArray:

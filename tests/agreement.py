@@ -16,8 +16,9 @@ from rich.progress import track
 from rich.table import Table
 
 from fpsolve.exponent.moments import moment_lyapunov
-from fpsolve.model.noise import ColouredNoise, NonGaussianNoise
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noise import Noise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.estimators import MomentEstimate, simulate
 from fpsolve.simulation.setup import default_step, largest_step, transient
 
@@ -47,10 +48,10 @@ class Row:
         return (found.value - self.finite_elements) / found.standard_error
 
 
-Step = Callable[[VibroImpactOscillator, ColouredNoise], float]
+Step = Callable[[VibroImpactOscillator, Noise], float]
 
 
-def cheap_step(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def cheap_step(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """For Eq. (7) about the largest step that is allowed, which takes half the time; for other noise the default."""
     if not isinstance(noise, NonGaussianNoise) or noise.r0 == 1:
         return default_step(oscillator, noise)

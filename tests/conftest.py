@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 FIG1 = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 FIG1_NOISE = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)

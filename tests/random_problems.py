@@ -16,8 +16,9 @@ import fpsolve
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noise import ColouredNoise, NonGaussianNoise
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noise import Noise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.oracles import fourier_hermite
 
 RTOL = 1e-8
@@ -30,7 +31,7 @@ class Problem:
     """One parameter set."""
 
     oscillator: VibroImpactOscillator
-    noise: ColouredNoise
+    noise: Noise
     p: float
 
     @property

@@ -21,9 +21,10 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent import INDICES
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate, Failure
+from fpsolve.model.kinds import parameter_of
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import MOMENT, noise_of, parameter_of, parameter_values
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.quantity import MOMENT
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
 from fpsolve.simulation.response import MEANS
 from fpsolve.study.solve import Numerics, Wanted, solve_curve
@@ -59,7 +60,7 @@ MAIN = {
 def simulated(estimates):
     return MonteCarlo(
         estimates, 0.001, 0.0001, 0.005, 0.0002, paths=4096, time=400.0, step=0.02, seed=1, impacts=12345,
-        warnings=("one", "another"), parameters=parameter_values(Problem(FIG1, REDUCED)),
+        warnings=("one", "another"), parameters=Problem(FIG1, REDUCED).values,
     )  # fmt: skip
 
 
@@ -84,8 +85,8 @@ def results(fig1_solver):
     moments = fpsolve.moment_lyapunov(FIG1, REDUCED, [2.0, -1.0, 0.0])
     empty = {name: np.zeros(0) for name in ("p", "value", "derivative", "error_estimate", "residual")}
     estimates = MomentEstimate(1.0, 0.004, 1e-4, "direct", 6000.0), MomentEstimate(9.0, None, None, "direct", 3.0)
-    slopes = fpsolve.sensitivities(FIG1, REDUCED, [1.0, 2.0], original=FIG1_NOISE)
-    line = fpsolve.boundary(FIG1, REDUCED, {"moment": 2.0}, *FRAME, original=FIG1_NOISE, nodes=5)
+    slopes = fpsolve.sensitivities(FIG1, REDUCED, [1.0, 2.0])
+    line = fpsolve.boundary(FIG1, REDUCED, {"moment": 2.0}, *FRAME, nodes=5)
     found = {
         "moments": moments,
         "one moment": fpsolve.moment_lyapunov(FIG1, REDUCED, 2.0),
@@ -195,7 +196,7 @@ def test_numbers_of_moments(results):
     same(found, "residual", moments.residual)
     assert found.attrs["oscillator.omega"] == 1.0
     assert found.attrs["oscillator.impact"] == "delta"
-    assert found.attrs["noise.alpha"] == REDUCED.alpha
+    assert found.attrs["noise.D0"] == REDUCED.D0
     assert found.moment.attrs == {**MOMENT.attributes, "equation": "(1), (19)", "units": "1/time"}
     assert results["no moment"].to_xarray().attrs["failures"] == "it is too large"
 
@@ -299,7 +300,7 @@ def test_numbers_of_a_simulation(results):
 def test_simulations_know_their_parameters():
     noise = FIG1_NOISE.ou_reduction()
     found = fpsolve.simulate(FIG1, noise, [1.0], paths=32, time=30.0)
-    assert found.parameters == parameter_values(Problem(FIG1, noise))
+    assert found.parameters == Problem(FIG1, noise).values
     assert found == replace(found, parameters={})
     assert hash(found) == hash(replace(found, parameters={}))
 
@@ -448,12 +449,12 @@ def test_parameters():
     assert parameter_of("noise.sigma").unit == "1/time^(3/2)"
     assert parameter_of("oscillator.mass").unit == "unknown"
     strong = VibroImpactOscillator(omega=2.0, restitution=0.9, c1=0.0, epsilon=1.0)
-    values = parameter_values(Problem(strong, UNIT_NOISE))
+    values = Problem(strong, UNIT_NOISE).values
     assert values["oscillator.omega"] == 2.0
     assert {"noise.alpha": 1.0, "noise.sigma": 1.0}.items() <= values.items()
     plane = fpsolve.PlaneSystem(strong.drives, strong.kicks, epsilon=0.5)
-    assert parameter_values(Problem(plane, UNIT_NOISE))["oscillator.epsilon"] == 0.5
-    assert noise_of(Problem(plane, UNIT_NOISE)).unit == "unknown"
+    assert Problem(plane, UNIT_NOISE).values["system.epsilon"] == 0.5
+    assert Problem(plane, UNIT_NOISE).noise_quantity.unit == "unknown"
 
 
 START = """

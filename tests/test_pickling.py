@@ -15,7 +15,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.9, c1=0.0, epsilon=1.5)

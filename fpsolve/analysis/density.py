@@ -16,7 +16,7 @@ from fpsolve.errors import NotConverged, Remedy
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
 from fpsolve.model.plane import growth_rate, phase_speed
-from fpsolve.model.quantity import NOISE, PHASE, density_unit, noise_of, parameter_values
+from fpsolve.model.quantity import NOISE, PHASE, density_unit
 
 if TYPE_CHECKING:
     import xarray
@@ -176,5 +176,5 @@ def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Densit
     phi, values, phi_weights = phi[order], values[order], np.tile(space.phi.weights, turns)[order]
     total, problem = phi_weights @ values @ at.measure, pair.generator.problem
     words = _NAMES[name] if pair.p or name == "product" else "stationary density"
-    about = f"{words} at p = {pair.p:g}", noise_of(problem), parameter_values(problem)
+    about = f"{words} at p = {pair.p:g}", problem.noise_quantity, problem.values
     return Density(phi, at.xi, phi_weights, at.measure, values / total, *about)

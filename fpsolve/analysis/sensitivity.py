@@ -39,10 +39,9 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.model.direction import Direction, directions
-from fpsolve.model.noise import NonGaussianNoise
-from fpsolve.model.problem import Problem, checked_moments, of_problem
-from fpsolve.model.quantity import Quantity, moment_at, parameter_of
+from fpsolve.model.noise import Noise
+from fpsolve.model.problem import Direction, Problem, checked_moments, of_problem, with_original
+from fpsolve.model.quantity import Quantity, moment_at
 
 SMALL_P = 1e-4
 """For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
@@ -99,7 +98,7 @@ def sensitivities(
     problem: Problem,
     p: ArrayLike = (),
     *,
-    original: NonGaussianNoise | None = None,
+    original: Noise | None = None,
     rtol: float = 1e-8,
     mesh: CylinderMesh | None = None,
     budget: Budget | None = None,
@@ -111,17 +110,17 @@ def sensitivities(
     Args:
         problem: a motion and its noise, in one argument or two.
         p: one moment, or an array of shape (n,); none by default.
-        original: the noise of Eq. (7) that an Ornstein-Uhlenbeck noise is the reduction (12)-(14) of; then θ are its
-            parameters, and not α₀ and σ₀.
+        original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).
         rtol, mesh, budget: as for `moment_lyapunov`.
 
     Raises:
         ValueError: a p is not finite, or the noise is not the reduction of `original`.
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
+    problem = with_original(problem, original)
     solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
     points = checked_moments(p, problem, may_be_empty=True)
-    return solve_sensitivities(solver, points, directions(problem, original))
+    return solve_sensitivities(solver, points, problem.directions())
 
 
 def solve_sensitivities(
@@ -141,7 +140,7 @@ def solve_sensitivities(
         indices: those wanted.
         root: near δ_p, if it is known.
     """
-    found, notes = Gradient(solver, along), list[str]()
+    found, notes, parameters = Gradient(solver, along), list[str](), solver.problem.parameters
 
     def tried(record: Quantity, solve: Callable[[], Slopes]) -> Slopes:
         try:
@@ -149,7 +148,7 @@ def solve_sensitivities(
         except (NotConverged, NoSuchExponent) as failure:
             notes.append(f"no sensitivities of {record.symbol}: {failure}")
             return {}
-        return {key: replace(each, quantity=record.by(parameter_of(key))) for key, each in slopes.items()}
+        return {key: replace(each, quantity=record.by(parameters[key].quantity)) for key, each in slopes.items()}
 
     def of_root() -> Slopes:
         index = nonzero_root(solver, guess=root)
@@ -160,6 +159,7 @@ def solve_sensitivities(
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
     return Sensitivities(
         theta={key: by.theta for key, by in along.items()},
+        quantities={key: parameters[key].quantity for key in along},
         p=p,
         moments=moments,
         indices={name: each for name, each in slopes.items() if each},
@@ -225,10 +225,13 @@ class Gradient:
 
 
 def _one_sided(problem: Problem, along: Mapping[str, Direction]) -> tuple[str, ...]:
-    """What is said of ∂/∂r₀ at r₀ = 1."""
-    if isinstance(problem.noise, NonGaussianNoise) and problem.noise.r0 == 1 and "noise.r0" in along:
-        return ("the sensitivities to noise.r0 = 1 are derivatives from below: above, Λ is infinite or another one",)
-    return ()
+    """Which derivatives are taken from below."""
+    noise, values = problem.noise, problem.values
+    return tuple(
+        f"the sensitivities to {key} = {values[key]:g} are derivatives from below: above, Λ is infinite or another one"
+        for key in (f"{noise.section}.{name}" for name in noise.one_sided)
+        if key in along
+    )
 
 
 def _summed(terms: Sequence[KroneckerSum], x: FloatArray, y: FloatArray, turns: int) -> Estimate:

@@ -21,7 +21,6 @@ from fpsolve.model.quantity import (
     P,
     Quantity,
     moment_at,
-    parameter_of,
 )
 
 if TYPE_CHECKING:
@@ -43,6 +42,7 @@ class Sensitivities(Result):
 
     Attributes:
         theta: the values of the parameters.
+        quantities: what the parameters are.
         p: the moments, shape (n,).
         moments: ∂Λ(p)/∂θ, one mapping for each p; empty where Λ(p) did not converge.
         indices: ∂/∂θ of "lyapunov_exponent", "stability_index" and "variance_rate"; without those that do not exist.
@@ -50,6 +50,7 @@ class Sensitivities(Result):
     """
 
     theta: Mapping[str, float]
+    quantities: Mapping[str, Quantity]
     p: FloatArray
     moments: tuple[Slopes, ...]
     indices: Mapping[str, Slopes]
@@ -61,7 +62,7 @@ class Sensitivities(Result):
         for name, record in RECORDS.items():
             if name in self.indices:
                 numbers |= _labelled(record, [self.indices[name]], self.theta)
-        names, units = ([getattr(parameter_of(key), of) for key in self.theta] for of in ("name", "unit"))
+        names, units = ([getattr(each, of) for each in self.quantities.values()] for of in ("name", "unit"))
         coordinates = {
             P: self.p,
             replace(THETA, name="parameter", words="key of a parameter", latex="", unit="1"): np.array(
@@ -85,7 +86,7 @@ class Sensitivities(Result):
             label: np.array([self.theta[key] * each.value for key, each in slopes.items()])
             for label, (_, slopes) in self.shown().items()
         }
-        draw_bars(axes, bars, [parameter_of(key).latex or key for key in self.theta], **kwargs)
+        draw_bars(axes, bars, [each.latex or key for key, each in self.quantities.items()], **kwargs)
         axes.set_xlabel(r"effect of a relative change, $\theta\,\partial/\partial\theta$ (1/time)")
         if bars:
             add_legend(axes)

@@ -24,10 +24,9 @@ from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
 from fpsolve.exponent.adapt import Budget
-from fpsolve.model.direction import Family
-from fpsolve.model.noise import NonGaussianNoise
-from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import POINTS, parameter_of, parameter_values
+from fpsolve.model.noise import Noise
+from fpsolve.model.problem import Problem, of_problem, with_original
+from fpsolve.model.quantity import POINTS
 
 if TYPE_CHECKING:
     import xarray
@@ -77,7 +76,7 @@ class Boundary(Result):
     Attributes:
         zero: what F is.
         x, y: the frame.
-        family: the problems, one of which has the values of the other parameters.
+        problem: with the values of the other parameters.
         traces: its branches, in shares of the sides of the frame.
         scan: F on the grid in which they were looked for; None where they were started from points.
         step: the longest step between two points, in sides of the frame.
@@ -87,7 +86,7 @@ class Boundary(Result):
     zero: Zero
     x: Axis
     y: Axis
-    family: Family
+    problem: Problem
     traces: tuple[Trace, ...] = ()
     scan: Scan | None = None
     step: float = LONGEST
@@ -101,7 +100,7 @@ class Boundary(Result):
     @property
     def quantity(self) -> Quantity:
         """F over the unit square."""
-        return Quantity(self.zero, self.family, (self.x, self.y), self.budget)
+        return Quantity(self.zero, self.problem, (self.x, self.y), self.budget)
 
     def remark(self) -> str:
         """That there is no line, if so."""
@@ -130,7 +129,7 @@ class Boundary(Result):
         other = replace(self, x=x or self.x, y=y or self.y, traces=(), scan=None)
         if (other.x.key, other.y.key) != (self.x.key, self.y.key):
             raise ValueError(f"a frame of {other.x.key}, {other.y.key}: use `started_from` for other parameters")
-        check_axes(self.family, other.x, other.y)
+        check_axes(self.problem, other.x, other.y)
         seeds = (
             np.array([other.x.share(x), other.y.share(y)])
             for branch in self.branches
@@ -146,18 +145,18 @@ class Boundary(Result):
         """
         here = self.branches[branch]
         values = {self.x.key: float(here.x[point]), self.y.key: float(here.y[point])}
-        family = self.family.at(values)
-        check_axes(family, x, y)
-        theta = {axis.key: family.directions()[axis.key].theta for axis in (x, y)}
+        problem = self.problem.at(values)
+        check_axes(problem, x, y)
+        theta = {axis.key: float(problem.values[axis.key]) for axis in (x, y)}
         start = np.array([axis.share(theta[axis.key]) for axis in (x, y)])
         if np.any((start < 0) | (start > 1)):
             point_there = ", ".join(f"{key} = {value:g}" for key, value in theta.items())
             raise ValueError(f"the point has {point_there}, which is not in the frame; choose a wider one")
-        return replace(self, x=x, y=y, family=family, traces=(), scan=None)._from([start])
+        return replace(self, x=x, y=y, problem=problem, traces=(), scan=None)._from([start])
 
     def rows(self) -> list[Row]:
         """The rows of its scan, tasks for `scan_row`, each of which begins anew; they pickle small."""
-        rough = partial(Quantity, self.zero, self.family, (self.x, self.y), self.budget, SCAN_RTOL)
+        rough = partial(Quantity, self.zero, self.problem, (self.x, self.y), self.budget, SCAN_RTOL)
         return rows_of(rough, NODES if self.scan is None else self.scan.nodes.size, rough().easy_axis)
 
     def grown(
@@ -238,7 +237,7 @@ def _dataset(line: Boundary) -> xarray.Dataset:
     numbers = np.repeat(np.arange(1, len(branches) + 1), [branch.x.size for branch in branches])
     columns = [np.concatenate([np.zeros(0), *(getattr(each, of) for each in branches)]) for of in ("x", "y", "width")]
     labels = np.array([label for branch in branches for label in branch.labels], dtype=str)
-    sides = [parameter_of(axis.key) for axis in (line.x, line.y)]
+    sides = [line.problem.parameters[axis.key].quantity for axis in (line.x, line.y)]
     x, y = (replace(side, name=name, dims=("point",)) for side, name in zip(sides, "xy", strict=True))
     variables = {x: columns[0], y: columns[1], POINTS["width"]: columns[2]}
     coordinates = {
@@ -246,9 +245,7 @@ def _dataset(line: Boundary) -> xarray.Dataset:
         POINTS["branch"]: numbers,
         POINTS["label"]: labels,
     }
-    original = line.family.original
-    values = dict(parameter_values(line.family.problem, original))
-    held = {key: value for key, value in values.items() if key not in (line.x.key, line.y.key)}
+    held = {key: value for key, value in line.problem.values.items() if key not in (line.x.key, line.y.key)}
     closed = [str(number) for number, branch in enumerate(branches, start=1) if branch.closed]
     more = {"line": line.zero.equation, "closed_branches": ", ".join(closed), "remark": line.remark()}
     found = dataset("line of stability", "finite elements", variables, coordinates, held, **more)
@@ -278,7 +275,7 @@ def boundary(
     x: Axis,
     y: Axis,
     *,
-    original: NonGaussianNoise | None = None,
+    original: Noise | None = None,
     step: float = LONGEST,
     nodes: int = NODES,
     budget: Budget | None = None,
@@ -289,8 +286,7 @@ def boundary(
         problem: a motion and its noise, in one argument or two; its other parameters are held.
         zero: "lyapunov_exponent", {"moment": p} or {"stability_index": v}.
         x, y: the frame.
-        original: the noise of Eq. (7) that an Ornstein-Uhlenbeck noise is the reduction (12)-(14) of; then its
-            parameters are those of the frame.
+        original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).
         step: the longest step between two points, in sides of the frame.
         nodes: of the grid in which branches are looked for, each way.
         budget: for a solve.
@@ -299,12 +295,12 @@ def boundary(
         ValueError: an axis is no parameter of the problem or out of its range, both are the same, or `zero`, `step` or
             `nodes` is none of these.
     """
-    family = Family(problem, original)
-    check_axes(family, x, y)
+    problem = with_original(problem, original)
+    check_axes(problem, x, y)
     if isinstance(nodes, bool) or not isinstance(nodes, int) or nodes < 2:
         raise ValueError(f"got nodes = {nodes!r}; must be a whole number from 2")
     empty = Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
-    line = Boundary(zero_of(zero), x, y, family, scan=empty, step=_checked_step(step), budget=budget or Budget())
+    line = Boundary(zero_of(zero), x, y, problem, scan=empty, step=_checked_step(step), budget=budget or Budget())
     *_, whole = line.grown()
     return whole
 

@@ -20,12 +20,9 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.bordered import Bordered
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.direction import Direction, Family
-from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.parameters import STRICT
-from fpsolve.model.problem import refuse_infinite
+from fpsolve.model.problem import Direction, Problem, refuse_infinite
 
-_LOSS = "oscillator.restitution"
 RTOL = 1e-10
 """Of F, relative to its scale."""
 
@@ -154,9 +151,9 @@ def said(failure: ValueError) -> str:
     return "; ".join(f"{key}: {text}" if key else text for key, text in faults)
 
 
-def check_axes(family: Family, x: Axis, y: Axis) -> None:
+def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
     """Refuse axes that span no frame. Raises `ValueError`."""
-    known = family.directions()
+    known = problem.differentiable
     for axis in (x, y):
         if not isinstance(axis, Axis):
             raise ValueError(f"got {axis!r} as an axis; must be an Axis")
@@ -164,7 +161,7 @@ def check_axes(family: Family, x: Axis, y: Axis) -> None:
             raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known) or 'none'}")
         for name, value in (("start", axis.start), ("stop", axis.stop)):
             try:
-                family.at({axis.key: value})
+                problem.at({axis.key: value})
             except ValidationError as failure:
                 if failure.errors()[0]["loc"]:  # of this parameter alone
                     raise ValueError(f"got {axis.key} with {name} = {value:g}: {said(failure)}") from failure
@@ -182,19 +179,24 @@ class Quantity:
 
     Args:
         zero: which of them.
-        family: the problems.
+        problem: the problem with the values of all other parameters.
         axes: the parameters.
         budget: for a solve.
         rtol: of F, relative to its scale.
     """
 
-    def __init__(self, zero: Zero, family: Family, axes: tuple[Axis, Axis], budget: Budget, rtol: float = RTOL) -> None:
-        self._zero, self._family, self._axes = zero, family, axes
+    def __init__(
+        self, zero: Zero, problem: Problem, axes: tuple[Axis, Axis], budget: Budget, rtol: float = RTOL
+    ) -> None:
+        self._zero, self._problem, self._axes = zero, problem, axes
         self._rtol, self._budget = rtol, budget
         self._starts: Mapping[float, Solution] = {}
-        keys = [axis.key for axis in axes]
-        is_affine = zero.p == 0 and _LOSS in keys and "oscillator.epsilon" not in keys  # ln R changes with both
-        self._bounce = keys.index(_LOSS) if is_affine else None
+        keys, system = [axis.key for axis in axes], problem.system
+        loss = f"{system.section}.{system.impact_parameter}"
+        is_affine = (
+            zero.p == 0 and loss in keys and not any(problem.direction(key).kicks for key in keys if key != loss)
+        )  # ln R changes with one of them
+        self._bounce = keys.index(loss) if is_affine else None
         self._solved: dict[float, dict[float, Sample]] = {}
 
     @property
@@ -206,39 +208,38 @@ class Quantity:
         """F at (u, v). Raises `FpsolveError` where there is none."""
         values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}
         try:
-            family = self._family.at(values)
+            problem = self._problem.at(values)
         except ValueError as failure:
             raise FpsolveError(f"no such problem: {said(failure)}") from failure
         if self._bounce is None:
-            return self._sample(at, family)
+            return self._sample(at, problem)
         known = self._solved.setdefault(float(at[1 - self._bounce]), {})
-        log_factor = family.problem.system.kicks[0].log_factor
+        log_factor = problem.system.kicks[0].log_factor
         if len(known) < 2 and log_factor not in known:
-            known[log_factor] = self._sample(at, family)
-        return known[log_factor] if log_factor in known else self._between(at, family, log_factor, known, self._bounce)
+            known[log_factor] = self._sample(at, problem)
+        return known[log_factor] if log_factor in known else self._between(at, problem, log_factor, known, self._bounce)
 
-    def _sample(self, at: FloatArray, family: Family) -> Sample:
+    def _sample(self, at: FloatArray, problem: Problem) -> Sample:
         """F from a solve."""
-        refuse_infinite(family.problem, self._zero.p)
-        solver = ExponentSolver(family.problem, rtol=self._rtol, budget=self._budget, starts=self._starts)
+        refuse_infinite(problem, self._zero.p)
+        solver = ExponentSolver(problem, rtol=self._rtol, budget=self._budget, starts=self._starts)
         value, error = solver.ratio_alone(self._zero.p)
         if value > 0 > self._zero.p:
             self._refuse_rare(solver)
-        directions = family.directions()
-        slopes = self._slopes(solver, [directions[axis.key] for axis in self._axes])
+        slopes = self._slopes(solver, [problem.direction(axis.key) for axis in self._axes])
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
         self._starts = solver.near.known
         scale = solver.scale(self._zero.p) / abs(self._zero.p) if self._zero.p else solver.scales.linear
         return Sample(at, value, gradient, error, scale)
 
     def _between(
-        self, at: FloatArray, family: Family, log_factor: float, known: Mapping[float, Sample], bounce: int
+        self, at: FloatArray, problem: Problem, log_factor: float, known: Mapping[float, Sample], bounce: int
     ) -> Sample:
         """λ from two of its values at other r."""
         (first, one), (second, other) = known.items()
         share = (log_factor - first) / (second - first)
         gradient = one.gradient + share * (other.gradient - one.gradient)
-        [rise] = family.directions()[_LOSS].kicks
+        [rise] = problem.direction(self._axes[bounce].key).kicks
         impacts = (other.value - one.value) / (second - first)
         gradient[bounce] = impacts * rise * self._axes[bounce].slope(float(at[bounce]))
         value = one.value + share * (other.value - one.value)
@@ -248,7 +249,7 @@ class Quantity:
     def _refuse_rare(self, solver: ExponentSolver) -> None:
         """Refuse a Λ(p) < 0 that is not the largest, as rare paths far out in algebraic tails grow. Raises so."""
         p = self._zero.p
-        if not has_algebraic_tails(solver.problem.noise):
+        if not solver.problem.noise.has_algebraic_tails:
             return
         near = solver.near.solution(p).pair
         if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:

@@ -33,7 +33,7 @@ from fpsolve.errors import CaseError, Fault
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.parameters import parameter
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 
 def _from_table(kind: Any) -> BeforeValidator:

@@ -9,9 +9,9 @@ from typing import Any
 
 from fpsolve.case.sections import NoiseSection, Value, Varied, flat
 from fpsolve.case.vary import RECORDS, assignments
-from fpsolve.model.noise import ColouredNoise, NonGaussianNoise
+from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Curve:
     """
 
     oscillator: VibroImpactOscillator
-    noise: ColouredNoise
+    noise: Noise
     parameters: Varied
     varied: Varied
     number: int = 1
@@ -55,11 +55,6 @@ class Curve:
     def is_exact(self) -> bool:
         """Whether the noise is Eq. (7) as it stands; perturbation theory then has its reduction only."""
         return self.parameters["noise.treatment"] == "exact"
-
-    @property
-    def original_noise(self) -> NonGaussianNoise:
-        """The noise of Eq. (7), whatever its treatment."""
-        return _noise(*(self.parameters[key] for key in NOISE)).original()
 
 
 def make_curve(oscillator: VibroImpactOscillator, noise: NoiseSection, varied: Varied, number: int = 1) -> Curve:

@@ -37,7 +37,7 @@ from fpsolve.case.vary import WORDS, Vary, assignments
 from fpsolve.errors import MeshError, NoSuchExponent
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.model.noise import NonGaussianNoise, check_existence
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.simulation.setup import obstacles
 from fpsolve.theory.perturbation import second_order
 
@@ -103,7 +103,7 @@ def _obstacle(valid: Known, varied: Varied, p: FloatArray, *, with_existence: bo
         return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
     try:
         for extreme in extremes if with_existence else ():
-            check_existence(curve.noise, extreme)
+            curve.noise.check_existence(extreme)
     except NoSuchExponent as error:
         return in_words_of_a_case(str(error))
     return ""

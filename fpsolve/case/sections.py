@@ -22,7 +22,7 @@ from fpsolve.errors import MeshError
 from fpsolve.exponent.quantities import QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, vertices_at
 from fpsolve.fem.mesh_file import read_mesh
-from fpsolve.model.noise import CorrelationTime, Departure, Intensity, NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.noises.non_gaussian import CorrelationTime, Departure, Intensity, NonGaussianNoise, ReducedNoise
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
@@ -82,13 +82,10 @@ class NoiseSection(Section):
         Literal["ou-reduction", "exact"], parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"')
     ] = "ou-reduction"
 
-    def original(self) -> NonGaussianNoise:
-        """The noise of Eq. (7), whatever the treatment."""
-        return NonGaussianNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
-
-    def process(self) -> OrnsteinUhlenbeck | NonGaussianNoise:
+    def process(self) -> ReducedNoise | NonGaussianNoise:
         """The noise that is solved for."""
-        return self.original() if self.treatment == "exact" else self.original().ou_reduction()
+        kind = NonGaussianNoise if self.treatment == "exact" else ReducedNoise
+        return kind(D0=self.D0, tau0=self.tau0, r0=self.r0)
 
 
 class Sweep(Section):

@@ -11,9 +11,9 @@ from pydantic import Field, TypeAdapter
 from pydantic.fields import FieldInfo
 
 from fpsolve.case.sections import MAX_MOMENTS, Moments, NoiseSection, Value, Values, same
+from fpsolve.model.kinds import parameter_of
 from fpsolve.model.parameters import STRICT
-from fpsolve.model.quantity import parameter_of
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.model.words import choices
 
 _VARIED_SECTIONS: Mapping[str, Any] = {"oscillator": VibroImpactOscillator, "noise": NoiseSection}

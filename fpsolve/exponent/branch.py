@@ -23,7 +23,6 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem
 
 TRIM = 0.8
@@ -114,7 +113,7 @@ class Branch:
 
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
-        side = p or (-1.0 if has_algebraic_tails(self.problem.noise) else 1.0)  # where Λ is finite
+        side = p or (-1.0 if self.problem.noise.has_algebraic_tails else 1.0)  # where Λ is finite
         q = math.copysign(SMALL_P, side)
         try:
             return self.solution(q, tolerance)

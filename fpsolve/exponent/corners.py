@@ -19,8 +19,8 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.fem.discretisation import Cells, Discretisation, PhaseCells
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import Diffusion
+from fpsolve.model.noise import Noise
+from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.plane import is_steady, turning_noise
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
@@ -99,7 +99,7 @@ def corners(problem: Problem, p: float, center: float | None = None) -> list[Cor
 
 
 def resolving(
-    found: Sequence[Corner], chosen: Discretisation, noise: Diffusion, center: float, rtol: float
+    found: Sequence[Corner], chosen: Discretisation, noise: Noise, center: float, rtol: float
 ) -> Discretisation:
     """Cells instead of polynomials, smaller towards the corners, down to the distance of one to the end of the support.
 
@@ -169,7 +169,7 @@ def _rays(found: Sequence[Corner], lines: FloatArray) -> FloatArray:
     return rays[(rays > lines[0] - NEAR) & (rays < lines[-1] + NEAR)]
 
 
-def _interval(noise: Diffusion, center: float) -> FloatArray:
+def _interval(noise: Noise, center: float) -> FloatArray:
     """The ends of the z around those of the tilted density and around 0, or of the support if it ends near by."""
     end = noise.half_width / noise.standard_deviation
     lower, upper = min(center, 0.0) - REACH, max(center, 0.0) + REACH

@@ -28,7 +28,7 @@ from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.factors import Factors
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.theory.frozen import eigenvalues_at
 
 BACKWARD_ERROR_GOAL = 1e-14

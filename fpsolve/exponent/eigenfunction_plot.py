@@ -8,7 +8,8 @@ from typing import Literal
 
 from fpsolve.exponent.fields import Pair
 from fpsolve.exponent.nodes import Nodes
-from fpsolve.model.quantity import PHASE, Quantity, density_unit, noise_of, parameter_lines, parameter_values
+from fpsolve.model.problem import parameter_lines
+from fpsolve.model.quantity import PHASE, Quantity, density_unit
 from fpsolve.surfaces import Picture, Surface, can_render, flat_picture, picture_in_space
 
 FINER = 2
@@ -57,7 +58,7 @@ def surface_of(pair: Pair, field: str) -> Surface:
     if field not in FIELDS:
         raise ValueError(f"got field = {field!r}; must be one of {', '.join(map(repr, FIELDS))}")
     (name, quantity), problem = FIELDS[field], pair.generator.problem
-    nodes, noise = Nodes.of(pair, FINER).seen(pair), noise_of(problem)
+    nodes, noise = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity
     unit = quantity.unit if name == "right" else density_unit(noise)
     about = {"phi": PHASE.attributes, "xi": noise.attributes, "values": {**quantity.attributes, "units": unit}}
     rays = {(kick.phase + turn) % (2 * math.pi) for kick in problem.system.kicks for turn in (0, math.pi)}
@@ -68,6 +69,6 @@ def surface_of(pair: Pair, field: str) -> Surface:
         about=about,
         name=quantity.symbol,
         title=f"p = {pair.p:g}, Λ(p) = {round(pair.value, 14) + 0.0:.6g} (1/time)",
-        lines=parameter_lines(parameter_values(problem)),
+        lines=parameter_lines(problem.parameters),
         impacts=sorted(rays),
     )

@@ -22,17 +22,9 @@ from fpsolve.exponent.rival import misplaced
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, missed
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
-from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.problem import Problem, checked_moments, of_problem_too
-from fpsolve.model.quantity import (
-    DERIVATIVE,
-    MOMENT,
-    SECOND_DERIVATIVE,
-    STABILITY_INDEX,
-    P,
-    moment_at,
-    parameter_values,
-)
+from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, STABILITY_INDEX, P, moment_at
 from fpsolve.theory.far import grows_far_out
 
 if TYPE_CHECKING:
@@ -215,7 +207,7 @@ def _dataset(function: MomentLyapunovFunction, p: FloatArray) -> xarray.Dataset:
         SECOND_DERIVATIVE: function.second_derivative(p),
     }
     solver, method = function.solver, "finite elements and interpolation"
-    return dataset(MOMENT.words, method, numbers, {P: p}, parameter_values(solver.problem), rtol=solver.rtol)
+    return dataset(MOMENT.words, method, numbers, {P: p}, solver.problem.values, rtol=solver.rtol)
 
 
 def _nodes_needed(count: int, last: float, error: float, allowed: float) -> float:

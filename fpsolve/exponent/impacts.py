@@ -30,9 +30,8 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message
-from fpsolve.model.direction import Direction
+from fpsolve.model.problem import Direction
 from fpsolve.model.quantity import CRITICAL_IMPACT_FACTOR, CRITICAL_RESTITUTION, IMPACT_RATE
-from fpsolve.model.vibro_impact import VibroImpactOscillator
 
 _EPS = sys.float_info.epsilon
 LARGEST_LOG = 500.0
@@ -84,20 +83,20 @@ def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
     Raises:
         NotConverged: λ or N is not resolved.
     """
-    oscillator = solver.problem.system
-    if not isinstance(oscillator, VibroImpactOscillator):
+    system = solver.problem.system
+    if not system.impact_parameter:
         return Absent(Message(Code.NO_RESTITUTION))
     log = _critical_log_factor(solver)
     if isinstance(log, Absent):
         return log
     if log.value > 0:
         # λ is affine in ln R, and 0 at ln R_c
-        lossless = solver.lyapunov_exponent().value * log.value / (log.value - oscillator.log_impact_factor)
+        lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.kicks[0].log_factor)
         return Absent(Message(Code.ALWAYS_STABLE, value=lossless))
-    value = oscillator.restitution_of(log.value)
+    value = system.impact_value(log.value)
     if value <= 0:
         return Absent(Message(Code.ALWAYS_UNSTABLE, value=value))
-    slope = oscillator.restitution_slope(log.value)
+    slope = system.impact_slope(log.value)
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
     return checked(Estimate(value, error, scale, quantity=CRITICAL_RESTITUTION), solver.near.remedy)
 

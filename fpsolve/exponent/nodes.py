@@ -18,8 +18,7 @@ from fpsolve.errors import OutputError
 from fpsolve.exponent.fields import Fields, Pair, fields, xi_marginal
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.fem.phase import PhaseAxis
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import has_algebraic_tails
+from fpsolve.model.noises.markov_chain import MarkovChain
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals; elements of a higher degree are cut into several of them."""
@@ -129,7 +128,7 @@ def _z_lines(pair: Pair) -> FloatArray:
 
 def _resolution(pair: Pair, lines: FloatArray) -> FloatArray:
     """The height of quadrilaterals, in noise units, that shows P_s in each cell: 1, or more in algebraic tails."""
-    if not has_algebraic_tails(pair.generator.problem.noise):
+    if not pair.generator.problem.noise.has_algebraic_tails:
         return np.ones(lines.size - 1)
     return np.maximum(1.0, np.minimum(abs(lines[:-1]), abs(lines[1:])) / 6)
 

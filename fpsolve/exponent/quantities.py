@@ -17,7 +17,6 @@ from fpsolve.model import quantity
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import MOMENT as MOMENT
 from fpsolve.model.quantity import Quantity as Quantity
-from fpsolve.model.vibro_impact import VibroImpactOscillator
 from fpsolve.theory.perturbation import second_order
 
 DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
@@ -93,9 +92,7 @@ QUANTITIES: Mapping[str, Quantity] = {MOMENT.name: MOMENT, **INDICES}
 
 def _restitution(problem: Problem, log_factor: float) -> float:
     """The r with a given ln R, by the impact law of the oscillator; NaN for other motions."""
-    if not isinstance(problem.system, VibroImpactOscillator):
-        return math.nan
-    return problem.system.restitution_of(log_factor)
+    return problem.system.impact_value(log_factor) if problem.system.impact_parameter else math.nan
 
 
 @of_problem

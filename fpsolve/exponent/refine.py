@@ -16,10 +16,10 @@ from fpsolve.exponent.corners import corners, graded_more, resolving
 from fpsolve.exponent.error import Solution
 from fpsolve.fem.discretisation import MOST_DEGREE, Cells, Discretisation, NoisePart, PhaseCells, Polynomials, States
 from fpsolve.fem.generator import Generator
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import has_algebraic_tails
+from fpsolve.model.noise import Noise
+from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.plane import System, phase_speed
-from fpsolve.model.problem import AnyNoise, Problem
+from fpsolve.model.problem import Problem
 from fpsolve.theory.far import Place
 from fpsolve.theory.frozen import frozen_noise
 
@@ -43,7 +43,7 @@ def first(problem: Problem, p: float, center: float, rtol: float) -> Discretisat
     end = noise.half_width / unit
     phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
     part: NoisePart
-    if has_algebraic_tails(noise):
+    if noise.has_algebraic_tails:
         part = Cells(_graded(12.0 + abs(center)), round(2 + digits / 2))
     else:
         frozen = frozen_noise(problem)
@@ -91,7 +91,7 @@ def _graded(end: float) -> FloatArray:
 def widened(generator: Generator) -> Discretisation:
     """That of a generator on an interval `WIDER` times as wide, where that is one of algebraic tails."""
     chosen, lines = generator.chosen, generator.chosen.noise.lines
-    if not (lines.size and has_algebraic_tails(generator.problem.noise)):
+    if not (lines.size and generator.problem.noise.has_algebraic_tails):
         return chosen
     steps = WIDER ** np.linspace(0, 1, 4)[1:]
     wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
@@ -112,6 +112,6 @@ def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation
     return new if new.size > chosen.size or solution.error_by_modes <= tolerance else new.raised()
 
 
-def _log_density(noise: AnyNoise, z: FloatArray) -> FloatArray:
+def _log_density(noise: Noise, z: FloatArray) -> FloatArray:
     """ln P_s of a diffusion."""
-    return noise.log_density(noise.standard_deviation * z)  # type: ignore[union-attr]
+    return noise.log_density(noise.standard_deviation * z)

@@ -11,7 +11,6 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.theory.far import Place, far_places
 from fpsolve.theory.frozen import frozen_noise
 
@@ -26,7 +25,7 @@ def rival(pair: PrincipalPair) -> float | None:
     told, and only the larger eigenvalue is Λ. For algebraic tails see `far_rivals`.
     """
     frozen = frozen_noise(pair.generator.problem)
-    if frozen is None or has_algebraic_tails(pair.generator.problem.noise):
+    if frozen is None or pair.generator.problem.noise.has_algebraic_tails:
         return None
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
@@ -44,7 +43,7 @@ def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tupl
     pair, z = next(((pair, z) for pair, z in found if z is not None), (None, None))
     if pair is None:
         return ()
-    has_tails = has_algebraic_tails(pair.generator.problem.noise)
+    has_tails = pair.generator.problem.noise.has_algebraic_tails
     return (Message(Code.CARRIED_ELSEWHERE, p=pair.p, has_tails=has_tails, z=z, remedy=Remedy.REACH),)
 
 

@@ -29,7 +29,6 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
-from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
 from fpsolve.theory.far import far_places, grows_far_out, highest_rate, log_tail, refuse_beyond, variance_tail
 from fpsolve.theory.perturbation import Scale, scale_of
@@ -96,7 +95,7 @@ class MomentLyapunov(Result):
         columns = ("value", "error_estimate", "derivative", "residual")
         numbers = {quantity.MOMENTS[name]: getattr(self, name) for name in columns}
         numbers[quantity.RARE] = np.isin(self.p, self.rare)
-        failures, values = [each.reason for each in self.failures], quantity.parameter_values(self.solver.problem)
+        failures, values = [each.reason for each in self.failures], self.solver.problem.values
         more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
         title, places = quantity.MOMENT.words, {quantity.P: self.p}
         return dataset(title, "finite elements", numbers, places, values, rtol=self.solver.rtol, **more)
@@ -169,7 +168,7 @@ class ExponentSolver:
         """
         p = real_number(p, "p")
         refuse_infinite(self.problem, p)
-        if self.mesh is not None or p == 0 or not has_algebraic_tails(self.problem.noise):
+        if self.mesh is not None or p == 0 or not self.problem.noise.has_algebraic_tails:
             return self.near.solution(p, tolerance)  # on a given mesh `misplaced` warns of other places
         places = far_places(self.problem, p)
         refuse_beyond(self.problem, p, highest_rate(self.problem, p))

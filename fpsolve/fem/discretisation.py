@@ -19,7 +19,7 @@ from fpsolve.fem.axis import Axis
 from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
 from fpsolve.fem.phase import PhaseAxis
-from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noises.markov_chain import MarkovChain
 
 HALVING = 2 * math.log(2)
 """By how much more the logarithm of an effect falls with each degree in half a cell."""

@@ -17,10 +17,9 @@ from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
-from fpsolve.model.direction import Direction
-from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rate, phase_speed
-from fpsolve.model.problem import Problem
+from fpsolve.model.problem import Direction, Problem
 
 KEPT_SPACES = 16
 MOST_FOR_A_BOUND = 300

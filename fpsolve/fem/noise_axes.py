@@ -21,9 +21,8 @@ from fpsolve.arrays import Coefficient, FloatArray, dense, one
 from fpsolve.fem.axis import Axis
 from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS
 from fpsolve.fem.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
-from fpsolve.model.direction import NoiseChange
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import Diffusion
+from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.noises.markov_chain import MarkovChain
 
 FAR = 50.0
 """Noise units beyond which OU noise does not come."""
@@ -70,7 +69,7 @@ class NoiseAxis(Axis):
     values: Any
     measure: FloatArray
 
-    def changed(self, change: NoiseChange, g: Coefficient | None) -> Any:
+    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Any:
         """∂/∂θ of `mass(g)`, for None of `generator()`, where the noise changes and the functions of ξ do not."""
         raise NotImplementedError
 
@@ -93,7 +92,7 @@ class LineAxis(NoiseAxis):
 
     points: FloatArray
 
-    def __init__(self, noise: Diffusion, tilt: float = 0.0) -> None:
+    def __init__(self, noise: Noise, tilt: float = 0.0) -> None:
         super().__init__()
         self.noise, self.unit, self.tilt, self._log_weight = noise, noise.standard_deviation, tilt, 0.0
         self._log_weight -= math.log(self.unit)
@@ -144,7 +143,7 @@ class PolynomialAxis(LineAxis):
 
     is_local = False
 
-    def __init__(self, noise: Diffusion, count: int, tilt: float = 0.0) -> None:
+    def __init__(self, noise: Noise, count: int, tilt: float = 0.0) -> None:
         super().__init__(noise, tilt)
         end = noise.half_width / self.unit
         if math.isinf(end):
@@ -180,13 +179,13 @@ class PolynomialAxis(LineAxis):
         """−½ ∫ P_s σ² (u′ + s u)(v′ + s v)."""
         return -_form(self._slopes, self._flux)
 
-    def changed(self, change: NoiseChange, g: Coefficient | None) -> FloatArray:
+    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
         logs = self._log_change(change)
         if g is not None:
             return _form(self.values, self.measure * logs * g(self.unit * self.points))
         return 2 * change.log_diffusion * self.matrix(None) - _form(self._slopes, self._flux * logs)
 
-    def _log_change(self, change: NoiseChange) -> FloatArray:
+    def _log_change(self, change: NoiseDerivative) -> FloatArray:
         """∂ ln P_s/∂θ at the points, without its mean; no rule of Gauss takes its ln(1 − x²) near ±1 as it stands."""
         logs, a = change.log_density(self.unit * self.points), self.noise.end_exponent
         if change.end_exponent and a < SHARP_ENDS:
@@ -217,7 +216,7 @@ class CellAxis(LineAxis):
         MeshError: a cell's polynomials cannot be told apart under the weight.
     """
 
-    def __init__(self, noise: Diffusion, lines: FloatArray, degree: int, is_killed: bool = False) -> None:
+    def __init__(self, noise: Noise, lines: FloatArray, degree: int, is_killed: bool = False) -> None:
         from fpsolve.fem.line import LineSpace  # scikit-fem takes a while to import
 
         super().__init__(noise)
@@ -244,7 +243,7 @@ class CellAxis(LineAxis):
         """−½ ∫ P_s σ² u′v′; at the ends no probability flux is the natural condition."""
         return self._form(-self.line.stiffness(self.rate))
 
-    def changed(self, change: NoiseChange, g: Coefficient | None) -> Any:
+    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Any:
         mean = float(self.measure @ change.log_density(self.unit * self.points) / np.sum(self.measure))
 
         def log_change(z: FloatArray) -> FloatArray:
@@ -291,7 +290,7 @@ class StateAxis(NoiseAxis):
         return np.eye(self.size)
 
 
-def squared_diffusion(noise: Diffusion, xi: FloatArray) -> FloatArray:
+def squared_diffusion(noise: Noise, xi: FloatArray) -> FloatArray:
     """σ²(ξ)."""
     return np.full_like(xi, noise.diffusion**2)
 

@@ -24,8 +24,8 @@ from scipy.sparse import diags, issparse
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.kronecker import KroneckerSum
-from fpsolve.model.direction import Direction
-from fpsolve.model.plane import Drive, Harmonics, Kick, System, phase_speed
+from fpsolve.model.plane import Drive, Harmonics, Kick, System, phase_speed, written_coefficient
+from fpsolve.model.problem import Direction
 
 ALL_ORDERS = slice(None)
 
@@ -253,7 +253,7 @@ class Terms:
 
 
 @dataclass(frozen=True, eq=False)
-class Moved:
+class Moved(System):
     """∂/∂θ of a motion, as a motion."""
 
     epsilon: float
@@ -274,7 +274,7 @@ def power_of_epsilon(order: int) -> str:
 def _prefix(drive: Drive) -> str:
     """ε^n g(ξ)."""
     power = f"{power_of_epsilon(drive.order)} " if drive.order else ""
-    g = "" if drive.g == one else "ξ " if drive.g.__name__ == "identity" else f"{drive.g.__name__}(ξ) "
+    g = written_coefficient(drive.g)
     return power + g
 
 

@@ -1,272 +1,162 @@
-"""The coloured noise ξ(t), Eqs. (7)-(16): the non-Gaussian process and the Ornstein-Uhlenbeck process.
+"""What solvers ask of a noise ξ(t), with what most of them answer; its kinds are in `noises`.
 
-Both satisfy dξ = b(ξ) dt + σ dW with a stationary density P_s, and b = ½σ² (ln P_s)′, so that the noise
-part of the generator is self-adjoint in P_s. The discretisation needs only what `Diffusion` names.
+A diffusion obeys dξ = b(ξ) dt + σ(ξ) dW and has a stationary density P_s with b P_s = ½(σ² P_s)′, so that the noise's
+part of the generator is self-adjoint in P_s. Solvers do not tell kinds apart: what they need to know is stated here.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Protocol
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field
-from pydantic.dataclasses import dataclass
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import Coefficient, FloatArray, nothing
 from fpsolve.errors import NoSuchExponent, Remedy
-from fpsolve.model.faults import told_in_words
-from fpsolve.model.parameters import DERIVED, SIZE, STRICT, parameter
-
-Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
-CorrelationTime = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
-Departure = Annotated[
-    float,
-    parameter(
-        "departure from Gaussian noise; from 5/3 on the variance (10) is infinite", "r0 = 0.95", "$r_0$", ge=-1e6
-    ),
-]
+from fpsolve.model.parameters import Parametrised
 
 
-class Noise(Protocol):
-    """What solvers ask of a noise."""
+@dataclass(frozen=True)
+class NoiseDerivative:
+    """∂/∂θ of a diffusion.
+
+    Attributes:
+        log_diffusion: ∂ ln σ/∂θ, the same for all ξ/c.
+        log_density: ∂ ln P_s(ξ)/∂θ at fixed ξ/c, but for a constant.
+        end_exponent: ∂a/∂θ of P_s ~ (1 − ξ²/ξ_s²)^a at the ends of a bounded support.
+        log_scale: ∂ ln c/∂θ of the length c that ξ is measured by; 0 where ξ itself is held.
+    """
+
+    log_diffusion: float = 0.0
+    log_density: Coefficient = nothing
+    end_exponent: float = 0.0
+    log_scale: float = 0.0
+
+
+class Noise(Parametrised):
+    """A stationary process that drives a system; what follows holds for most kinds.
+
+    Attributes:
+        has_states: whether ξ jumps between states; it then has no density, and what is said of that does not apply.
+        mixes_slowly: whether ξ may hardly ever leave some states for others, so that these have a positive eigenpair.
+        approximates_spectrum: whether `spectral_density` is that of a process which stands for this one.
+        may_tilt: whether functions of ξ gain by a factor exp(s ξ), as where P_s falls to both sides.
+    """
+
+    section: ClassVar[str] = "noise"
+    has_states: ClassVar[bool] = False
+    mixes_slowly: ClassVar[bool] = False
+    approximates_spectrum: ClassVar[bool] = False
+    may_tilt: ClassVar[bool] = True
 
     @property
-    def mean(self) -> float:
-        """Stationary mean of ξ."""
-
-    @property
+    @abstractmethod
     def standard_deviation(self) -> float:
         """Stationary standard deviation of ξ: one noise unit, z = ξ/std."""
 
     @property
+    @abstractmethod
     def correlation_time(self) -> float:
         """About how long ξ remembers its value."""
 
-    @property
-    def moments(self) -> tuple[float, float]:
-        """The p for which Λ(p) of a motion linear in ξ is finite, as a closed interval."""
-
+    @abstractmethod
     def spectral_density(self, omega: float) -> float:
         """S(ω) = ∫ C(t) cos ωt dt over all t, C the autocovariance."""
 
-
-class Diffusion(Noise, Protocol):
-    """A process dξ = ½σ² (ln P_s)′ dt + σ dW on an interval."""
+    @property
+    def mean(self) -> float:
+        """Stationary mean of ξ."""
+        return 0.0
 
     @property
-    def diffusion(self) -> float:
-        """σ, the coefficient of dW."""
+    def moments(self) -> tuple[float, float]:
+        """The p for which Λ(p) of a system linear in ξ is finite, as a closed interval."""
+        return -math.inf, math.inf
+
+    @property
+    def has_algebraic_tails(self) -> bool:
+        """Whether P_s falls like a power of ξ only, so that not all moments are finite."""
+        return math.isfinite(self.moments[1])
+
+    @property
+    def basis(self) -> Literal["polynomials", "cells", "states"]:
+        """What the functions of ξ are made of: orthogonal polynomials of P_s, cells of a line, or states."""
+        return "states" if self.has_states else "cells" if self.has_algebraic_tails else "polynomials"
 
     @property
     def half_width(self) -> float:
         """The support of ξ is (−half_width, half_width); ∞ where it is the whole line."""
+        return math.inf
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether ξ stays within an interval."""
+        return self.has_states or math.isfinite(self.half_width)
 
     @property
     def end_exponent(self) -> float:
         """a in P_s ~ (half_width − |ξ|)^a at the ends of a bounded support; 0 on the whole line."""
+        return 0.0
+
+    @property
+    def reached(self) -> FloatArray:
+        """Values of ξ, increasing or its states, that go as far as the noise does where that matters, shape (n,)."""
+        return np.asarray(min(self.half_width, 1e6 * self.standard_deviation) * np.linspace(-1, 1, 1001))
+
+    @property
+    def largest_jump_rate(self) -> float:
+        """The highest rate at which ξ leaves a state; 0 for continuous paths."""
+        return 0.0
+
+    @property
+    def diffusion(self) -> float:
+        """σ, the coefficient of dW, where it is constant; else its value at ξ = 0."""
+        raise NotImplementedError
+
+    def squared_diffusion(self, xi: ArrayLike) -> FloatArray:
+        """σ²(ξ), of the shape of ξ."""
+        return np.full_like(np.asarray(xi, dtype=float), self.diffusion**2)
+
+    @property
+    def relaxation_time(self) -> float:
+        """2⟨ξ²⟩/σ², the time in which ξ forgets its value: 1/α₀ for the Ornstein-Uhlenbeck process."""
+        return 2 * (self.standard_deviation / self.diffusion) ** 2
 
     def log_density(self, xi: ArrayLike) -> FloatArray:
         """ln P_s(ξ) of the stationary density; −∞ outside the support."""
+        raise NotImplementedError
 
     def density(self, xi: ArrayLike) -> FloatArray:
         """P_s(ξ); 0 outside the support."""
-
-
-@told_in_words
-@dataclass(frozen=True, config=STRICT)
-class OrnsteinUhlenbeck:
-    """Ornstein-Uhlenbeck noise dξ = −α₀ ξ dt + σ₀ dW, Eq. (15).
-
-    Args:
-        alpha: relaxation rate α₀, 1e-32 to 1e32, in 1/time.
-        sigma: coefficient of the Wiener process, σ₀, 1e-32 to 1e32, in time^(-3/2).
-
-    Raises:
-        ParameterError: a parameter is not a finite number in its range.
-    """
-
-    alpha: Annotated[float, parameter("relaxation rate", "", r"$\alpha_0$", "1/time", **DERIVED)]
-    sigma: Annotated[float, parameter("intensity of its white noise", "", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)]
-
-    mean, half_width, end_exponent, moments = 0.0, math.inf, 0.0, (-math.inf, math.inf)
-
-    @property
-    def diffusion(self) -> float:
-        return self.sigma
-
-    @property
-    def standard_deviation(self) -> float:
-        """σ₀/√(2α₀)."""
-        return self.sigma / math.sqrt(2 * self.alpha)
-
-    @property
-    def correlation_time(self) -> float:
-        """1/α₀."""
-        return 1 / self.alpha
-
-    def drift(self, xi: ArrayLike) -> FloatArray:
-        """−α₀ ξ."""
-        return -self.alpha * np.asarray(xi, dtype=float)
-
-    def log_density(self, xi: ArrayLike) -> FloatArray:
-        """Logarithm of the Gaussian density with variance σ₀²/(2α₀)."""
-        z = np.asarray(xi, dtype=float) / self.standard_deviation
-        return -0.5 * z**2 - math.log(math.sqrt(2 * math.pi) * self.standard_deviation)
-
-    def density(self, xi: ArrayLike) -> FloatArray:
-        """Gaussian density with variance σ₀²/(2α₀)."""
         return np.exp(self.log_density(xi))
 
-    def spectral_density(self, omega: float) -> float:
-        """S(ω) = σ₀²/(α₀² + ω²), Eq. (16)."""
-        return self.sigma**2 / (self.alpha**2 + omega**2)
-
-
-@told_in_words
-@dataclass(frozen=True, config=STRICT)
-class NonGaussianNoise:
-    """Non-Gaussian coloured noise dξ = −V′(ξ)/τ₀ dt + (√(2D₀)/τ₀) dW, Eqs. (7)-(8).
-
-    r₀ = 1 is the Ornstein-Uhlenbeck process; r₀ < 1 has bounded support, r₀ > 1 algebraic tails.
-
-    Args:
-        D0: noise intensity D₀, 1e-15 to 1e15, in 1/time.
-        tau0: correlation time τ₀, 1e-15 to 1e15.
-        r0: departure from the Gaussian noise, −1e6 ≤ r₀ < 3 (beyond, Eq. (9) cannot be normalised).
-
-    Raises:
-        ParameterError: a parameter is not a finite number in its range.
-    """
-
-    D0: Intensity
-    tau0: CorrelationTime
-    r0: Annotated[Departure, Field(lt=3)]
+    def holding_cost(self, xi: FloatArray) -> FloatArray:
+        """At which rate paths that hold ξ at these increasing values get rarer, about ⅛σ²((ln P_s)′)²."""
+        return 0.125 * self.squared_diffusion(xi) * np.gradient(self.log_density(xi), xi) ** 2
 
     @property
-    def curvature(self) -> float:
-        """b in 1 + b ξ², the bracket of Eqs. (8)-(9): b = τ₀(r₀ − 1)/(2D₀)."""
-        return self.tau0 * (self.r0 - 1) / (2 * self.D0)
-
-    mean = 0.0
+    def replaces(self) -> Noise | None:
+        """The noise that it stands for, as the reduction (12)-(14) does for that of Eq. (7)."""
+        return None
 
     @property
-    def diffusion(self) -> float:
-        """√(2D₀)/τ₀, which is σ₀ of Eq. (14)."""
-        return math.sqrt(2 * self.D0) / self.tau0
+    def one_sided(self) -> Sequence[str]:
+        """The names of parameters by which derivatives are taken from below here."""
+        return ()
 
-    @property
-    def variance(self) -> float:
-        """⟨ξ²⟩ of Eq. (10): 2D₀/(τ₀(5 − 3r₀)) for r₀ < 5/3, otherwise ∞."""
-        return 2 * self.D0 / (self.tau0 * self._bracket) if self._bracket > 0 else math.inf
+    def derivative(self, name: str) -> NoiseDerivative:
+        """∂/∂θ, θ one of the `differentiable` parameters."""
+        raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
 
-    @property
-    def _bracket(self) -> float:
-        """5 − 3r₀ of Eqs. (10) and (12), which rounding makes 0 for an r₀ just below 5/3."""
-        return 5 - 3 * self.r0
-
-    @property
-    def standard_deviation(self) -> float:
-        return math.sqrt(self.variance)
-
-    @property
-    def half_width(self) -> float:
-        """√(2D₀/(τ₀(1 − r₀))) for r₀ < 1, otherwise ∞."""
-        return 1 / math.sqrt(-self.curvature) if self.r0 < 1 else math.inf
-
-    @property
-    def end_exponent(self) -> float:
-        return 1 / (1 - self.r0) if self.r0 < 1 else 0.0
-
-    def potential(self, xi: ArrayLike) -> FloatArray:
-        """V(ξ) of Eq. (8); its limit ξ²/2 for r₀ = 1; NaN outside the support."""
-        square = np.asarray(xi, dtype=float) ** 2
-        if self.r0 == 1:
-            return square / 2
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return self.D0 / (self.tau0 * (self.r0 - 1)) * np.log1p(self.curvature * square)
-
-    def drift(self, xi: ArrayLike) -> FloatArray:
-        """−V′(ξ)/τ₀ = −(ξ/τ₀)/(1 + τ₀(r₀ − 1)ξ²/(2D₀)), Eq. (11) before its approximation."""
-        xi = np.asarray(xi, dtype=float)
-        return -xi / self.tau0 / (1 + self.curvature * xi**2)
-
-    def log_density(self, xi: ArrayLike) -> FloatArray:
-        """ln P_s(ξ) of Eq. (9) with the exponent −1/(r₀ − 1), normalised in closed form; −∞ outside the support."""
-        from scipy.special import xlog1py  # takes a tenth of a second to import
-
-        xi = np.asarray(xi, dtype=float)
-        if self.r0 == 1:
-            return self.ou_reduction().log_density(xi)
-        bracket = self.curvature * xi**2
-        with np.errstate(invalid="ignore", divide="ignore"):
-            power = xlog1py(-1 / (self.r0 - 1), bracket)
-        return np.where(bracket > -1, power, -math.inf) - self._log_normalisation
-
-    def density(self, xi: ArrayLike) -> FloatArray:
-        """P_s(ξ) of Eq. (9); 0 outside the support."""
-        return np.exp(self.log_density(xi))
-
-    @property
-    def _log_normalisation(self) -> float:
-        """ln Z of Eq. (9): Z = B(a + 1, ½)/√|b| for r₀ < 1 and B(a − ½, ½)/√b for r₀ > 1, with a = 1/|r₀ − 1|."""
-        from scipy.special import betaln
-
-        a = 1 / abs(self.r0 - 1)
-        return float(betaln(a + 1 if self.r0 < 1 else a - 0.5, 0.5)) - 0.5 * math.log(abs(self.curvature))
-
-    @property
-    def correlation_time(self) -> float:
-        """τ₁ of Eq. (12), that of the reduced noise, for r₀ < 5/3, otherwise ∞."""
-        return 2 * (2 - self.r0) / self._bracket * self.tau0 if self._bracket > 0 else math.inf
-
-    @property
-    def moments(self) -> tuple[float, float]:
-        """[−1, 0] for the algebraic tails of r₀ > 1, else all."""
-        return (-1.0, 0.0) if self.r0 > 1 else (-math.inf, math.inf)
-
-    def spectral_density(self, omega: float) -> float:
-        """S(ω) of the reduced noise, Eq. (16); that of Eq. (7) itself has no closed form."""
-        return self.ou_reduction().spectral_density(omega)
-
-    def ou_reduction(self) -> OrnsteinUhlenbeck:
-        """The Ornstein-Uhlenbeck process of Eqs. (12)-(14): α₀ = 1/τ₁, σ₀ = √(2D₀)/τ₀.
-
-        Raises:
-            ValueError: r₀ ≥ 5/3, where ⟨ξ²⟩ is infinite and Eq. (11) has no meaning.
-        """
-        if self._bracket <= 0:
-            raise ValueError(
-                f"r0 = {self.r0} has no Ornstein-Uhlenbeck reduction: Eqs. (11)-(12) need r0 < 5/3, "
-                "where the variance (10) is finite"
+    def check_existence(self, p: float) -> None:
+        """Refuse a p for which E‖x‖^p is infinite. Raises `NoSuchExponent` for a p that is not among the `moments`."""
+        low, high = self.moments
+        if not low <= p <= high:
+            raise NoSuchExponent(
+                f"Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
+                f"hide it; choose p in [{low:g}, {high:g}], r0 <= 1, {Remedy.REDUCTION}"
             )
-        return OrnsteinUhlenbeck(alpha=1 / self.correlation_time, sigma=self.diffusion)
-
-
-ColouredNoise = OrnsteinUhlenbeck | NonGaussianNoise
-"""The paper's noise, reduced or not."""
-
-
-def relaxation_time(noise: Diffusion) -> float:
-    """2⟨ξ²⟩/σ², the time in which ξ forgets its value: 1/α₀ for the Ornstein-Uhlenbeck process."""
-    return 2 * (noise.standard_deviation / noise.diffusion) ** 2
-
-
-def has_algebraic_tails(noise: Noise) -> bool:
-    """Whether P_s falls like a power of ξ only, so that not all moments are finite."""
-    return math.isfinite(noise.moments[1])
-
-
-def check_existence(noise: Noise, p: float) -> None:
-    """Refuse a p for which E‖x‖^p is infinite.
-
-    Raises:
-        NoSuchExponent: p is not among the `moments` of the noise.
-    """
-    low, high = noise.moments
-    if not low <= p <= high:
-        raise NoSuchExponent(
-            f"Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
-            f"hide it; choose p in [{low:g}, {high:g}], r0 <= 1, {Remedy.REDUCTION}"
-        )

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from enum import Enum
+from functools import cache
+from typing import Any, ClassVar, NamedTuple, Self
 
 from pydantic import ConfigDict, Field
 from pydantic.fields import FieldInfo
+
+from fpsolve.model.quantity import Quantity
 
 SIZE = {"ge": 1e-15, "le": 1e15}
 """The range of a positive parameter: whatever the others are, no formula overflows or divides by nothing."""
@@ -61,3 +67,83 @@ def meaning_of(field: FieldInfo) -> str:
 def _extra(field: FieldInfo, name: str) -> str:
     extra = field.json_schema_extra
     return str(extra[name]) if isinstance(extra, dict) else ""
+
+
+class Parameter(NamedTuple):
+    """A parameter of a problem.
+
+    Attributes:
+        value: a number, or a word such as "delta".
+        quantity: its key, such as "noise.D0", its symbol, its words and its unit.
+        kind: the class that it is a parameter of.
+    """
+
+    value: float | str
+    quantity: Quantity
+    kind: type[Parametrised]
+
+    @property
+    def field(self) -> FieldInfo | None:
+        """The range that it may have; None where that is not stated."""
+        return self.kind.fields().get(self.quantity.name.partition(".")[2])
+
+
+class Parametrised:
+    """A system or a noise, a kind with named parameters; here those of a pydantic dataclass.
+
+    Attributes:
+        kind: the name by which case files and the registry know it.
+        section: the first part of the keys of its parameters, such as "noise".
+        words: parameters that the class itself decides, by their names.
+        inert: names of parameters on which the linear problem does not depend.
+    """
+
+    kind: ClassVar[str] = ""
+    section: ClassVar[str]
+    words: ClassVar[Mapping[str, str]] = {}
+    inert: ClassVar[Sequence[str]] = ()
+
+    @classmethod
+    def fields(cls) -> Mapping[str, FieldInfo]:
+        """The ranges and meanings of the parameters by their names."""
+        return getattr(cls, "__pydantic_fields__", {})
+
+    def quantity_of(self, name: str) -> Quantity:
+        """What a parameter is."""
+        return quantities_of(type(self))[name]  # type: ignore[arg-type]
+
+    @property
+    def values(self) -> Mapping[str, float | str]:
+        """The values of the parameters by their names; the words of the class last."""
+        found: dict[str, float | str] = {}
+        for name in self.fields():
+            value = getattr(self, name)
+            if isinstance(value, Enum | int | float):
+                found[name] = str(value.value) if isinstance(value, Enum) else float(value)
+        return {**found, **self.words}
+
+    @property
+    def differentiable(self) -> Sequence[str]:
+        """The names of the parameters by which the linear problem can be differentiated."""
+        return [name for name, value in self.values.items() if not isinstance(value, str) and name not in self.inert]
+
+    def at(self, values: Mapping[str, float | str]) -> Self:
+        """The same with other values of some parameters, by name. Raises `ValueError` where one is out of range."""
+        return replace(self, **values)  # type: ignore[type-var]
+
+
+@cache
+def quantities_of(kind: type[Parametrised]) -> Mapping[str, Quantity]:
+    """What the parameters of a kind are, by their names."""
+    known = {
+        name: Quantity(
+            key := f"{kind.section}.{name}", key, field.title or key, symbol_of(field), unit_of(field) or "1"
+        )
+        for name, field in kind.fields().items()
+    }
+    return known | {name: unknown_parameter(f"{kind.section}.{name}") for name in kind.words}
+
+
+def unknown_parameter(key: str) -> Quantity:
+    """A parameter of which no more than its key is known."""
+    return Quantity(key, key, key, "", "unknown")

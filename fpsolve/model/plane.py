@@ -10,16 +10,17 @@ dφ = h dt and d ln a = q dt with h = e′ᵀA e, q = eᵀA e, e′ = de/dφ: a 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, one
+from fpsolve.model.parameters import Parametrised
 
 Matrix = Sequence[Sequence[float]]
 SAMPLES = 4001
@@ -62,6 +63,78 @@ def stretching(a: FloatArray) -> Harmonics:
     )
 
 
+PROBES = np.concatenate([-(side := np.geomspace(1e-6, 1e6, 97) * (1 + 0.01 * np.sin(np.arange(97)))), [0.0], side])
+"""ξ at which a function is compared with a + bξ."""
+
+
+@dataclass(frozen=True)
+class Function:
+    """A user's coefficient of ξ, which may return numbers for arrays.
+
+    Attributes:
+        f: any callable.
+    """
+
+    f: Callable[[Any], Any]
+
+    def __call__(self, x: Any) -> Any:
+        x = np.asarray(x, dtype=float)
+        return np.broadcast_to(np.asarray(self.f(x), dtype=float), x.shape)
+
+    def __hash__(self) -> int:
+        try:
+            return hash(self.f)
+        except TypeError:  # an object that compares by value and may change
+            return id(self.f)
+
+    @cached_property
+    def affine(self) -> tuple[float, float] | None:
+        """a and b where it is a + bξ at all of the `PROBES`, else None."""
+        try:
+            with np.errstate(all="ignore"):
+                values = self(PROBES)
+        except Exception:  # it may be defined near 0 only
+            return None
+        offset, slope = float(values[PROBES == 0][0]), float(values[-1] - values[0]) / float(PROBES[-1] - PROBES[0])
+        near = np.abs(values - offset - slope * PROBES) <= 1e-14 * (abs(offset) + abs(slope * PROBES))
+        return (offset, slope) if np.all(near) else None
+
+
+def coefficient(g: Coefficient) -> Constant | Linear | Function:
+    """A coefficient as a value. Raises `TypeError` where it is no function."""
+    if isinstance(g, Constant | Linear | Function):
+        return g
+    if not callable(g):
+        raise TypeError(f"got g = {g!r}; must be a function of xi")
+    return Function(g)
+
+
+def affine(g: Constant | Linear | Function) -> tuple[float, float] | None:
+    """a and b of a coefficient a + bξ; None for others."""
+    match g:
+        case Constant(value):
+            return value, 0.0
+        case Linear():
+            return 0.0, 1.0
+    return g.affine
+
+
+def written_coefficient(g: Constant | Linear | Function) -> str:
+    """How a coefficient is written before what it multiplies: nothing for 1, "ξ ", "sin(ξ) "."""
+    match g:
+        case Constant(value):
+            return "" if value == 1 else f"{value:g} "
+        case Linear():
+            return "ξ "
+    return f"{getattr(g.f, '__name__', type(g.f).__name__)}(ξ) "
+
+
+def is_driven(g: Constant | Linear | Function) -> bool:
+    """Whether a coefficient changes with ξ."""
+    line = affine(g)
+    return line is None or line[1] != 0
+
+
 @dataclass(frozen=True)
 class Drive:
     """One term of the motion, ε^order g(ξ) A x.
@@ -69,7 +142,7 @@ class Drive:
     Args:
         order: n ≥ 0, the power of ε.
         matrix: A, two rows of two numbers.
-        g: a function of ξ from arrays to arrays; a function of a module, so that results can be pickled.
+        g: a coefficient of ξ: any callable from arrays to arrays or numbers; one that pickles, so that results do.
 
     Raises:
         ValueError: the matrix is not 2×2 and finite, or the order is negative.
@@ -77,7 +150,7 @@ class Drive:
 
     order: int
     matrix: Matrix
-    g: Coefficient = one
+    g: Constant | Linear | Function = one
 
     def __post_init__(self) -> None:
         entries = np.array(self.matrix, dtype=float)
@@ -88,6 +161,7 @@ class Drive:
                 "finite numbers, such as ((0.0, 0.0), (0.0, 1.0))"
             )
         object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
+        object.__setattr__(self, "g", coefficient(self.g))
 
     @cached_property
     def h(self) -> Harmonics:
@@ -126,74 +200,35 @@ class Kick:
         return self.log_factor if self.leading is None else self.leading
 
 
-class System(Protocol):
-    """What solvers ask of a motion."""
+class System(Parametrised):
+    """What solvers ask of a linear system in the plane.
 
-    @property
-    def epsilon(self) -> float:
-        """ε."""
+    Attributes:
+        epsilon: ε.
+        drives: the terms of the motion, one at least.
+        kicks: the rays at which the state is stretched.
+        noise_unit: the unit of ξ.
+        impact_parameter: the name of a parameter that is in ln R of the only kick and nowhere else; empty for none.
+    """
 
-    @property
-    def drives(self) -> Sequence[Drive]:
-        """The terms of the motion."""
-
-    @property
-    def kicks(self) -> Sequence[Kick]:
-        """The rays at which the state is stretched."""
-
-
-class Differentiable(System, Protocol):
-    """A motion that knows how it changes with its parameters."""
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """The names of those it can be differentiated by."""
+    section: ClassVar[str] = "system"
+    noise_unit: ClassVar[str] = "unknown"
+    impact_parameter: ClassVar[str] = ""
+    epsilon: float
+    drives: Sequence[Drive]
+    kicks: Sequence[Kick]
 
     def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
         """∂/∂θ of the sum of the drives, as drives, and ∂ ln R/∂θ of every kick, nothing where none changes."""
+        raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
 
+    def impact_value(self, log_factor: float) -> float:
+        """The value of the `impact_parameter` for which the kick has a given ln R; it may be out of range."""
+        raise NotImplementedError
 
-@dataclass(frozen=True)
-class PlaneSystem:
-    """A linear motion in the plane from its parts, see `System`.
-
-    >>> from fpsolve.arrays import identity
-    >>> rotation, stiffness = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))
-    >>> PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity)]).epsilon  # ẍ + (1 + ξ) x = 0
-    1.0
-
-    Args:
-        drives: one at least.
-        kicks: stretches at rays.
-        epsilon: ε > 0.
-
-    Raises:
-        ValueError: there is no drive, or ε is not a positive number.
-    """
-
-    drives: Sequence[Drive]
-    kicks: Sequence[Kick] = ()
-    epsilon: float = 1.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "drives", tuple(self.drives))
-        object.__setattr__(self, "kicks", tuple(self.kicks))
-        rays = np.sort(np.mod([kick.phase for kick in self.kicks], math.pi))
-        if np.any(np.diff(np.append(rays, rays[:1] + math.pi)) < 1e-6) and rays.size > 1:
-            raise ValueError(f"got kicks at {[kick.phase for kick in self.kicks]}; their phases must differ modulo pi")
-        if not self.drives or not (math.isfinite(self.epsilon) and self.epsilon > 0):
-            raise ValueError(
-                f"got {len(self.drives)} drives and epsilon = {self.epsilon}; needs one at least, and a positive number"
-            )
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """ε."""
-        return ("epsilon",)
-
-    def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
-        """∂/∂ε."""
-        return by_epsilon(self), ()
+    def impact_slope(self, log_factor: float) -> float:
+        """Its derivative by ln R at a given ln R."""
+        raise NotImplementedError
 
 
 def by_epsilon(system: System) -> tuple[Drive, ...]:
@@ -235,7 +270,8 @@ def crosses_both_ways(system: System, kick: Kick, xi: ArrayLike) -> bool:
 def is_steady(system: System, kick: Kick) -> bool:
     """Whether no noise changes the speed of the phase at the ray of a kick, but for rounding."""
     return all(
-        drive.g is one or abs(float(drive.h(kick.phase))) <= 1e-12 * drive.h.amplitude for drive in system.drives
+        not is_driven(drive.g) or abs(float(drive.h(kick.phase))) <= 1e-12 * drive.h.amplitude
+        for drive in system.drives
     )
 
 
@@ -283,6 +319,9 @@ def angular_frequency(system: System) -> float:
 
 
 def noise_strength(system: System) -> float:
-    """Σ ε^n max|q| over what the noise drives: the size of d ln a/dt for ξ = 1; for the paper's oscillator ε."""
-    driven = (drive for drive in system.drives if drive.g is not one)
-    return float(sum(system.epsilon**drive.order * (abs(drive.q.mean) + drive.q.amplitude) for drive in driven))
+    """Σ ε^n |b| max|q| over g = a + bξ, b = 1 for other g: d ln a/dt for ξ = 1; for the paper's oscillator ε."""
+    total = 0.0
+    for drive in system.drives:
+        slope = abs((affine(drive.g) or (0.0, 1.0))[1])
+        total += slope * system.epsilon**drive.order * float(abs(drive.q.mean) + drive.q.amplitude)
+    return total

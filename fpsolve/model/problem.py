@@ -3,28 +3,48 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
 from functools import wraps
+from textwrap import wrap
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_numbers
 from fpsolve.errors import NoSuchExponent
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import Diffusion, check_existence
-from fpsolve.model.plane import System, crosses_both_ways
+from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.parameters import Parameter, Parametrised
+from fpsolve.model.plane import Drive, System, crosses_both_ways
+from fpsolve.model.quantity import NOISE, Quantity
 
-AnyNoise = Diffusion | MarkovChain
 P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
+LINE = 90
+"""Letters of a line of parameters at most."""
+
+
+@dataclass(frozen=True)
+class Direction:
+    """∂/∂θ of a problem, all at fixed φ and ξ.
+
+    Attributes:
+        theta: the value of θ.
+        drives: Σ ε^n g(ξ) A x of these is ∂/∂θ of the motion.
+        kicks: ∂ ln R/∂θ of each of the kicks of the motion; empty where none changes.
+        noise: that of the noise; None where it does not change.
+    """
+
+    theta: float
+    drives: tuple[Drive, ...] = ()
+    kicks: tuple[float, ...] = ()
+    noise: NoiseDerivative | None = None
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A motion and its noise.
+    """A system and the noise that drives it; its parameters have keys such as "noise.D0".
 
     Attributes:
         system: `VibroImpactOscillator`, or a `PlaneSystem`.
@@ -35,13 +55,115 @@ class Problem:
     """
 
     system: System
-    noise: AnyNoise
+    noise: Noise
 
     def __post_init__(self) -> None:
-        halves = ((self.system, "motion", "drives"), (self.noise, "noise", "spectral_density"))
-        for half, kind, needed in halves:
-            if isinstance(half, type) or not hasattr(half, needed):
+        for half, kind, needed in ((self.system, "motion", System), (self.noise, "noise", Noise)):
+            if not isinstance(half, needed):
                 raise TypeError(f"got {half!r} as a {kind}; the first arguments must be an oscillator and a noise")
+
+    @property
+    def halves(self) -> tuple[Parametrised, Parametrised]:
+        """The system and the noise."""
+        return self.system, self.noise
+
+    @property
+    def values(self) -> Mapping[str, float | str]:
+        """The values of all parameters, numbers and words, by their keys."""
+        return {f"{half.section}.{name}": value for half in self.halves for name, value in half.values.items()}
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """All parameters by their keys, with symbol, words, unit and range."""
+        return {
+            f"{half.section}.{name}": Parameter(value, half.quantity_of(name), type(half))
+            for half in self.halves
+            for name, value in half.values.items()
+        }
+
+    @property
+    def differentiable(self) -> list[str]:
+        """The keys of the parameters by which Λ can be differentiated."""
+        return [f"{half.section}.{name}" for half in self.halves for name in half.differentiable]
+
+    def at(self, values: Mapping[str, float | str]) -> Problem:
+        """The problem with other values of some parameters, by their keys. Raises `ValueError`."""
+        known = {half.section: half for half in self.halves}
+        new = dict[str, dict[str, float | str]]()
+        for key, value in values.items():
+            section, _, name = key.partition(".")
+            if section not in known:
+                raise ValueError(f"got {key}; the parameters are {', '.join(self.values)}")
+            new.setdefault(section, {})[name] = value
+        system, noise = (half.at(new[half.section]) if half.section in new else half for half in self.halves)
+        return Problem(system, noise)  # type: ignore[arg-type]
+
+    def direction(self, key: str) -> Direction:
+        """∂/∂θ by one of the `differentiable` parameters. Raises `ValueError` for others."""
+        if key not in self.differentiable:
+            raise ValueError(f"got {key}; the parameters to differentiate by are {', '.join(self.differentiable)}")
+        section, _, name = key.partition(".")
+        theta = float(self.values[key])
+        if section == self.noise.section:
+            return Direction(theta, noise=self.noise.derivative(name))
+        drives, kicks = self.system.derivative(name)
+        return Direction(theta, drives, kicks)
+
+    def directions(self) -> Mapping[str, Direction]:
+        """∂/∂θ by all of the `differentiable` parameters, by their keys."""
+        return {key: self.direction(key) for key in self.differentiable}
+
+    @property
+    def noise_quantity(self) -> Quantity:
+        """ξ, whose unit the system decides."""
+        return replace(NOISE, unit=self.system.noise_unit)
+
+
+def parameter_words(parameters: Mapping[str, Parameter], keys: Collection[str]) -> str:
+    """Some of the parameters with their units, by dotted keys: "noise.D0 = 0.1 (1/time), noise.r0 = 0.9"."""
+    return ", ".join(f"{key} = {_valued(parameters[key])}" for key in keys)
+
+
+def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
+    """The same of all parameters besides some, in lines for the system and for the noise, none of them long."""
+    sections = dict[str, list[str]]()
+    for key, parameter in parameters.items():
+        if key not in besides:
+            section, _, name = key.partition(".")
+            sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}".replace(" ", "\xa0"))
+    lines = [wrap(f"{section}: {', '.join(words)}", LINE) for section, words in sections.items()]
+    return [line.replace("\xa0", " ") for each in lines for line in each]
+
+
+def _valued(parameter: Parameter) -> str:
+    """The value of a parameter with its unit."""
+    value, unit = parameter.value, parameter.quantity.unit
+    if isinstance(value, str) or unit in ("1", "unknown"):
+        return value if isinstance(value, str) else f"{value:g}"
+    return f"{value:g} ({unit})"
+
+
+def with_original(problem: Problem, original: Any) -> Problem:
+    """The problem with the parameters of the noise of Eq. (7) that its noise is the reduction of; deprecated.
+
+    Raises:
+        ValueError: it is not the reduction of that noise, nor that noise.
+    """
+    if original is None:
+        return problem
+    warnings.warn(
+        "`original` is not needed any more: NonGaussianNoise.ou_reduction() knows D0, tau0 and r0; leave it out",
+        DeprecationWarning,
+        stacklevel=4,
+    )
+    noise = problem.noise
+    if noise == original:
+        return problem
+    reduced = original.ou_reduction()
+    same = [getattr(noise, name, math.nan) for name in ("alpha", "sigma")] == [reduced.alpha, reduced.sigma]
+    if not same:
+        raise ValueError(f"got original = {original}, but {noise} is not its reduction")
+    return Problem(problem.system, reduced)
 
 
 def refuse_infinite(problem: Problem, p: float) -> None:
@@ -56,13 +178,10 @@ def refuse_infinite(problem: Problem, p: float) -> None:
         NoSuchExponent: p is not among the `moments` of the noise, or there is such a ray.
     """
     noise, system = problem.noise, problem.system
-    check_existence(noise, p)
+    noise.check_existence(p)
     if not any(p * kick.log_factor > math.log(2.0) for kick in system.kicks):
         return
-    if isinstance(noise, MarkovChain):
-        xi, most = np.array(noise.states), math.e
-    else:
-        xi, most = min(noise.half_width, 1e6 * noise.standard_deviation) * np.linspace(-1, 1, 1001), 2.0
+    xi, most = noise.reached, math.e if noise.has_states else 2.0
     for kick in system.kicks:
         if p * kick.log_factor > math.log(most) and crosses_both_ways(system, kick, xi):
             raise NoSuchExponent(
@@ -87,7 +206,7 @@ class OfProblem(Protocol[P, R_co]):
     def __call__(self, problem: Problem, /, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
 
     @overload
-    def __call__(self, oscillator: System, noise: AnyNoise, /, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
+    def __call__(self, oscillator: System, noise: Noise, /, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
 
 
 def of_problem(function: Callable[Concatenate[Problem, P], R_co]) -> OfProblem[P, R_co]:

@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from enum import Enum
-from textwrap import wrap
-
-from pydantic.fields import FieldInfo
 
 from fpsolve.data import Quantity as Quantity
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.parameters import symbol_of, unit_of
-from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
 
-LINE = 90
-"""Letters of a line of parameters at most."""
 UNNAMED = Quantity("value", "value", "number", "", "unknown")
 """Of a number of which nothing more is known."""
 P = Quantity("p", "p", "order of the moment", "$p$", dims=("p",))
@@ -107,12 +97,6 @@ STORED_MOMENTS = {
     "perturbation": MOMENT.perturbation,
 }
 """Those of them that results.nc holds, by the same names, as they are called there."""
-_FIELDS: Mapping[str, FieldInfo] = {
-    f"{half}.{name}": field
-    for half, kinds in (("oscillator", [VibroImpactOscillator]), ("noise", [NonGaussianNoise, OrnsteinUhlenbeck]))
-    for kind in kinds
-    for name, field in kind.__pydantic_fields__.items()  # type: ignore[attr-defined]
-}
 
 
 def moment_at(p: float) -> Quantity:
@@ -120,59 +104,6 @@ def moment_at(p: float) -> Quantity:
     return replace(MOMENT, symbol=f"Λ({p:g})", latex=rf"$\Lambda({p:g})$", dims=())
 
 
-def parameter_of(key: str) -> Quantity:
-    """A parameter of a problem, by its key, such as "noise.D0"."""
-    field = _FIELDS.get(key)
-    if field is None:
-        return Quantity(key, key, key, "", "unknown")
-    return Quantity(key, key, field.title or key, symbol_of(field), unit_of(field) or "1")
-
-
-def parameter_values(problem: Problem, original: NonGaussianNoise | None = None) -> Mapping[str, float | str]:
-    """The parameters of a problem by their keys, as far as they are numbers or words.
-
-    Args:
-        problem: a motion and its noise.
-        original: the noise of Eq. (7) that the noise is the reduction of; then its parameters are told.
-    """
-    found: dict[str, float | str] = {}
-    for half, part in (("oscillator", problem.system), ("noise", original or problem.noise)):
-        for name, value in vars(part).items():
-            if isinstance(value, Enum | int | float):
-                found[f"{half}.{name}"] = str(value.value) if isinstance(value, Enum) else float(value)
-    if original is not None:
-        found["noise.treatment"] = "exact" if problem.noise == original else "ou-reduction"
-    return found
-
-
-def parameter_words(parameters: Mapping[str, float | str], keys: Collection[str]) -> str:
-    """Some of the parameters with their units, by dotted keys: "noise.D0 = 0.1 (1/time), noise.r0 = 0.9"."""
-    return ", ".join(f"{key} = {_valued(key, parameters[key])}" for key in keys)
-
-
-def parameter_lines(parameters: Mapping[str, float | str], besides: Collection[str] = ()) -> list[str]:
-    """The same of all parameters besides some, in lines for the oscillator and for the noise, none of them long."""
-    lines: list[str] = []
-    for half in ("oscillator", "noise"):
-        keys = [key for key in parameters if key.startswith(f"{half}.") and key not in besides]
-        words = [f"{key.partition('.')[2]} = {_valued(key, parameters[key])}" for key in keys]
-        lines += wrap(f"{half}: {', '.join(each.replace(' ', chr(160)) for each in words)}", LINE) if words else []
-    return [line.replace(chr(160), " ") for line in lines]
-
-
-def _valued(key: str, value: float | str) -> str:
-    """The value of a parameter with its unit."""
-    unit = parameter_of(key).unit
-    if isinstance(value, str) or unit in ("1", "unknown"):
-        return value if isinstance(value, str) else f"{value:g}"
-    return f"{value:g} ({unit})"
-
-
 def density_unit(noise: Quantity) -> str:
     """Of a density per radian and unit of ξ."""
     return {"1/time": "time/rad", "1": "1/rad"}.get(noise.unit, "unknown")
-
-
-def noise_of(problem: Problem) -> Quantity:
-    """ξ, whose unit the motion decides."""
-    return NOISE if isinstance(problem.system, VibroImpactOscillator) else replace(NOISE, unit="unknown")

@@ -22,7 +22,7 @@ from fpsolve.case.figure import fixed
 from fpsolve.case.sections import Varied
 from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
 from fpsolve.files import write_csv, write_json
-from fpsolve.model.quantity import parameter_of
+from fpsolve.model.kinds import parameter_of
 from fpsolve.output.tables import head
 from fpsolve.study.chart import Chart, charted
 

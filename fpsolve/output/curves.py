@@ -27,7 +27,8 @@ from fpsolve.drawing import (
     scale_axis,
     scale_of,
 )
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT, STABILITY_INDEX, P, Quantity, parameter_of
+from fpsolve.model.kinds import parameter_of
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, STABILITY_INDEX, P, Quantity
 from fpsolve.output.series import STYLES, Series, Telling, numbers_of, texts_of
 
 MOST_VECTORS = 1000

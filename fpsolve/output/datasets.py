@@ -17,7 +17,8 @@ from fpsolve.case.vary import PARAMETERS
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.files import atomic
-from fpsolve.model.quantity import SECONDS, STORED_MOMENTS, P, Quantity, parameter_of
+from fpsolve.model.kinds import parameter_of
+from fpsolve.model.quantity import SECONDS, STORED_MOMENTS, P, Quantity
 from fpsolve.output.tables import asked
 from fpsolve.study.results import CurveResult, Status
 

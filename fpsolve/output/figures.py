@@ -16,8 +16,8 @@ from fpsolve.case.sections import Value, Varied, same
 from fpsolve.drawing import Format, draw_bars, figure_for
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
+from fpsolve.model.kinds import parameter_of
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import parameter_of
 from fpsolve.output.charts import held_in_words, read_line
 from fpsolve.output.curves import write_figure
 from fpsolve.output.maps import Plane, write_map

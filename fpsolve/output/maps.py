@@ -14,7 +14,8 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.figure import FigureSection
 from fpsolve.drawing import FORMATS, draw_colours, figure_for, label_axes, points, scale_axis, scale_of
 from fpsolve.exponent.quantities import Index
-from fpsolve.model.quantity import Quantity, parameter_of
+from fpsolve.model.kinds import parameter_of
+from fpsolve.model.quantity import Quantity
 
 _BETWEEN = "#00C800"
 """Of the line between values, which may lie on the black one of a chart."""

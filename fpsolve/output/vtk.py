@@ -22,7 +22,10 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import xi_marginal
 from fpsolve.exponent.nodes import Nodes
 from fpsolve.files import write_text
-from fpsolve.model.quantity import parameter_lines, parameter_words
+from fpsolve.model.kinds import parameter_of
+from fpsolve.model.noise import Noise
+from fpsolve.model.parameters import Parameter
+from fpsolve.model.problem import parameter_lines, parameter_words
 from fpsolve.signals import signals_held
 from fpsolve.study.results import SimulatedCurve, Solved
 
@@ -177,9 +180,10 @@ def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: 
 
 def _facts(parameters: Facts, varied: Collection[str]) -> Facts:
     """The parameters, and the words about them that a picture shows, if there are any, in ASCII."""
+    known = {key: Parameter(value, parameter_of(key), Noise) for key, value in parameters.items()}
     words = {
-        "varied": parameter_words(parameters, varied),
-        "held": "\n".join(parameter_lines(parameters, varied)),
+        "varied": parameter_words(known, varied),
+        "held": "\n".join(parameter_lines(known, varied)),
     }
     return {**parameters, **{name: text.replace("²", "^2") for name, text in words.items() if text}}
 

@@ -13,8 +13,9 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from fpsolve.errors import FpsolveError
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.vibro_impact import ImpactLaw, VibroImpactOscillator
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
 from fpsolve.proofs.balls import ball, precision
 from fpsolve.proofs.basis import Basis, Core, Whole
 from fpsolve.proofs.statement import DIRECT, EXACT, IMPACT, NOISE, OSCILLATOR, REDUCED, TREATMENT, Parameters

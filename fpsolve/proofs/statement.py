@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.errors import NoSuchExponent, Remedy
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import ImpactLaw, VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
 from fpsolve.proofs.balls import Balls, ball
 
 if TYPE_CHECKING:

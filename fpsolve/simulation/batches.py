@@ -12,7 +12,7 @@ import numpy as np
 from numpy.random import SeedSequence, default_rng
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.noise import ColouredNoise, has_algebraic_tails, relaxation_time
+from fpsolve.model.noise import Noise
 from fpsolve.pool import processors
 from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
 from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator
@@ -42,7 +42,7 @@ class Plan:
         levels: the direct estimator has windows of 2⁰ … 2^(levels − 1) slices.
     """
 
-    noise: ColouredNoise
+    noise: Noise
     motion: Motion
     noise_step: NoiseStep
     step: float
@@ -155,9 +155,9 @@ class Population(_Paths):
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
         super().__init__(plan, seed)
         self.p, self.bias, self.expected = p, 0.0, 0.0
-        self._is_biased = p != 0 and not has_algebraic_tails(plan.noise)
+        self._is_biased = p != 0 and not plan.noise.has_algebraic_tails
         if is_far and self._is_biased:
-            self.bias = p * plan.motion.strength * relaxation_time(plan.noise)
+            self.bias = p * plan.motion.strength * plan.noise.relaxation_time
         self.tallies = np.zeros(1, TALLIES)
         self._log_weights, self._ancestors = np.zeros(plan.paths), np.arange(plan.paths)
         self._log_z = np.zeros(2)  # of the weights that have been reset, and of all at the last slice

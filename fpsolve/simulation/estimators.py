@@ -24,7 +24,6 @@ from scipy.special import logsumexp
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.errors import NotConverged
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import parameter_values
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.simulation.kernels import TALLIES
 from fpsolve.simulation.monte_carlo import MomentEstimate as MomentEstimate
@@ -97,7 +96,7 @@ def simulate(
     advances = [batch.advance for batch in (*plain, *populations)]
     interrupted = advance_all(advances, plan.settling + plan.wanted, plan.slice_seconds, progress)
     found = _result(plan, plain, populations, seed, interrupted)
-    return replace(found, parameters=parameter_values(problem))
+    return replace(found, parameters=problem.values)
 
 
 def _plan(

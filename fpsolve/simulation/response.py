@@ -14,8 +14,8 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import IMPACT_RATE, parameter_values
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.quantity import IMPACT_RATE
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.kernels import advance_and_count
 from fpsolve.simulation.setup import BATCHES, simulated_parts
@@ -201,7 +201,7 @@ def stationary_response(
         batch.impacts, batch.reach = 0, reach
     interrupted = advance_all(advances, looks, seconds, progress)
     found = _collect(oscillator, batches, between, reach, interrupted)
-    return replace(found, parameters=parameter_values(problem))
+    return replace(found, parameters=problem.values)
 
 
 def _collect(

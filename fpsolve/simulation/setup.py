@@ -10,9 +10,11 @@ import numpy as np
 
 from fpsolve.arrays import real_numbers
 from fpsolve.errors import FpsolveError
-from fpsolve.model.noise import ColouredNoise, NonGaussianNoise, check_existence, relaxation_time
+from fpsolve.model.noise import Noise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 Estimator = Literal["direct", "population"]
 BATCHES = 32
@@ -26,14 +28,14 @@ _LONGEST = 1_000_000
 """Steps in a transient, and transients in all; with more, a simulation would not end."""
 
 
-def simulated_parts(problem: Problem) -> tuple[VibroImpactOscillator, ColouredNoise]:
+def simulated_parts(problem: Problem) -> tuple[VibroImpactOscillator, Noise]:
     """The motion and the noise of a problem, if they can be simulated.
 
     Raises:
         FpsolveError: they cannot.
     """
     system, noise = problem.system, problem.noise
-    if isinstance(system, VibroImpactOscillator) and isinstance(noise, ColouredNoise):
+    if isinstance(system, VibroImpactOscillator) and isinstance(noise, NonGaussianNoise | GaussianNoise):
         return system, noise
     raise FpsolveError(
         "simulation is for a VibroImpactOscillator under OrnsteinUhlenbeck or NonGaussianNoise, but this is a "
@@ -41,9 +43,7 @@ def simulated_parts(problem: Problem) -> tuple[VibroImpactOscillator, ColouredNo
     )
 
 
-def check_settings(
-    noise: ColouredNoise, p: float | Sequence[float], estimator: Estimator, paths: int, seed: int
-) -> None:
+def check_settings(noise: Noise, p: float | Sequence[float], estimator: Estimator, paths: int, seed: int) -> None:
     """Refuse what lengths and steps have no part in, see `obstacles`.
 
     Raises:
@@ -53,7 +53,7 @@ def check_settings(
     if not math.isfinite(noise.standard_deviation):
         raise ValueError("got a noise of infinite variance; must be finite, as for r0 < 5/3")
     for order in real_numbers(p, "p", may_be_empty=True):
-        check_existence(noise, order)
+        noise.check_existence(order)
     is_whole = all(isinstance(each, int | np.integer) for each in (paths, seed))
     if estimator not in get_args(Estimator) or not is_whole or not BATCHES <= paths <= MAX_PATHS or seed < 0:
         raise ValueError(
@@ -62,7 +62,7 @@ def check_settings(
         )
 
 
-def largest_step(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> tuple[float, str]:
+def largest_step(oscillator: VibroImpactOscillator, noise: Noise) -> tuple[float, str]:
     """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
 
     ω h ≤ ½, ε² |c₁| h ≤ ⅛, ε std(ξ) h ≤ ⅛, α₀ h ≤ ½. For Eq. (7) instead of the last h ≤ τ₀/20; and near the ends of
@@ -82,28 +82,28 @@ def largest_step(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> tup
             share = min(share, max(2e-3 * min(a, 1.0) ** 2, a * 1.25e-3 ** (2 / (a + 1))))
         limits["the correlation time of the noise"] = share * noise.tau0
     else:
-        limits["the correlation time of the noise"] = 0.5 / noise.alpha
+        limits["the correlation time of the noise"] = 0.5 / noise.alpha  # type: ignore[attr-defined]
     reason = min(limits, key=lambda name: limits[name])
     return limits[reason], reason
 
 
-def transient(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def transient(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """The time after which ln E‖x‖^p grows like Λ(p) t: whole half-turns π/ω, at least two and eight correlation times.
 
     In whole half-turns the oscillation cancels that the start from the stationary law leaves in weak noise.
     """
     half_turn = math.pi / oscillator.omega
-    return half_turn * max(2, math.ceil(8 * relaxation_time(noise) / half_turn))
+    return half_turn * max(2, math.ceil(8 * noise.relaxation_time / half_turn))
 
 
-def default_step(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def default_step(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """Half the largest step, or less, so that a half-turn π/ω is a whole number of steps."""
     half_turn = math.pi / oscillator.omega
     return half_turn / math.ceil(half_turn / (0.5 * largest_step(oscillator, noise)[0]))
 
 
 def obstacles(
-    oscillator: VibroImpactOscillator, noise: ColouredNoise, *, time: float | None = None, step: float | None = None
+    oscillator: VibroImpactOscillator, noise: Noise, *, time: float | None = None, step: float | None = None
 ) -> dict[str, str]:
     """Why a simulation with this length and this step would not be right: a sentence for each of "time" and "step"."""
     found = {}

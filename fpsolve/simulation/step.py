@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.noise import ColouredNoise, NonGaussianNoise
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noise import Noise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 
 class Motion(NamedTuple):
@@ -60,13 +61,13 @@ def motion(oscillator: VibroImpactOscillator, *, smooth: bool = False) -> Motion
     )
 
 
-def noise_step(noise: ColouredNoise, h: float, bias: float = 0.0) -> NoiseStep:
+def noise_step(noise: Noise, h: float, bias: float = 0.0) -> NoiseStep:
     """The coefficients of one step of length h; `bias` is b, which adds σ² b to the drift."""
     force = noise.diffusion**2 * bias
     if isinstance(noise, NonGaussianNoise) and noise.r0 != 1:
         kick = noise.diffusion * math.sqrt(h)
         return NoiseStep(0.0, 0.0, kick, force * h, 0.0, 0.0, 0.0, 0.0, h / (2 * noise.tau0), noise.curvature)
-    alpha = 1 / noise.tau0 if isinstance(noise, NonGaussianNoise) else noise.alpha
+    alpha = 1 / noise.tau0 if isinstance(noise, NonGaussianNoise) else noise.alpha  # type: ignore[attr-defined]
     std, a = noise.standard_deviation, alpha * h
     decay, mean = math.exp(-a), -math.expm1(-a) / a
     # Variances of ξ₁ and ξ̄ and their covariance, in units of std²; the series avoids cancellation.
@@ -92,14 +93,14 @@ def noise_step(noise: ColouredNoise, h: float, bias: float = 0.0) -> NoiseStep:
 
 
 def starting_state(
-    noise: ColouredNoise, paths: int, rng: np.random.Generator, amplitude: float = 1.0
+    noise: Noise, paths: int, rng: np.random.Generator, amplitude: float = 1.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """x, u and ξ of paths of one amplitude, with uniform phases in front of the wall and stationary noise."""
     phase = rng.uniform(0, math.pi, paths)
     return amplitude * np.sin(phase), amplitude * np.cos(phase), stationary_noise(noise, paths, rng)
 
 
-def stationary_noise(noise: ColouredNoise, size: int, rng: np.random.Generator) -> FloatArray:
+def stationary_noise(noise: Noise, size: int, rng: np.random.Generator) -> FloatArray:
     """Independent values of ξ from the stationary density: Gaussian, or Eq. (9) as a beta or a Student variable."""
     if not isinstance(noise, NonGaussianNoise) or noise.r0 == 1:
         return noise.standard_deviation * rng.standard_normal(size)

@@ -16,7 +16,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.chart import ChartSection
 from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import FpsolveError
-from fpsolve.model.direction import Family
+from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import second_order
 
 CLOSED_FORM_NODES = 81
@@ -99,9 +99,9 @@ def solve_chart(
     frame = charted(case)
     x, y = frame.x.axis, frame.y.axis
     curve = case.curve({})
-    family = Family(curve.problem, curve.original_noise)
-    chart = Chart((), _closed_forms(family, frame.zero, (x, y)))
-    begun = [Boundary(zero, x, y, family, budget=case.budget) for zero in frame.zero]
+    problem = curve.problem
+    chart = Chart((), _closed_forms(problem, frame.zero, (x, y)))
+    begun = [Boundary(zero, x, y, problem, budget=case.budget) for zero in frame.zero]
     rows = iter(map(scan_row, [row for line in begun for row in line.rows()]))
     for each in begun:
         done = chart.lines
@@ -111,7 +111,9 @@ def solve_chart(
     yield Chart(tuple(crossed(chart.lines)), chart.closed_forms, regions(chart.lines), complete=True)
 
 
-def _closed_forms(family: Family, zeros: Sequence[Zero], axes: tuple[Axis, Axis]) -> tuple[tuple[FloatArray, ...], ...]:
+def _closed_forms(
+    problem: Problem, zeros: Sequence[Zero], axes: tuple[Axis, Axis]
+) -> tuple[tuple[FloatArray, ...], ...]:
     """The lines ε²Λ₂(p)/p = 0 in the parameters themselves, for noise that is reduced as in the paper."""
     from contourpy import contour_generator
 
@@ -121,7 +123,7 @@ def _closed_forms(family: Family, zeros: Sequence[Zero], axes: tuple[Axis, Axis]
     for i, u in enumerate(shares):
         for j, v in enumerate(shares):
             try:
-                theory = second_order(family.at({x.key: float(x.value(u)), y.key: float(y.value(v))}).problem)
+                theory = second_order(problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))}))
             except ValueError:  # no such problem
                 continue
             linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic

@@ -27,7 +27,6 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STAB
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import message_of
-from fpsolve.model.direction import directions
 from fpsolve.study.results import Comparison, CurveResult, Moments, Solved
 from fpsolve.theory import validity
 from fpsolve.theory.perturbation import second_order
@@ -218,7 +217,7 @@ def _sensitivities(
     return solve_sensitivities(
         solver,
         np.array([p for p in wanted.differentiated if np.any(moments.p == p)]),
-        directions(curve.problem, curve.original_noise),
+        curve.problem.directions(),
         indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
         root=None if index is None else index.value,
     )
@@ -229,7 +228,7 @@ def _notes(curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> 
     notes = [
         validity.heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
         *moments.notes,
-        None if curve.is_exact else validity.reduction_note(curve.original_noise),
+        validity.reduction_note(curve.noise),
         validity.impact_note(curve.oscillator),
         validity.weak_noise_note(curve.problem, moments.p, moments.value),
     ]

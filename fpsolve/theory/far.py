@@ -12,7 +12,6 @@ import scipy.linalg
 from fpsolve.arrays import finite
 from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message
-from fpsolve.model.noise import has_algebraic_tails
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import FURTHEST, FrozenNoise, eigenvalues_at, frozen_noise
 
@@ -75,7 +74,7 @@ def _kept(problem: Problem, p: float) -> list[Place]:
 
 def _far_places(problem: Problem, p: float) -> list[Place]:
     frozen = frozen_noise(problem)
-    if p == 0 or frozen is None or not has_algebraic_tails(problem.noise):
+    if p == 0 or frozen is None or not problem.noise.has_algebraic_tails:
         return []
     z, _ = frozen.peaks(p)
     return [_held(problem, p, *_well(frozen, p, float(each))) for each in z[np.abs(z) > NEAR]]
@@ -86,7 +85,7 @@ def grows_far_out(problem: Problem) -> bool:
 
     It is so where the growth rate G(ξ) of noise that rests is negative far out, on one side, and |G|ξ² → ∞.
     """
-    if not has_algebraic_tails(problem.noise):
+    if not problem.noise.has_algebraic_tails:
         return False
     z = np.array(FAR_OUT)
     for side in (-1.0, 1.0):
@@ -103,11 +102,11 @@ def variance_tail(problem: Problem) -> float:
     P_s ~ |ξ|^(−d), s = d − 2a − 3. For the paper's oscillator a is 1 where it is fed with energy, and Λ″(0) is finite
     for r₀ < 7/5.
     """
-    if not has_algebraic_tails(problem.noise):
+    if not problem.noise.has_algebraic_tails:
         return math.inf
     xi, least = problem.noise.standard_deviation * np.array(FAR_OUT), math.inf
     for side in (-1.0, 1.0):
-        density = problem.noise.log_density(side * xi)  # type: ignore[union-attr]
+        density = problem.noise.log_density(side * xi)
         growth = np.log(np.maximum(np.abs(eigenvalues_at(problem, side * xi)[0]), 1e-300))
         fall = float(density[0] - density[1] - 2 * (growth[1] - growth[0])) / math.log(FAR_OUT[1] / FAR_OUT[0])
         least = min(least, fall - 3)
@@ -117,13 +116,13 @@ def variance_tail(problem: Problem) -> float:
 def log_tail(problem: Problem, z: float) -> float:
     """About the logarithm of the probability that noise with algebraic tails lies beyond z: that of |ξ| P_s."""
     xi = problem.noise.standard_deviation * z
-    return float(problem.noise.log_density(xi)) + math.log(abs(xi))  # type: ignore[union-attr]
+    return float(problem.noise.log_density(xi)) + math.log(abs(xi))
 
 
 def growth_beyond(problem: Problem, p: float) -> float:
     """About how fast ‖x‖^p grows, for −1 ≤ p < 0, on paths that hold the noise beyond all z looked at, or −∞."""
     frozen = frozen_noise(problem)
-    if p == 0 or frozen is None or not has_algebraic_tails(problem.noise):
+    if p == 0 or frozen is None or not problem.noise.has_algebraic_tails:
         return -math.inf
     return frozen.at_the_ends(p)
 
@@ -152,9 +151,9 @@ def _held(problem: Problem, p: float, inner: float, outer: float) -> Place:
     noise, unit = problem.noise, problem.noise.standard_deviation
     step = math.log(outer / inner) / (POINTS + 1)
     z = inner * np.exp(0.5 * step * np.arange(2 * POINTS + 3))
-    density, size = noise.log_density(unit * z), np.log(np.abs(z))  # type: ignore[union-attr]
+    density, size = noise.log_density(unit * z), np.log(np.abs(z))
     mass = (density + size)[2:-1:2]
-    flux = (density - size)[1::2] + 2 * math.log(noise.diffusion / unit / step) - math.log(2)  # type: ignore[union-attr]
+    flux = (density - size)[1::2] + 2 * math.log(noise.diffusion / unit / step) - math.log(2)
     growth = p * eigenvalues_at(problem, unit * z[2:-1:2])[0]
     diagonal = growth - np.exp(flux[:-1] - mass) - np.exp(flux[1:] - mass)
     beside = np.exp(flux[1:-1] - 0.5 * (mass[:-1] + mass[1:]))

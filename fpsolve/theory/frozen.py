@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import has_algebraic_tails
+from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem
 
@@ -63,7 +62,7 @@ class FrozenNoise:
         unit = noise.standard_deviation
         furthest = 5 * LARGEST_P * unit * noise_strength(problem.system) * noise.correlation_time
         end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
-        self._is_heavy = has_algebraic_tails(noise)
+        self._is_heavy = noise.has_algebraic_tails
         end = FURTHEST if self._is_heavy else end
         spread = max(np.log(end / 1e-2), 1.0)
         side = end * np.sinh(spread * np.linspace(0, 1, SAMPLES)) / np.sinh(spread)

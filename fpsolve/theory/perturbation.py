@@ -19,9 +19,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, identity, one
+from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoPerturbationTheory
-from fpsolve.model.plane import Harmonics, System, angular_frequency, matrix_at, squared_frequency, stretching, turning
+from fpsolve.model.plane import (
+    Harmonics,
+    System,
+    affine,
+    angular_frequency,
+    is_driven,
+    matrix_at,
+    squared_frequency,
+    stretching,
+    turning,
+    written_coefficient,
+)
 from fpsolve.model.problem import Problem
 
 
@@ -111,14 +122,15 @@ def second_order(problem: Problem) -> SecondOrder:
     terms: list[float] = []
     driven = np.zeros((2, 2))
     for drive in system.drives:
-        if drive.order == 1 and drive.g is identity:
-            driven += np.array(drive.matrix)
-        elif drive.order != 1 and drive.g is one:
-            terms.append(system.epsilon**drive.order * _growth(drive.matrix, frame).mean)
-        elif drive.order < 2 or drive.g is not identity:
+        offset, slope = affine(drive.g) or (math.nan, math.nan)
+        if drive.order == 1 and offset == 0:
+            driven += slope * np.array(drive.matrix)
+        elif drive.order != 1 and slope == 0:
+            terms.append(offset * system.epsilon**drive.order * _growth(drive.matrix, frame).mean)
+        elif not (drive.order >= 2 and offset == 0):
             raise NoPerturbationTheory(
                 f"perturbation theory is for motions whose noise enters as epsilon xi; a drive of order {drive.order} "
-                f"with g = {drive.g.__name__} is not of that form"
+                f"with g = {written_coefficient(drive.g).strip() or 1} is not of that form"
             )
     if abs(noise.mean) > 1e-12 * noise.standard_deviation:
         raise NoPerturbationTheory(f"perturbation theory is for noise of mean 0, but it has {noise.mean:g}")
@@ -165,8 +177,8 @@ def _rough_scale(problem: Problem) -> Scale:
     steady, driven = 0.0, 0.0
     for drive in system.drives:
         size = system.epsilon**drive.order * float(abs(drive.q.mean) + drive.q.amplitude)
-        if drive.g is one:
-            steady += size
+        if not is_driven(drive.g):
+            steady += abs(float(drive.g(0.0))) * size
         else:
             typical = np.asarray(drive.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
             driven += size * float(np.sqrt(np.mean(typical**2)))

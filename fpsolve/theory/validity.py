@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.messages import ALMOST_EVERY, Remedy
-from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.perturbation import second_order
 
@@ -16,15 +18,16 @@ NEAR_GAUSSIAN = 0.1
 WEAK = 0.05
 
 
-def reduction_note(noise: NonGaussianNoise) -> str | None:
+def reduction_note(noise: Noise) -> str | None:
     """On the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
-    if abs(noise.r0 - 1) <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
+    replaced: Any = noise.replaces
+    if replaced is None or abs(replaced.r0 - 1) <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
         return None
-    reduced = noise.ou_reduction().standard_deviation ** 2
+    reduced = noise.standard_deviation**2
     return (
-        f"the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = {abs(noise.r0 - 1):.3g} > "
-        f"{NEAR_GAUSSIAN:g}: it gives the noise the variance {reduced:.4g} instead of {noise.variance:.4g}, Eq. (10); "
-        f"{Remedy.NO_REDUCTION}"
+        f"the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = {abs(replaced.r0 - 1):.3g} > "
+        f"{NEAR_GAUSSIAN:g}: it gives the noise the variance {reduced:.4g} instead of {replaced.variance:.4g}, "
+        f"Eq. (10); {Remedy.NO_REDUCTION}"
     )
 
 
@@ -70,7 +73,7 @@ def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> str |
     beyond = shares > WEAK
     if not np.any(beyond):
         return None
-    reduced = ", and here for the reduced one" if isinstance(problem.noise, NonGaussianNoise) else ""
+    reduced = ", and here for the reduced one" if problem.noise.approximates_spectrum else ""
     worst, first = int(np.argmax(shares)), float(p[beyond][np.argmin(np.abs(p[beyond]))])
     most = f"at p = {p[worst]:.3g}, where it is {rest[worst]:.3g}, {shares[worst]:.0%}"
     return (

@@ -7,9 +7,10 @@ from fpsolve.analysis.density import adjoint_density, furstenberg_khasminskii, s
 from fpsolve.exponent.fields import fields
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE
 
 PROBLEMS = {
@@ -79,7 +80,7 @@ def test_furstenberg_khasminskii_integral_is_the_slope_at_zero(solver):
 
 def test_phase_flux_is_the_same_through_every_phase(solver):
     """∂φ of the flux ∫(ω + ε h₁ξ + ε² h₂) ρ dξ vanishes, tested with cos 2kφ and sin 2kφ."""
-    from fpsolve.model.vibro_impact import h1
+    from fpsolve.model.systems.vibro_impact import h1
 
     density = stationary_density(solver.pair(0.0))
     eps, oscillator = solver.problem.system.epsilon, solver.problem.system
@@ -97,7 +98,7 @@ def test_phase_flux_is_the_same_through_every_phase(solver):
 @pytest.mark.parametrize("p", [-1.0, 2.0])
 def test_tilted_mean_of_the_derivative_of_the_generator_is_the_slope(fig1_solver, p):
     """Λ′(p) = E_tilted[ε q₁ξ + ε² q₂] + ln R × (impacts per unit time); here without impact."""
-    from fpsolve.model.vibro_impact import q1
+    from fpsolve.model.systems.vibro_impact import q1
 
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.1, epsilon=0.2)
     pair = ExponentSolver(Problem(oscillator, FIG1_NOISE.ou_reduction())).pair(p)

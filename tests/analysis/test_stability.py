@@ -20,8 +20,7 @@ from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent import bordered, eigen
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.direction import Family
-from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noises.markov_chain import MarkovChain
 
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.95)
 LAMBDA, SECOND, INDEX = "lyapunov_exponent", {"moment": 2.0}, {"stability_index": -1.0}
@@ -37,13 +36,13 @@ def line(zero=LAMBDA, x=OMEGA, y=C1, *, noise=NOISE, exact=False, **values):
     """A line in a frame, by default of ω and c₁, for noise that is reduced or not."""
     known = {key: values.pop(key) for key in ("nodes", "step", "budget") if key in values}
     problem = Problem(oscillator(**values), noise if exact else noise.ou_reduction())
-    return boundary(problem, zero, x, y, original=None if exact else noise, **(COARSE | known))
+    return boundary(problem, zero, x, y, **(COARSE | known))
 
 
 def growth(found, at, rtol=1e-11):
     """F at a point of a frame, solved anew, with its error and its scale."""
     values = {axis.key: float(axis.value(share)) for axis, share in zip((found.x, found.y), at, strict=True)}
-    solver, p = ExponentSolver(found.family.at(values).problem, rtol=rtol), found.zero.p
+    solver, p = ExponentSolver(found.problem.at(values), rtol=rtol), found.zero.p
     value, error = solver.ratio_alone(p)
     return value, error, solver.scale(p) / abs(p) if p else solver.scales.linear
 
@@ -130,8 +129,8 @@ def test_without_impacts_the_line_of_index_minus_two_is_exact(omega, epsilon, d0
 def test_the_gradient_is_that_of_central_differences(zero, x, y, at, exact):
     at = np.array(at) if not (exact and y.key == "noise.r0") else np.array([at[0], 0.5])
     noise = NOISE if not exact else replace(NOISE, r0=0.5)
-    family = Family(Problem(oscillator(0.6), noise if exact else noise.ou_reduction()), None if exact else noise)
-    of = Quantity(zero_of(zero), family, (x, y), Budget(), rtol=1e-11)
+    problem = Problem(oscillator(0.6), noise if exact else noise.ou_reduction())
+    of = Quantity(zero_of(zero), problem, (x, y), Budget(), rtol=1e-11)
     sample, h = of(at), 1e-3
     for k, step in enumerate(h * np.eye(2)):
         values = [of(at + m * step).value for m in (-2, -1, 1, 2)]
@@ -199,7 +198,7 @@ def test_a_fold():
         found = line({"moment": -6.0}, Axis("oscillator.omega", 0.3, 4.0), y, restitution=0.95, epsilon=epsilon)
         [(x_there, y_there)] = wanted(found, "fold in y")
         at = np.array([found.x.share(x_there), found.y.share(y_there)])
-        sample = Quantity(found.zero, found.family, (found.x, found.y), Budget(), 1e-11)(at)
+        sample = Quantity(found.zero, found.problem, (found.x, found.y), Budget(), 1e-11)(at)
         assert abs(sample.value) < 1e-9 * sample.scale
         assert abs(sample.gradient[0]) < 1e-8 * abs(sample.gradient[1])
         [branch] = found.branches
@@ -216,11 +215,11 @@ def test_a_fold_of_strong_noise():
     zero, values = {"stability_index": -4.0}, {"noise": noise, "omega": 0.3, "restitution": 0.9}
     found = line(zero, x, y, epsilon=1.0, **values)
     [(tau0, c1)] = wanted(found, "fold in y")
-    sample = Quantity(found.zero, found.family, (x, y), Budget(), 1e-11)(np.array([x.share(tau0), y.share(c1)]))
+    sample = Quantity(found.zero, found.problem, (x, y), Budget(), 1e-11)(np.array([x.share(tau0), y.share(c1)]))
     assert abs(sample.value) < 1e-9 * sample.scale
     assert abs(sample.gradient[0]) < 1e-8 * abs(sample.gradient[1])
     for beside in (0.9 * tau0, 1.1 * tau0):  # where the line is lower, so that Λ(−4) has fallen below 0
-        problem = found.family.at({"noise.tau0": beside, "oscillator.c1": c1}).problem
+        problem = found.problem.at({"noise.tau0": beside, "oscillator.c1": c1})
         assert ExponentSolver(problem).solution(-4.0).pair.value < -1e-6
     weak = line(zero, x, y, epsilon=0.1, **values)
     assert not wanted(weak, "fold in y")
@@ -247,7 +246,7 @@ def test_a_line_started_from_another(weak):
     x, y = Axis("noise.D0", 0.05, 5.0, "log"), Axis("oscillator.restitution", 0.5, 1.0)
     other = weak.started_from(0, 3, x, y)
     omega, c1 = float(weak.branches[0].x[3]), float(weak.branches[0].y[3])
-    assert (other.family.problem.system.omega, other.family.problem.system.c1) == (omega, c1)
+    assert (other.problem.system.omega, other.problem.system.c1) == (omega, c1)
     start = np.array([x.share(NOISE.D0), y.share(0.8)])
     assert held(other, [start])
     value, error, scale = growth(other, start)
@@ -428,7 +427,10 @@ def test_a_problem_without_such_parameters_is_refused():
     chain = MarkovChain(states=(-1.0, 1.0), rates=((-1.0, 1.0), (1.0, -1.0)))
     with pytest.raises(ValueError, match=r"got noise\.D0 as an axis; the parameters are oscillator\.omega, .*epsilon$"):
         boundary(Problem(oscillator(), chain), LAMBDA, OMEGA, Axis("noise.D0", 0.1, 1.0))
-    with pytest.raises(ValueError, match=r"got original = .* is not its reduction"):
+    with (
+        pytest.warns(DeprecationWarning, match="knows"),
+        pytest.raises(ValueError, match=r"got original = .* is not its reduction"),
+    ):
         boundary(Problem(oscillator(), OrnsteinUhlenbeck(1.0, 1.0)), LAMBDA, OMEGA, C1, original=NOISE)
 
 
@@ -477,7 +479,7 @@ def test_a_line_ends_where_there_is_no_problem():
     law = VibroImpactOscillator(omega=1.0, restitution=0.5, c1=0.3, epsilon=0.5, impact="restitution")
     of = Quantity(
         zero_of(LAMBDA),
-        Family(Problem(law, NOISE.ou_reduction()), NOISE),
+        Problem(law, NOISE.ou_reduction()),
         (Axis("oscillator.epsilon", 0.5, 3.0), Axis("oscillator.restitution", 0.1, 0.9)),
         Budget(),
     )
@@ -495,7 +497,7 @@ def test_rare_paths_leave_no_line():
     assert (
         ExponentSolver(problem).solution(-0.5).pair.value > 0 > ExponentSolver(problem).near.solution(-0.5).pair.value
     )
-    of = Quantity(zero_of({"stability_index": -0.5}), Family(problem), (OMEGA, C1), Budget())
+    of = Quantity(zero_of({"stability_index": -0.5}), problem, (OMEGA, C1), Budget())
     with pytest.raises(NoSuchExponent, match="rare paths"):
         of(np.array([OMEGA.share(1.0), C1.share(0.3)]))
     assert of(np.array([OMEGA.share(1.0), C1.share(0.0)])).value < 0
@@ -521,7 +523,7 @@ def test_rows_are_the_same_in_other_processes():
     problem = Problem(oscillator(0.5), NOISE.ou_reduction())
     nowhere = Scan(np.linspace(0, 1, 4), np.zeros((0, 0)), np.zeros((0, 0, 2)))
     c1 = Axis("oscillator.c1", -1.2, 0.8)
-    of = Boundary(zero_of(SECOND), Axis("noise.r0", 0.5, 1.2), c1, Family(problem, NOISE), scan=nowhere)
+    of = Boundary(zero_of(SECOND), Axis("noise.r0", 0.5, 1.2), c1, problem, scan=nowhere)
     here = next(of.grown()).scan
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         there = next(of.grown(map=pool.map)).scan
@@ -532,7 +534,7 @@ def test_rows_are_the_same_in_other_processes():
 
 
 def test_a_row_does_not_depend_on_others():
-    of = Boundary(zero_of(SECOND), OMEGA, C1, Family(Problem(oscillator(), NOISE.ou_reduction()), NOISE))
+    of = Boundary(zero_of(SECOND), OMEGA, C1, Problem(oscillator(), NOISE.ou_reduction()))
     rows = of.rows()
     forth, back = [scan_row(row) for row in rows[:2]], [scan_row(row) for row in rows[1::-1]]
     for one, other in zip(forth, reversed(back), strict=True):
@@ -546,7 +548,7 @@ def test_the_scan_of_lambda_over_r_solves_two_nodes_of_a_row(is_first, monkeypat
     solved, sample = [], Quantity._sample
     monkeypatch.setattr(Quantity, "_sample", lambda self, *given: (solved.append(1), sample(self, *given))[1])
     r = Axis("oscillator.restitution", 0.5, 1.0)
-    of = Boundary(zero_of(LAMBDA), *((r, C1) if is_first else (C1, r)), Family(Problem(oscillator(), NOISE)))
+    of = Boundary(zero_of(LAMBDA), *((r, C1) if is_first else (C1, r)), Problem(oscillator(), NOISE))
     scan_row(of.rows()[3])
     assert len(solved) == 2
 
@@ -562,9 +564,9 @@ def test_f_is_solved_in_one_thread(monkeypatch):
     known = eigen.factorised
     for module in (bordered, eigen):
         monkeypatch.setattr(module, "factorised", factorised)
-    family = Family(Problem(oscillator(0.5), NOISE.ou_reduction()), NOISE)
+    problem = Problem(oscillator(0.5), NOISE.ou_reduction())
     with threadpool_limits(2):
-        Quantity(zero_of(LAMBDA), family, (OMEGA, C1), Budget())(np.array([0.2, 0.6]))
-        sensitivities(family.problem, 2.0)
+        Quantity(zero_of(LAMBDA), problem, (OMEGA, C1), Budget())(np.array([0.2, 0.6]))
+        sensitivities(problem, 2.0)
     assert threads
     assert set(threads) == {1}

@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from fpsolve.model.noise import NonGaussianNoise
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.estimators import simulate
 
 OSCILLATOR = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)

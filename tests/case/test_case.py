@@ -20,8 +20,8 @@ from fpsolve.case.toml import read_document
 from fpsolve.case.vary import Vary
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.mesh_file import write_mesh
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.vibro_impact import ImpactLaw, VibroImpactOscillator
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
 from tests.oracles import perturbation
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -77,7 +77,7 @@ def test_every_curve_of_a_figure_has_the_caption_s_parameters(name: str) -> None
     for curve in load_case(CASES / f"{name}.toml").curves():
         stated = {key.partition(".")[2]: value for key, value in curve.parameters.items()}
         assert stated | CAPTIONS[name] == stated
-        assert isinstance(curve.noise, OrnsteinUhlenbeck)
+        assert curve.noise.replaces is not None
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,9 @@ def test_a_curve_holds_every_parameter() -> None:
 def test_defaults_and_integers(write: Write) -> None:
     case = load_case(write(SMALL))
     [curve] = case.curves()
-    assert curve == Curve(case.oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=math.sqrt(2)), curve.parameters, {})
+    assert curve == Curve(
+        case.oscillator, NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.0).ou_reduction(), curve.parameters, {}
+    )
     assert isinstance(case.oscillator.omega, float)
     assert case.oscillator.impact is ImpactLaw.DELTA
     assert case.p.tolist() == [2.0, -1.0]
@@ -254,8 +256,8 @@ def test_the_only_curve_needs_no_name(write: Write) -> None:
 
 def test_a_curve_knows_the_noise_before_its_reduction(write: Write) -> None:
     [curve] = load_case(write(SMALL.replace("r0 = 1", "r0 = 0.9"))).curves()
-    assert curve.original_noise == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
-    assert curve.noise == curve.original_noise.ou_reduction()
+    assert curve.noise.replaces == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
+    assert curve.noise == curve.noise.replaces.ou_reduction()
 
 
 def test_varied_keys_may_be_dotted_without_quotes(write: Write) -> None:

@@ -13,9 +13,10 @@ from pydantic.fields import FieldInfo
 from fpsolve.case.case import Case
 from fpsolve.case.vary import ABSCISSAE, PARAMETERS, VARIABLE
 from fpsolve.exponent.adapt import Budget
+from fpsolve.model.kinds import parameter_of
 from fpsolve.model.parameters import STRICT, example_of, symbol_of
-from fpsolve.model.quantity import P, parameter_of
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.quantity import P
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 
 def fields_of(annotation: Any) -> Mapping[str, FieldInfo]:

@@ -12,7 +12,7 @@ import pytest
 import fpsolve
 from fpsolve.case.remedies import CASE_WORDS, in_words_of_a_case
 from fpsolve.errors import NoSuchExponent, Remedy
-from fpsolve.model.noise import NonGaussianNoise, check_existence
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.theory.validity import reduction_note
 
 WORDS = {
@@ -56,9 +56,9 @@ def test_no_remedy_is_part_of_another() -> None:
 
 def test_the_solver_speaks_of_the_noise_and_a_case_of_its_treatment() -> None:
     with pytest.raises(NoSuchExponent, match=r"r0 <= 1, or the Ornstein-Uhlenbeck reduction of the noise$") as raised:
-        check_existence(NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.2), 2.0)
+        NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.2).check_existence(2.0)
     assert in_words_of_a_case(str(raised.value)).endswith('r0 <= 1, or treatment = "ou-reduction"')
-    note = reduction_note(NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.5))
+    note = reduction_note(NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.5).ou_reduction())
     assert note is not None
     assert note.endswith("; the unreduced noise keeps Eq. (7)")
     assert in_words_of_a_case(note).endswith('; treatment = "exact" keeps Eq. (7)')

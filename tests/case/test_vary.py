@@ -18,7 +18,8 @@ from fpsolve.case.sections import Sweep
 from fpsolve.case.vary import Vary, assignments, legend
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.theory.perturbation import second_order
 
 TEXT = """\

@@ -12,10 +12,12 @@ from fpsolve.arrays import identity
 from fpsolve.exponent.corners import corners
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick, PlaneSystem
+from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.plane import Drive, Kick
 from fpsolve.model.problem import Problem
+from fpsolve.model.systems.plane_system import PlaneSystem
 from tests.oracles import two_way_rays
 
 ROTATION, STIFFNESS = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))

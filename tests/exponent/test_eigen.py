@@ -7,9 +7,9 @@ from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.eigen import principal_pair, spectrum
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
-from fpsolve.model.noise import OrnsteinUhlenbeck
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite
 

@@ -15,11 +15,13 @@ from fpsolve.exponent.error import Absent
 from fpsolve.exponent.impacts import critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick, PlaneSystem, crosses_both_ways
+from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.plane import Drive, Kick, crosses_both_ways
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.plane_system import PlaneSystem
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0)
 GAUSSIAN = NonGaussianNoise(D0=1.0, tau0=0.5, r0=1.0).ou_reduction()

@@ -13,7 +13,7 @@ from fpsolve.exponent.moments import FEW_MOMENTS, moment_lyapunov, solve_moments
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE
 
 WEAK_NOISE = FIG1_NOISE.ou_reduction()

@@ -7,9 +7,9 @@ from fpsolve.exponent.eigen import principal_pair, spectrum
 from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.terms import Terms
-from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.theory.frozen import frozen_noise
 from tests.conftest import FIG1, FIG1_NOISE
 

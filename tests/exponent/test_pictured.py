@@ -14,10 +14,10 @@ from fpsolve.exponent import eigenfunction_plot
 from fpsolve.exponent.eigenfunction_plot import FIELDS, surface_of
 from fpsolve.exponent.fields import fields
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.surfaces import can_render, flat_figure
 from tests.conftest import FIG1, UNIT_NOISE
 

@@ -14,11 +14,12 @@ from fpsolve.exponent.moments import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick, PlaneSystem, matrix_at
+from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.plane import Drive, Kick, matrix_at
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.plane_system import PlaneSystem
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import UNIT_NOISE
 from tests.oracles import moment_hierarchy
 

@@ -6,9 +6,9 @@ import pytest
 
 import fpsolve
 from fpsolve.exponent.quantities import INDICES, QUANTITIES, DrawnName, QuantityName
-from fpsolve.model.noise import OrnsteinUhlenbeck
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE
 from tests.oracles import perturbation
 

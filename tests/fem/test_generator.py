@@ -11,11 +11,12 @@ from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.terms import Jump, Power
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import NonGaussianNoise
-from fpsolve.model.plane import Drive, PlaneSystem
+from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.plane import Drive
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.plane_system import PlaneSystem
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, UNIT_NOISE
 from tests.oracles.paper_generator import PaperGenerator
 

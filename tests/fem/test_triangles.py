@@ -6,9 +6,9 @@ import pytest
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.noise import OrnsteinUhlenbeck
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import oracle_arguments
 from tests.oracles import triangles
 

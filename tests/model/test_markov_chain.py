@@ -7,7 +7,7 @@ import pytest
 import scipy.integrate
 import scipy.linalg
 
-from fpsolve.model.markov_chain import MarkovChain
+from fpsolve.model.noises.markov_chain import MarkovChain
 
 RING = MarkovChain((0.0, 1.0, 3.0), ((0, 2.0, 0), (0, 0, 1.0), (0.5, 0, 0)))
 """0 → 1 → 3 → 0, which no detailed balance holds for."""

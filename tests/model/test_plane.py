@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from fpsolve.arrays import identity
-from fpsolve.model.noise import OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick, PlaneSystem, angular_frequency, growth_rate, matrix_at, phase_speed
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.plane import Drive, Kick, angular_frequency, growth_rate, matrix_at, phase_speed
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator, h1, q1
+from fpsolve.model.systems.plane_system import PlaneSystem
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator, h1, q1
 
 PHI = np.linspace(0, 2 * np.pi, 33)
 ROTATION = ((0.0, 1.3), (-1.3, 0.0))

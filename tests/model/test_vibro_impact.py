@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fpsolve.model.vibro_impact import IMPACT_PHASES, ImpactLaw, VibroImpactOscillator, h1, q1
+from fpsolve.model.systems.vibro_impact import IMPACT_PHASES, ImpactLaw, VibroImpactOscillator, h1, q1
 
 
 def test_polar_coefficients_come_from_the_cartesian_system(rng):

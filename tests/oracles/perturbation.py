@@ -12,17 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.noise import ColouredNoise, NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noise import Noise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 
-def reduced(noise: ColouredNoise) -> OrnsteinUhlenbeck:
+def reduced(noise: Noise) -> OrnsteinUhlenbeck:
     """The Ornstein-Uhlenbeck process that stands for the noise in Eqs. (33)-(39)."""
     return noise.ou_reduction() if isinstance(noise, NonGaussianNoise) else noise
 
 
 def first_order_eigenfunction(
-    oscillator: VibroImpactOscillator, noise: ColouredNoise, p: float, phi: ArrayLike, xi: ArrayLike
+    oscillator: VibroImpactOscillator, noise: Noise, p: float, phi: ArrayLike, xi: ArrayLike
 ) -> FloatArray:
     """T₁(φ, ξ; p) of Eq. (33) with C = 1 and K(ξ, τ) = ξ exp(−α₀τ); φ and ξ broadcast.
 
@@ -34,7 +36,7 @@ def first_order_eigenfunction(
     return 0.5 * p * xi * (1 / alpha - wave)
 
 
-def _spectral_densities(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> tuple[float, float]:
+def _spectral_densities(oscillator: VibroImpactOscillator, noise: Noise) -> tuple[float, float]:
     """S(0) and S(2ω), Eq. (16)."""
     ou = reduced(noise)
     return ou.spectral_density(0.0), ou.spectral_density(2 * oscillator.omega)
@@ -45,7 +47,7 @@ def _mean_loss(oscillator: VibroImpactOscillator) -> float:
     return 2 * oscillator.omega / math.pi * (1 - oscillator.restitution)
 
 
-def moment_exponent(oscillator: VibroImpactOscillator, noise: ColouredNoise, p: ArrayLike) -> Any:
+def moment_exponent(oscillator: VibroImpactOscillator, noise: Noise, p: ArrayLike) -> Any:
     """ε²Λ₂(p), Eq. (37); an array for an array of p."""
     s0, s2 = _spectral_densities(oscillator, noise)
     p = np.asarray(p, dtype=float)
@@ -53,7 +55,7 @@ def moment_exponent(oscillator: VibroImpactOscillator, noise: ColouredNoise, p: 
     return (oscillator.epsilon**2 / 16 * p * bracket)[()]
 
 
-def moment_scale(oscillator: VibroImpactOscillator, noise: ColouredNoise, p: ArrayLike) -> Any:
+def moment_scale(oscillator: VibroImpactOscillator, noise: Noise, p: ArrayLike) -> Any:
     """The sum of the absolute values of the terms of Eq. (37), before they cancel: the scale of an error of Λ(p)."""
     s0, s2 = _spectral_densities(oscillator, noise)
     size = np.abs(np.asarray(p, dtype=float))
@@ -61,47 +63,47 @@ def moment_scale(oscillator: VibroImpactOscillator, noise: ColouredNoise, p: Arr
     return (oscillator.epsilon**2 / 16 * size * terms)[()]
 
 
-def stability_index(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def stability_index(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """δ_p, the non-zero root of ε²Λ₂(p), Eq. (38)."""
     s0, s2 = _spectral_densities(oscillator, noise)
     return (8 * (_mean_loss(oscillator) - oscillator.c1) - 2 * s2) / (s2 + 2 * s0)
 
 
-def lyapunov_exponent(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def lyapunov_exponent(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """λ = ε²Λ₂′(0), Eq. (39)."""
     _, s2 = _spectral_densities(oscillator, noise)
     return oscillator.epsilon**2 / 8 * (s2 + 4 * (oscillator.c1 - _mean_loss(oscillator)))
 
 
-def lyapunov_scale(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def lyapunov_scale(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """The sum of the absolute values of the terms of Eq. (39): the scale of an error of λ."""
     _, s2 = _spectral_densities(oscillator, noise)
     return oscillator.epsilon**2 / 8 * (s2 + 4 * (abs(oscillator.c1) + _mean_loss(oscillator)))
 
 
-def impact_rate(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def impact_rate(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """N of Eq. (36): two impacts in a turn, 2π/ω."""
     return oscillator.omega / math.pi
 
 
-def _noise_and_damping(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def _noise_and_damping(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """λ of Eq. (39) without impacts."""
     return oscillator.epsilon**2 / 8 * (_spectral_densities(oscillator, noise)[1] + 4 * oscillator.c1)
 
 
-def critical_impact_factor(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def critical_impact_factor(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """The R that makes up for noise and damping within half a turn."""
     return math.exp(-_noise_and_damping(oscillator, noise) * math.pi / oscillator.omega)
 
 
-def critical_restitution(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def critical_restitution(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """The r with this R, by either law."""
     factor = critical_impact_factor(oscillator, noise)
     loss = -math.log(factor) if oscillator.impact == "delta" else 1 - factor
     return 1 - loss / oscillator.epsilon**2
 
 
-def variance_rate(oscillator: VibroImpactOscillator, noise: ColouredNoise) -> float:
+def variance_rate(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     """ε²Λ₂″(0) = ε²(S(2ω) + 2S(0))/8, from Eq. (37): the growth rate of the variance of ln ‖x‖."""
     s0, s2 = _spectral_densities(oscillator, noise)
     return oscillator.epsilon**2 / 8 * (s2 + 2 * s0)

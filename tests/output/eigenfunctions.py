@@ -4,7 +4,7 @@ import numpy as np
 import pyvista
 
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.vtk import write_eigenfunctions
 
 HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.2)

@@ -17,9 +17,9 @@ from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.vtk import write_density, write_eigenfunctions, write_response
 from fpsolve.study import sweep
 from fpsolve.workflow import run

@@ -19,8 +19,8 @@ import fpsolve
 from fpsolve.case.case import load_case
 from fpsolve.case.curves import make_curve
 from fpsolve.cli import BAD_INPUT, NOT_CONVERGED, main
-from fpsolve.model.noise import NonGaussianNoise
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.proofs import print_proofs
 from fpsolve.proofs.certificate import Certificate, Enclosure
 from fpsolve.study.prove import CurveProof, Plan

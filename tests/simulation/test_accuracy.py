@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.simulation import estimators
 from fpsolve.simulation.estimators import simulate
 from tests.agreement import cheap_step

@@ -9,9 +9,10 @@ import pytest
 
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation import batches, estimators
 from fpsolve.simulation.estimators import simulate
 from fpsolve.simulation.setup import largest_step, transient

@@ -10,7 +10,7 @@ import fpsolve
 
 DRAW = """
 import numpy as np
-from fpsolve.model.noise import OrnsteinUhlenbeck
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.simulation import kernels
 from fpsolve.simulation.step import noise_step
 start, mean, end, push = np.full(4, 3.0), np.empty(4), np.empty(4), np.zeros(4)

@@ -9,10 +9,11 @@ import pytest
 
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
-from fpsolve.model.noise import NonGaussianNoise
-from fpsolve.model.plane import Drive, PlaneSystem
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.plane import Drive
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import DAMPING, VibroImpactOscillator
+from fpsolve.model.systems.plane_system import PlaneSystem
+from fpsolve.model.systems.vibro_impact import DAMPING, VibroImpactOscillator
 from fpsolve.simulation.batches import PlainBatch, Plan
 from fpsolve.simulation.estimators import simulate
 from fpsolve.simulation.response import stationary_response

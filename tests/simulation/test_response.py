@@ -7,9 +7,9 @@ import pytest
 from scipy.stats import gamma
 
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation import batches
 from fpsolve.simulation.response import stationary_response
 from fpsolve.simulation.setup import default_step

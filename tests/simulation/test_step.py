@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad_vec
 from scipy.stats import kstest
 
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.kernels import advance, draw, move
 from fpsolve.simulation.setup import default_step, largest_step
 from fpsolve.simulation.step import Motion, motion, noise_step, stationary_noise

@@ -10,7 +10,6 @@ import pytest
 from fpsolve import ExponentSolver, load_case
 from fpsolve.analysis.zero import Zero
 from fpsolve.cli import main
-from fpsolve.model.direction import Family
 from fpsolve.output.charts import read_line
 from fpsolve.study.chart import chart_work, solve_chart
 from fpsolve.workflow import Watch, chart_case, run
@@ -64,8 +63,8 @@ def solver_at(path, x, y):
     """Of the case with the two parameters of its chart."""
     case = load_case(path)
     [curve] = case.curves()
-    family = Family(curve.problem, curve.original_noise).at({"oscillator.omega": float(x), "noise.D0": float(y)})
-    return ExponentSolver(family.problem, rtol=1e-11)
+    problem = curve.problem.at({"oscillator.omega": float(x), "noise.D0": float(y)})
+    return ExponentSolver(problem, rtol=1e-11)
 
 
 def test_all_files_are_written(folder):

@@ -8,9 +8,9 @@ from numpy.polynomial.hermite_e import hermegauss
 
 from fpsolve.exponent.fields import fields
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noise import OrnsteinUhlenbeck
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator, h1, q1
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator, h1, q1
 from tests.oracles import perturbation
 
 OU = OrnsteinUhlenbeck(alpha=1.7, sigma=0.9)

@@ -8,11 +8,13 @@ import pytest
 from fpsolve.arrays import identity
 from fpsolve.errors import NoPerturbationTheory
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.markov_chain import MarkovChain
-from fpsolve.model.noise import NonGaussianNoise, OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick, PlaneSystem
+from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.plane import Drive, Kick
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.plane_system import PlaneSystem
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.theory.perturbation import first_order_eigenfunction, scale_of, second_order
 from tests.oracles import perturbation
 
@@ -70,7 +72,7 @@ def test_what_is_left_out_is_of_higher_order(seed, noise, order, slack, p):
     ("drives", "noise", "message"),
     [
         ([Drive(0, ((1.0, 0.0), (0.0, -1.0)))], None, "that rotate without noise"),
-        ([Drive(0, ROTATION), Drive(1, ROTATION)], None, "a drive of order 1 with g = one"),
+        ([Drive(0, ROTATION), Drive(1, ROTATION)], None, "a drive of order 1 with g = 1"),
         ([Drive(0, ROTATION), Drive(1, ROTATION, np.tanh)], None, "with g = tanh"),
         ([Drive(0, ROTATION), Drive(1, ROTATION, identity)], MarkovChain((0, 1), ((0, 1), (1, 0))), "noise of mean 0"),
     ],

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fpsolve.exponent.moments import moment_lyapunov
-from fpsolve.model.noise import NonGaussianNoise
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
-from fpsolve.model.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.theory import validity
 from tests.conftest import FIG1, FIG1_NOISE
 from tests.oracles import perturbation
@@ -14,7 +14,7 @@ from tests.oracles import perturbation
 
 @pytest.mark.parametrize("r0", [0.9, 0.95, 1.0, 1.05, 1.1])
 def test_the_reduction_near_gaussian_noise_needs_no_note(r0):
-    assert validity.reduction_note(NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0)) is None
+    assert validity.reduction_note(NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0).ou_reduction()) is None
 
 
 @pytest.mark.parametrize("r0", [0.6, 1.3])
@@ -23,7 +23,7 @@ def test_the_variances_of_the_reduction_and_of_the_noise(r0):
     noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0)
     ou = noise.ou_reduction()
     assert ou.sigma**2 / (2 * ou.alpha) == pytest.approx((2 - r0) * noise.variance, rel=1e-12)
-    note = validity.reduction_note(noise)
+    note = validity.reduction_note(noise.ou_reduction())
     assert f"the variance {(2 - r0) * noise.variance:.4g} instead of {noise.variance:.4g}, Eq. (10)" in note
     assert f"|r0 - 1| = {abs(r0 - 1):.3g} > 0.1" in note
 

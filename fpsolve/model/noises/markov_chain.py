@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.model.noise import Noise
 
 _BALANCED = 1e-12
 
 
 @dataclass(frozen=True)
-class MarkovChain:
+class MarkovChain(Noise):
     """ξ(t) with values among some states, from one of which to another it jumps at given rates.
 
     >>> MarkovChain.telegraph(amplitude=0.5, rate=1.0).correlation_time  # ξ = ±0.5, each state left at rate 1
@@ -33,7 +35,9 @@ class MarkovChain:
     states: Sequence[float]
     rates: Sequence[Sequence[float]]
 
-    moments = (-math.inf, math.inf)
+    kind: ClassVar[str] = "markov-chain"
+    has_states: ClassVar[bool] = True
+    mixes_slowly: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         states, rates = np.array(self.states, dtype=float), np.array(self.rates, dtype=float)
@@ -70,6 +74,14 @@ class MarkovChain:
     @property
     def mean(self) -> float:
         return float(self.probabilities @ self.states)
+
+    @property
+    def reached(self) -> FloatArray:
+        return np.array(self.states)
+
+    @property
+    def largest_jump_rate(self) -> float:
+        return float(-np.min(self.rates))
 
     @property
     def standard_deviation(self) -> float:

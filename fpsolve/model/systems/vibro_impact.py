@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from enum import StrEnum
 from functools import cached_property
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +16,7 @@ from pydantic.dataclasses import dataclass
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
-from fpsolve.model.plane import Drive, Kick, by_epsilon
+from fpsolve.model.plane import Drive, Kick, System, by_epsilon
 
 IMPACT_PHASES = (math.pi / 2, 3 * math.pi / 2)
 """φ in [0, 2π] where cos φ = 0: the mass is at the wall."""
@@ -48,7 +49,7 @@ def q1(phi: ArrayLike) -> FloatArray:
 
 @told_in_words
 @dataclass(frozen=True, config=STRICT)
-class VibroImpactOscillator:
+class VibroImpactOscillator(System):
     """Rayleigh-Van der Pol oscillator that bounces off a wall at x = 0, Eqs. (3) and (6).
 
     Args:
@@ -92,6 +93,12 @@ class VibroImpactOscillator:
     ] = 0.0
     impact: Annotated[ImpactLaw, parameter("impact law", 'impact = "delta"', strict=False)] = ImpactLaw.DELTA
 
+    kind: ClassVar[str] = "vibro-impact"
+    section: ClassVar[str] = "oscillator"
+    noise_unit: ClassVar[str] = "1/time"
+    impact_parameter: ClassVar[str] = "restitution"
+    inert: ClassVar[Sequence[str]] = ("c2", "c3")
+
     @model_validator(mode="after")
     def _restitution_law_keeps_the_direction(self) -> Self:
         if self.impact == ImpactLaw.RESTITUTION and self._loss >= 1:
@@ -115,23 +122,18 @@ class VibroImpactOscillator:
         return math.exp(p * self.log_impact_factor)
 
     @cached_property
-    def drives(self) -> tuple[Drive, ...]:
+    def drives(self) -> tuple[Drive, ...]:  # type: ignore[override]
         """Free oscillation, noise and damping in (x, ẋ/ω): dφ = ω dt; ε ξ (h₁, q₁); ε² c₁ (h₁, q₁), Eqs. (17)-(18)."""
         rotation = ((0.0, self.omega), (-self.omega, 0.0))
         return Drive(0, rotation), Drive(1, DAMPING, identity), Drive(2, ((0.0, 0.0), (0.0, self.c1)))
 
     @property
-    def kicks(self) -> tuple[Kick, ...]:
+    def kicks(self) -> tuple[Kick, ...]:  # type: ignore[override]
         """The impacts, where cos φ = 0; to the order ε² both laws lose 1 − r."""
         return (Kick(math.pi / 2, self.log_impact_factor, -self._loss),)
 
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """ω, r, c₁ and ε; c₂ and c₃ are not in the linear motion."""
-        return "omega", "restitution", "c1", "epsilon"
-
     def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
-        """∂/∂θ of the drives and of ln R for one of the `parameters`."""
+        """∂/∂θ of the drives and of ln R, θ = ω, r, c₁ or ε."""
         bounce = 1.0 if self.impact == ImpactLaw.DELTA else 1 / (1 - self._loss)
         match name:
             case "omega":
@@ -143,13 +145,13 @@ class VibroImpactOscillator:
             case _:
                 return by_epsilon(self), (-2 * self.epsilon * (1 - self.restitution) * bounce,)
 
-    def restitution_of(self, log_factor: float) -> float:
+    def impact_value(self, log_factor: float) -> float:
         """The r for which this law, with this ε, has a given ln R; it may be no coefficient of restitution."""
         with np.errstate(over="ignore"):
             loss = -log_factor if self.impact == ImpactLaw.DELTA else -float(np.expm1(log_factor))
         return 1 - loss / self.epsilon**2
 
-    def restitution_slope(self, log_factor: float) -> float:
+    def impact_slope(self, log_factor: float) -> float:
         """dr/d ln R of this law at a given ln R."""
         return (1.0 if self.impact == ImpactLaw.DELTA else math.exp(log_factor)) / self.epsilon**2
 

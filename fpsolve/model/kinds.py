@@ -1,0 +1,79 @@
+"""The kinds of systems and of noises by name: ours, and those that other packages register as entry points.
+
+Another package offers a kind by the entry points "fpsolve.systems" or "fpsolve.noises", name = "module:Class". It is
+loaded when its name is asked for and is none of ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from fpsolve.model.noise import Noise
+from fpsolve.model.parameters import Parametrised, quantities_of, unknown_parameter
+from fpsolve.model.plane import System
+from fpsolve.model.quantity import Quantity
+
+SYSTEMS: Mapping[str, str] = {
+    "vibro-impact": "vibro_impact:VibroImpactOscillator",
+    "plane": "plane_system:PlaneSystem",
+}
+NOISES: Mapping[str, str] = {
+    "non-gaussian": "non_gaussian:NonGaussianNoise",
+    "ou-reduction": "non_gaussian:ReducedNoise",
+    "ornstein-uhlenbeck": "ornstein_uhlenbeck:OrnsteinUhlenbeck",
+    "markov-chain": "markov_chain:MarkovChain",
+}
+
+
+def system_kind(name: str) -> type[System]:
+    """The class of a kind of system. Raises `ValueError` where there is none, or it is no `System`."""
+    return _kind(name, "systems", System)
+
+
+def noise_kind(name: str) -> type[Noise]:
+    """The class of a kind of noise. Raises `ValueError` where there is none, or it is no `Noise`."""
+    return _kind(name, "noises", Noise)
+
+
+@cache
+def version_of(kind: type[Parametrised]) -> str:
+    """The package and version that a kind of others comes from, on which results depend; empty for ours."""
+    for group in ("fpsolve.systems", "fpsolve.noises"):
+        for entry in entry_points(group=group):
+            if entry.name == kind.kind and entry.dist is not None and entry.value.partition(":")[0] == kind.__module__:
+                return f"{entry.dist.name} {entry.dist.version}"
+    return ""
+
+
+@cache
+def _kind(name: str, room: str, base: type[Any]) -> Any:
+    ours = {"systems": SYSTEMS, "noises": NOISES}[room]
+    if name in ours:
+        module, _, cls = ours[name].partition(":")
+        return getattr(import_module(f"fpsolve.model.{room}.{module}"), cls)
+    found = entry_points(group=f"fpsolve.{room}", name=name)
+    if not found:
+        others = sorted(entry.name for entry in entry_points(group=f"fpsolve.{room}"))
+        raise ValueError(f'got kind = "{name}"; must be one of {", ".join([*ours, *others])}')
+    made = next(iter(found)).load()
+    if not (isinstance(made, type) and issubclass(made, base) and getattr(made, "kind", "") == name):
+        raise ValueError(f'kind = "{name}" is {made!r}; must be a subclass of {base.__name__} with kind = "{name}"')
+    return made
+
+
+def parameter_of(key: str) -> Quantity:
+    """A parameter by its key alone, such as "noise.D0", of the first of our kinds that has it."""
+    return _known().get(key) or unknown_parameter(key)
+
+
+@cache
+def _known() -> Mapping[str, Quantity]:
+    found: dict[str, Quantity] = {}
+    for kind in (*map(system_kind, SYSTEMS), *map(noise_kind, NOISES)):
+        for quantity in quantities_of(kind).values():  # type: ignore[arg-type]
+            found.setdefault(quantity.name, quantity)
+    return found

@@ -1,0 +1,245 @@
+"""The paper's coloured noise, Eqs. (7)-(14): the non-Gaussian process, and the Gaussian one that replaces it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.faults import told_in_words
+from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
+from fpsolve.model.parameters import SIZE, STRICT, parameter
+
+Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
+CorrelationTime = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
+Departure = Annotated[
+    float,
+    parameter(
+        "departure from Gaussian noise; from 5/3 on the variance (10) is infinite", "r0 = 0.95", "$r_0$", ge=-1e6
+    ),
+]
+_SMALL = 0.05
+"""Below it a series is closer than a difference of logarithms."""
+
+
+@told_in_words
+@dataclass(frozen=True, config=STRICT)
+class NonGaussianNoise(Noise):
+    """Non-Gaussian coloured noise dξ = −V′(ξ)/τ₀ dt + (√(2D₀)/τ₀) dW, Eqs. (7)-(8).
+
+    r₀ = 1 is the Ornstein-Uhlenbeck process; r₀ < 1 has bounded support, r₀ > 1 algebraic tails.
+
+    Args:
+        D0: noise intensity D₀, 1e-15 to 1e15, in 1/time.
+        tau0: correlation time τ₀, 1e-15 to 1e15.
+        r0: departure from the Gaussian noise, −1e6 ≤ r₀ < 3 (beyond, Eq. (9) cannot be normalised).
+
+    Raises:
+        ParameterError: a parameter is not a finite number in its range.
+    """
+
+    D0: Intensity
+    tau0: CorrelationTime
+    r0: Annotated[Departure, Field(lt=3)]
+
+    kind: ClassVar[str] = "non-gaussian"
+    words: ClassVar[Mapping[str, str]] = {"treatment": "exact"}
+    approximates_spectrum: ClassVar[bool] = True
+
+    @property
+    def curvature(self) -> float:
+        """b in 1 + b ξ², the bracket of Eqs. (8)-(9): b = τ₀(r₀ − 1)/(2D₀)."""
+        return self.tau0 * (self.r0 - 1) / (2 * self.D0)
+
+    @property
+    def diffusion(self) -> float:
+        """√(2D₀)/τ₀, which is σ₀ of Eq. (14)."""
+        return math.sqrt(2 * self.D0) / self.tau0
+
+    @property
+    def variance(self) -> float:
+        """⟨ξ²⟩ of Eq. (10): 2D₀/(τ₀(5 − 3r₀)) for r₀ < 5/3, otherwise ∞."""
+        return 2 * self.D0 / (self.tau0 * self._bracket) if self._bracket > 0 else math.inf
+
+    @property
+    def _bracket(self) -> float:
+        """5 − 3r₀ of Eqs. (10) and (12), which rounding makes 0 for an r₀ just below 5/3."""
+        return 5 - 3 * self.r0
+
+    @property
+    def standard_deviation(self) -> float:
+        return math.sqrt(self.variance)
+
+    @property
+    def half_width(self) -> float:
+        """√(2D₀/(τ₀(1 − r₀))) for r₀ < 1, otherwise ∞."""
+        return 1 / math.sqrt(-self.curvature) if self.r0 < 1 else math.inf
+
+    @property
+    def end_exponent(self) -> float:
+        return 1 / (1 - self.r0) if self.r0 < 1 else 0.0
+
+    def potential(self, xi: ArrayLike) -> FloatArray:
+        """V(ξ) of Eq. (8); its limit ξ²/2 for r₀ = 1; NaN outside the support."""
+        square = np.asarray(xi, dtype=float) ** 2
+        if self.r0 == 1:
+            return square / 2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self.D0 / (self.tau0 * (self.r0 - 1)) * np.log1p(self.curvature * square)
+
+    def drift(self, xi: ArrayLike) -> FloatArray:
+        """−V′(ξ)/τ₀ = −(ξ/τ₀)/(1 + τ₀(r₀ − 1)ξ²/(2D₀)), Eq. (11) before its approximation."""
+        xi = np.asarray(xi, dtype=float)
+        return -xi / self.tau0 / (1 + self.curvature * xi**2)
+
+    def log_density(self, xi: ArrayLike) -> FloatArray:
+        """ln P_s(ξ) of Eq. (9) with the exponent −1/(r₀ − 1), normalised in closed form; −∞ outside the support."""
+        from scipy.special import xlog1py  # takes a tenth of a second to import
+
+        xi = np.asarray(xi, dtype=float)
+        if self.r0 == 1:
+            return self.ou_reduction().log_density(xi)
+        bracket = self.curvature * xi**2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            power = xlog1py(-1 / (self.r0 - 1), bracket)
+        return np.where(bracket > -1, power, -math.inf) - self._log_normalisation
+
+    def density(self, xi: ArrayLike) -> FloatArray:
+        """P_s(ξ) of Eq. (9); 0 outside the support."""
+        return np.exp(self.log_density(xi))
+
+    @property
+    def _log_normalisation(self) -> float:
+        """ln Z of Eq. (9): Z = B(a + 1, ½)/√|b| for r₀ < 1 and B(a − ½, ½)/√b for r₀ > 1, with a = 1/|r₀ − 1|."""
+        from scipy.special import betaln
+
+        a = 1 / abs(self.r0 - 1)
+        return float(betaln(a + 1 if self.r0 < 1 else a - 0.5, 0.5)) - 0.5 * math.log(abs(self.curvature))
+
+    @property
+    def correlation_time(self) -> float:
+        """τ₁ of Eq. (12), that of the reduced noise, for r₀ < 5/3, otherwise ∞."""
+        return 2 * (2 - self.r0) / self._bracket * self.tau0 if self._bracket > 0 else math.inf
+
+    @property
+    def moments(self) -> tuple[float, float]:
+        """[−1, 0] for the algebraic tails of r₀ > 1, else all."""
+        return (-1.0, 0.0) if self.r0 > 1 else (-math.inf, math.inf)
+
+    def spectral_density(self, omega: float) -> float:
+        """S(ω) of the reduced noise, Eq. (16); that of Eq. (7) itself has no closed form."""
+        return self.ou_reduction().spectral_density(omega)
+
+    def ou_reduction(self) -> ReducedNoise:
+        """The Ornstein-Uhlenbeck process of Eqs. (12)-(14) that stands for this one.
+
+        Raises:
+            ValueError: r₀ ≥ 5/3, where ⟨ξ²⟩ is infinite and Eq. (11) has no meaning.
+        """
+        if self._bracket <= 0:
+            raise ValueError(
+                f"r0 = {self.r0} has no Ornstein-Uhlenbeck reduction: Eqs. (11)-(12) need r0 < 5/3, "
+                "where the variance (10) is finite"
+            )
+        return ReducedNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
+
+    @property
+    def one_sided(self) -> Sequence[str]:
+        """r₀ at 1: above, Λ is infinite, or another one."""
+        return ("r0",) if self.r0 == 1 else ()
+
+    def derivative(self, name: str) -> NoiseDerivative:
+        """∂/∂θ of Eq. (9), ln P_s = −ln(1 + q)/(r₀ − 1) with q = (r₀ − 1)u and u = τ₀ξ²/(2D₀)."""
+
+        def u(xi: FloatArray) -> FloatArray:
+            return np.asarray(0.5 * self.tau0 / self.D0 * xi**2)
+
+        def by_log_tau0(xi: FloatArray) -> FloatArray:
+            return np.asarray(-u(xi) / (1 + (self.r0 - 1) * u(xi)))
+
+        match name:
+            case "D0":
+                return NoiseDerivative(0.5 / self.D0, lambda xi: -by_log_tau0(xi) / self.D0)
+            case "tau0":
+                return NoiseDerivative(-1 / self.tau0, lambda xi: by_log_tau0(xi) / self.tau0)
+        end_exponent = 1 / (1 - self.r0) ** 2 if math.isfinite(self.half_width) else 0.0
+        return NoiseDerivative(0.0, lambda xi: u(xi) ** 2 * _curvature_of_log((self.r0 - 1) * u(xi)), end_exponent)
+
+    def at(self, values: Mapping[str, float | str]) -> NonGaussianNoise | ReducedNoise:  # type: ignore[override]
+        return _treated(self, values)
+
+
+@told_in_words
+@dataclass(frozen=True, config=STRICT)
+class ReducedNoise(GaussianNoise):
+    """The Ornstein-Uhlenbeck process by which Eqs. (12)-(14) replace the noise of Eq. (7): α₀ = 1/τ₁, σ₀ = √(2D₀)/τ₀.
+
+    Args:
+        D0: noise intensity D₀, 1e-15 to 1e15, in 1/time.
+        tau0: correlation time τ₀, 1e-15 to 1e15.
+        r0: departure from the Gaussian noise, −1e6 ≤ r₀ < 5/3 (beyond, the variance (10) is infinite).
+
+    Raises:
+        ParameterError: a parameter is not a finite number in its range.
+    """
+
+    D0: Intensity
+    tau0: CorrelationTime
+    r0: Annotated[Departure, Field(lt=math.nextafter(5 / 3, 0))]  # at which 5 - 3 r0 is 0 already
+
+    kind: ClassVar[str] = "ou-reduction"
+    words: ClassVar[Mapping[str, str]] = {"treatment": "ou-reduction"}
+
+    @property
+    def alpha(self) -> float:  # type: ignore[override]
+        """α₀ = 1/τ₁ with τ₁ of Eq. (12)."""
+        return 1 / (2 * (2 - self.r0) / (5 - 3 * self.r0) * self.tau0)
+
+    @property
+    def sigma(self) -> float:  # type: ignore[override]
+        """σ₀ = √(2D₀)/τ₀, Eq. (14)."""
+        return math.sqrt(2 * self.D0) / self.tau0
+
+    @property
+    def replaces(self) -> NonGaussianNoise:
+        """The noise of Eq. (7)."""
+        return NonGaussianNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
+
+    def derivative(self, name: str) -> NoiseDerivative:
+        """∂/∂θ by D₀, τ₀ or r₀ of α₀ = (5 − 3r₀)/(2(2 − r₀)τ₀) and σ₀."""
+        match name:
+            case "D0":
+                return self.by_logarithms(0.5 / self.D0, 0.0)
+            case "tau0":
+                return self.by_logarithms(-1 / self.tau0, -1 / self.tau0)
+        return self.by_logarithms(0.0, 1 / (2 - self.r0) - 3 / (5 - 3 * self.r0))
+
+    def at(self, values: Mapping[str, float | str]) -> NonGaussianNoise | ReducedNoise:  # type: ignore[override]
+        return _treated(self, values)
+
+
+def _treated(
+    noise: NonGaussianNoise | ReducedNoise, values: Mapping[str, float | str]
+) -> NonGaussianNoise | ReducedNoise:
+    """The noise with other values of D₀, τ₀, r₀ or of its treatment, "exact" or "ou-reduction"."""
+    numbers = {"D0": noise.D0, "tau0": noise.tau0, "r0": noise.r0, **values}
+    treatment = numbers.pop("treatment", noise.words["treatment"])
+    if treatment not in ("exact", "ou-reduction"):
+        raise ValueError(f'got {treatment!r} as a treatment of the noise; must be one of "exact", "ou-reduction"')
+    made: type[NonGaussianNoise | ReducedNoise] = NonGaussianNoise if treatment == "exact" else ReducedNoise
+    return made(**numbers)  # type: ignore[arg-type]
+
+
+def _curvature_of_log(q: FloatArray) -> FloatArray:
+    """(ln(1 + q) − q/(1 + q))/q², which is ½ − ⅔q + ¾q² − … near 0."""
+    n = np.arange(2, 18)
+    series = np.polynomial.polynomial.polyval(q, (-1.0) ** n * (1 - 1 / n))
+    far = np.where(np.abs(q) < _SMALL, 1.0, q)
+    return np.where(np.abs(q) < _SMALL, series, (np.log1p(far) - far / (1 + far)) / far**2)

@@ -1,0 +1,80 @@
+"""Ornstein-Uhlenbeck noise, Eqs. (15)-(16): the Gaussian process with an exponential correlation."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic.dataclasses import dataclass
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.faults import told_in_words
+from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.parameters import DERIVED, STRICT, parameter
+
+
+class GaussianNoise(Noise):
+    """A process with the law of Eq. (15), dξ = −α₀ ξ dt + σ₀ dW, whatever its parameters are."""
+
+    alpha: float
+    sigma: float
+
+    @property
+    def diffusion(self) -> float:
+        return self.sigma
+
+    @property
+    def standard_deviation(self) -> float:
+        """σ₀/√(2α₀)."""
+        return self.sigma / math.sqrt(2 * self.alpha)
+
+    @property
+    def correlation_time(self) -> float:
+        """1/α₀."""
+        return 1 / self.alpha
+
+    def drift(self, xi: ArrayLike) -> FloatArray:
+        """−α₀ ξ."""
+        return -self.alpha * np.asarray(xi, dtype=float)
+
+    def log_density(self, xi: ArrayLike) -> FloatArray:
+        """Logarithm of the Gaussian density with variance σ₀²/(2α₀)."""
+        z = np.asarray(xi, dtype=float) / self.standard_deviation
+        return -0.5 * z**2 - math.log(math.sqrt(2 * math.pi) * self.standard_deviation)
+
+    def density(self, xi: ArrayLike) -> FloatArray:
+        """Gaussian density with variance σ₀²/(2α₀)."""
+        return np.exp(self.log_density(xi))
+
+    def spectral_density(self, omega: float) -> float:
+        """S(ω) = σ₀²/(α₀² + ω²), Eq. (16)."""
+        return self.sigma**2 / (self.alpha**2 + omega**2)
+
+    def by_logarithms(self, log_sigma: float, log_alpha: float) -> NoiseDerivative:
+        """∂/∂θ from ∂ ln σ₀/∂θ and ∂ ln α₀/∂θ: ln P_s = −z²/2 and z ~ ξ√α₀/σ₀."""
+        factor, unit = log_sigma - 0.5 * log_alpha, self.standard_deviation
+        return NoiseDerivative(log_sigma, lambda xi: factor * (xi / unit) ** 2)
+
+
+@told_in_words
+@dataclass(frozen=True, config=STRICT)
+class OrnsteinUhlenbeck(GaussianNoise):
+    """Ornstein-Uhlenbeck noise dξ = −α₀ ξ dt + σ₀ dW, Eq. (15).
+
+    Args:
+        alpha: relaxation rate α₀, 1e-32 to 1e32, in 1/time.
+        sigma: coefficient of the Wiener process, σ₀, 1e-32 to 1e32, in time^(-3/2).
+
+    Raises:
+        ParameterError: a parameter is not a finite number in its range.
+    """
+
+    alpha: Annotated[float, parameter("relaxation rate", "", r"$\alpha_0$", "1/time", **DERIVED)]
+    sigma: Annotated[float, parameter("intensity of its white noise", "", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)]
+
+    kind: ClassVar[str] = "ornstein-uhlenbeck"
+
+    def derivative(self, name: str) -> NoiseDerivative:
+        return self.by_logarithms(1 / self.sigma, 0.0) if name == "sigma" else self.by_logarithms(0.0, 1 / self.alpha)

@@ -1,0 +1,3 @@
+from .plane_system import PlaneSystem as PlaneSystem
+from .vibro_impact import ImpactLaw as ImpactLaw
+from .vibro_impact import VibroImpactOscillator as VibroImpactOscillator

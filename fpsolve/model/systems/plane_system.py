@@ -1,0 +1,195 @@
+"""Any linear system in the plane, from its coefficient matrices or from a function of parameters that makes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.parameters import unknown_parameter
+from fpsolve.model.plane import Drive, Kick, System, by_epsilon
+from fpsolve.model.quantity import Quantity
+
+Parts = Sequence[Drive] | tuple[Sequence[Drive], Sequence[Kick]]
+"""The terms of a system, or these and its kicks."""
+NODES, REACH, LEAST = 9, 0.05, 0.05
+"""Values of a parameter for a derivative, how far they go in shares of it, and the least size that it counts as."""
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """Terms with numbers in place of the names by which they are multiplied, a function for `PlaneSystem.of`.
+
+    Attributes:
+        terms: pairs of a name, or "" for none, and a term.
+        kicks: which do not change.
+    """
+
+    terms: Sequence[tuple[str, Drive]]
+    kicks: Sequence[Kick] = ()
+
+    def __call__(self, **values: float) -> tuple[Sequence[Drive], Sequence[Kick]]:
+        sizes = {"": 1.0, **values}
+        scaled = [replace(term, matrix=(sizes[name] * np.array(term.matrix)).tolist()) for name, term in self.terms]
+        return scaled, self.kicks
+
+
+@dataclass(frozen=True)
+class PlaneSystem(System):
+    """A linear system in the plane from its parts, see `System`.
+
+    >>> from fpsolve.arrays import identity
+    >>> rotation, stiffness = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))
+    >>> PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity)]).epsilon  # ẍ + (1 + ξ) x = 0
+    1.0
+
+    Args:
+        drives: one at least.
+        kicks: stretches at rays.
+        epsilon: ε > 0.
+        build: makes both from parameters, see `of`, which is the usual way.
+        named: the values of these parameters by their names.
+
+    Raises:
+        ValueError: there is no drive, or ε is not a positive number.
+    """
+
+    drives: Sequence[Drive]
+    kicks: Sequence[Kick] = ()
+    epsilon: float = 1.0
+    build: Callable[..., Parts] | None = None
+    named: tuple[tuple[str, float], ...] = ()
+
+    kind: ClassVar[str] = "plane"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "drives", tuple(self.drives))
+        object.__setattr__(self, "kicks", tuple(self.kicks))
+        rays = np.sort(np.mod([kick.phase for kick in self.kicks], math.pi))
+        if np.any(np.diff(np.append(rays, rays[:1] + math.pi)) < 1e-6) and rays.size > 1:
+            raise ValueError(f"got kicks at {[kick.phase for kick in self.kicks]}; their phases must differ modulo pi")
+        if not self.drives or not (math.isfinite(self.epsilon) and self.epsilon > 0):
+            raise ValueError(
+                f"got {len(self.drives)} drives and epsilon = {self.epsilon}; needs one at least, and a positive number"
+            )
+
+    @classmethod
+    def of(cls, build: Callable[..., Parts], *, epsilon: float = 1.0, **named: float) -> Self:
+        """The system that a function makes from named parameters, by each of which it has sensitivities and charts.
+
+        >>> def beam(omega, damping):  # ẍ + 2 damping ẋ + (omega² + ξ) x = 0
+        ...     free = Drive(0, ((0.0, 1.0), (-(omega**2), -2 * damping)))
+        ...     return [free, Drive(1, ((0.0, 0.0), (-1.0, 0.0)), lambda xi: xi)]
+        >>> PlaneSystem.of(beam, omega=2.0, damping=0.1).values["damping"]
+        0.1
+
+        Args:
+            build: takes the parameters by name and returns the terms, or the terms and the kicks; smooth in each, with
+                the same number of both for all values; a function of a module, so that results can be pickled.
+            epsilon: ε > 0.
+            named: the values of the parameters.
+
+        Raises:
+            ValueError: a parameter is not a finite number or is called epsilon, or as `PlaneSystem`.
+        """
+        for name, value in named.items():
+            if isinstance(value, str | bool) or not math.isfinite(value):
+                raise ValueError(f"got {name} = {value!r}; must be a finite number")
+        drives, kicks = _parts(build, named)
+        return cls(drives, kicks, epsilon, build, tuple((name, float(value)) for name, value in named.items()))
+
+    @classmethod
+    def of_terms(
+        cls, terms: Sequence[tuple[str, Drive]], kicks: Sequence[Kick] = (), *, epsilon: float = 1.0, **named: float
+    ) -> Self:
+        """The system whose terms are multiplied by named parameters.
+
+        >>> stiffness, damping = ((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, -2.0))
+        >>> free = Drive(0, ((0.0, 1.0), (-1.0, 0.0)))
+        >>> PlaneSystem.of_terms([("", free), ("c", Drive(0, damping))], c=0.1).drives[1].matrix
+        ((0.0, 0.0), (0.0, -0.2))
+
+        Args:
+            terms: pairs of the name of a parameter, or "" for none, and a term.
+            kicks: stretches at rays.
+            epsilon: ε > 0.
+            named: the values of the parameters.
+
+        Raises:
+            ValueError: as `of`, or the names of the terms are not those of the values.
+        """
+        names = {name for name, _ in terms if name}
+        if names != named.keys():
+            raise ValueError(
+                f"got values of {sorted(named)}; must be of {sorted(names)}, the names that the terms carry"
+            )
+        return cls.of(Scaled(tuple(terms), tuple(kicks)), epsilon=epsilon, **named)
+
+    @property
+    def values(self) -> Mapping[str, float | str]:
+        """ε, and the named parameters."""
+        return {"epsilon": float(self.epsilon), **dict(self.named)}
+
+    def quantity_of(self, name: str) -> Quantity:
+        """ε, or a named parameter, whose unit is not known."""
+        key = f"{self.section}.{name}"
+        return Quantity(key, key, "small parameter", r"$\varepsilon$") if name == "epsilon" else unknown_parameter(key)
+
+    def at(self, values: Mapping[str, float | str]) -> Self:
+        unknown = [name for name in values if name not in self.values]
+        if unknown:
+            raise ValueError(f"got {unknown[0]}; the parameters are {', '.join(self.values)}")
+        new: dict[str, Any] = {**self.values, **values}
+        if self.build is None:
+            return replace(self, epsilon=new["epsilon"])
+        return type(self).of(self.build, **new)
+
+    def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
+        """∂/∂ε, or ∂/∂θ by the derivative of the polynomial through the matrices for `NODES` values of θ around it.
+
+        Raises:
+            ValueError: the number of terms or the rays of the kicks change with θ.
+        """
+        if name == "epsilon":
+            return by_epsilon(self), ()
+        assert self.build is not None
+        named = dict(self.named)
+        half = REACH * max(abs(named[name]), LEAST)
+        x = np.cos(np.pi * np.arange(NODES) / (NODES - 1))
+        around = [_parts(self.build, {**named, name: named[name] + half * each}) for each in x]
+        if any(_form(each) != _form((self.drives, self.kicks)) for each in around):
+            raise ValueError(
+                f"the terms, their g or the rays of the kicks change with {name}; only matrices and ln R may"
+            )
+        weights = _slope_weights(x) / half
+        matrices = np.tensordot(weights, np.array([[drive.matrix for drive in drives] for drives, _ in around]), 1)
+        slopes = weights @ np.array([[kick.log_factor for kick in kicks] for _, kicks in around])
+        changed = [replace(drive, matrix=a.tolist()) for drive, a in zip(self.drives, matrices, strict=True) if a.any()]
+        return tuple(changed), tuple(slopes.tolist()) if slopes.any() else ()
+
+
+def _parts(build: Callable[..., Parts], named: Mapping[str, float]) -> tuple[Sequence[Drive], Sequence[Kick]]:
+    """The terms and the kicks that a function makes."""
+    made: Any = build(**named)
+    return made if isinstance(made, tuple) and len(made) == 2 and not isinstance(made[0], Drive) else (made, ())
+
+
+def _form(parts: tuple[Sequence[Drive], Sequence[Kick]]) -> tuple[Any, ...]:
+    """What must not change with a parameter."""
+    drives, kicks = parts
+    return tuple(drive.order for drive in drives), tuple(kick.phase for kick in kicks)
+
+
+def _slope_weights(x: FloatArray) -> FloatArray:
+    """The weights of the values at some points of [-1, 1] in the slope at 0 of the polynomial through them."""
+    return np.asarray(np.linalg.solve(np.polynomial.chebyshev.chebvander(x, x.size - 1).T, _chebyshev_slopes(x.size)))
+
+
+def _chebyshev_slopes(count: int) -> FloatArray:
+    """T_k′(0) for k < count: k sin(kπ/2)."""
+    k = np.arange(count)
+    return np.asarray(k * np.sin(k * np.pi / 2), dtype=float)
