@@ -70,7 +70,7 @@ class KroneckerSum:
     def shifted(self, shift: float) -> KroneckerSum:
         """The sum less `shift` · 1 ⊗ Ξ₀ ⊗ …, Ξ₀ ⊗ … being what the first term has beside its φ-matrix."""
         (phase, *noises), *others = self.terms
-        unit = identity(len(phase.T), format="csr") if issparse(phase) else np.eye(len(phase))
+        unit = identity(phase.shape[0], format="csr") if issparse(phase) else np.eye(phase.shape[0])
         return KroneckerSum([(phase - shift * unit, *noises), *others])
 
     @cached_property
