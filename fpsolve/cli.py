@@ -18,8 +18,9 @@ from cyclopts import App, CycloptsError, Parameter, Token
 from rich.console import Console
 
 from fpsolve import __version__
-from fpsolve.case.remedies import in_words_of_a_case
+from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import CaseError, FpsolveError, NotConverged
+from fpsolve.messages import Severity, message_of
 from fpsolve.output.screen import HANDLER
 from fpsolve.signals import ended_by_signals
 
@@ -100,7 +101,7 @@ def _run(argv: Sequence[str] | None) -> int:
     except CycloptsError:  # cyclopts has said what is wrong
         return BAD_INPUT
     except FpsolveError as failure:
-        print_error(str(failure))
+        print_error(failure.message)
         return NOT_CONVERGED if isinstance(failure, NotConverged) else BAD_INPUT
     except KeyboardInterrupt as interrupt:
         print_error(str(interrupt) or "interrupted")
@@ -120,7 +121,7 @@ def print_error(text: str) -> None:
     from rich.text import Text
 
     try:
-        Console(stderr=True).print(Text(in_words_of_a_case(text)), style="bold red", soft_wrap=True)
+        Console(stderr=True).print(Text(message_of(text).words(CASE_WORDS)), style="bold red", soft_wrap=True)
     except (OSError, SystemExit):  # nobody can be told
         _drop_blocked_output()
 
@@ -280,7 +281,7 @@ def chart(
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """
-    from fpsolve.output.remarks import FAILURE, print_remark
+    from fpsolve.output.remarks import print_remark
     from fpsolve.output.terminal import print_chart, print_written, traced
     from fpsolve.study.chart import refuse_no_chart
     from fpsolve.workflow.cases import chart_case
@@ -293,8 +294,8 @@ def chart(
         start = monotonic()
         found = chart_case(case, out, pool=pool, watch=_watch(is_quiet=quiet))
         if quiet:
-            for text in dict.fromkeys(found.failures):
-                print_remark(f"{case.name}: {in_words_of_a_case(text)}", FAILURE)
+            for each in dict.fromkeys(found.failures):
+                print_remark(f"{case.name}: {each.words(CASE_WORDS)}", Severity.FAILURE)
         else:
             print_chart(case, found)
         print_written(out / case.name, traced(found), monotonic() - start)

@@ -12,7 +12,8 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Any, TextIO
 
-from fpsolve.errors import OutputError, Remedy
+from fpsolve.errors import OutputError
+from fpsolve.messages import Code, Message, Remedy
 
 LOCK = ".fpsolve.lock"
 LOCK_SECONDS = 0.1
@@ -56,14 +57,14 @@ def writable(folder: Path) -> Iterator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as failure:
-        raise OutputError(f"{folder} cannot be made: {failure.strerror or failure}; {Remedy.FOLDER}") from failure
+        raise OutputError(f"{folder} cannot be made: {failure.strerror or failure}", Remedy.FOLDER) from failure
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder} cannot be written to; {Remedy.FOLDER}")
+        raise OutputError(f"{folder} cannot be written to", Remedy.FOLDER)
     try:
         yield
     except OSError as failure:
         place, reason = failure.filename or folder, failure.strerror or failure
-        raise OutputError(f"{place} cannot be written: {reason}; {Remedy.FOLDER}") from failure
+        raise OutputError(f"{place} cannot be written: {reason}", Remedy.FOLDER) from failure
 
 
 @contextmanager
@@ -85,7 +86,7 @@ def alone(folder: Path) -> Iterator[None]:
         try:
             lock.acquire()
         except Timeout:
-            raise OutputError(f"{folder} is being written by another run; wait for it, or {Remedy.FOLDER}") from None
+            raise OutputError(Message(Code.BEING_WRITTEN, place=str(folder), remedy=Remedy.FOLDER)) from None
         except OSError as failure:
             if failure.errno not in NO_LOCKS:
                 raise

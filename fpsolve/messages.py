@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from enum import Enum, StrEnum, unique
 from string import Formatter
@@ -232,7 +233,7 @@ class Code(Enum):
     NO_SENSITIVITIES = _NOTE, "no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
     ONE_SIDED = (
         _NOTE,
-        "the sensitivities to noise.r0 = 1 are derivatives from below: above, Λ is infinite or another one",
+        "the sensitivities to {key} = {value:g} are derivatives from below: above, Λ is infinite or another one",
     )
 
     NO_PROBLEM = _FAILURE, "no such problem: {reason}"
@@ -277,11 +278,7 @@ class Code(Enum):
     NO_MEMORY = _FAILURE, "not enough memory"
     WORKER_DIED = _FAILURE, "its worker died, perhaps for lack of memory; {remedy}, and run it again"
     FAULT = _FAILURE, "{kind}: {text} (a fault of fpsolve, in {file}:{line})"
-    NOT_MADE = _FAILURE, "{place} cannot be made: {reason}"
-    NOT_WRITABLE = _FAILURE, "{place} cannot be written to"
-    NOT_WRITTEN = _FAILURE, "{place} cannot be written: {reason}"
     BEING_WRITTEN = _FAILURE, "{place} is being written by another run; wait for it, or {remedy}"
-    NOT_SHARED = _FAILURE, "{place} is not where the workers write: they must share it"
 
 
 class Message(str):
@@ -338,7 +335,7 @@ class Message(str):
         return Message(self.code, **others, **({"remedy": remedy} if remedy else {}))
 
     def to_data(self) -> dict[str, Any]:
-        """What JSON can hold, from which `from_data` makes it again."""
+        """What strict JSON can hold, from which `from_data` makes it again."""
         return {"code": self.code.name, "data": {key: _plain(value) for key, value in self.data.items()}}
 
     @classmethod
@@ -404,10 +401,14 @@ def _plain(value: Any) -> Any:
         return value.to_data()
     if isinstance(value, Remedy):
         return {"remedy": value.name}
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"number": str(value)}
     return [_plain(each) for each in value] if isinstance(value, tuple) else value
 
 
 def _from_plain(value: Any) -> Any:
     if isinstance(value, Mapping):
+        if "number" in value:
+            return float(value["number"])
         return Message.from_data(value) if "code" in value else Remedy[value["remedy"]]
     return tuple(map(_from_plain, value)) if isinstance(value, list) else value

@@ -17,6 +17,7 @@ from fpsolve.analysis.curve import Field, Point, Sample, Trace, cubic
 from fpsolve.analysis.scan import FINE, Scan
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
+from fpsolve.messages import Code, Message
 
 LONGEST, SHORTEST = 0.02, 1e-5
 """Steps, in sides of the square."""
@@ -33,8 +34,6 @@ BESIDE = 1e-8
 
 FRAME = "leaves the frame"
 """The label of a point where a curve leaves the frame."""
-UNSETTLED = "Newton's method does not settle on it"
-TOO_SHARP = "it turns too sharply, as where it meets another branch"
 
 
 def found(
@@ -113,38 +112,38 @@ def traced(field: Field, start: Sample, longest: float = LONGEST, stepped: Calla
 
 def _half(
     field: Field, start: Sample, sign: float, longest: float, stepped: Callable[[], None]
-) -> tuple[list[Point], bool, str]:
+) -> tuple[list[Point], bool, Message | None]:
     """Points from a start on in one direction, whether they come back to it, and why they end inside of the square."""
     points, step = [Point(start)], 0.25 * longest
     last, before = start, None
     while len(points) < MOST_POINTS:
-        at, reason = _predicted(last, before, sign * step), UNSETTLED
+        at, reason = _predicted(last, before, sign * step), Message(Code.NEWTON_UNSETTLED)
         try:
             sample = _near(field, last, at)
             is_leaving = sample is None and bool(np.any((at < 0) | (at > 1)))
             sample = _landed(field, last, at) if is_leaving else sample
         except FpsolveError as failure:
-            sample, reason = None, str(failure)
+            sample, reason = None, failure.message
         turn = 0.0 if sample is None else _angle(last.tangent, sample.tangent)
         if sample is None or turn > 2 * MOST_TURN:
             step /= 3
             if step < SHORTEST:
-                return points, False, TOO_SHARP if sample is not None else reason
+                return points, False, reason if sample is None else Message(Code.TOO_SHARP)
             continue
         if len(points) > 2 and _passes(last.at, sample, start):
-            return points, True, ""
+            return points, True, None
         if is_leaving:
             if np.linalg.norm(sample.at - last.at) < BESIDE:
                 points.pop()
             else:
                 stepped()
             points.append(Point(sample, FRAME))
-            return points, False, ""
+            return points, False, None
         points.append(Point(sample))
         stepped()
         before, last = last, sample
         step = min(longest, step * min(2.0, MOST_TURN / max(turn, 1e-3)))
-    return points, False, f"it has more than {MOST_POINTS} points"
+    return points, False, Message(Code.TOO_LONG, count=MOST_POINTS)
 
 
 def _predicted(last: Sample, before: Sample | None, step: float) -> FloatArray:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.messages import Message
 
 TOLERANCE = 1e-10
 """|F| over its scale on a curve; a tenth of what the solves of F leave."""
@@ -81,7 +82,7 @@ class Trace:
 
     points: tuple[Point, ...]
     closed: bool = False
-    obstacles: tuple[str, ...] = ()
+    obstacles: tuple[Message, ...] = ()
 
     @property
     def at(self) -> FloatArray:

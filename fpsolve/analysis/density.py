@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import QUARTERS, draw_plane
-from fpsolve.errors import NotConverged, Remedy
+from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import growth_rate, phase_speed
 from fpsolve.model.quantity import NOISE, PHASE, density_unit
 
@@ -158,11 +159,7 @@ def _judged(pair: PrincipalPair, density: Density, name: str) -> Density:
     """The density, if it is one. Raises `NotConverged`."""
     share = density.negative_share()
     if share > MOST_NEGATIVE:
-        raise NotConverged(
-            f"the {name} at p = {pair.p:g} is not resolved, {share:.0%} of it is negative",
-            density,
-            Remedy.CELLS,
-        )
+        raise NotConverged(Message(Code.NEGATIVE_DENSITY, name=name, p=pair.p, size=share), density, Remedy.CELLS)
     return density
 
 

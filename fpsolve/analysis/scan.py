@@ -10,6 +10,7 @@ import numpy as np
 from fpsolve.analysis.curve import Field, Sample
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
+from fpsolve.messages import Message
 
 FINE = 13
 """Points along a cell of a scan where its interpolation is looked at."""
@@ -29,7 +30,7 @@ class Scan:
     nodes: FloatArray
     values: FloatArray
     gradients: FloatArray
-    reasons: tuple[str, ...] = ()
+    reasons: tuple[Message, ...] = ()
 
     def between(self, i: int, j: int, s: FloatArray, t: FloatArray) -> FloatArray:
         """F in the cell of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation.
@@ -107,7 +108,7 @@ class ScannedRow:
 
     values: FloatArray
     gradients: FloatArray
-    reasons: tuple[str, ...] = ()
+    reasons: tuple[Message, ...] = ()
 
 
 def rows_of(begin: Callable[[], Field], count: int, axis: int = 1) -> list[Row]:
@@ -117,21 +118,21 @@ def rows_of(begin: Callable[[], Field], count: int, axis: int = 1) -> list[Row]:
 
 def scan_row(row: Row) -> ScannedRow:
     """F on a row from one end to the other, so that each node is close to the one before."""
-    field, reasons = row.begin(), dict[str, None]()
+    field, reasons = row.begin(), dict[Message, None]()
     values, gradients = np.full(row.count, np.nan), np.full((row.count, 2), np.nan)
     for k, at in enumerate(row.nodes):
         try:
             sample = field(at)
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
-            reasons.setdefault(str(failure))
+            reasons.setdefault(failure.message)
     return ScannedRow(values, gradients, tuple(reasons))
 
 
 def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable[[], None] = lambda: None) -> Scan:
     """The scan of all rows of a grid, from what is found on them, in their order; no more of that is taken."""
     count = len(rows)
-    values, gradients, reasons = np.empty((count, count)), np.empty((count, count, 2)), dict[str, None]()
+    values, gradients, reasons = np.empty((count, count)), np.empty((count, count, 2)), dict[Message, None]()
     for row in rows:
         result = next(found)
         place = (slice(None), row.number) if row.axis == 0 else row.number

@@ -39,6 +39,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Direction, Problem, checked_moments, of_problem, with_original
 from fpsolve.model.quantity import Quantity, moment_at
@@ -140,13 +141,14 @@ def solve_sensitivities(
         indices: those wanted.
         root: near δ_p, if it is known.
     """
-    found, notes, parameters = Gradient(solver, along), list[str](), solver.problem.parameters
+    found, notes, parameters = Gradient(solver, along), list[Message](), solver.problem.parameters
 
-    def tried(record: Quantity, solve: Callable[[], Slopes]) -> Slopes:
+    def tried(record: Quantity, solve: Callable[[], Slopes], p: float | None = None) -> Slopes:
         try:
             slopes = solve()
         except (NotConverged, NoSuchExponent) as failure:
-            notes.append(f"no sensitivities of {record.symbol}: {failure}")
+            symbol = record.symbol if p is None else "Λ(p)"
+            notes.append(Message(Code.NO_SENSITIVITIES, p=p, symbol=symbol, reason=failure.message))
             return {}
         return {key: replace(each, quantity=record.by(parameters[key].quantity)) for key, each in slopes.items()}
 
@@ -154,7 +156,7 @@ def solve_sensitivities(
         index = nonzero_root(solver, guess=root)
         return found.root(index.value) if isinstance(index, Estimate) else {}
 
-    moments = tuple(tried(moment_at(each), partial(found.moment, each)) for each in p.tolist())
+    moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
     solves = dict(zip(RECORDS, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
     return Sensitivities(
@@ -224,11 +226,11 @@ class Gradient:
         return Bordered(coarse), Bordered(fine)
 
 
-def _one_sided(problem: Problem, along: Mapping[str, Direction]) -> tuple[str, ...]:
+def _one_sided(problem: Problem, along: Mapping[str, Direction]) -> tuple[Message, ...]:
     """Which derivatives are taken from below."""
     noise, values = problem.noise, problem.values
     return tuple(
-        f"the sensitivities to {key} = {values[key]:g} are derivatives from below: above, Λ is infinite or another one"
+        Message(Code.ONE_SIDED, key=key, value=values[key])
         for key in (f"{noise.section}.{name}" for name in noise.one_sided)
         if key in along
     )

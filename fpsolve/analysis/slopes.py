@@ -12,6 +12,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.exponent.error import Estimate
+from fpsolve.messages import Message
 from fpsolve.model.quantity import (
     LYAPUNOV_EXPONENT,
     MOMENT,
@@ -54,7 +55,7 @@ class Sensitivities(Result):
     p: FloatArray
     moments: tuple[Slopes, ...]
     indices: Mapping[str, Slopes]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Message, ...] = ()
 
     def to_xarray(self) -> xarray.Dataset:
         """The derivatives over p and θ, and their errors; NaN where there is none."""

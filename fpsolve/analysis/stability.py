@@ -24,6 +24,7 @@ from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
 from fpsolve.exponent.adapt import Budget
+from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem, of_problem, with_original
 from fpsolve.model.quantity import POINTS
@@ -63,7 +64,7 @@ class Branch:
     width: FloatArray
     labels: tuple[str, ...]
     closed: bool = False
-    obstacles: tuple[str, ...] = ()
+    obstacles: tuple[Message, ...] = ()
 
     def __repr__(self) -> str:
         return brief(self, f"{self.x.size} points{', closed' * self.closed}")
@@ -103,17 +104,16 @@ class Boundary(Result):
         return Quantity(self.zero, self.problem, (self.x, self.y), self.budget)
 
     def remark(self) -> str:
-        """That there is no line, if so."""
+        """That there is no line, as a `Message`, or an empty text."""
         if self.traces or self.scan is None:
             return ""
         exists = np.isfinite(self.scan.values)
         values = self.scan.values[exists]
         if not values.size:
-            return f"{self.zero.symbol} exists nowhere in the frame"
+            return Message(Code.NOWHERE, symbol=self.zero.symbol)
         if np.any(values > 0) and np.any(values < 0):
-            return f"no line {self.zero.equation} was found, though {self.zero.symbol} changes its sign in the frame"
-        where = "everywhere" if exists.all() else "wherever it exists"
-        return f"{self.zero.side(float(values[0]))} {where} in the frame"
+            return Message(Code.NO_LINE, line=self.zero.equation, symbol=self.zero.symbol)
+        return Message(Code.ONE_SIGN, side=self.zero.side(float(values[0])), is_whole=bool(exists.all()))
 
     def refined(self, step: float) -> Boundary:
         """The same with shorter steps, in sides of the frame. Raises `ValueError`."""

@@ -15,11 +15,12 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 from fpsolve.analysis.curve import Sample
 from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
 from fpsolve.arrays import FloatArray, real_number
-from fpsolve.errors import FpsolveError, NoSuchExponent, Remedy
+from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.bordered import Bordered
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.parameters import STRICT
 from fpsolve.model.problem import Direction, Problem, refuse_infinite
 
@@ -210,7 +211,7 @@ class Quantity:
         try:
             problem = self._problem.at(values)
         except ValueError as failure:
-            raise FpsolveError(f"no such problem: {said(failure)}") from failure
+            raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
         if self._bounce is None:
             return self._sample(at, problem)
         known = self._solved.setdefault(float(at[1 - self._bounce]), {})
@@ -253,10 +254,7 @@ class Quantity:
             return
         near = solver.near.solution(p).pair
         if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
-            raise NoSuchExponent(
-                f"Λ({p:g}) is that of rare paths, which hold the noise far out in its tails, and zero nowhere; choose "
-                f"r0 <= 1, {Remedy.REDUCTION}"
-            )
+            raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
 
     def _slopes(self, solver: ExponentSolver, along: Sequence[Direction]) -> FloatArray:
         """∂F/∂θ."""

@@ -23,7 +23,7 @@ from fpsolve.case.curves import make_curve
 from fpsolve.case.figure import FigureSection, figure_refusals
 from fpsolve.case.messages import Refusal, nearest, shown
 from fpsolve.case.output import OutputSection
-from fpsolve.case.remedies import in_words_of_a_case
+from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
     Expectation,
     MeshSection,
@@ -105,7 +105,7 @@ def _obstacle(valid: Known, varied: Varied, p: FloatArray, *, with_existence: bo
         for extreme in extremes if with_existence else ():
             curve.noise.check_existence(extreme)
     except NoSuchExponent as error:
-        return in_words_of_a_case(str(error))
+        return error.message.words(CASE_WORDS)
     return ""
 
 
@@ -115,10 +115,11 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
         with np.errstate(all="ignore"):
             made = mesh.mesh(context.get("folder", Path()))
             reason = _misfit(made, valid) if made and {"oscillator", "noise", "budget", "vary"} <= valid.keys() else ""
-    except (MeshError, OSError, ValueError) as error:
+    except MeshError as error:
+        reason = error.message.words(CASE_WORDS)
+    except (OSError, ValueError) as error:
         reason = str(error)
     if reason:
-        reason = in_words_of_a_case(reason)
         text = f"got {shown(mesh.file)}; {reason}" if mesh.file else reason
         yield ("file",) if mesh.file else (), mesh.file, text
 

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import MeshError, Remedy
+from fpsolve.errors import MeshError
 from fpsolve.fem.mesh import MAX_DEGREE, NO_ZERO, TOLERANCE, CylinderMesh, make_mesh
 from fpsolve.files import atomic
+from fpsolve.messages import Code, Message, Remedy
 
 MARKERS = {"domain": 0, "impact": 1, "seam": 2, "truncation": 3}
 """Cell data `marker` of a .vtu; the physical groups of a .msh have the same names, and numbers greater by 1."""
@@ -53,10 +54,8 @@ def read_mesh(path: str | Path) -> CylinderMesh:
     try:
         content = meshio.vtu.read(path) if path.suffix == ".vtu" else meshio.gmsh.read(path)
     except Exception as failure:  # meshio raises whatever its parsers do
-        raise MeshError(
-            f"{path} cannot be read as a {path.suffix} mesh ({str(failure) or type(failure).__name__}); "
-            f"{Remedy.MESH_FILE}"
-        ) from failure
+        why = str(failure) or type(failure).__name__
+        raise MeshError(f"{path} cannot be read as a {path.suffix} mesh ({why})", Remedy.MESH_FILE) from failure
     quads = content.cells_dict.get("quad")
     others = {block.type for block in content.cells} - {"quad", "line", "vertex"}
     if quads is None or others:
@@ -72,7 +71,7 @@ def read_mesh(path: str | Path) -> CylinderMesh:
             raise MeshError(NO_ZERO.format(z[0][0], z[0][-1]))
         return CylinderMesh(phi[0], z[0], **degrees)
     except MeshError as failure:
-        raise MeshError(f"{path}: {failure}") from failure
+        raise MeshError(Message(Code.PLACED, place=str(path), reason=failure.message)) from failure
 
 
 def _check_format(path: Path) -> None:
@@ -118,10 +117,10 @@ def _grid_lines(coordinates: FloatArray) -> tuple[FloatArray, Any]:
 def _check_numbers(points: Any, quads: Any) -> None:
     """Points must be finite pairs, and cells made of them."""
     if points.ndim != 2 or points.shape[1] < 2 or not np.all(np.isfinite(points)):
-        raise MeshError(f"the points must be finite (phi, xi) or (phi, xi, 0); {Remedy.MESH_FILE}")
+        raise MeshError("the points must be finite (phi, xi) or (phi, xi, 0)", Remedy.MESH_FILE)
     if not np.all((quads >= 0) & (quads < len(points))):
         strange = quads[(quads < 0) | (quads >= len(points))][0]
-        raise MeshError(f"a cell has the corner {strange}, but points are 0 to {len(points) - 1}; {Remedy.MESH_FILE}")
+        raise MeshError(f"a cell has the corner {strange}, but points are 0 to {len(points) - 1}", Remedy.MESH_FILE)
 
 
 def _check_tensor_grid(index: Any, quads: Any, shape: tuple[int, int]) -> None:

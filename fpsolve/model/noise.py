@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import Coefficient, FloatArray, nothing
-from fpsolve.errors import NoSuchExponent, Remedy
+from fpsolve.errors import NoSuchExponent
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.parameters import Parametrised
 
 
@@ -156,7 +157,4 @@ class Noise(Parametrised):
         """Refuse a p for which E‖x‖^p is infinite. Raises `NoSuchExponent` for a p that is not among the `moments`."""
         low, high = self.moments
         if not low <= p <= high:
-            raise NoSuchExponent(
-                f"Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
-                f"hide it; choose p in [{low:g}, {high:g}], r0 <= 1, {Remedy.REDUCTION}"
-            )
+            raise NoSuchExponent(Message(Code.INFINITE, p=p, low=low, high=high, remedy=Remedy.REDUCTION))

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_numbers
 from fpsolve.errors import NoSuchExponent
+from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import Parameter, Parametrised
 from fpsolve.model.plane import Drive, System, crosses_both_ways
@@ -184,11 +185,7 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     xi, most = noise.reached, math.e if noise.has_states else 2.0
     for kick in system.kicks:
         if p * kick.log_factor > math.log(most) and crosses_both_ways(system, kick, xi):
-            raise NoSuchExponent(
-                f"Λ({p:g}) is infinite or out of reach: the noise moves the phase to and fro over the ray at "
-                f"{kick.phase:.6g}, where ‖x‖^p grows by a factor > {most:.3g} each time; choose a p nearer to 0, or a "
-                "ray on which no noise acts"
-            )
+            raise NoSuchExponent(Message(Code.INFINITE_ON_RAY, p=p, phase=kick.phase, factor=most))
 
 
 def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = False) -> FloatArray:

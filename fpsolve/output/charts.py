@@ -23,7 +23,7 @@ from fpsolve.case.sections import Varied
 from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
 from fpsolve.files import write_csv, write_json
 from fpsolve.model.kinds import parameter_of
-from fpsolve.output.tables import head
+from fpsolve.output.tables import head, in_case_words
 from fpsolve.study.chart import Chart, charted
 
 _TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
@@ -142,7 +142,7 @@ def _summary(case: Case, chart: Chart) -> dict[str, Any]:
             | {"x": float(x.value(each.at[0])), "y": float(y.value(each.at[1]))}
             for each in regions
         ],
-        "warnings": list(chart.remarks),
+        "warnings": in_case_words(chart.remarks),
     }
 
 

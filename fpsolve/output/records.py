@@ -75,7 +75,7 @@ class Records:
         until = monotonic() + SHARED_SECONDS
         while place.file not in self._seen and not (self.folder / place.file).exists():
             if monotonic() > until:
-                raise OutputError(f"{self.folder} is not where the workers write: they must share it; {Remedy.FOLDER}")
+                raise OutputError(f"{self.folder} is not where the workers write: they must share it", Remedy.FOLDER)
             sleep(0.5)
         self._seen.setdefault(place.file, 0)
 

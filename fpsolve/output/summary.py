@@ -24,6 +24,7 @@ MOST_TABLES, MOST_ROWS = 10, 50
 MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
 """Failed curves that are named among more, p whose Λ has a column, and quantities whose extremes are shown."""
 DIGITS = 7
+BEYOND_RTOL = "beyond rtol"
 STAR = "* for the noise reduced by Eqs. (12)-(14)"
 
 
@@ -54,24 +55,29 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
     chosen = _chosen(results, quantities) if is_digest else [("", result) for result in results]
     has_status = len(results) > MOST_TABLES or any(result.status for _, result in chosen)
     columns = [*varied_columns(case), *(Column(each.heading, each.rank) for each in quantities)]
-    is_whole = all(result.status == Status.CONVERGED for _, result in chosen)
+    is_whole = all(_state(result) == "converged" for _, result in chosen)
     columns += [Column("status", 1 if is_whole else 0)] * has_status + [Column("which", is_text=True)] * is_digest
     is_starred = any("*" in each.heading for each in quantities)
     grid = Grid(case.headline, columns, remark=STAR if is_starred else "")
     for which, result in chosen:
         varied, numbers = map(written, result.curve.varied.values()), (each.text(result) for each in quantities)
-        grid.rows.append([*varied, *numbers, *[result.status.name.lower()] * has_status, *[which] * is_digest])
+        grid.rows.append([*varied, *numbers, *[_state(result)] * has_status, *[which] * is_digest])
     return grid
 
 
 def counted(results: Sequence[CurveResult]) -> str:
     """How many curves have become what, which of them have a row, and where all numbers are."""
-    counts = Counter(result.status for result in results)
-    states = ", ".join(f"{count} {status.name.lower()}" for status, count in sorted(counts.items()))
-    lacking = len(results) - counts[Status.CONVERGED]
+    counts = Counter((result.status, _state(result) == BEYOND_RTOL, _state(result)) for result in results)
+    states = ", ".join(f"{count} {state}" for (*_, state), count in sorted(counts.items()))
+    lacking = sum(bool(result.status) for result in results)
     is_short = len(results) > MOST_ROWS and lacking > MOST_FAILED
     shown = f"; of those that are not converged the first {MOST_FAILED} are shown" if is_short else ""
     return f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc"
+
+
+def _state(result: CurveResult) -> str:
+    """What became of a curve, for the eye; one that converged may be less precise than rtol asks for."""
+    return BEYOND_RTOL if result.status == Status.CONVERGED and result.misses_rtol else result.status.name.lower()
 
 
 def varied_columns(case: Case) -> list[Column]:

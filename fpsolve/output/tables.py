@@ -16,9 +16,11 @@ from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.case.output import SENSITIVITIES
+from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.exponent.quantities import INDICES, MOMENT, Index
 from fpsolve.files import draft, write_csv, write_json
+from fpsolve.messages import message_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 if TYPE_CHECKING:
@@ -82,6 +84,11 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> Non
     write_csv(folder / f"response{suffix}.csv", header, rows)
 
 
+def in_case_words(messages: Sequence[str]) -> list[str]:
+    """Messages as those read them who work with case files."""
+    return [message_of(each).words(CASE_WORDS) for each in messages]
+
+
 def head(case: Case) -> dict[str, str]:
     """What every table begins with."""
     return {"case": case.name, "title": case.title, "fpsolve_version": __version__}
@@ -103,8 +110,8 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
         "status": result.status.name.lower(),
         **found,
         "discretisation": result.discretisation,
-        "warnings": [*result.warnings, *(failure.reason for failure in result.failures)],
-        "notes": list(result.notes),
+        "warnings": in_case_words([*result.warnings, *(failure.reason for failure in result.failures)]),
+        "notes": in_case_words(result.notes),
         "seconds": round(result.seconds, 6),
     }
 
@@ -168,7 +175,7 @@ def _simulation_summary(simulated: SimulatedCurve) -> dict[str, Any]:
         "seed": result.seed,
         "impacts": result.impacts,
         "response": None if response is None else _response_summary(response),
-        "warnings": list(simulated.warnings),
+        "warnings": in_case_words(simulated.warnings),
     }
 
 

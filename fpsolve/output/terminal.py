@@ -11,7 +11,8 @@ from rich.text import Text
 from fpsolve.case.case import Case
 from fpsolve.case.vary import written
 from fpsolve.exponent.quantities import IMPACT_RATE, INDICES, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE
-from fpsolve.output.remarks import FAILURE, Remarks, print_remark
+from fpsolve.messages import Severity
+from fpsolve.output.remarks import Remarks, print_remark
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.summary import (
     MOST_ROWS,
@@ -24,7 +25,7 @@ from fpsolve.output.summary import (
     theory_heading,
     varied_columns,
 )
-from fpsolve.output.tables import asked
+from fpsolve.output.tables import asked, in_case_words
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 
@@ -54,17 +55,17 @@ def print_warnings(case: Case, results: Sequence[CurveResult], file: str = SUMMA
     Args:
         file: that holds all of it; none where nothing is written.
     """
-    remarks = Remarks(case, file)
-    for result in results:
-        remarks.add_result(result)
-    remarks.tell()
+    _tell(Remarks(case, file), results)
 
 
 def print_failures(case: Case, results: Sequence[CurveResult], file: str = SUMMARY) -> None:
     """Why some numbers are missing, and nothing else."""
-    remarks = Remarks(case, file, [FAILURE])
-    for result in results:
-        remarks.add_result(result)
+    _tell(Remarks(case, file, [Severity.FAILURE]), results)
+
+
+def _tell(remarks: Remarks, found: Sequence[CurveResult | SimulatedCurve]) -> None:
+    for each in found:
+        remarks.add(each)
     remarks.tell()
 
 
@@ -127,10 +128,7 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
             screen.say(f"{case.place(each.curve)}: stationary means")
             screen.packed([f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items()], "  ")
             screen.lines([""])
-    remarks = Remarks(case, MONTE_CARLO)
-    for each in simulated:
-        remarks.add_simulated(each)
-    remarks.tell()
+    _tell(Remarks(case, MONTE_CARLO), simulated)
 
 
 def _simulated_indices(simulated: SimulatedCurve, result: CurveResult | None) -> list[str]:
@@ -249,7 +247,7 @@ def print_chart(case: Case, chart: Chart) -> None:
     screen.show(grid)
     for region in () if chart.regions is None else chart.regions.each:
         screen.say(f"{region.share:5.1%}  {region.name}")
-    for text in chart.remarks:
+    for text in in_case_words(chart.remarks):
         print_remark(f"{case.name}: {text}")
 
 

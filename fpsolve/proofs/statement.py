@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.errors import NoSuchExponent, Remedy
+from fpsolve.errors import NoSuchExponent
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
@@ -33,10 +34,6 @@ EXACT, REDUCED = "exact", "ou-reduction"
 OSCILLATOR = ("oscillator.omega", "oscillator.restitution", "oscillator.c1", "oscillator.epsilon")
 IMPACT, TREATMENT = "oscillator.impact", "noise.treatment"
 NOISE, DIRECT = ("noise.D0", "noise.tau0", "noise.r0"), ("noise.alpha", "noise.sigma")
-ALGEBRAIC = (
-    "for r0 > 1 the noise of Eq. (7) has algebraic tails: Λ(p) is finite for -1 <= p <= 0 only, and no trial function "
-    f"is known to prove a bound there; choose r0 <= 1, {Remedy.REDUCTION}"
-)
 Parameters = Mapping[str, str]
 """Numbers as decimals, and the two words, by the keys of a case file."""
 
@@ -140,7 +137,7 @@ def _noise(stated: Parameters) -> tuple[arb, arb, arb, bool]:
     departure = Fraction(stated[NOISE[2]])
     if stated[TREATMENT] == EXACT and departure != 1:
         if departure > 1:
-            raise NoSuchExponent(f"got {NOISE[2]} = {stated[NOISE[2]]}; {ALGEBRAIC}")
+            raise NoSuchExponent(Message(Code.NO_BOUND, key=NOISE[2], value=stated[NOISE[2]], remedy=Remedy.REDUCTION))
         return (1 - r0) / tau0, 1 / (1 - r0), (2 * D0 / (tau0 * (1 - r0))).sqrt(), True
     alpha = (5 - 3 * r0) / (2 * (2 - r0) * tau0)
     return 2 * alpha, ball("0.5"), (2 * D0).sqrt() / tau0 / (2 * alpha).sqrt(), False

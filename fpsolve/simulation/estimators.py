@@ -23,6 +23,7 @@ from scipy.special import logsumexp
 
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.errors import NotConverged
+from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.simulation.kernels import TALLIES
@@ -155,14 +156,14 @@ def _result(
     exponents = np.array([batch.growth for batch in plain]) / times
     variance_rates = np.array([batch.variance for batch in plain]) / times
     if not np.all(np.isfinite(exponents)):
-        raise NotConverged("the simulation overflowed: some ξ is too large for this step; use a smaller step")
+        raise NotConverged(Message(Code.SIMULATION_OVERFLOWED))
     if plan.estimator == "direct":
         estimates, drifts = direct_estimates(plan, plain)
     else:
         estimates, drifts = population_estimates(plan, populations)
     warnings = [*_missing(plan, estimates), *drifts]
     if interrupted:
-        warnings.append(f"stopped early, after {slices.mean() / plan.wanted:.0%} of the time")
+        warnings.append(Message(Code.STOPPED, share=slices.mean() / plan.wanted))
     return MonteCarlo(
         estimates=tuple(estimates),
         lyapunov_exponent=float(exponents.mean()),
@@ -179,7 +180,7 @@ def _result(
     )
 
 
-def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[MomentEstimate], list[str]]:
+def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[MomentEstimate], list[Message]]:
     """Λ(p) by the slope of ln M between t and 2t; its error by the jackknife over batches; and warnings."""
     levels = min(plan.levels, min(batch.slices for batch in batches).bit_length())
     windows = np.array([[batch.slices >> j for j in range(levels)] for batch in batches], dtype=float)[:, :, None]
@@ -192,7 +193,7 @@ def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[Mo
     slopes = np.diff(total - np.log(windows.sum(axis=0)), axis=0) / times
     rests = np.diff(log_rest - np.log(windows.sum(axis=0) - windows), axis=1) / times
     estimates: list[MomentEstimate] = []
-    warnings: list[str] = []
+    warnings: list[Message] = []
     for k, p in enumerate(plan.p):
         usable = np.flatnonzero((share[1:, k] >= _KEPT) & (effective[1:, k] >= FEW["direct"]))
         j = int(usable[-1]) if usable.size else 0
@@ -200,11 +201,11 @@ def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[Mo
         estimates.append(_estimate(plan, p, found, float(effective[j + 1, k])))
         if j > 0:
             change, uncertainty = _jackknife(slopes[j, k] - slopes[j - 1, k], rests[:, j, k] - rests[:, j - 1, k])
-            _warn_of_drift(p, change, uncertainty, "a longer window", warnings)
+            warnings += _drift(plan, p, change, uncertainty)
     return estimates, warnings
 
 
-def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple[list[MomentEstimate], list[str]]:
+def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple[list[MomentEstimate], list[Message]]:
     """Λ(p) by the mean growth of ln Z, corrected by half its variance; its error by batches; and warnings.
 
     Every second batch has started far away, see `Population`. Where the two kinds disagree the moment has two places;
@@ -221,21 +222,18 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
     growth = (expected + mean) / plan.length
     trends = (tallies["numbered"] - (count - 1) / 2 * excess) / count
     estimates: list[MomentEstimate] = []
-    warnings: list[str] = []
+    warnings: list[Message] = []
     for k, p in enumerate(plan.p):
         used = slice(None)
         near, far = growth[::2, k], growth[1::2, k]
         gap, gap_error = float(far.mean() - near.mean()), math.hypot(standard_error(near), standard_error(far))
         if abs(gap) > DRIFT * gap_error > 0:
             used = slice(int(gap > 0), None, 2)
-            warnings.append(
-                f"Λ({p:g}): populations that start in two places differ by {abs(gap):.3g}, {abs(gap) / gap_error:.0f} "
-                "standard errors: the noise is too slow to pass between them; the larger value is given"
-            )
+            warnings.append(Message(Code.TWO_PLACES, p=p, gap=abs(gap), size=abs(gap) / gap_error))
         value = float(growth[used, k].mean() + rate[used, k].mean() / 2)
         carrying = float(np.sum(tallies["effective"][used, k] / count[used, k]))
         estimates.append(_estimate(plan, p, (value, standard_error(growth[used, k])), carrying))
-        _warn_of_drift(p, float(trends[used, k].mean()), standard_error(trends[used, k]), "more time", warnings)
+        warnings += _drift(plan, p, float(trends[used, k].mean()), standard_error(trends[used, k]))
     return estimates, warnings
 
 
@@ -255,37 +253,26 @@ def _has_variance(plan: Plan, p: float) -> bool:
     return low <= 2 * p <= high
 
 
-def _missing(plan: Plan, estimates: Sequence[MomentEstimate]) -> list[str]:
+def _missing(plan: Plan, estimates: Sequence[MomentEstimate]) -> list[Message]:
     """Why some p have no estimate, in a warning for each reason."""
-    warnings = []
+    warnings, is_direct = [], plan.estimator == "direct"
     none = [estimate for estimate in estimates if estimate.value is None]
     wild, few = ([each for each in none if _has_variance(plan, each.p) == has] for has in (False, True))
     if wild:
-        warnings.append(
-            f"no estimate of Λ(p) at {_orders(wild)}: ‖x‖^p has no variance, as for r0 > 1 the moment of order 2p is "
-            "infinite; use the finite elements"
-        )
+        warnings.append(Message(Code.NO_PATH_VARIANCE, p=[each.p for each in wild]))
     if few:
         low, high = (pick(each.effective_paths for each in few) for pick in (min, max))
-        number = f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
-        remedy = 'use estimator = "population", or more paths' if plan.estimator == "direct" else "use more paths"
-        warnings.append(
-            f"no estimate of Λ(p) at {_orders(few)}: too few effective paths carry the mean, {number} of the "
-            f"{FEW[plan.estimator]} that are needed; {remedy}"
-        )
+        found = {"p": [each.p for each in few], "low": low, "high": None if low == high else high}
+        warnings.append(Message(Code.FEW_PATHS, **found, needed=FEW[plan.estimator], is_direct=is_direct))
     return warnings
 
 
-def _orders(estimates: Sequence[MomentEstimate]) -> str:
-    return f"p = {', '.join(f'{each.p:g}' for each in estimates)}"
-
-
-def _warn_of_drift(p: float, change: float, error: float, remedy: str, warnings: list[str]) -> None:
-    if abs(change) > DRIFT * error > 0:
-        warnings.append(
-            f"Λ({p:g}) still drifts: over the simulation it changes by {abs(change) / error:.1f} standard errors, more "
-            f"than {DRIFT:g}, which its standard error does not cover; use {remedy}"
-        )
+def _drift(plan: Plan, p: float, change: float, error: float) -> list[Message]:
+    """That Λ(p) changes over the simulation, if it does."""
+    if not abs(change) > DRIFT * error > 0:
+        return []
+    is_direct = plan.estimator == "direct"
+    return [Message(Code.DRIFTING, p=p, size=abs(change) / error, most=DRIFT, is_direct=is_direct)]
 
 
 def _jackknife(value: float, rests: FloatArray) -> tuple[float, float]:

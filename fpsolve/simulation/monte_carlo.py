@@ -10,6 +10,7 @@ import numpy as np
 
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import draw_dots, finish, label_axes
+from fpsolve.messages import Message
 from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE, P
 from fpsolve.simulation.setup import Estimator
 
@@ -62,7 +63,7 @@ class MonteCarlo(Result):
     step: float
     seed: int
     impacts: int
-    warnings: tuple[str, ...]
+    warnings: tuple[Message, ...]
     interrupted: bool = False
     parameters: Mapping[str, float | str] = field(default_factory=dict, compare=False)
 

@@ -14,8 +14,8 @@ from fpsolve.analysis.zero import Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.chart import ChartSection
-from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import FpsolveError
+from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import second_order
 
@@ -41,20 +41,20 @@ class Chart:
     complete: bool = False
 
     @property
-    def failures(self) -> tuple[str, ...]:
+    def failures(self) -> tuple[Message, ...]:
         """Why lines end inside of the frame."""
         return tuple(text for line in self.lines for trace in line.traces for text in trace.obstacles)
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[Message, ...]:
         """What has no line, which lines end inside of the frame, and where no F exists, with the reasons."""
         found = [line.remark() for line in (self.lines if self.complete else self.lines[:-1])]
         for line in self.lines:
             ends = dict.fromkeys(text for trace in line.traces for text in trace.obstacles)
             holes = line.scan.reasons if line.scan is not None else ()
-            found += [f"the line {line.zero.equation} ends inside of the frame: {text}" for text in ends]
-            found += [f"{line.zero.symbol} is missing in part of the frame: {text}" for text in holes]
-        return tuple(in_words_of_a_case(text) for text in found if text)
+            found += [Message(Code.LINE_ENDS, line=line.zero.equation, reason=each) for each in ends]
+            found += [Message(Code.HOLES, symbol=line.zero.symbol, reason=each) for each in holes]
+        return tuple(message_of(each) for each in found if each)
 
 
 def charted(case: Case) -> ChartSection:

@@ -13,6 +13,7 @@ from fpsolve.case.curves import Curve
 from fpsolve.case.sections import Sweep
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
+from fpsolve.messages import Code, Message
 from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import verdicts
 from fpsolve.proofs.questions import (
@@ -151,8 +152,8 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
         try:
             refuse_unprovable(plan.stated(curve))
         except NoSuchExponent as failure:
-            place = f"with {curve.label}: " if curve.varied else ""
-            raise NoSuchExponent(f"{case.path}: {place}{failure}") from None
+            place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
+            raise NoSuchExponent(Message(Code.PLACED, place=place, reason=failure.message)) from None
 
 
 def answer(question: Question) -> Enclosure | IndexEnclosure:

@@ -15,6 +15,7 @@ from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
+from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.quantity import MOMENT, MOMENTS, P
 
 if TYPE_CHECKING:  # which take half a second to import
@@ -55,7 +56,7 @@ class Status(IntEnum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CurveResult(Result):
-    """What was computed for one parameter set: numbers and sentences, which a record can hold.
+    """What was computed for one parameter set: numbers and messages, which a record can hold.
 
     Attributes:
         curve: the parameters, the oscillator and the noise.
@@ -74,8 +75,8 @@ class CurveResult(Result):
     moments: Moments
     estimates: Mapping[str, Estimate | None]
     discretisation: dict[str, Any] | None = None
-    warnings: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    warnings: tuple[Message, ...] = ()
+    notes: tuple[Message, ...] = ()
     failures: tuple[Failure, ...] = ()
     sensitivities: Sensitivities | None = None
     seconds: float = 0.0
@@ -101,6 +102,11 @@ class CurveResult(Result):
         if not self.failures:
             return Status.CONVERGED
         return Status.PARTLY if self.moments.p.size or any(self.estimates.values()) else Status.FAILED
+
+    @property
+    def misses_rtol(self) -> bool:
+        """Whether the estimated error of some number exceeds rtol."""
+        return any(message_of(each).code in (Code.RTOL_MISSED, Code.INDEX_RTOL_MISSED) for each in self.warnings)
 
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
@@ -152,7 +158,7 @@ class SimulatedCurve:
     curve: Curve
     result: MonteCarlo
     response: Response | None
-    warnings: tuple[str, ...]
+    warnings: tuple[Message, ...]
     interrupted: bool = False
 
     @property

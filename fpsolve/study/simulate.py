@@ -10,6 +10,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.errors import FpsolveError
+from fpsolve.messages import Code, Message
 from fpsolve.pool import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles
 from fpsolve.study.results import SimulatedCurve
@@ -126,13 +127,12 @@ def simulate_curve(
     try:
         response, warnings = _respond(curve, result, progress)
     except KeyboardInterrupt:
-        warning = "no stationary response: stopped before it was reached"
-        return SimulatedCurve(curve, result, None, (*noted, warning), interrupted=True)
+        return SimulatedCurve(curve, result, None, (*noted, Message(Code.RESPONSE_NOT_REACHED)), interrupted=True)
     interrupted = response is not None and response.interrupted
     return SimulatedCurve(curve, result, response, (*noted, *warnings), interrupted)
 
 
-def _respond(curve: Curve, result: MonteCarlo, progress: Callable[[], None]) -> tuple[Response | None, list[str]]:
+def _respond(curve: Curve, result: MonteCarlo, progress: Callable[[], None]) -> tuple[Response | None, list[Message]]:
     """The stationary response, or why there is none. Raises KeyboardInterrupt before it is stationary."""
     from fpsolve.simulation.response import stationary_response
 
@@ -140,17 +140,12 @@ def _respond(curve: Curve, result: MonteCarlo, progress: Callable[[], None]) -> 
     if value <= SIGNIFICANT * error:
         for _ in range(2 * PROGRESS_STEPS):
             progress()
-        reason = "is not positive" if value <= 0 else f"is not {SIGNIFICANT:g} standard errors above 0"
-        return None, [
-            f"no stationary response: λ = {value:.3g} ± {error:.1e} {reason}, "
-            "and with λ < 0 almost every path comes to rest"
-        ]
+        return None, [Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)]
     response = stationary_response(
         curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
         time=result.time, step=result.step, seed=result.seed, progress=progress,
     )  # fmt: skip
-    warnings = [f"the response was stopped early, after {response.time:.3g}"] if response.interrupted else []
-    return response, warnings
+    return response, [Message(Code.RESPONSE_STOPPED, time=response.time)] if response.interrupted else []
 
 
 def _is_nonlinear(curve: Curve) -> bool:

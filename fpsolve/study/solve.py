@@ -15,9 +15,8 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.case.output import EIGENFUNCTIONS, SENSITIVITIES
-from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.case.sections import Expectation
-from fpsolve.errors import NoSuchExponent, NotConverged, Remedy
+from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
@@ -26,7 +25,7 @@ from fpsolve.exponent.moments import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.messages import message_of
+from fpsolve.messages import Code, Message, Remedy, Severity
 from fpsolve.study.results import Comparison, CurveResult, Moments, Solved
 from fpsolve.theory import validity
 from fpsolve.theory.perturbation import second_order
@@ -118,23 +117,31 @@ def solve_curve(
     started = thread_time()
     solver = ExponentSolver(curve.problem, numerics.mesh, rtol=numerics.rtol, budget=numerics.budget)
     found = solve_moments(solver, wanted.p, progress=progress)
-    estimates, unsolved, missing, absent = _solve_indices(solver, wanted.indices, found)
-    failures = found.failures or tuple(Failure(None, message_of(text)) for text in unsolved)
+    estimates, missing = _solve_indices(solver, wanted.indices, found)
+    of = {each: [message for message in missing if message.severity is each] for each in Severity}
     pairs, stationary = _functions(solver, without_failed(wanted, found.failures))
     lost = _lost(stationary, solver.near.refinement)
-    warnings = [*found.warnings, *missing, *(unsolved if found.failures else ()), *_imprecise(estimates, numerics)]
-    warnings += lost or _unresolved(pairs)
     slopes = _sensitivities(solver, curve, wanted, found, estimates)
-    notes = [*_notes(curve, found, estimates[LYAPUNOV_EXPONENT.name]), *absent, *(slopes.notes if slopes else ())]
+    exponent = estimates[LYAPUNOV_EXPONENT.name]
+    notes = (
+        validity.heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
+        *found.notes,
+        validity.reduction_note(curve.noise),
+        validity.impact_note(curve.oscillator),
+        validity.weak_noise_note(curve.problem, found.p, found.value),
+        *of[Severity.NOTE],
+        *(slopes.notes if slopes else ()),
+    )
+    limits = (*of[Severity.WARNING], *_imprecise(estimates, numerics), *(lost or _unresolved(pairs)))
     result = CurveResult(
         curve=curve,
         moments=_moments(found),
         estimates=estimates,
         discretisation=_discretisation(solver),
-        warnings=tuple(map(in_words_of_a_case, warnings)),
+        warnings=(*found.warnings, *limits),
         sensitivities=slopes,
-        notes=tuple(map(in_words_of_a_case, notes)),
-        failures=tuple(replace(each, reason=message_of(in_words_of_a_case(each.reason))) for each in failures),
+        notes=tuple(note for note in notes if note is not None),
+        failures=found.failures or tuple(Failure(None, message) for message in of[Severity.FAILURE]),
         seconds=thread_time() - started,
     )
     return Solved(result, pairs, None if lost else stationary)
@@ -146,7 +153,7 @@ def solve_functions(
     """The eigenpairs of a parameter set whose numbers are known: those to be drawn, and that at p = 0."""
     solver = ExponentSolver(curve.problem, numerics.mesh, rtol=numerics.rtol, budget=numerics.budget)
     pairs, stationary = _functions(solver, wanted)
-    return pairs, None if _lost(stationary, "") else stationary
+    return pairs, None if _lost(stationary, solver.near.refinement) else stationary
 
 
 def without_failed(wanted: Wanted, failures: Sequence[Failure]) -> Wanted:
@@ -170,37 +177,33 @@ def _moments(found: MomentLyapunov) -> Moments:
 
 def _solve_indices(
     solver: ExponentSolver, names: Sequence[str], moments: MomentLyapunov
-) -> tuple[dict[str, Estimate | None], list[str], list[str], list[str]]:
-    """Indices, δ_p first, None for those not asked for; why some did not converge, are infinite, or do not exist."""
+) -> tuple[dict[str, Estimate | None], list[Message]]:
+    """Indices, δ_p first, None for those not asked for; why others did not converge, are infinite, or do not exist."""
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
-    failed: dict[str, list[str]] = {}
-    infinite: dict[str, list[str]] = {}
-    absent: dict[str, list[str]] = {}
-    missing = []
+    unsolved = {each.reason: Message(Code.NO_MOMENT, p=each.p) for each in moments.failures if each.p is not None}
+    missing: dict[tuple[Code, Message], list[str]] = {}
     for index in sorted(INDICES.values(), key=lambda index: index != STABILITY_INDEX):
         if index.name not in names:
             continue
+        symbol = index.symbol
         try:
             found = index.solve(solver, moments.root)
-        except (NotConverged, NoSuchExponent) as failure:
-            reasons = failed if isinstance(failure, NotConverged) else infinite
-            reasons.setdefault(str(failure), []).append(index.symbol)
-            continue
-        if isinstance(found, Estimate):
-            estimates[index.name] = found
-        elif index != STABILITY_INDEX:
-            absent.setdefault(found.reason, []).append(index.symbol)
-        elif found.reason != validity.NO_INDEX:  # of which a note tells
-            missing.append(f"no stability index: {found.reason}")
-    told: dict[str, str] = {
-        failure.reason: f"as there is no Λ({failure.p:g})" for failure in moments.failures if failure.p is not None
-    }
-    failed = {told.get(reason, reason): symbols for reason, symbols in failed.items()}
-    unsolved, warnings, notes = (
-        [f"no {', '.join(symbols)}: {reason}" for reason, symbols in each.items()]
-        for each in (failed, infinite, absent)
-    )
-    return estimates, unsolved, missing + warnings, notes
+        except NotConverged as failure:
+            code = Code.INDEX_MISSING if moments.failures else Code.INDEX_FAILED
+            reason = unsolved.get(failure.message, failure.message)
+        except NoSuchExponent as failure:
+            code, reason = Code.INDEX_MISSING, failure.message
+        else:
+            if isinstance(found, Estimate):
+                estimates[index.name] = found
+                continue
+            code, reason = Code.INDEX_ABSENT, found.reason
+            if index == STABILITY_INDEX:
+                if reason.code is Code.NO_INDEX:  # of which a note tells
+                    continue
+                code, symbol = Code.INDEX_MISSING, "stability index"
+        missing.setdefault((code, reason), []).append(symbol)
+    return estimates, [Message(code, symbols=symbols, reason=reason) for (code, reason), symbols in missing.items()]
 
 
 def _sensitivities(
@@ -223,23 +226,10 @@ def _sensitivities(
     )
 
 
-def _notes(curve: Curve, moments: MomentLyapunov, exponent: Estimate | None) -> tuple[str, ...]:
-    """What heavy tails make of the numbers, and where the reduction of the noise, the impact law or Eq. (37) fails."""
-    notes = [
-        validity.heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
-        *moments.notes,
-        validity.reduction_note(curve.noise),
-        validity.impact_note(curve.oscillator),
-        validity.weak_noise_note(curve.problem, moments.p, moments.value),
-    ]
-    return tuple(note for note in notes if note)
-
-
-def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
+def _unresolved(pairs: Sequence[PrincipalPair]) -> list[Message]:
     """Which eigenfunctions or T T* are not positive, as layers of slow or strong noise are thinner than the cells."""
     return [
-        f"{name} at p = {pair.p:g} is not resolved, {defect:.0%} of it has the wrong sign; its errors have next to no "
-        "effect on Λ, but do not read its picture"
+        Message(Code.UNREADABLE, name=name, p=pair.p, size=defect)
         for pair in pairs
         for name, defect, most in (
             ("T", pair.sign_defects[0], UNRESOLVED),
@@ -250,21 +240,28 @@ def _unresolved(pairs: Sequence[PrincipalPair]) -> list[str]:
     ]
 
 
-def _lost(stationary: PrincipalPair | None, remedy: str) -> list[str]:
+def _lost(stationary: PrincipalPair | None, remedy: Remedy) -> list[Message]:
     """Why the stationary density of a pair at p = 0 is not written, and what to do, or nothing."""
     try:
         if stationary is not None:
             stationary_density(stationary)
     except NotConverged as failure:
-        return [f"neither the stationary density nor eigenfunctions are written: {failure.reason}; {remedy}"]
+        return [Message(Code.NOTHING_DRAWN, reason=failure.reason, remedy=remedy)]
     return []
 
 
-def _imprecise(estimates: Mapping[str, Estimate | None], numerics: Numerics) -> list[str]:
+def _imprecise(estimates: Mapping[str, Estimate | None], numerics: Numerics) -> list[Message]:
     """Which indices miss rtol."""
+    of_all = {"rtol": numerics.rtol, "remedy": None if numerics.mesh is None else Remedy.MESH}
     return [
-        f"rtol = {numerics.rtol:g} is not met by {INDICES[name].symbol}: {estimate.value:.6g} has an estimated error "
-        f"of {estimate.error_estimate:.1e}; {'' if numerics.mesh is None else Remedy.MESH + ', or '}use a larger rtol"
+        Message(
+            Code.INDEX_RTOL_MISSED,
+            symbol=INDICES[name].symbol,
+            value=estimate.value,
+            error=estimate.error_estimate,
+            size=estimate.relative_error,
+            **of_all,
+        )
         for name, estimate in estimates.items()
         if estimate and estimate.relative_error > numerics.rtol
     ]

@@ -17,11 +17,10 @@ import numpy as np
 
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.case.remedies import in_words_of_a_case
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Failure
 from fpsolve.exponent.quantities import INDICES
-from fpsolve.messages import message_of
+from fpsolve.messages import Code, Message, Remedy, message_of
 from fpsolve.study.results import CurveResult, Moments, Solved
 from fpsolve.study.solve import Numerics, Wanted, solve_curve, solve_functions
 
@@ -106,32 +105,28 @@ def _anew(curve: Curve, wanted: Wanted, numerics: Numerics, progress: Callable[[
     try:
         return solve_curve(curve, wanted, numerics, progress)
     except FpsolveError as failure:
-        return Solved(failed(curve, str(failure)), (), None)
+        return Solved(failed(curve, failure.message), (), None)
     except MemoryError:
-        return Solved(failed(curve, "not enough memory; use a smaller [budget], or fewer --jobs"), (), None, True)
+        return Solved(failed(curve, Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)), (), None, True)
     except OSError:
         raise
     except Exception as failure:
         last = traceback.extract_tb(failure.__traceback__)[-1]
-        text = f"{type(failure).__name__}: {failure} (a fault of fpsolve, in {Path(last.filename).name}:{last.lineno})"
-        return Solved(failed(curve, text), (), None, True)
+        said = {"kind": type(failure).__name__, "text": str(failure)}
+        told = Message(Code.FAULT, **said, file=Path(last.filename).name, line=last.lineno)
+        return Solved(failed(curve, told), (), None, True)
 
 
 def failed(curve: Curve, reason: str) -> CurveResult:
     """A result without numbers."""
     nothing = np.zeros(0)
-    return CurveResult(
-        curve,
-        Moments(*[nothing] * 7),
-        dict.fromkeys(INDICES),
-        failures=(Failure(None, message_of(in_words_of_a_case(reason))),),
-    )
+    failures = (Failure(None, message_of(reason)),)
+    return CurveResult(curve, Moments(*[nothing] * 7), dict.fromkeys(INDICES), failures=failures)
 
 
 def lost(curve: Curve) -> CurveResult:
     """The result of a set on which its worker died."""
-    reason = "its worker died, perhaps for lack of memory; use a smaller [budget], or fewer --jobs, and run it again"
-    return failed(curve, reason)
+    return failed(curve, Message(Code.WORKER_DIED, remedy=Remedy.MEMORY))
 
 
 def result_alone(order: Order, solved: Solved) -> CurveResult | None:

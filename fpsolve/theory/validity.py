@@ -1,4 +1,4 @@
-"""Where the theories that fpsolve compares stop being valid: sentences, each with its criterion and the numbers."""
+"""Where the theories that fpsolve compares stop being valid, each with its criterion and the numbers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.messages import ALMOST_EVERY, Remedy
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -18,50 +18,35 @@ NEAR_GAUSSIAN = 0.1
 WEAK = 0.05
 
 
-def reduction_note(noise: Noise) -> str | None:
+def reduction_note(noise: Noise) -> Message | None:
     """On the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
     replaced: Any = noise.replaces
-    if replaced is None or abs(replaced.r0 - 1) <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
+    departure = 0.0 if replaced is None else abs(replaced.r0 - 1)
+    if departure <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
         return None
-    reduced = noise.standard_deviation**2
-    return (
-        f"the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = {abs(replaced.r0 - 1):.3g} > "
-        f"{NEAR_GAUSSIAN:g}: it gives the noise the variance {reduced:.4g} instead of {replaced.variance:.4g}, "
-        f"Eq. (10); {Remedy.NO_REDUCTION}"
-    )
+    variances = {"reduced": noise.standard_deviation**2, "variance": replaced.variance}
+    criterion = {"departure": departure, "most": NEAR_GAUSSIAN}
+    return Message(Code.FAR_FROM_GAUSSIAN, **criterion, **variances, remedy=Remedy.NO_REDUCTION)
 
 
-def impact_note(oscillator: VibroImpactOscillator) -> str | None:
+def impact_note(oscillator: VibroImpactOscillator) -> Message | None:
     """On the delta law where the bounce of Eq. (3) cannot be: 1 − ε²(1 − r) ≤ 0."""
     left = 1 - oscillator.epsilon**2 * (1 - oscillator.restitution)
-    if left > 0:
-        return None
-    return (
-        f"1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much; R = "
-        f"{oscillator.impact_factor():.3g} belongs to the delta law alone"
-    )
+    return None if left > 0 else Message(Code.IMPOSSIBLE_BOUNCE, left=left, factor=oscillator.impact_factor())
 
 
-NO_INDEX = "Λ(p) > 0 for every p ≠ 0, as rare paths that hold the noise far out carry the moments in the end"
-"""Why noise with algebraic tails leaves no stability index, see `far_places`."""
-
-
-def heavy_tail_note(problem: Problem, exponent: float | None) -> str | None:
+def heavy_tail_note(problem: Problem, exponent: float | None) -> Message | None:
     """What λ, Λ(p) and δ_p mean for noise with algebraic tails, see `far_places`."""
-    if not grows_far_out(problem):
-        return None
-    slope = "" if exponent is None or exponent <= 0 else ", not Λ′(0)"
-    return f"algebraic tails: {NO_INDEX}; there is no stability index, and λ is the {ALMOST_EVERY}{slope}"
+    is_no_slope = exponent is not None and exponent > 0
+    return Message(Code.HEAVY_TAILS, is_no_slope=is_no_slope) if grows_far_out(problem) else None
 
 
-def simulated_tail_note(problem: Problem) -> str | None:
+def simulated_tail_note(problem: Problem) -> Message | None:
     """What a simulation cannot see."""
-    if not grows_far_out(problem):
-        return None
-    return f"algebraic tails: {NO_INDEX}; a simulation shows Λ(p) without these paths, and λ is the {ALMOST_EVERY}"
+    return Message(Code.UNSEEN_TAILS) if grows_far_out(problem) else None
 
 
-def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> str | None:
+def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> Message | None:
     """On Eq. (37) where the orders ε⁴ and above, Λ − ε²Λ₂, are not small against its terms before they cancel.
 
     Eq. (37) is a parabola, convex for every p; what limits it is the p from which on this criterion is broken.
@@ -73,10 +58,6 @@ def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> str |
     beyond = shares > WEAK
     if not np.any(beyond):
         return None
-    reduced = ", and here for the reduced one" if problem.noise.approximates_spectrum else ""
-    worst, first = int(np.argmax(shares)), float(p[beyond][np.argmin(np.abs(p[beyond]))])
-    most = f"at p = {p[worst]:.3g}, where it is {rest[worst]:.3g}, {shares[worst]:.0%}"
-    return (
-        f"Eq. (37) is for weak noise{reduced}: from |p| = {abs(first):.3g} on, what it leaves out, epsilon^4 and "
-        f"higher, exceeds {WEAK:.0%} of its terms, most {most}"
-    )
+    worst, first = int(np.argmax(shares)), np.min(np.abs(p[beyond]))
+    found = {"first": first, "p": p[worst], "rest": rest[worst], "size": shares[worst]}
+    return Message(Code.STRONG_NOISE, is_reduced=problem.noise.approximates_spectrum, most=WEAK, **found)

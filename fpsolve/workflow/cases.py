@@ -10,6 +10,7 @@ from pathlib import Path
 from fpsolve.case.case import Case, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.files import writable
+from fpsolve.messages import Code, Message
 from fpsolve.output.charts import draw_chart, write_chart
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_simulation
@@ -57,7 +58,7 @@ class Outcome:
     outdated: int = 0
 
     @property
-    def failures(self) -> tuple[str, ...]:
+    def failures(self) -> tuple[Message, ...]:
         """Why some p or indices of some curves are missing."""
         return tuple(failure.reason for result in self.results for failure in result.failures)
 
@@ -95,7 +96,7 @@ def run(
     outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=watch)
     results = tuple(outcome.results)
     if outcome.failures:
-        raise NotConverged("\n".join(outcome.failures), results)
+        raise NotConverged(Message(Code.SEVERAL, reasons=outcome.failures), results)
     return results
 
 

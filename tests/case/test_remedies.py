@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import ast
 import re
-from itertools import permutations
 from pathlib import Path
 
 import pytest
 
 import fpsolve
-from fpsolve.case.remedies import CASE_WORDS, in_words_of_a_case
-from fpsolve.errors import NoSuchExponent, Remedy
+from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.errors import NoSuchExponent, NotConverged
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.theory.validity import reduction_note
 
@@ -24,6 +24,7 @@ WORDS = {
     "REDUCTION": 'or treatment = "ou-reduction"',
     "NO_REDUCTION": 'treatment = "exact" keeps Eq. (7)',
     "FOLDER": "choose another --out",
+    "MEMORY": "use a smaller [budget], or fewer --jobs",
 }
 LOWER_ROOMS = ["", "model", "theory", "fem", "simulation", "exponent", "analysis"]
 OF_A_CASE = re.compile(
@@ -37,31 +38,22 @@ COMMANDS = {"cli.py", "commands.py", "arguments.py"}
 
 @pytest.mark.parametrize("remedy", Remedy)
 def test_every_remedy_has_words_for_a_case(remedy: Remedy) -> None:
-    text = f"Λ(2) did not converge; {remedy}, or use a larger rtol"
-    told = f"Λ(2) did not converge; {WORDS.get(remedy.name, remedy)}, or use a larger rtol"
-    assert in_words_of_a_case(text) == told
-    assert in_words_of_a_case(told) == told
-    assert in_words_of_a_case(f"{text}\n{text}") == f"{told}\n{told}"
-
-
-@pytest.mark.parametrize("text", ["", "use a larger rtol", "Λ(2) is infinite; use more cells", "choose another place"])
-def test_a_text_without_a_remedy_is_left_alone(text: str) -> None:
-    assert in_words_of_a_case(text) == text
-
-
-def test_no_remedy_is_part_of_another() -> None:
-    assert not any(one in other for one, other in permutations(Remedy, 2))
-    assert not any(remedy in words for remedy in Remedy for words in CASE_WORDS.values())
+    """Those without words of their own speak of nothing that a case calls otherwise."""
+    message = Message(Code.RTOL_MISSED, rtol=1e-8, count=1, of=2, p=2.0, size=1e-3, remedy=remedy)
+    assert message.endswith(f"1.0e-03; {remedy.value}, or use a larger rtol")
+    words = WORDS.get(remedy.name, remedy.value)
+    assert message.words(CASE_WORDS).endswith(f"1.0e-03; {words}, or use a larger rtol")
+    assert NotConverged("no", remedy=remedy).message.words(CASE_WORDS) == f"no; {words}"
 
 
 def test_the_solver_speaks_of_the_noise_and_a_case_of_its_treatment() -> None:
     with pytest.raises(NoSuchExponent, match=r"r0 <= 1, or the Ornstein-Uhlenbeck reduction of the noise$") as raised:
         NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.2).check_existence(2.0)
-    assert in_words_of_a_case(str(raised.value)).endswith('r0 <= 1, or treatment = "ou-reduction"')
+    assert raised.value.message.words(CASE_WORDS).endswith('r0 <= 1, or treatment = "ou-reduction"')
     note = reduction_note(NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.5).ou_reduction())
     assert note is not None
     assert note.endswith("; the unreduced noise keeps Eq. (7)")
-    assert in_words_of_a_case(note).endswith('; treatment = "exact" keeps Eq. (7)')
+    assert note.words(CASE_WORDS).endswith('; treatment = "exact" keeps Eq. (7)')
 
 
 @pytest.mark.parametrize("room", LOWER_ROOMS)

@@ -11,6 +11,7 @@ from fpsolve.case.case import load_case
 from fpsolve.case.sections import Expectation
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
+from fpsolve.messages import Code, Message
 from fpsolve.output.remarks import print_remark
 from fpsolve.output.screen import Column, Grid, Screen, spelt
 from fpsolve.output.terminal import duration, print_comparisons, print_results, print_simulation, print_warnings
@@ -108,14 +109,16 @@ def test_tables_without_indices_stand_apart(tmp_path, capsys):
 def test_what_is_missing_is_told_before_what_is_only_remarkable(case, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     (result,) = solve_case(case)
-    noted = replace(result, notes=tuple(f"note {i}" for i in range(25)), warnings=())
-    failed = replace(noted, notes=("note 7",), warnings=("a warning",), failures=(Failure(2.0, "a reason"),))
+    noted = replace(result, notes=tuple(Message(Code.NO_MOMENT, p=i) for i in range(25)), warnings=())
+    failed = replace(
+        noted, notes=(Message(Code.NO_MOMENT, p=7),), warnings=("a warning",), failures=(Failure(2.0, "a reason"),)
+    )
     capsys.readouterr()
     print_warnings(case, [noted, failed])
     first, second, third = capsys.readouterr().err.splitlines()
     assert re.fullmatch("not converged: .*: a reason", first)
     assert re.fullmatch("warning: .*: a warning", second)
-    assert re.fullmatch(r"note: .*: note 0; .*", third)
+    assert re.fullmatch(r"note: .*: as there is no Λ\(0\); .*", third)
 
 
 def result(curve, D0, **more):
@@ -145,8 +148,10 @@ def tokens(text):
 
 
 KINDS = {
-    "warnings": lambda i: (f"rtol = 1e-08 is not met by λ: {i} has an estimated error of {(i * 7) % 11}e-6; use more",),
-    "notes": lambda i: (f"Eq. (37) is for weak noise: from |p| = {i} on, most at p = 6, where it is 0.{i}, {i % 90}%",),
+    "warnings": lambda i: (
+        Message(Code.INDEX_RTOL_MISSED, rtol=1e-8, symbol="λ", value=i, error=1e-5, size=(i * 7) % 11 * 1e-6),
+    ),
+    "notes": lambda i: (Message(Code.STRONG_NOISE, first=i, most=0.05, p=6, rest=i / 100, size=i % 90 / 100),),
 }
 SECTIONS = [
     [],
@@ -186,7 +191,7 @@ def test_many_curves_have_a_row_each(tmp_path, capsys, count, rows):
 
 def test_of_more_curves_the_extreme_and_the_failed_ones_have_a_row(tmp_path, capsys):
     def failures(i):
-        return (Failure(2.0, f"Λ(2) did not converge at {i}"),) if i in (7, 40) else ()
+        return (Failure(2.0, Message(Code.NOT_CONVERGED, p=2.0, reason=f"at {i % 2}")),) if i in (7, 40) else ()
 
     case, results = many(tmp_path, 60, failures=failures)
     print_results(case, results)
@@ -197,7 +202,8 @@ def test_of_more_curves_the_extreme_and_the_failed_ones_have_a_row(tmp_path, cap
     assert [row[-1].strip() for row in rows] == ["least λ, largest δ_p", "", "", "largest λ, least δ_p"]
     assert [row[-2].strip() for row in rows] == ["converged", "partly", "partly", "converged"]
     assert "60 curves: 58 converged, 2 partly; all numbers are in curves.csv and results.nc" in out
-    assert f"not converged: many, noise.D0 = {D0[7]} and noise.D0 = {D0[40]}: Λ(2) did not converge at 7" in err
+    assert f"not converged: many, noise.D0 = {D0[7]}: Λ(2) did not converge: at 1" in err  # another reason
+    assert f"not converged: many, noise.D0 = {D0[40]}: Λ(2) did not converge: at 0" in err
 
 
 def test_of_many_failed_curves_the_first_are_shown(tmp_path, capsys):
@@ -255,9 +261,9 @@ def test_sentences_that_differ_in_numbers_are_one(tmp_path, capsys):
     warning, note = capsys.readouterr().err.splitlines()
     worst = results[89].curve.label
     assert note.startswith("note: many: 200 of 200 curves: Eq. (37) is for weak noise: from |p| = 89 on")
-    assert note.endswith(f"0.89, 89%; most for {worst} (all in summary.json)")
+    assert note.endswith(f"where it is 0.89, 89%; most for {worst} (all in summary.json)")
     largest = results[3].curve.label  # 3 * 7 % 11 = 10
-    assert "λ: 3 has an estimated error of 10e-6" in warning
+    assert "rtol = 1e-08 is not met by λ: 3 has an estimated error of 1.0e-05; use a larger rtol" in warning
     assert warning.endswith(f"most for {largest} (all in summary.json)")
 
 
@@ -274,10 +280,23 @@ def test_curves_that_share_a_sentence_are_named_if_they_are_few(tmp_path, capsys
 
 def test_several_sentences_of_one_curve_are_counted(tmp_path, capsys):
     case, results = many(
-        tmp_path, 1, ["vary={}"], failures=lambda _: tuple(Failure(p, f"no Λ({p})") for p in (2, 3, 4))
+        tmp_path, 1, ["vary={}"], failures=lambda _: tuple(Failure(p, Message(Code.NO_MOMENT, p=p)) for p in (2, 3, 4))
     )
     print_warnings(case, results, file="")
-    assert capsys.readouterr().err == "not converged: many: no Λ(2); and 2 more like this one\n"
+    assert capsys.readouterr().err == "not converged: many: as there is no Λ(2); and 2 more like this one\n"
+
+
+@pytest.mark.parametrize("count", [12, 60])
+@pytest.mark.parametrize("code", [Code.RTOL_MISSED, Code.INDEX_RTOL_MISSED])
+def test_the_line_of_states_agrees_with_the_warnings(tmp_path, capsys, count, code):
+    """A curve of which it is said that rtol is not met does not count among those that converged."""
+    told = Message(code, rtol=1e-8, count=1, of=2, p=2.0, symbol="λ", value=1.0, error=1e-3, size=1e-3)
+    case, results = many(tmp_path, count, warnings=lambda i: (told,) if i < 5 else ())
+    print_results(case, results)
+    out, err = capsys.readouterr()
+    assert f"{count} curves: {count - 5} converged, 5 beyond rtol; " in out
+    assert f"warning: many: 5 of {count} curves: rtol = 1e-08 is not met" in err
+    assert out.count("│ beyond rtol │") == (5 if count == 12 else 1)  # of many the extreme ones are shown
 
 
 def test_equations_and_names_with_numbers_keep_sentences_apart(tmp_path, capsys):
