@@ -183,7 +183,7 @@ def label_of(attributes: Mapping[str, Any], letters: int = 40) -> str:
     """The same in several lines, of at most so many letters, where it is long."""
     words, rest = str(attributes["long_name"]), title_of({**attributes, "long_name": ""})
     drawn = re.sub(r"\\[A-Za-z]+ ?", "x", rest).translate(dict.fromkeys(map(ord, "${}^_")))
-    return f"{fill(words, letters)}{' ' if len(words) + len(drawn) < letters else chr(10)}{rest}".strip()
+    return f"{fill(words, letters)}{' ' if len(words) + 1 + len(drawn) <= letters else chr(10)}{rest}".strip()
 
 
 def label_axes(axes: Axes, x: Mapping[str, Any], y: Mapping[str, Any]) -> None:
@@ -285,7 +285,7 @@ def draw_plane(axes: Axes, main: xarray.DataArray, **kwargs: Any) -> None:
 def draw_colours(axes: Axes, x: FloatArray, y: FloatArray, values: Any, about: Mapping[str, Any], **kwargs: Any) -> Any:
     """Values over a plane, shape (y, x), in colours, with a colour bar that their attributes name; the bar."""
     style = {"cmap": "viridis", "rasterized": True, "shading": "nearest", **kwargs}
-    return axes.figure.colorbar(axes.pcolormesh(x, y, values, **style), ax=axes, pad=0.02, label=label_of(about, 34))
+    return axes.figure.colorbar(axes.pcolormesh(x, y, values, **style), ax=axes, pad=0.02, label=label_of(about, 36))
 
 
 def draw_bars(

@@ -1,12 +1,11 @@
-"""Pictures of a function of (φ, ξ): in space by pyvista where this machine can render, in the plane by matplotlib."""
+"""A function of φ and ξ as a surface: in space by pyvista where this machine can render, in the plane by matplotlib."""
 
 from __future__ import annotations
 
 import math
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from io import BytesIO
@@ -30,19 +29,16 @@ raise SystemExit(not plotter.screenshot(return_img=True).std())
 """
 PATIENCE = 60.0
 """Seconds that a first picture may take."""
-WINDOW = [1200, 800]
 BOX = (1.0, 0.75, 0.4)
 """Edges of the surface's box along φ, ξ and the values."""
 LENGTH, SWELL = 2.0, 0.5
 """Length of the cylinder, whose radius is 1, and by how much the largest value adds to that."""
-CAMERA = {False: (-1.2, -2.0, 1.6), True: (-1.5, -1.5, 1.3)}
-ZOOM = {False: 0.85, True: 0.95}
-"""From where the plane (False) and the cylinder (True) are seen, and how large, so that words fit around them."""
-FLOOR = (0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)
-WALLS = ((0, 1, 0), (0, 1, 1), (1, 1, 1), (1, 0, 1), (1, 0, 0)), ((1, 1, 0), (1, 1, 1))
-"""Lines of the box that stand behind the surface, in its edges."""
-SIDES = ("left", "right", "right", "left")
-"""How the words at the quarters of the rim are justified."""
+LINES = (
+    ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)),
+    ((0, 1, 0), (0, 1, 1), (1, 1, 1), (1, 0, 1), (1, 0, 0)),
+    ((1, 1, 0), (1, 1, 1)),
+)
+"""Of the floor of the box, and of its edges behind the surface, in its edges."""
 RIM = ("0", "pi/2", "pi", "3 pi/2", "2 pi")
 """Words at the quarters of the rim, in ASCII."""
 RED = "#C8102E"
@@ -140,16 +136,16 @@ def flat_figure(surface: Surface, cmap: str) -> Figure:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    low, high = surface.limits
+    about, (low, high) = surface.about, surface.limits
     style: dict[str, Any] = {"shading": "gouraud", "cmap": cmap, "vmin": low, "vmax": high}
     with rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.add_subplot()
-        draw_colours(axes, surface.phi.ravel(), surface.xi, surface.values.T, surface.about["values"], **style)
+        draw_colours(axes, surface.phi.ravel(), surface.xi, surface.values.T, about["values"], **style)
         for impact in surface.impacts:
             axes.axvline(impact, color=RED, linewidth=1.2)
         axes.set_xticks(*QUARTERS)
-        label_axes(axes, surface.about["phi"], surface.about["xi"])
+        label_axes(axes, about["phi"], about["xi"])
         figure.suptitle(surface.title, parse_math=False)
         axes.set_title("\n".join(surface.lines), fontsize=9, parse_math=False)
     return figure
@@ -159,36 +155,32 @@ def picture_in_space(surface: Surface, cmap: str, *, cylinder: bool) -> Picture:
     """The function as a surface over the plane or around a cylinder, by pyvista; only where `can_render` says so."""
     from matplotlib.image import imsave
 
-    content = BytesIO()
-    with _plotter() as plotter:
-        _add_surface(plotter, surface, cmap, cylinder=cylinder)
-        _add_labels(plotter, _labels_of_cylinder(surface) if cylinder else _labels_of_box(surface))
-        title = surface.title.replace("Λ", "Lambda")  # VTK's letters are Latin
-        plotter.add_text(title, position="upper_edge", font_size=12, color="black")
-        plotter.add_text("\n".join(surface.lines), position="lower_edge", font_size=8, color="black")
-        plotter.camera_position = [CAMERA[cylinder], (0, 0, 0), (0, 0, 1)]
-        plotter.reset_camera()
-        plotter.camera.zoom(ZOOM[cylinder])
-        imsave(content, plotter.screenshot(return_img=True), format="png")
-    return Picture(content.getvalue())
-
-
-@contextmanager
-def _plotter() -> Iterator[Any]:
-    """A canvas of pyvista that nobody sees; of a display that is not there VTK says nothing."""
     with signals_held():
         import pyvista
         from vtkmodules.vtkCommonCore import vtkLogger
-    before = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    plotter: Any = pyvista.Plotter(off_screen=True, notebook=False, window_size=WINDOW)
+    before, content = vtkLogger.GetCurrentVerbosityCutoff(), BytesIO()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # it complains of a display that is not there
+    plotter: Any = pyvista.Plotter(off_screen=True, notebook=False, window_size=[1200, 800])
     try:
         plotter.set_background("white")
         plotter.enable_anti_aliasing("ssaa")
-        yield plotter
+        _add_surface(plotter, surface, cmap, cylinder=cylinder)
+        plain: dict[str, Any] = {"shape": None, "show_points": False, "always_visible": True, "bold": False}
+        for words, place, side in (_labels_of_cylinder if cylinder else _labels_of_box)(surface):
+            style = {"text_color": RED if "impact" in words else "black", "justification_horizontal": side}
+            plotter.add_point_labels([place], [words], font_size=22, **plain, **style)
+        title = surface.title.replace("Λ", "Lambda")  # VTK's letters are Latin
+        plotter.add_text(title, position="upper_edge", font_size=12, color="black")
+        plotter.add_text("\n".join(surface.lines), position="lower_edge", font_size=8, color="black")
+        seen_from = (-1.5, -1.5, 1.3) if cylinder else (-1.2, -2.0, 1.6)
+        plotter.camera_position = [seen_from, (0, 0, 0), (0, 0, 1)]
+        plotter.reset_camera()
+        plotter.camera.zoom(0.95 if cylinder else 0.85)  # so that words fit around it
+        imsave(content, plotter.screenshot(return_img=True), format="png")
     finally:
         plotter.close()
         vtkLogger.SetStderrVerbosity(before)
+    return Picture(content.getvalue())
 
 
 def _add_surface(plotter: Any, surface: Surface, cmap: str, *, cylinder: bool) -> None:
@@ -199,38 +191,23 @@ def _add_surface(plotter: Any, surface: Surface, cmap: str, *, cylinder: bool) -
     points = surface.placed(phi[:, None], surface.xi, surface.values, cylinder=cylinder)
     corners = rows[:, :-1].reshape(-1, 1) * surface.xi.size + np.arange(surface.xi.size - 1)
     sides = [corners, corners + surface.xi.size, corners + surface.xi.size + 1, corners + 1]
-    faces = np.stack([np.full_like(corners, 4), *sides], axis=-1)
-    mesh = pyvista.PolyData(points.reshape(-1, 3), faces.ravel())
+    mesh = pyvista.PolyData(points.reshape(-1, 3), np.stack([np.full_like(corners, 4), *sides], axis=-1).ravel())
     mesh.point_data["values"] = surface.values.ravel()
     bar: dict[str, Any] = {"title": f"{surface.label('values')}\n", "vertical": True, "color": "black", "fmt": "%.3g"}
     bar |= {"position_x": 0.88, "position_y": 0.25, "height": 0.5, "width": 0.06, "n_labels": 5}
     bar |= {"title_font_size": 20, "label_font_size": 20}
     plotter.add_mesh(mesh, cmap=cmap, clim=surface.limits, smooth_shading=True, ambient=0.45, scalar_bar_args=bar)
-    for impact in surface.impacts:
-        for row in np.flatnonzero(np.abs(phi - impact) < 1e-9):
-            edge = pyvista.lines_from_points(points[row])
-            plotter.add_mesh(edge, color=RED, line_width=4, render_lines_as_tubes=True, lighting=False)
-    if not cylinder:
-        for edges in (FLOOR, *WALLS):
-            plotter.add_lines(np.multiply(edges, BOX), color="black", width=1, connected=True)
-
-
-def _add_labels(plotter: Any, labels: Iterable[Label]) -> None:
-    """Words at points of space, those about impacts in red."""
-    for words, place, side in labels:
-        style: dict[str, Any] = {
-            "shape": None,
-            "show_points": False,
-            "always_visible": True,
-            "bold": False,
-            "font_size": 22,
-        }
-        style |= {"text_color": RED if "impact" in words else "black", "justification_horizontal": side}
-        plotter.add_point_labels([place], [words], **style)
+    for row in (row for impact in surface.impacts for row in np.flatnonzero(np.abs(phi - impact) < 1e-9)):
+        edge = pyvista.lines_from_points(points[row])
+        plotter.add_mesh(edge, color=RED, line_width=4, render_lines_as_tubes=True, lighting=False)
+    for edges in () if cylinder else LINES:
+        plotter.add_lines(np.multiply(edges, BOX), color="black", width=1, connected=True)
 
 
 def _labels_of_box(surface: Surface) -> Iterator[Label]:
     """Ticks and names of φ along the front and of ξ along the left side, and the impacts at the back."""
+    from matplotlib.ticker import MaxNLocator
+
     (low, high), start, end = surface.limits, float(surface.xi[0]), float(surface.xi[-1])
 
     def at(phi: float, xi: float, value: float, *shift: float) -> FloatArray:
@@ -239,8 +216,9 @@ def _labels_of_box(surface: Surface) -> Iterator[Label]:
     for k, words in enumerate(RIM):
         yield words, at(k * math.pi / 2, start, low, 0, -0.05, 0), "left"
     yield surface.label("phi"), at(1.1 * math.pi, start, low, 0, -0.17, 0), "left"
-    for xi in _ticks(start, end):
-        yield f"{xi:g}", at(0, xi, low, -0.03, 0, 0), "right"
+    for xi in MaxNLocator(4).tick_values(start, end):
+        if start < xi < end:
+            yield f"{xi:g}", at(0, xi, low, -0.03, 0, 0), "right"
     yield surface.label("xi"), at(0, (start + end) / 2, low, -0.12, 0, 0), "right"
     for impact in surface.impacts:
         yield "impact", at(impact, end, high, 0, 0, 0.03), "center"
@@ -250,18 +228,11 @@ def _labels_of_cylinder(surface: Surface) -> Iterator[Label]:
     """φ around the upper rim, and ξ at both ends, on the side that has no colour bar."""
     high, phi, start, end = surface.limits[1], surface.phi.ravel(), float(surface.xi[0]), float(surface.xi[-1])
     impacts = {round(impact / (math.pi / 2), 9) for impact in surface.impacts}
-    for k, words in enumerate(RIM[:4]):
+    for k, (words, side) in enumerate(zip(RIM[:4], ("left", "right", "right", "left"), strict=True)):
         rim = surface.values[np.argmin(np.abs(phi - k * math.pi / 2)), -1] if k < 2 else high
         place = surface.placed(k * math.pi / 2, end, rim, cylinder=True) * (1.1, 1.1, 1)
         text = f"{words}: impact" if k in impacts else words
-        yield surface.label("phi").replace("phi", f"phi = {text}") if k == 0 else text, place, SIDES[k]
+        yield surface.label("phi").replace("phi", f"phi = {text}") if k == 0 else text, place, side
     for xi in (start, end):
         words = surface.label("xi").replace("xi", f"xi = {xi:.3g}")
         yield words, surface.placed(0.75 * math.pi, xi, high, cylinder=True) * (1.1, 1.1, 1), "right"
-
-
-def _ticks(start: float, end: float) -> list[float]:
-    """Some round numbers between two."""
-    from matplotlib.ticker import MaxNLocator
-
-    return [float(tick) for tick in np.asarray(MaxNLocator(4).tick_values(start, end)) if start < tick < end]

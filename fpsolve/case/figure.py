@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, model_validator
 
 from fpsolve.arrays import is_log_spaced
 from fpsolve.case.messages import Refusal, nearest, refuse, repeated_or_unknown, shown, shown_with_kind
-from fpsolve.case.sections import Section, Text, Value, Varied, is_number
+from fpsolve.case.sections import Section, Text, is_number
 from fpsolve.case.vary import ABSCISSAE, WORDS, Vary
 from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName
 from fpsolve.model.parameters import parameter
@@ -23,7 +23,6 @@ Width = Literal["single column", "double column"]
 _LARGEST = 1e30
 _APART = 1e-9
 """How far the ends of an axis are from each other at least, relative to their size."""
-_EXAMPLE = "y = { moment = 2.0 }"
 
 
 class MomentAt(Section):
@@ -40,12 +39,9 @@ def _ordinate(value: Any) -> Any:
     if isinstance(value, dict) and value.keys() == {"moment"} and is_number(value["moment"]):
         return MomentAt(moment=float(value["moment"]))
     known = ", ".join(f'"{name}"' for name in names)
-    guess = nearest(value, names) if isinstance(value, str) else ""
-    got = shown(value) if isinstance(value, str) else shown_with_kind(value)
-    text = (
-        f"got {got}; must be one of {known}, or {{ moment = p }} with a finite p;{guess} write, for example, {_EXAMPLE}"
-    )
-    refuse([((), value, text)])
+    got, guess = (shown(value), nearest(value, names)) if isinstance(value, str) else (shown_with_kind(value), "")
+    text = f"got {got}; must be one of {known}, or {{ moment = p }} with a finite p;{guess} write, for example, "
+    refuse([((), value, text + "y = { moment = 2.0 }")])
     return value
 
 
@@ -110,24 +106,30 @@ class FigureSection(Section):
     ] = "time"
 
     @property
-    def quantity(self) -> Quantity:
-        """What is drawn."""
-        return moment_at(self.y.moment) if isinstance(self.y, MomentAt) else QUANTITIES[self.y]
+    def moment(self) -> float | None:
+        """The p whose Λ(p) is drawn over a parameter; None where another quantity is drawn."""
+        return self.y.moment if isinstance(self.y, MomentAt) else None
 
     @property
     def needed(self) -> str:
-        """What must be computed for it."""
+        """The name of the quantity that must be computed for it."""
         return MOMENT.name if isinstance(self.y, MomentAt) else self.y
+
+    @property
+    def quantity(self) -> Quantity:
+        """What is drawn."""
+        return QUANTITIES[self.needed] if self.moment is None else moment_at(self.moment)
 
     @model_validator(mode="after")
     def _fits_x(self) -> Self:
-        got = f"got {shown(self._written)}"
+        written = self.y.model_dump() if isinstance(self.y, MomentAt) else self.y
         names = '{ moment = 2.0 }, "lyapunov_exponent" or "stability_index"'
         if self.x == "p" and self.y != "moment":
             remedy = 'must be "moment" where x = "p"; write y = "moment", or set x to a key of [vary]'
-            refuse([(("y",), self._written, f"{got}; {remedy}")])
+            refuse([(("y",), written, f"got {shown(written)}; {remedy}")])
         if self.x != "p" and self.y == "moment":
-            refuse([(("y",), self.y, f'{got}; must be {names} where x is not "p"; write one of these')])
+            text = f'got {shown(written)}; must be {names} where x is not "p"; write one of these'
+            refuse([(("y",), self.y, text)])
         if self.x == "p" and self.map:
             text = "got true; a map is drawn over two keys of [vary]; set x to one of them, or remove it"
             refuse([(("map",), self.map, text)])
@@ -135,11 +137,6 @@ class FigureSection(Section):
             text = f'got {shown(self.mark)}; only Λ(p) over p has marks; write x = "p", or remove it'
             refuse([(("mark",), self.mark, text)])
         return self
-
-    @property
-    def _written(self) -> Any:
-        """The ordinate as the file has it."""
-        return self.y.model_dump() if isinstance(self.y, MomentAt) else self.y
 
 
 def other_key(x: str, vary: Vary) -> str | None:
@@ -157,33 +154,22 @@ def map_key(figure: FigureSection, vary: Vary) -> str | None:
     return key if figure.map or len(vary.values(key)) > MOST_NAMED else None
 
 
-def is_logarithmic(key: str, vary: Vary) -> bool:
-    """Whether the axis of a varied key is."""
-    return key in vary.keys and is_log_spaced(vary.values(key))
-
-
 def figure_refusals(figure: FigureSection, valid: Mapping[str, Any]) -> Iterator[Refusal]:
     """What of a figure the other sections do not allow."""
-    if isinstance(figure.y, MomentAt) and "moments" in valid and not valid["moments"].has(figure.y.moment):
+    if figure.moment is not None and "moments" in valid and not valid["moments"].has(figure.moment):
         values = valid["moments"].values
-        known = f"moments.p ({values.size} values, {values[0]:g} to {values[-1]:g})"
-        text = f"got {figure.y.moment}; must be among {known}; add it there, or choose one of them"
-        yield ("y", "moment"), figure.y.moment, text
-    if "vary" in valid:
-        yield from _of_keys(figure, valid["vary"])
-
-
-def _of_keys(figure: FigureSection, vary: Vary) -> Iterator[Refusal]:
-    """An abscissa that is not varied, or is no number; a map where there is none; an end that is not on an axis."""
-    known = [key for key in ("p", *vary.keys) if key in ABSCISSAE]
-    if figure.x in vary.keys and figure.x not in ABSCISSAE:
-        text = f"got {shown(figure.x)}, whose values are texts; must be one of {', '.join(known)}; choose one of them"
-        yield ("x",), figure.x, text
+        among = f"moments.p ({values.size} values, {values[0]:g} to {values[-1]:g})"
+        text = f"got {figure.moment}; must be among {among}; add it there, or choose one of them"
+        yield ("y", "moment"), figure.moment, text
+    if "vary" not in valid:
         return
+    vary = valid["vary"]
+    known = [key for key in ("p", *vary.keys) if key in ABSCISSAE]
     if figure.x not in known:
-        guess = nearest(figure.x, known)
-        text = f"got {shown(figure.x)};{guess} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
-        yield ("x",), figure.x, text
+        text = f";{nearest(figure.x, known)} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
+        if figure.x in vary.keys:
+            text = f", whose values are texts; must be one of {', '.join(known)}; choose one of them"
+        yield ("x",), figure.x, f"got {shown(figure.x)}{text}"
         return
     if figure.map and other_key(figure.x, vary) is None:
         text = (
@@ -192,12 +178,6 @@ def _of_keys(figure: FigureSection, vary: Vary) -> Iterator[Refusal]:
         )
         yield ("map",), figure.map, text
     for name, key, limits in (("xlim", figure.x, figure.xlim), ("ylim", map_key(figure, vary), figure.ylim)):
-        if key and limits and limits[0] <= 0 and is_logarithmic(key, vary):
+        if key in vary.keys and limits and limits[0] <= 0 and is_log_spaced(vary.values(key)):
             text = f"got {shown(limits)}; must be > 0, as the values of {key} are spread by factors, on a "
             yield (name,), limits, f"{text}logarithmic axis; raise the smaller one"
-
-
-def fixed(parameters: Varied, varied: Iterable[str]) -> dict[str, Value]:
-    """The parameters that a figure holds: those that are not varied, without the nonlinear ones that are 0."""
-    left = {*varied, *(key for key in ("oscillator.c2", "oscillator.c3") if parameters[key] == 0)}
-    return {key: value for key, value in parameters.items() if key not in left}

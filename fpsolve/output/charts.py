@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
 from string import ascii_lowercase
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from fpsolve.analysis.zero import RTOL, Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
-from fpsolve.case.figure import fixed
 from fpsolve.case.sections import Varied
 from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
 from fpsolve.files import write_csv, write_json
@@ -37,8 +35,14 @@ _SPECIAL = {"fold": ("fold", "^"), "crossing": ("crossing", "o"), "at ": ("value
 
 
 def write_chart(case: Case, chart: Chart, folder: Path) -> None:
-    """chart.csv and chart.json, which says whether all is there."""
-    write_csv(folder / "chart.csv", ["line", "branch", "x", "y", "width", "label"], _rows(chart))
+    """Write chart.csv, and chart.json, which says whether all is there."""
+    rows = (
+        [line.zero.name, number, *map(float, point), label]
+        for line in chart.lines
+        for number, branch in enumerate(line.branches, start=1)
+        for *point, label in zip(branch.x, branch.y, branch.width, branch.labels, strict=True)
+    )
+    write_csv(folder / "chart.csv", ["line", "branch", "x", "y", "width", "label"], rows)
     write_json(folder / "chart.json", {**head(case), **_summary(case, chart)})
 
 
@@ -67,14 +71,8 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
             axes.plot([], [], marker=f"${letter}$", label=name, markersize=8, **_LETTER)
 
 
-@dataclass(frozen=True, eq=False)
-class Traced:
-    """A line of a chart that was written.
-
-    Attributes:
-        branches: its points, each of shape (2, n).
-        is_whole: whether the chart was finished.
-    """
+class Traced(NamedTuple):
+    """A line of a chart that was written: its branches, each of shape (2, n), and whether the chart was finished."""
 
     branches: tuple[FloatArray, ...] = ()
     is_whole: bool = True
@@ -92,13 +90,13 @@ def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varie
         found = summary["x"]["key"], summary["y"]["key"]
         if set(found) != set(keys) or not summary["parameters"].items() <= parameters.items():
             return Traced()
-        closed = [each["closed"] for line in summary["lines"] if line["line"] == zero.name for each in line["branches"]]
         with (folder / "chart.csv").open(encoding="utf-8", newline="") as file:
             rows = [row for row in csv.DictReader(file) if row["line"] == zero.name]
         branches = []
-        for number, is_closed in enumerate(closed, start=1):
-            points = [(float(row["x"]), float(row["y"])) for row in rows if row["branch"] == str(number)]
-            path = np.array(points + points[:1] if is_closed else points).T
+        of_line = (each for line in summary["lines"] if line["line"] == zero.name for each in line["branches"])
+        for number, branch in enumerate(of_line, start=1):
+            points = [[float(row[key]) for key in "xy"] for row in rows if row["branch"] == str(number)]
+            path = np.array(points + points[:1] if branch["closed"] else points).T
             branches.append(path if found == keys else path[::-1])
         return Traced(tuple(branches), bool(summary["complete"]))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):  # there is none, or it is no chart of ours
@@ -106,61 +104,49 @@ def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varie
 
 
 def held_in_words(curve: Curve, varied: Iterable[str], time_unit: str) -> list[str]:
-    """The parameters of a curve that are not varied, for below a title."""
-    return [parameter_of(key).timed(time_unit).stated(value) for key, value in fixed(curve.parameters, varied).items()]
-
-
-def _rows(chart: Chart) -> Iterator[list[Any]]:
-    """A row for each point of each branch."""
-    for line in chart.lines:
-        for number, branch in enumerate(line.branches, start=1):
-            points = zip(branch.x, branch.y, branch.width, branch.labels, strict=True)
-            yield from (
-                [line.zero.name, number, float(x), float(y), float(width), label] for x, y, width, label in points
-            )
+    """The parameters of a curve that are not varied, for below a title, without the nonlinear ones that are 0."""
+    left = {*varied, *(key for key in ("oscillator.c2", "oscillator.c3") if curve.parameters[key] == 0)}
+    held = {key: value for key, value in curve.parameters.items() if key not in left}
+    return [parameter_of(key).timed(time_unit).stated(value) for key, value in held.items()]
 
 
 def _summary(case: Case, chart: Chart) -> dict[str, Any]:
-    x, y = charted(case).x.axis, charted(case).y.axis
-    regions = () if chart.regions is None else chart.regions.each
-    held = {key: value for key, value in case.curve({}).parameters.items() if key not in (x.key, y.key)}
+    """What chart.json says."""
+    zeros, frame = charted(case).zero, {"x": charted(case).x.axis, "y": charted(case).y.axis}
+    keys = [axis.key for axis in frame.values()]
     return {
         "complete": chart.complete,
-        "planned": len(charted(case).zero),
+        "planned": len(zeros),
         "done": len(chart.lines) if chart.complete else max(len(chart.lines) - 1, 0),
-        "parameters": held,
-        "x": _frame(x),
-        "y": _frame(y),
+        "parameters": {key: value for key, value in case.curve({}).parameters.items() if key not in keys},
+        **{
+            side: {"key": axis.key, "start": axis.start, "stop": axis.stop, "scale": axis.scale, "at": list(axis.at)}
+            for side, axis in frame.items()
+        },
         "rtol": RTOL,
-        "lines": [_line(line) for line in chart.lines],
+        "lines": [
+            {
+                "line": line.zero.name,
+                "equation": line.zero.equation,
+                "appears": _appears(line.zero),
+                "scan": None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": SCAN_RTOL},
+                "branches": [
+                    {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
+                    for branch in line.branches
+                ],
+            }
+            for line in chart.lines
+        ],
         "closed_forms": [
             {"line": zero.name, "equation": "(38)-(39)", "branches": [branch.tolist() for branch in branches]}
-            for zero, branches in zip(charted(case).zero, chart.closed_forms, strict=True)
+            for zero, branches in zip(zeros, chart.closed_forms, strict=True)
         ],
         "regions": [
             {"name": each.name, "signs": each.signs, "share": each.share}
-            | {"x": float(x.value(each.at[0])), "y": float(y.value(each.at[1]))}
-            for each in regions
+            | {side: float(axis.value(at)) for (side, axis), at in zip(frame.items(), each.at, strict=True)}
+            for each in (chart.regions.each if chart.regions else ())
         ],
         "warnings": in_case_words(chart.remarks),
-    }
-
-
-def _frame(axis: Axis) -> dict[str, Any]:
-    return {"key": axis.key, "start": axis.start, "stop": axis.stop, "scale": axis.scale, "at": list(axis.at)}
-
-
-def _line(line: Boundary) -> dict[str, Any]:
-    scan = None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": SCAN_RTOL}
-    return {
-        "line": line.zero.name,
-        "equation": line.zero.equation,
-        "appears": _appears(line.zero),
-        "scan": scan,
-        "branches": [
-            {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
-            for branch in line.branches
-        ],
     }
 
 

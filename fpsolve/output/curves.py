@@ -189,7 +189,7 @@ def _draw_bar(axes: Any, scale: Any, told: Telling, time_unit: str) -> None:
         bar.set_label("number of the curve")
         bar.ax.yaxis.set_major_locator(MaxNLocator(6, integer=True))
         return
-    bar.set_label(label_of(parameter_of(told.key).timed(time_unit).attributes, 34))
+    bar.set_label(label_of(parameter_of(told.key).timed(time_unit).attributes, 36))
     if scale_of(told.colours) == "log":
         plain_numbers(bar.ax.yaxis)
 

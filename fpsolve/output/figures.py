@@ -11,7 +11,7 @@ import numpy as np
 from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.case.figure import MOST_NAMED, MomentAt, map_key
+from fpsolve.case.figure import MOST_NAMED, map_key
 from fpsolve.case.sections import Value, Varied, same
 from fpsolve.drawing import Format, draw_bars, figure_for
 from fpsolve.exponent.error import Estimate
@@ -38,53 +38,48 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     setting = case.figure
     if setting.needed not in case.output.quantities or not results:
         return
-    pictures = [folder / "figure.png", folder / "figure.pdf"]
+    paths = _paths(folder, "figure")
     held = held_in_words(results[0].curve, case.vary.keys, setting.time_unit)
     if other := map_key(setting, case.vary):
         plane = _plane(case, results, (setting.x, other), folder)
-        write_map(plane, setting.quantity, case.caption, pictures, parameters=held, setting=setting)
+        write_map(plane, setting.quantity, case.caption, paths, parameters=held, setting=setting)
         return
     samples = {each.curve.key: each for each in simulated}
     pairs = [(result, samples.get(result.curve.key)) for result in results]
-    series = _over_p(case, pairs) if setting.x == "p" else _over_parameter(case, pairs)
+    if setting.x == "p":
+        shown = _some(len(pairs))
+        series = [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
+    else:
+        series = _over_parameter(case, pairs)
     is_exact = any(result.curve.is_exact for result in results)
     write_figure(
-        series, setting.x, setting.quantity, case.caption, pictures,
+        series, setting.x, setting.quantity, case.caption, paths,
         parameters=held, setting=setting, is_reduced=is_exact,
     )  # fmt: skip
 
 
 def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path) -> None:
-    """Draw sensitivities.png and .pdf of every curve, if the case says so."""
+    """Draw sensitivities.png and .pdf of every curve, if the case says so: θ ∂/∂θ of λ and of some Λ(p), scaled."""
     for result in results if case.output.sensitivities else ():
-        _draw_sensitivities(case, result, folder)
-
-
-def _draw_sensitivities(case: Case, result: CurveResult, folder: Path) -> None:
-    """θ ∂Λ(p)/∂θ of some p, and that of λ, over the scale of each."""
-    found = result.sensitivities
-    if found is None:
-        return
-    scale, bars = scale_of(result.curve.problem), dict[str, list[float]]()
-    for label, (p, slopes) in found.shown().items():
-        size = float(scale.moment(p)) if p else scale.linear
-        bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
-    pictures = [folder / f"sensitivities{result.curve.suffix}.{ending}" for ending in ("png", "pdf")]
-    held = held_in_words(result.curve, (), case.figure.time_unit)
-    with figure_for(pictures, case.headline, held) as figure:
-        axes = figure.add_subplot(
-            xlabel=r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
-        )
-        draw_bars(axes, bars, [parameter_of(key).latex for key in found.theta])
+        found = result.sensitivities
+        if found is None:
+            continue
+        scale, bars = scale_of(result.curve.problem), dict[str, list[float]]()
+        for label, (p, slopes) in found.shown().items():
+            size = float(scale.moment(p)) if p else scale.linear
+            bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
+        held = held_in_words(result.curve, (), case.figure.time_unit)
+        with figure_for(_paths(folder, f"sensitivities{result.curve.suffix}"), case.headline, held) as figure:
+            words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
+            draw_bars(figure.add_subplot(xlabel=words), bars, [parameter_of(key).latex for key in found.theta])
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
     """Draw response.png and response.pdf of a curve, if it has a response."""
-    if simulated.response is None:
-        return
-    pictures = [folder / f"response{simulated.curve.suffix}.{ending}" for ending in ("png", "pdf")]
-    held = held_in_words(simulated.curve, (), "time")
-    write_response_figure(simulated.response, case.headline, pictures, held)
+    if simulated.response is not None:
+        held = held_in_words(simulated.curve, (), "time")
+        paths = _paths(folder, f"response{simulated.curve.suffix}")
+        write_response_figure(simulated.response, case.headline, paths, held)
 
 
 def write_response_figure(
@@ -98,42 +93,37 @@ def write_response_figure(
         response.plot_amplitude(radial)
 
 
-def _over_p(case: Case, pairs: Sequence[Pair]) -> list[Series]:
-    """Λ(p) of each curve; of many without the perturbation theory of all but some."""
-    shown = set(_some(len(pairs)))
-    return [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
+def _paths(folder: Path, name: str) -> list[Path]:
+    return [folder / f"{name}.{ending}" for ending in ("png", "pdf")]
 
 
-def _some(count: int) -> Sequence[int]:
-    """Places among so many curves: all that a legend can name, or of more some, evenly spread."""
-    return (
-        range(count) if count <= MOST_NAMED else np.linspace(0, count - 1, 3 * MOST_NAMED).round().astype(int).tolist()
-    )
+def _some(count: int) -> set[int]:
+    """Places of curves with perturbation theory: all that a legend can name, or of more some, evenly spread."""
+    places = np.linspace(0, count - 1, count if count <= MOST_NAMED else 3 * MOST_NAMED)
+    return set(places.round().astype(int).tolist())
 
 
 def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | None, *, with_theory: bool) -> Series:
-    moments, marked = result.moments, case.figure.mark
-    ends = (float(moments.p.min()), float(moments.p.max())) if moments.p.size else (math.nan, math.nan)
-    line = np.linspace(*ends, 200) if with_theory and moments.p.size else _NOTHING
+    """Λ(p) of a curve over p."""
+    p = result.moments.p
+    first, last = (float(p.min()), float(p.max())) if p.size else (math.nan, math.nan)
+    line = np.linspace(first, last, 200) if with_theory and p.size else _NOTHING
     estimates = sample.result.estimates if sample else ()
-    dots = [(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]
-    root = _value(result.stability_index) if STABILITY_INDEX.name in marked else None
-    slope = _value(result.lyapunov_exponent) if LYAPUNOV_EXPONENT.name in marked else None
+    root, slope = (
+        _value(result.estimates[each.name]) if each.name in case.figure.mark else None
+        for each in (STABILITY_INDEX, LYAPUNOV_EXPONENT)
+    )
     return Series(
         dict(result.curve.varied),
-        moments.p,
-        moments.value,
+        p,
+        result.moments.value,
         line,
         second_order(result.curve.problem).moment_exponent(line) if line.size else _NOTHING,
-        _columns(dots),
-        np.isin(moments.p, moments.rare) if moments.rare.size else False,
-        root=root if root is not None and ends[0] <= root <= ends[1] else None,
-        slope=slope if ends[0] <= 0 <= ends[1] else None,
+        _columns([(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]),
+        np.isin(p, result.moments.rare) if result.moments.rare.size else False,
+        root=root if root is not None and first <= root <= last else None,
+        slope=slope if first <= 0 <= last else None,
     )
-
-
-def _value(estimate: Estimate | None) -> float | None:
-    return None if estimate is None else estimate.value
 
 
 def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
@@ -142,7 +132,7 @@ def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
     for pair in pairs:
         others = tuple((key, value) for key, value in pair[0].curve.key if key != case.figure.x)
         groups.setdefault(others, []).append(pair)
-    shown = set(_some(len(groups)))
+    shown = _some(len(groups))
     return [
         _parameter_series(case, dict(others), group, with_theory=i in shown)
         for i, (others, group) in enumerate(groups.items())
@@ -151,63 +141,74 @@ def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
 
 def _parameter_series(case: Case, others: Varied, group: Sequence[Pair], *, with_theory: bool) -> Series:
     """A number over the parameter; its perturbation theory, which has poles, where it is sought."""
-    key = case.figure.x
+    key, p = case.figure.x, case.figure.moment
     x = np.array([float(result.curve.varied[key]) for result, _ in group])
-    y = np.array([_number(case, result) for result, _ in group])
     line = np.linspace(x.min(), x.max(), 200) if with_theory else _NOTHING
     if with_theory and x.min() > 0:
         line = np.unique(np.concatenate([line, np.geomspace(x.min(), x.max(), 200)]))
-    line_y = np.array([_theory(case, case.curve({**others, key: float(value)}).problem) for value in line])
-    dots = [(each, _sample(case, sample)) for each, (_, sample) in zip(x, group, strict=True) if sample]
-    found = _columns([(each, *dot) for each, dot in dots if dot])
-    rare = np.array(
-        [isinstance(case.figure.y, MomentAt) and case.figure.y.moment in result.moments.rare for result, _ in group]
+    dots = [(at, _simulated(case, sample)) for at, (_, sample) in zip(x, group, strict=True) if sample]
+    return Series(
+        others,
+        x,
+        np.array([_number(case, result) for result, _ in group]),
+        line,
+        np.array([_theory(case, case.curve({**others, key: float(value)}).problem) for value in line]),
+        _columns([(at, *dot) for at, dot in dots if dot]),
+        np.array([p in result.moments.rare for result, _ in group]),
     )
-    return Series(others, x, y, line, line_y, found, rare)
+
+
+def _value(estimate: Estimate | None) -> float | None:
+    return None if estimate is None else estimate.value
 
 
 def _number(case: Case, result: CurveResult) -> float:
     """What a figure over parameters shows of a curve; NaN where there is none."""
-    if isinstance(case.figure.y, MomentAt):
-        at = np.flatnonzero(np.isclose(result.moments.p, case.figure.y.moment, rtol=0, atol=1e-12))
-        return float(result.moments.value[at[0]]) if at.size else math.nan
-    found = _value(result.estimates[case.figure.y])
-    return math.nan if found is None else found
+    if case.figure.moment is None:
+        found = _value(result.estimates[case.figure.needed])
+        return math.nan if found is None else found
+    at = np.flatnonzero(np.isclose(result.moments.p, case.figure.moment, rtol=0, atol=1e-12))
+    return float(result.moments.value[at[0]]) if at.size else math.nan
 
 
 def _theory(case: Case, problem: Problem) -> float:
     """Its perturbation theory, NaN beyond where it is sought."""
-    if isinstance(case.figure.y, MomentAt):
-        return float(second_order(problem).moment_exponent(case.figure.y.moment))
-    index = INDICES[case.figure.y]
+    if case.figure.moment is not None:
+        return float(second_order(problem).moment_exponent(case.figure.moment))
+    index = INDICES[case.figure.needed]
     value = index.theory(problem)
     return value if index.interval[0] <= value <= index.interval[1] else math.nan
 
 
-def _sample(case: Case, sample: SimulatedCurve) -> tuple[float, float] | None:
+def _simulated(case: Case, sample: SimulatedCurve) -> tuple[float, float] | None:
     """The same from a simulation, with its standard error."""
-    if not isinstance(case.figure.y, MomentAt):
-        return sample.estimates.get(case.figure.y)
-    p = case.figure.y.moment
-    for each in sample.result.estimates:
-        if same(each.p, p) and each.value is not None and each.standard_error is not None:
-            return each.value, each.standard_error
-    return None
+    p = case.figure.moment
+    if p is None:
+        return sample.estimates.get(case.figure.needed)
+    found = [each for each in sample.result.estimates if same(each.p, p)]
+    return next(
+        ((e.value, e.standard_error) for e in found if e.value is not None and e.standard_error is not None), None
+    )
 
 
 def _plane(case: Case, results: Sequence[CurveResult], keys: tuple[str, str], folder: Path) -> Plane:
     """What a map shows, and the line of zeros that a chart has traced in the same folder."""
     x, y = (np.sort(np.array(case.vary.values(key), dtype=float)) for key in keys)
     values, failed = np.full((y.size, x.size), math.nan), np.ones((y.size, x.size), dtype=bool)
-    columns, rows = ({value: i for i, value in enumerate(axis.tolist())} for axis in (x, y))
     for result in results:
-        at = rows[float(result.curve.varied[keys[1]])], columns[float(result.curve.varied[keys[0]])]
-        values[at] = _number(case, result)
-        failed[at] = math.isnan(values[at]) and bool(result.failures)
-    at_p = case.figure.y.moment if isinstance(case.figure.y, MomentAt) else 0.0
-    zero = Zero("moment", at_p) if at_p else Zero("lyapunov_exponent")
+        column, row = (
+            axis.searchsorted(float(result.curve.varied[key])) for axis, key in zip((x, y), keys, strict=True)
+        )
+        values[row, column] = number = _number(case, result)
+        failed[row, column] = math.isnan(number) and bool(result.failures)
+    setting = case.figure
+    zero = Zero("moment", setting.moment) if setting.moment else Zero("lyapunov_exponent")
     traced = read_line(folder, keys, zero, results[0].curve.parameters)
-    return Plane(keys, x, y, values, failed, traced.branches, zero.latex, is_partial=not traced.is_whole)
+    where = "" if setting.moment is not None else " from {:g} to {:g}".format(*INDICES[setting.needed].interval)
+    return Plane(
+        keys, x, y, values, failed, traced.branches, zero.latex,
+        is_partial=not traced.is_whole, absent=f"no {setting.quantity.words}{where}",
+    )  # fmt: skip
 
 
 def _columns(dots: Sequence[tuple[float | None, ...]]) -> FloatArray | None:

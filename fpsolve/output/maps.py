@@ -13,7 +13,6 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.case.figure import FigureSection
 from fpsolve.drawing import FORMATS, draw_colours, figure_for, label_axes, points, scale_axis, scale_of
-from fpsolve.exponent.quantities import Index
 from fpsolve.model.kinds import parameter_of
 from fpsolve.model.quantity import Quantity
 
@@ -33,6 +32,7 @@ class Plane:
         zero: branches on which it is zero to the tolerance of a chart, each of shape (2, n).
         equation: what holds on them, in LaTeX, such as "$\\lambda = 0$".
         is_partial: whether the chart was not finished.
+        absent: what to say where none exists.
     """
 
     keys: tuple[str, str]
@@ -43,6 +43,7 @@ class Plane:
     zero: Sequence[FloatArray] = ()
     equation: str = ""
     is_partial: bool = False
+    absent: str = ""
 
 
 def write_map(
@@ -59,12 +60,12 @@ def write_map(
         axes, edges = figure.add_subplot(), (_edges(plane.x), _edges(plane.y))
         label_axes(axes, *(parameter_of(key).timed(setting.time_unit).attributes for key in plane.keys))
         _draw_values(axes, plane, edges, quantity.timed(setting.time_unit).attributes)
-        ends = ((float(each[0]), float(each[-1])) for each in edges)
-        for axis, values, limits, end in zip(
-            (axes.xaxis, axes.yaxis), (plane.x, plane.y), (setting.xlim, setting.ylim), ends, strict=True
+        for axis, values, ends, limits in (
+            (axes.xaxis, plane.x, edges[0], setting.xlim),
+            (axes.yaxis, plane.y, edges[1], setting.ylim),
         ):
-            scale_axis(axis, scale_of(values), limits or end)
-        _draw_gaps(axes, plane, edges, quantity)
+            scale_axis(axis, scale_of(values), limits or (float(ends[0]), float(ends[-1])))
+        _draw_gaps(axes, plane, edges)
         _draw_zeros(axes, plane)
 
 
@@ -106,37 +107,31 @@ def _edges(values: FloatArray) -> FloatArray:
     return np.exp(edges) if is_log else edges
 
 
-def _draw_gaps(axes: Any, plane: Plane, edges: tuple[FloatArray, FloatArray], quantity: Quantity) -> None:
+def _draw_gaps(axes: Any, plane: Plane, edges: tuple[FloatArray, FloatArray]) -> None:
     """Hatched where it is not known, grey where there is none."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Rectangle
 
     x, y = edges
-    where = " from {:g} to {:g}".format(*quantity.interval) if isinstance(quantity, Index) else ""
-    hatched: dict[str, Any] = {
-        "label": "failed or not solved",
-        "facecolor": "white",
-        "edgecolor": "0.45",
-        "hatch": "/////",
-    }
-    plain: dict[str, Any] = {"label": f"no {quantity.words}{where}", "facecolor": "0.8", "edgecolor": "none"}
-    for gaps, style in ((plane.failed, hatched), (np.isnan(plane.values) & ~plane.failed, plain)):
+    for gaps, label, colours in (
+        (plane.failed, "failed or not solved", {"facecolor": "white", "edgecolor": "0.45", "hatch": "/////"}),
+        (np.isnan(plane.values) & ~plane.failed, plane.absent, {"facecolor": "0.8", "edgecolor": "none"}),
+    ):
+        style: dict[str, Any] = {"label": label, "linewidth": 0, **colours}
         cells = [Rectangle((x[j], y[i]), x[j + 1] - x[j], y[i + 1] - y[i]) for i, j in np.argwhere(gaps)]
         if cells:
-            axes.add_collection(PatchCollection(cells, linewidth=0, **style))
+            axes.add_collection(PatchCollection(cells, **style))
 
 
 def _draw_zeros(axes: Any, plane: Plane) -> None:
     """The line of zeros between the values, and that of a chart."""
     known = plane.values[np.isfinite(plane.values)]
     if known.size and known.min() < 0 < known.max():
-        wide = points(1.5)
-        values = np.ma.masked_invalid(plane.values)
-        axes.contour(
-            plane.x, plane.y, values, levels=[0.0], colors=_BETWEEN, linestyles="--", linewidths=wide, zorder=3
-        )
-        axes.plot([], [], color=_BETWEEN, linestyle="--", linewidth=wide, label="zero, interpolated between the values")
+        values, wide = np.ma.masked_invalid(plane.values), points(1.5)
+        style: dict[str, Any] = {"colors": _BETWEEN, "linestyles": "--", "linewidths": wide, "zorder": 3}
+        axes.contour(plane.x, plane.y, values, levels=[0.0], **style)
+        axes.plot([], [], "--", color=_BETWEEN, linewidth=wide, label="zero, interpolated between the values")
     words = f"{plane.equation}, traced by a chart{', not finished' if plane.is_partial else ''}"
     for i, branch in enumerate(plane.zero):
-        style = {"color": "black", "linewidth": points(2.6), "label": "" if i else words}
-        axes.plot(*branch, scalex=False, scaley=False, **style)
+        label = "" if i else words
+        axes.plot(*branch, color="black", linewidth=points(2.6), label=label, scalex=False, scaley=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import combinations
 from pathlib import Path
 
@@ -101,35 +100,24 @@ def data_paths(figure):
 
 
 def assert_sound(figure):
-    """Legends cover no data, all that is written is on the canvas, and no two numbers of an axis overlap."""
+    """Legends cover no data, all that is written is on the canvas, and no two texts overlap."""
     figure.canvas.draw()
-    canvas = figure.bbox
-    for text in texts(figure):
-        if text.get_text() and text.get_visible():
-            box = text.get_window_extent()
-            inside = (
-                canvas.x0 - 1 <= box.x0 <= box.x1 <= canvas.x1 + 1
-                and canvas.y0 - 1 <= box.y0 <= box.y1 <= canvas.y1 + 1
-            )
-            assert inside, (text.get_text(), box)
-            assert text.get_fontsize() >= 6, text.get_text()
-    for legend in legends(figure):
-        box = legend.get_window_extent()
-        assert canvas.x0 - 1 <= box.x0 <= box.x1 <= canvas.x1 + 1
-        assert canvas.y0 - 1 <= box.y0 <= box.y1 <= canvas.y1 + 1
+    canvas = figure.bbox.padded(1)
+    boxes = [legend.get_window_extent() for legend in legends(figure)]
+    written = [(text, text.get_window_extent()) for text in texts(figure) if text.get_text() and text.get_visible()]
+    for thing, box in [*written, *((legend, box) for legend, box in zip(legends(figure), boxes, strict=True))]:
+        assert canvas.x0 <= box.x0 <= box.x1 <= canvas.x1, (thing, box)
+        assert canvas.y0 <= box.y0 <= box.y1 <= canvas.y1, (thing, box)
+    for text, _ in written:
+        assert text.get_fontsize() >= 6, text
+    for box in boxes:
         for axes, path in data_paths(figure):
             if box.overlaps(axes.bbox):
                 assert not path.intersects_bbox(box, filled=False), "the legend covers a curve"
                 assert not any(box.contains(*vertex) for vertex in path.vertices), "the legend covers a point"
     for labels in tick_labels(figure):
-        for one, other in combinations(labels, 2):
-            assert not one.get_window_extent().overlaps(other.get_window_extent()), (one, other)
-    for one, other in combinations([text for text in texts(figure) if text.get_text() and text.get_visible()], 2):
-        assert not _overlap(one.get_window_extent(), other.get_window_extent()), (one, other)
-
-
-def _overlap(one, other):
-    """Whether two boxes share more than their rims."""
-    across = min(one.x1, other.x1) - max(one.x0, other.x0)
-    along = min(one.y1, other.y1) - max(one.y0, other.y0)
-    return across > 1 and along > 1 and not math.isclose(across, 0)
+        for one, other in combinations([label.get_window_extent() for label in labels], 2):
+            assert not one.overlaps(other), labels
+    for (one, box), (other, second) in combinations(written, 2):
+        across, along = (min(box.max[k], second.max[k]) - max(box.min[k], second.min[k]) for k in (0, 1))
+        assert min(across, along) <= 1, (one, other)
