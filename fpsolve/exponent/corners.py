@@ -20,7 +20,6 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.fem.discretisation import Cells, Discretisation, PhaseCells
 from fpsolve.model.noise import Noise
-from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.plane import is_steady, turning_noise
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
@@ -83,7 +82,7 @@ def corners(problem: Problem, p: float, center: float | None = None) -> list[Cor
     """
     noise, system = problem.noise, problem.system
     kicks = [kick for kick in system.kicks if kick.log_factor and not is_steady(system, kick)]
-    if not kicks or isinstance(noise, MarkovChain) or (frozen := frozen_noise(problem)) is None:
+    if not kicks or noise.has_states or (frozen := frozen_noise(problem)) is None:
         return []
     center = frozen.center(p) if center is None else center
     unit, ends = noise.standard_deviation, _interval(noise, center)

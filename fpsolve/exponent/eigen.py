@@ -28,7 +28,6 @@ from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.factors import Factors
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.theory.frozen import eigenvalues_at
 
 BACKWARD_ERROR_GOAL = 1e-14
@@ -106,7 +105,7 @@ def principal_pair(
         lambda: _carried(pairs, p, generator) if pairs else _simplest(generator, p),
         lambda: _from_the_right(generator, p),
     ]
-    if isinstance(generator.problem.noise, MarkovChain):  # states that hardly mix have a positive pair each
+    if generator.problem.noise.mixes_slowly:  # states that hardly mix have a positive pair each
         searches.reverse()
     found: list[PrincipalPair] = []
     for search in searches:
@@ -131,7 +130,7 @@ def _rightmost(pair: PrincipalPair) -> PrincipalPair:
     States may hardly mix, or the phase not leave a ray: then other pairs have a positive T, or T*, too.
     """
     generator = pair.generator
-    if isinstance(generator.problem.noise, MarkovChain) and generator.size <= SURVEYED_UNKNOWNS:
+    if generator.problem.noise.mixes_slowly and generator.size <= SURVEYED_UNKNOWNS:
         rightmost = spectrum(generator, pair.p, 1)[0]
         if abs(rightmost - pair.value) > 1e-6 * max(abs(rightmost), generator.unit_rate):
             told = Message(Code.LARGER_EIGENVALUE, p=pair.p, rightmost=rightmost.real, value=pair.value)

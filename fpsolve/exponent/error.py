@@ -214,7 +214,7 @@ def _with_corners(pair: PrincipalPair, effects: list[ModeEffects | None]) -> tup
 def truncation(pair: PrincipalPair) -> tuple[float, float]:
     """Bounds on what the two ends of an interval of cells change in Λ: ½σ² ∫ P_s |T_z| T* dφ / ∫ T T* there."""
     xi = pair.space.xi
-    if not isinstance(xi, CellAxis):
+    if not pair.generator.chosen.noise.lines.size:
         return 0.0, 0.0
     return _end_effect(pair, xi, 0), _end_effect(pair, xi, -1)
 

@@ -22,7 +22,6 @@ from fpsolve.exponent.rival import misplaced
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, missed
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
-from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.problem import Problem, checked_moments, of_problem_too
 from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, STABILITY_INDEX, P, moment_at
 from fpsolve.theory.far import grows_far_out
@@ -275,8 +274,7 @@ def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> Mess
 def _no_root(problem: Problem, interval: tuple[float, float]) -> Absent:
     """That Λ(p) has no root p ≠ 0 in an interval."""
     low, high = np.clip(interval, *problem.noise.moments)
-    is_bounded = isinstance(problem.noise, MarkovChain) or math.isfinite(problem.noise.half_width)
-    return Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=is_bounded))
+    return Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=problem.noise.is_bounded))
 
 
 def nonzero_root(

@@ -18,7 +18,6 @@ from fpsolve.errors import OutputError
 from fpsolve.exponent.fields import Fields, Pair, fields, xi_marginal
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.fem.phase import PhaseAxis
-from fpsolve.model.noises.markov_chain import MarkovChain
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals; elements of a higher degree are cut into several of them."""
@@ -66,7 +65,7 @@ class Nodes:
     def seen(self, pair: Pair) -> Nodes:
         """The same where the tilted density, or that of the noise, is not negligible."""
         noise = pair.generator.problem.noise
-        if isinstance(noise, MarkovChain):  # of which there are no nodes
+        if noise.has_states:  # of which there are no nodes
             return self
         densities = self.fields(pair).product.max(axis=0), noise.density(self.unit * self.z)
         living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
@@ -114,7 +113,7 @@ def _z_lines(pair: Pair) -> FloatArray:
     Outside it P_s and the tilted density are below `FAINT` of their largest values.
     """
     xi, noise = _on_a_line(pair), pair.generator.problem.noise
-    if pair.generator.chosen.noise.lines.size or isinstance(noise, MarkovChain):
+    if pair.generator.chosen.noise.lines.size or noise.has_states:
         return pair.generator.chosen.noise.lines
     end = noise.half_width / noise.standard_deviation
     reach = min(end, 12.0 + abs(xi.center))
@@ -135,7 +134,7 @@ def _resolution(pair: Pair, lines: FloatArray) -> FloatArray:
 
 def _on_a_line(pair: Pair) -> LineAxis:
     """The functions of ξ of a pair. Raises `OutputError` where the noise has states."""
-    if not isinstance(pair.space.xi, LineAxis):
+    if pair.generator.problem.noise.has_states:
         raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
     return pair.space.xi
 

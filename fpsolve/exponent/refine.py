@@ -17,7 +17,6 @@ from fpsolve.exponent.error import Solution
 from fpsolve.fem.discretisation import MOST_DEGREE, Cells, Discretisation, NoisePart, PhaseCells, Polynomials, States
 from fpsolve.fem.generator import Generator
 from fpsolve.model.noise import Noise
-from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.plane import System, phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.far import Place
@@ -37,17 +36,17 @@ WIDER = 4.0
 def first(problem: Problem, p: float, center: float, rtol: float) -> Discretisation:
     """A first discretisation, small, for a tilted density around some z."""
     noise, system, digits = problem.noise, problem.system, -math.log10(rtol)
-    if isinstance(noise, MarkovChain):
-        return Discretisation(_phase(system, np.array(noise.states), digits), (States(len(noise.states)),))
+    if noise.basis == "states":
+        return Discretisation(_phase(system, noise.reached, digits), (States(noise.reached.size),))
     unit = noise.standard_deviation
     end = noise.half_width / unit
     phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
     part: NoisePart
-    if noise.has_algebraic_tails:
+    if noise.basis == "cells":
         part = Cells(_graded(12.0 + abs(center)), round(2 + digits / 2))
     else:
         frozen = frozen_noise(problem)
-        slope = frozen.tilt(center) / p if frozen else 0.0
+        slope = frozen.tilt(center) / p if frozen and noise.may_tilt else 0.0
         part = Polynomials(round(digits / 2) + (3 if math.isinf(end) else 5), slope)
     chosen = Discretisation(phase, (part,))
     found = corners(problem, p, center)

@@ -19,7 +19,7 @@ from fpsolve.fem.axis import Axis
 from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
 from fpsolve.fem.phase import PhaseAxis
-from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noise import Noise
 
 HALVING = 2 * math.log(2)
 """By how much more the logarithm of an effect falls with each degree in half a cell."""
@@ -144,7 +144,7 @@ class NoisePart:
         """Number of unknowns."""
         raise NotImplementedError
 
-    def axis(self, noise: Any, p: float) -> NoiseAxis:
+    def axis(self, noise: Noise, p: float) -> NoiseAxis:
         """The functions for one p. Raises `MeshError`."""
         raise NotImplementedError
 
@@ -183,7 +183,7 @@ class Polynomials(NoisePart):
     def size(self) -> int:
         return self.count
 
-    def axis(self, noise: Any, p: float) -> PolynomialAxis:
+    def axis(self, noise: Noise, p: float) -> PolynomialAxis:
         return PolynomialAxis(noise, self.count, self.slope * p)
 
     def enriched(self) -> Polynomials:
@@ -221,7 +221,7 @@ class Cells(NoisePart):
     def size(self) -> int:
         return (self.lines.size - 1) * self.degree + 1 - 2 * self.is_killed
 
-    def axis(self, noise: Any, p: float) -> CellAxis:
+    def axis(self, noise: Noise, p: float) -> CellAxis:
         return CellAxis(noise, self.lines, self.degree, self.is_killed)
 
     def enriched(self) -> Cells:
@@ -282,7 +282,7 @@ class States(NoisePart):
     def size(self) -> int:
         return self.count
 
-    def axis(self, noise: Any, p: float) -> StateAxis:
+    def axis(self, noise: Noise, p: float) -> StateAxis:
         return StateAxis(noise)
 
 
@@ -299,18 +299,17 @@ class Discretisation:
     noises: tuple[NoisePart, ...]
 
     @classmethod
-    def on(cls, mesh: CylinderMesh, noise: Any) -> Discretisation:
+    def on(cls, mesh: CylinderMesh, noise: Noise) -> Discretisation:
         """The elements of a mesh, which is cut off at the end of the noise's support.
 
         Raises:
             MeshError: the mesh has lines where the noise has states, or none where it has a line.
         """
-        has_states = isinstance(noise, MarkovChain)
-        if has_states == bool(mesh.z_lines.size):
+        if noise.has_states == bool(mesh.z_lines.size):
             raise MeshError("noise with states needs a mesh without z_lines, and noise on a line one with them")
         phase = PhaseCells(mesh.phi_lines, np.full(mesh.phi_lines.size - 1, mesh.phi_degree))
-        if has_states:
-            return cls(phase, (States(len(noise.states)),))
+        if noise.has_states:
+            return cls(phase, (States(noise.reached.size),))
         mesh = mesh.within(noise.half_width / noise.standard_deviation)
         return cls(phase, (Cells(mesh.z_lines, mesh.xi_degree),))
 
@@ -366,7 +365,7 @@ class Discretisation:
             phase, tuple(part if each is None else part.refined(each, share, may_coarsen) for part, each in pairs)
         )
 
-    def axes(self, noises: Sequence[Any], p: float) -> list[Axis]:
+    def axes(self, noises: Sequence[Noise], p: float) -> list[Axis]:
         """The functions of the noises for one p. Raises `MeshError`."""
         return [part.axis(noise, p) for part, noise in zip(self.noises, noises, strict=True)]
 

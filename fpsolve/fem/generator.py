@@ -17,7 +17,6 @@ from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
-from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rate, phase_speed
 from fpsolve.model.problem import Direction, Problem
 
@@ -170,6 +169,6 @@ class Generator:
             driven = space.xi.matrix(None) + space.xi.mass(fastest)
             growth = float(np.max(scipy.linalg.eigvals(finite(driven), space.xi.matrix(one)).real))
         for kick in system.kicks:
-            if isinstance(noise, MarkovChain) and crosses_both_ways(system, kick, space.xi.support):
-                growth += float(-np.min(noise.rates)) * math.expm1(max(0.0, p * kick.log_factor))
+            if noise.largest_jump_rate and crosses_both_ways(system, kick, space.xi.support):
+                growth += noise.largest_jump_rate * math.expm1(max(0.0, p * kick.log_factor))
         return growth

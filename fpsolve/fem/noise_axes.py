@@ -22,7 +22,6 @@ from fpsolve.fem.axis import Axis
 from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS
 from fpsolve.fem.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.noises.markov_chain import MarkovChain
 
 FAR = 50.0
 """Noise units beyond which OU noise does not come."""
@@ -30,6 +29,8 @@ SHARP_ENDS = 50.0
 """Exponents from which on P_s leaves next to nothing at the ends of its support."""
 NEAR_END, VANISHES = 1e-9, 1e-6
 """σ² vanishes at the ends of the support where so near to one it is less than this share of that at ξ = 0."""
+STEP = 1e-5
+"""Of ln ξ, by which a coefficient is differentiated."""
 MORE_POINTS = 16
 """Quadrature points beyond the number of polynomials."""
 
@@ -99,7 +100,14 @@ class LineAxis(NoiseAxis):
 
     def rate(self, z: FloatArray) -> FloatArray:
         """½σ²/std², the diffusion of z."""
-        return 0.5 * squared_diffusion(self.noise, self.unit * z) / self.unit**2
+        return 0.5 * self.noise.squared_diffusion(self.unit * z) / self.unit**2
+
+    def changed_weight(self, change: NoiseDerivative, g: Coefficient, logs: FloatArray, z: FloatArray) -> FloatArray:
+        """∂(P_s g)/∂θ over P_s from ∂ ln P_s/∂θ, where ξ may be measured by a length that changes: z is held."""
+        xi, weight = self.unit * z, logs * g(self.unit * z)
+        if change.log_scale:
+            weight = weight + change.log_scale * (g(xi * (1 + STEP)) - g(xi * (1 - STEP))) / (2 * STEP)
+        return np.asarray(weight)
 
     def values_at(self, z: FloatArray) -> Any:
         """The functions at any z, shape (len(z), size)."""
@@ -152,7 +160,7 @@ class PolynomialAxis(LineAxis):
             self.points = x + self._shift
         else:
             self._shift, self._scale, self.slowest = 0.0, end, 1.0
-            middle, near = squared_diffusion(noise, noise.half_width * np.array([0.0, 1 - NEAR_END]))
+            middle, near = noise.squared_diffusion(noise.half_width * np.array([0.0, 1 - NEAR_END]))
             missing = 0.0 if near < VANISHES * middle else 1.0  # 1 − b: by so much more does P_s fall at the ends
             more = min(abs(tilt) * end, 4 * tilt**2)
             points = 16 * math.ceil((2 * count + MORE_POINTS + more) / 16)  # few rules serve many spaces
@@ -182,8 +190,9 @@ class PolynomialAxis(LineAxis):
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
         logs = self._log_change(change)
         if g is not None:
-            return _form(self.values, self.measure * logs * g(self.unit * self.points))
-        return 2 * change.log_diffusion * self.matrix(None) - _form(self._slopes, self._flux * logs)
+            return _form(self.values, self.measure * self.changed_weight(change, g, logs, self.points))
+        own = 2 * (change.log_diffusion - change.log_scale) * self.matrix(None)
+        return own - _form(self._slopes, self._flux * logs)
 
     def _log_change(self, change: NoiseDerivative) -> FloatArray:
         """∂ ln P_s/∂θ at the points, without its mean; no rule of Gauss takes its ln(1 − x²) near ±1 as it stands."""
@@ -250,9 +259,9 @@ class CellAxis(LineAxis):
             return change.log_density(self.unit * z) - mean
 
         if g is not None:
-            return self._form(self.line.mass(lambda z: log_change(z) * g(self.unit * z)))
+            return self._form(self.line.mass(lambda z: self.changed_weight(change, g, log_change(z), z)))
         stiffness = self.line.stiffness(lambda z: self.rate(z) * log_change(z))
-        return 2 * change.log_diffusion * self.matrix(None) - self._form(stiffness)
+        return 2 * (change.log_diffusion - change.log_scale) * self.matrix(None) - self._form(stiffness)
 
     @cached_property
     def nested(self) -> Any:
@@ -270,7 +279,7 @@ class CellAxis(LineAxis):
 class StateAxis(NoiseAxis):
     """One value for each state of a Markov chain: ∫ P_s becomes a sum over the states with their probabilities."""
 
-    def __init__(self, noise: MarkovChain) -> None:
+    def __init__(self, noise: Any) -> None:
         super().__init__()
         self.support, self.measure, self._rates = np.array(noise.states), noise.probabilities, np.array(noise.rates)
         self.size, self.constant, self.values = self.support.size, np.ones(self.support.size), np.eye(self.support.size)
@@ -288,11 +297,6 @@ class StateAxis(NoiseAxis):
 
     def projection(self, other: StateAxis) -> FloatArray:
         return np.eye(self.size)
-
-
-def squared_diffusion(noise: Noise, xi: FloatArray) -> FloatArray:
-    """σ²(ξ)."""
-    return np.full_like(xi, noise.diffusion**2)
 
 
 @lru_cache(maxsize=64)

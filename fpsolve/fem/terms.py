@@ -24,7 +24,7 @@ from scipy.sparse import diags, issparse
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.kronecker import KroneckerSum
-from fpsolve.model.plane import Drive, Harmonics, Kick, System, phase_speed, written_coefficient
+from fpsolve.model.plane import Drive, Harmonics, Kick, System, is_driven, phase_speed, written_coefficient
 from fpsolve.model.problem import Direction
 
 ALL_ORDERS = slice(None)
@@ -210,8 +210,8 @@ class Terms:
         steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
         for drive in self.system.drives:
             speed = self.system.epsilon**drive.order * drive.h(self._vertices)
-            if drive.g == one:
-                steady += speed
+            if not is_driven(drive.g):
+                steady += float(drive.g(0.0)) * speed
             else:
                 square = xi.mass(lambda xi, g=drive.g: g(xi) ** 2)
                 driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
@@ -273,9 +273,7 @@ def power_of_epsilon(order: int) -> str:
 
 def _prefix(drive: Drive) -> str:
     """ε^n g(ξ)."""
-    power = f"{power_of_epsilon(drive.order)} " if drive.order else ""
-    g = written_coefficient(drive.g)
-    return power + g
+    return (f"{power_of_epsilon(drive.order)} " if drive.order else "") + written_coefficient(drive.g)
 
 
 def _written(harmonics: Harmonics) -> str:

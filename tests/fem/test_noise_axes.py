@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from fpsolve.arrays import one
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
 from fpsolve.fem.polynomials import gegenbauer, hermite, stieltjes
+from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 
@@ -123,3 +125,42 @@ def test_nested_modes_of_cells_are_those_of_lower_degrees():
     nested = line.nested @ coefficients
     assert np.max(np.abs(nested[line.modes > 4])) < 1e-9 * np.max(np.abs(nested))
     assert np.max(np.abs(coefficients[line.modes > 4])) > 1e-6
+
+
+class Arcsine(Noise):
+    """ξ = A sin θ, dθ = σ dW: P_s = 1/(π√(A² − ξ²)) and σ²(ξ) = σ²(A² − ξ²)."""
+
+    half_width, end_exponent, standard_deviation, correlation_time = 0.8, -0.5, 0.8 / math.sqrt(2), 2 / 1.3**2
+
+    def spectral_density(self, omega):
+        raise NotImplementedError
+
+    def squared_diffusion(self, xi):
+        return 1.3**2 * (self.half_width**2 - np.asarray(xi) ** 2)
+
+    def log_density(self, xi):
+        return -0.5 * np.log(self.half_width**2 - np.asarray(xi) ** 2) - math.log(math.pi)
+
+
+def test_noise_whose_diffusion_vanishes_at_its_ends_has_chebyshev_polynomials():
+    """L_ξ T_k = −½σ²k² T_k, and ξ couples neighbours: by A/√2 the first two, by A/2 all others."""
+    noise, n = Arcsine(), np.arange(9.0)
+    axis = PolynomialAxis(noise, 9)
+    np.testing.assert_allclose(axis.mass(), np.eye(9), atol=1e-13)
+    np.testing.assert_allclose(axis.generator(), -0.5 * 1.3**2 * np.diag(n**2), atol=1e-12)
+    couplings = noise.half_width * np.append(1 / math.sqrt(2), np.full(7, 0.5))
+    np.testing.assert_allclose(axis.mass(identity), np.diag(couplings, 1) + np.diag(couplings, -1), atol=1e-13)
+    np.testing.assert_allclose(axis.samples().weight, np.exp(noise.log_density(axis.samples().xi)), rtol=1e-11)
+
+
+def test_a_length_that_changes_holds_what_is_measured_by_it():
+    """∂/∂ ln A of ∫P_s ξ³ u v at fixed ξ/A is three times it, and L_ξ does not change: σ ~ A."""
+    axis = PolynomialAxis(Arcsine(), 9)
+    by_size = NoiseDerivative(log_diffusion=1.0, log_scale=1.0)
+
+    def cubed(xi):
+        return xi**3
+
+    np.testing.assert_allclose(axis.changed(by_size, cubed), 3 * axis.mass(cubed), atol=1e-9)
+    np.testing.assert_allclose(axis.changed(by_size, None), np.zeros((9, 9)), atol=1e-12)
+    np.testing.assert_allclose(axis.changed(by_size, one), np.zeros((9, 9)), atol=1e-12)
