@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.vary import PARAMETERS
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.quantities import INDICES, MOMENT
+from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
 from fpsolve.model.kinds import parameter_of
-from fpsolve.model.quantity import SECONDS, STORED_MOMENTS, P, Quantity
+from fpsolve.model.quantity import SECONDS, STATUS, STORED_MOMENTS, P
 from fpsolve.output.tables import asked
 from fpsolve.study.results import CurveResult, Status
 
@@ -28,12 +27,6 @@ if TYPE_CHECKING:
 SET = "set"
 """The dimension of parameter sets that are no product."""
 RESULTS = "results.nc"
-_STATUS = {
-    "long_name": "what became of the parameter set",
-    "flag_values": np.array([int(each) for each in Status], dtype=np.int8),
-    "flag_meanings": " ".join(each.name.lower() for each in Status),
-    "units": "1",
-}
 
 
 def write_dataset(case: Case, results: Iterable[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
@@ -50,53 +43,34 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
     """
     import xarray as xr
 
-    columns = _Columns(case)
+    over, planned = _dimensions(case), case.planned
+    shape = tuple(len(case.vary.values(key)) for key in over) if over != (SET,) else (planned,)
+    places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.output.quantities else {}
+    moments = {name: np.full((planned, len(places)), math.nan) for name in STORED_MOMENTS if places}
+    indices = {index: np.full((3, planned), math.nan) for index in asked(case)}
+    status, seconds = np.full(planned, Status.MISSING, dtype=np.int8), np.full(planned, math.nan)
     for result in results:
-        columns.add(result)
-    found = xr.Dataset(columns.variables(), _coordinates(case), _attributes(case, facts))
-    return found.assign_attrs(complete=int(not np.any(columns.status == Status.MISSING)))
-
-
-class _Columns:
-    """Arrays over the sets of a case, filled curve by curve."""
-
-    def __init__(self, case: Case) -> None:
-        self.case, self.names = case, asked(case)
-        self.places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.output.quantities else {}
-        size = case.planned, len(self.places)
-        self.moments = {name: np.full(size, math.nan) for name in STORED_MOMENTS}
-        self.estimates = {name: np.full((3, case.planned), math.nan) for name in self.names}
-        self.status = np.full(case.planned, Status.MISSING, dtype=np.int8)
-        self.seconds = np.full(case.planned, math.nan)
-
-    def add(self, result: CurveResult) -> None:
         row, found = result.curve.number - 1, result.moments
-        if self.places:
-            at = [self.places[p] for p in found.p.tolist()]
-            for name, values in self.moments.items():
-                values[row, at] = getattr(found, name)
-        for name, values in self.estimates.items():
-            if estimate := result.estimates[name]:
-                theory = INDICES[name].theory(result.curve.problem)
-                values[:, row] = estimate.value, estimate.error_estimate, theory
-        self.status[row], self.seconds[row] = result.status, result.seconds
-
-    def variables(self) -> dict[str, tuple[tuple[str, ...], Any, Mapping[str, Any]]]:
-        """The dimensions, the values and the attributes of each, by its name."""
-        over = _dimensions(self.case)
-        shape = tuple(len(self.case.vary.values(key)) for key in over) if over != (SET,) else (self.case.planned,)
-        columns: dict[Quantity, FloatArray] = {
-            STORED_MOMENTS[name]: values for name, values in self.moments.items() if self.places
-        }
-        for name, (value, error, theory) in self.estimates.items():
-            index = INDICES[name]
-            columns |= {index: value, index.error(): error, index.perturbation: theory}
-        found: dict[str, tuple[tuple[str, ...], Any, Mapping[str, Any]]] = {
-            each.name: ((*over, *each.dims), values.reshape(shape + values.shape[1:]), each.attributes)
-            for each, values in columns.items()
-        }
-        found["status"] = over, self.status.reshape(shape), _STATUS
-        return found | {SECONDS.name: (over, self.seconds.reshape(shape), SECONDS.attributes)}
+        for name, values in moments.items():
+            values[row, [places[p] for p in found.p.tolist()]] = getattr(found, name)
+        for index, values in indices.items():
+            if numbers := result.index(index):
+                values[:, row] = [*numbers.values()]
+        status[row], seconds[row] = result.status, result.seconds
+    columns = [(STORED_MOMENTS[name], values) for name, values in moments.items()]
+    for index, three in indices.items():
+        columns += zip((index, index.error(), index.perturbation), three, strict=True)
+    columns += [(STATUS, status), (SECONDS, seconds)]
+    variables = {
+        each.name: ((*over, *each.dims), values.reshape(shape + values.shape[1:]), each.attributes)
+        for each, values in columns
+    }
+    dataset = xr.Dataset(variables, _coordinates(case), _attributes(case, facts))
+    dataset[STATUS.name].attrs |= {
+        "flag_values": np.array([int(each) for each in Status], dtype=np.int8),
+        "flag_meanings": " ".join(each.name.lower() for each in Status),
+    }
+    return dataset.assign_attrs(complete=int(not np.any(status == Status.MISSING)))
 
 
 def _dimensions(case: Case) -> tuple[str, ...]:
@@ -110,15 +84,11 @@ def _coordinates(case: Case) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key in case.vary.keys:
         values = case.vary.values(key) if over != (SET,) else case.vary.columns[key]
-        found[key] = ((key,) if over != (SET,) else over, list(values), _parameter(key))
+        about = parameter_of(key).attributes if key in PARAMETERS else {}  # a text has no unit
+        found[key] = ((key,) if over != (SET,) else over, list(values), about)
     if MOMENT.name in case.output.quantities:
         found["p"] = (("p",), case.p, P.attributes)
     return found
-
-
-def _parameter(key: str) -> dict[str, Any]:
-    """What a varied key is; a text has no unit."""
-    return parameter_of(key).attributes if key in PARAMETERS else {}
 
 
 def _attributes(case: Case, facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,13 +7,10 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from fpsolve.case.case import Case
-from fpsolve.case.sections import Value
 from fpsolve.case.vary import written
-from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import CRITICAL_RESTITUTION, INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
+from fpsolve.exponent.quantities import CRITICAL_RESTITUTION, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
+from fpsolve.model.quantity import moment_at
 from fpsolve.output.screen import Column, Grid
 from fpsolve.output.tables import asked
 from fpsolve.study.results import CurveResult, Status
@@ -25,6 +22,7 @@ MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
 """Failed curves that are named among more, p whose Λ has a column, and quantities whose extremes are shown."""
 DIGITS = 7
 BEYOND_RTOL = "beyond rtol"
+MAIN = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
 STAR = "* for the noise reduced by Eqs. (12)-(14)"
 
 
@@ -34,13 +32,13 @@ class Shown:
 
     Attributes:
         heading: of the column.
-        of: gives it, None where it is not there; of perturbation theory no extremes are sought.
+        value: gives it, None where it is not there; None for perturbation theory, of which no extremes are sought.
         text: of it, also where it is not there.
         rank: as of a `Column`.
     """
 
     heading: str
-    of: Callable[[CurveResult], float | None] | None
+    value: Callable[[CurveResult], float | None] | None
     text: Callable[[CurveResult], str]
     rank: int = 0
 
@@ -50,7 +48,9 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
 
     Of more than `MOST_ROWS` curves the extreme and the failed ones have one.
     """
-    quantities = _quantities(case, is_exact="exact" in _treatments(case))
+    key = "noise.treatment"
+    treatments = case.vary.values(key) if key in case.vary.keys else [case.noise.treatment]
+    quantities = _quantities(case, is_exact="exact" in treatments)
     is_digest = len(results) > MOST_ROWS
     chosen = _chosen(results, quantities) if is_digest else [("", result) for result in results]
     has_status = len(results) > MOST_TABLES or any(result.status for _, result in chosen)
@@ -90,12 +90,12 @@ def theory_heading(equation: str, *, is_exact: bool) -> str:
     return f"Eq. {equation}{'*' if is_exact else ''}"
 
 
-def index_text(name: str, result: CurveResult, most: int) -> str:
+def index_text(index: Index, result: CurveResult, most: int) -> str:
     """An index of a curve with its digits, or that there is none."""
-    estimate = result.estimates[name]
+    estimate = result.estimates[index.name]
     if estimate is not None:
         return digits(estimate.value, estimate.error_estimate, most)
-    return "none" if name == CRITICAL_RESTITUTION.name or grows_far_out(result.curve.problem) else "none found"
+    return "none" if index == CRITICAL_RESTITUTION or grows_far_out(result.curve.problem) else "none found"
 
 
 def digits(value: float, error: float, most: int = 13) -> str:
@@ -107,85 +107,60 @@ def digits(value: float, error: float, most: int = 13) -> str:
 
 
 def _quantities(case: Case, *, is_exact: bool) -> list[Shown]:
-    """What has a column, the most important first."""
-    first = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
-    names = asked(case)
+    """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
+    ordered = sorted(asked(case), key=lambda index: index not in MAIN)
     if case.figure.x != "p":
-        pairs = ((_index(each, 0), _theory(each, is_exact=is_exact)) for each in first if each.name in names)
+        pairs = ((_index(each, 0), _theory(each, is_exact=is_exact)) for each in ordered if each in MAIN)
         return [each for pair in pairs for each in pair]
-    ordered = [*(each for each in first if each.name in names)]
-    ordered += [INDICES[name] for name in names if INDICES[name] not in first]
-    return [*(_index(each, rank) for rank, each in enumerate(ordered)), *_moments(case, is_alone=not ordered)]
-
-
-def _treatments(case: Case) -> Sequence[Value]:
-    """Those of the noise of all curves."""
-    key = "noise.treatment"
-    return case.vary.values(key) if key in case.vary.keys else (case.noise.treatment,)
+    found = [_index(each, rank + 1 if rank > 1 else 0) for rank, each in enumerate(ordered)]
+    p = [float(each) for each in case.p if each] if MOMENT.name in case.output.quantities else []
+    if len(p) > MOST_MOMENTS:
+        p = [] if found else [p[0], p[-1]]
+    return found + [_moment(each, 2 if found else 0) for each in p]
 
 
 def _index(index: Index, rank: int) -> Shown:
-    def of(result: CurveResult) -> float | None:
-        return _value(result.estimates[index.name])
+    def value(result: CurveResult) -> float | None:
+        estimate = result.estimates[index.name]
+        return None if estimate is None else estimate.value
 
     def text(result: CurveResult) -> str:
-        is_lost = of(result) is None and result.status != Status.CONVERGED
-        return "" if is_lost else index_text(index.name, result, DIGITS)
+        is_lost = result.estimates[index.name] is None and result.status != Status.CONVERGED
+        return "" if is_lost else index_text(index, result, DIGITS)
 
-    return Shown(index.symbol, of, text, rank + 1 if rank > 1 else 0)
+    return Shown(index.symbol, value, text, rank)
 
 
 def _theory(index: Index, *, is_exact: bool) -> Shown:
     """Its closed form."""
-    return Shown(
-        theory_heading(index.closed_form, is_exact=is_exact),
-        None,
-        lambda result: f"{index.theory(result.curve.problem):.6g}",
-        rank=1,
-    )
-
-
-def _moments(case: Case, *, is_alone: bool) -> list[Shown]:
-    """Λ at the p of a case if these are few; otherwise at the ends, if nothing else is there."""
-    if MOMENT.name not in case.output.quantities:
-        return []
-    p = [float(each) for each in case.p if each]
-    if len(p) > MOST_MOMENTS:
-        p = [p[0], p[-1]] if is_alone else []
-    return [_moment(each, 0 if is_alone else 2) for each in p]
+    heading = theory_heading(index.closed_form, is_exact=is_exact)
+    return Shown(heading, None, lambda result: f"{index.theory(result.curve.problem):.6g}", rank=1)
 
 
 def _moment(p: float, rank: int) -> Shown:
-    def found(result: CurveResult) -> tuple[float, float] | None:
-        [places] = np.nonzero(result.moments.p == p)
-        moments = result.moments
-        return (float(moments.value[places[0]]), float(moments.error_estimate[places[0]])) if places.size else None
+    def numbers(result: CurveResult) -> list[tuple[float, float]]:
+        found = result.moments
+        columns = (found.p.tolist(), found.value.tolist(), found.error_estimate.tolist())
+        return [(value, error) for each, value, error in zip(*columns, strict=True) if each == p]
 
-    def of(result: CurveResult) -> float | None:
-        pair = found(result)
-        return pair and pair[0]
-
-    def text(result: CurveResult) -> str:
-        pair = found(result)
-        return "" if pair is None else digits(*pair, most=DIGITS)
-
-    return Shown(f"Λ({p:g})", of, text, rank)
-
-
-def _value(estimate: Estimate | None) -> float | None:
-    return None if estimate is None else estimate.value
+    return Shown(
+        moment_at(p).symbol,
+        lambda result: next((value for value, _ in numbers(result)), None),
+        lambda result: next((digits(*pair, most=DIGITS) for pair in numbers(result)), ""),
+        rank,
+    )
 
 
 def _chosen(results: Sequence[CurveResult], quantities: Sequence[Shown]) -> list[tuple[str, CurveResult]]:
     """The curves with the extreme values of the first quantities, and some that failed, each with the reason."""
-    shown = [(each.heading, each.of) for each in quantities if each.of is not None]
+    shown = [(each.heading, each.value) for each in quantities if each.value is not None]
     extremes: dict[tuple[str, str], tuple[float, CurveResult]] = {}
     failed: list[CurveResult] = []
     for result in results:
         if result.status and len(failed) < MOST_FAILED:
             failed.append(result)
-        for heading, of in shown[:MOST_EXTREMES]:
-            if (value := of(result)) is None:
+        for heading, value_of in shown[:MOST_EXTREMES]:
+            if (value := value_of(result)) is None:
                 continue
             for word, sign in (("least", 1), ("largest", -1)):
                 known = extremes.get((word, heading))

@@ -18,15 +18,15 @@ from fpsolve.case.curves import Curve
 from fpsolve.case.output import SENSITIVITIES
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.exponent.error import MEANINGLESS, Estimate
-from fpsolve.exponent.quantities import INDICES, MOMENT, Index
+from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
+from fpsolve.model.quantity import MOMENT, MOMENTS
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 if TYPE_CHECKING:
-    from fpsolve.simulation.response import Response
+    pass
 
-MOMENT_COLUMNS = ("p", "value", "derivative", "perturbation", "error_estimate", "residual")
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
 
@@ -37,44 +37,50 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
     Args:
         facts: on the run, see `Run.facts`.
     """
+    state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
+    start = json.dumps({**head(case), **state, **facts}, indent=1, ensure_ascii=False).removesuffix("\n}")
+    indent = 1 if case.planned <= MOST_INDENTED else None
+    indices = [column.name for each in asked(case) for column in (each, each.error())]
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
         )
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
-        by_moment.writerow([*case.vary.keys, *MOMENT_COLUMNS])
-        by_curve.writerow([*case.vary.keys, *_curve_columns(case)])
-        summary.write(_begin(case, len(results), facts))
+        by_moment.writerow([*case.vary.keys, *MOMENTS])
+        by_curve.writerow([*case.vary.keys, *indices, "p_solved", "p_failed", "status", "seconds"])
+        summary.write(f'{start},\n "curves": [')
         for number, result in enumerate(results):
             varied, rows = result.curve.varied.values(), _rows(result)
-            summary.write((",\n  " if number else "\n  ") + _text(case, _summary(case, result, rows)))
+            content = _summary(case, result, rows)
+            text = json.dumps(content, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
+            summary.write((",\n  " if number else "\n  ") + text)
             by_moment.writerows([*varied, *row.values()] for row in rows)
-            by_curve.writerow([*varied, *_curve_row(case, result)])
+            by_curve.writerow([*varied, *_row(case, result)])
         summary.write("\n ]\n}\n")
 
 
-def _begin(case: Case, done: int, facts: Mapping[str, Any]) -> str:
-    """The summary up to its curves."""
-    state = {"complete": done == case.planned, "planned": case.planned, "done": done}
-    head_text = json.dumps({**head(case), **state, **facts}, indent=1, ensure_ascii=False).removesuffix("\n}")
-    return f'{head_text},\n "curves": ['
-
-
-def _text(case: Case, curve: Mapping[str, Any]) -> str:
-    """A curve of the summary; of many each is one line."""
-    indent = 1 if case.planned <= MOST_INDENTED else None
-    return json.dumps(curve, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
-
-
-def asked(case: Case) -> list[str]:
+def asked(case: Case) -> list[Index]:
     """The indices that a case asks for."""
-    return [name for name in INDICES if name in case.output.quantities]
+    return [index for name, index in INDICES.items() if name in case.output.quantities]
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
     """monte_carlo.json of a curve, and response.csv where there is a response."""
-    suffix, response = simulated.curve.suffix, simulated.response
-    write_json(folder / f"monte_carlo{suffix}.json", {**head(case), **_simulation_summary(simulated)})
+    suffix, result, response = simulated.curve.suffix, simulated.result, simulated.response
+    content = {
+        **head(case),
+        **_parameters(simulated.curve),
+        "estimates": [asdict(estimate) for estimate in result.estimates],
+        **_with_errors(simulated.estimates),
+        **{name: getattr(result, name) for name in ("paths", "time", "step", "seed", "impacts")},
+        "response": response
+        and {
+            "means": _with_errors(response.means),
+            **{name: getattr(response, name) for name in ("impact_rate", "outside", "time")},
+        },
+        "warnings": in_case_words(simulated.warnings),
+    }
+    write_json(folder / f"monte_carlo{suffix}.json", content)
     if response is None:
         return
     edges = response.amplitude_edges
@@ -100,9 +106,10 @@ def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
 
 def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """What a case asks for of a curve; `rows` are those of its moments."""
-    found: dict[str, Any] = {name: _estimate(result, INDICES[name]) for name in asked(case)}
-    if MOMENT.name in case.output.quantities:
-        found = {"moments": rows, **found}
+    found: dict[str, Any] = {"moments": rows} if MOMENT.name in case.output.quantities else {}
+    for index in asked(case):
+        numbers = result.index(index)
+        found[index.name] = numbers and {key: _finite(value) for key, value in numbers.items()}
     if SENSITIVITIES in case.output.quantities:
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
     return {
@@ -116,36 +123,23 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
     }
 
 
-def _curve_columns(case: Case) -> list[str]:
-    estimates = [f"{name}{ending}" for name in asked(case) for ending in ("", "_error")]
-    return [*estimates, "p_solved", "p_failed", "status", "seconds"]
-
-
-def _curve_row(case: Case, result: CurveResult) -> list[Any]:
+def _row(case: Case, result: CurveResult) -> list[Any]:
     """Each index and its error, empty where there is none, and what became of the curve."""
-    estimates = [result.estimates[name] for name in asked(case)]
-    pairs = [(each.value, each.error_estimate) if each else ("", "") for each in estimates]
+    found = [result.index(each) or {"value": "", "error_estimate": ""} for each in asked(case)]
+    numbers = [each[name] for each in found for name in ("value", "error_estimate")]
     solved, wanted = result.moments.p.size, case.p.size if MOMENT.name in case.output.quantities else 0
-    numbers = [number for pair in pairs for number in pair]
     return [*numbers, solved, wanted - solved, result.status.name.lower(), round(result.seconds, 6)]
 
 
 def _rows(result: CurveResult) -> list[dict[str, float | None]]:
     """One row for each p; what is not known is None."""
-    moments = result.moments
-    columns = {name: getattr(moments, name) for name in MOMENT_COLUMNS}
-    known = {name: [None if math.isnan(x) else x for x in values.tolist()] for name, values in columns.items()}
-    return [dict(zip(known, row, strict=True)) for row in zip(*known.values(), strict=True)]
+    columns = [getattr(result.moments, name).tolist() for name in MOMENTS]
+    known = ([None if math.isnan(each) else each for each in row] for row in zip(*columns, strict=True))
+    return [dict(zip(MOMENTS, row, strict=True)) for row in known]
 
 
-def _estimate(result: CurveResult, index: Index) -> dict[str, float | None] | None:
-    """An index beside its perturbation theory, null where that overflows."""
-    estimate = result.estimates[index.name]
-    if estimate is None:
-        return None
-    theory = index.theory(result.curve.problem)
-    perturbation = theory if math.isfinite(theory) else None
-    return {"value": estimate.value, "error_estimate": estimate.error_estimate, "perturbation": perturbation}
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _sensitivities(found: Sensitivities) -> dict[str, Any]:
@@ -161,31 +155,6 @@ def _sensitivities(found: Sensitivities) -> dict[str, Any]:
 
     errors = numbers(lambda each: each.error_estimate)
     return {**numbers(lambda each: each.value), "error_estimates": errors}
-
-
-def _simulation_summary(simulated: SimulatedCurve) -> dict[str, Any]:
-    result, response = simulated.result, simulated.response
-    return {
-        **_parameters(simulated.curve),
-        "estimates": [asdict(estimate) for estimate in result.estimates],
-        **_with_errors(simulated.estimates),
-        "paths": result.paths,
-        "time": result.time,
-        "step": result.step,
-        "seed": result.seed,
-        "impacts": result.impacts,
-        "response": None if response is None else _response_summary(response),
-        "warnings": in_case_words(simulated.warnings),
-    }
-
-
-def _response_summary(response: Response) -> dict[str, Any]:
-    return {
-        "means": _with_errors(response.means),
-        "impact_rate": response.impact_rate,
-        "outside": response.outside,
-        "time": response.time,
-    }
 
 
 def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from fpsolve.case.case import Case
 from fpsolve.case.vary import written
-from fpsolve.exponent.quantities import IMPACT_RATE, INDICES, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE
+from fpsolve.exponent.quantities import IMPACT_RATE, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE
 from fpsolve.messages import Severity
 from fpsolve.output.remarks import Remarks, print_remark
 from fpsolve.output.screen import Cell, Column, Grid, Screen
@@ -220,12 +220,12 @@ def _moment_grid(case: Case, result: CurveResult) -> Grid:
 def _indices(case: Case, result: CurveResult) -> list[list[str]]:
     """λ, δ_p and Λ″(0), each with its error, and apart from them what concerns impacts; what the case asks for."""
     groups: list[list[str]] = [[]]
-    for name in asked(case):
-        estimate = result.estimates[name]
+    for index in asked(case):
+        estimate = result.estimates[index.name]
         error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
-        if name == IMPACT_RATE.name:
+        if index == IMPACT_RATE:
             groups.append([])
-        groups[-1].append(f"{INDICES[name].symbol} = {index_text(name, result, most=9)}{error}")
+        groups[-1].append(f"{index.symbol} = {index_text(index, result, most=9)}{error}")
     return groups
 
 

@@ -14,7 +14,7 @@ from fpsolve.case.sections import Expectation, Varied
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE, Index
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.quantity import MOMENT, MOMENTS, P
 
@@ -95,6 +95,13 @@ class CurveResult(Result):
     def variance_rate(self) -> Estimate | None:
         """Λ″(0)."""
         return self.estimates[VARIANCE_RATE.name]
+
+    def index(self, index: Index) -> dict[str, float] | None:
+        """The value, the error estimate and the perturbation theory of an index; None where it was not found."""
+        if not (found := self.estimates[index.name]):
+            return None
+        theory = index.theory(self.curve.problem)
+        return {"value": found.value, "error_estimate": found.error_estimate, "perturbation": theory}
 
     @property
     def status(self) -> Status:
