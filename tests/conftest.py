@@ -33,6 +33,12 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(20)
 
 
+def sampled(*cases: object, keep: int = 1) -> list[object]:
+    """Values of a parameter, or tuples of several: the first are a sample that runs always, the others are slow."""
+    rest = [case if isinstance(case, tuple) else (case,) for case in cases[keep:]]
+    return [*cases[:keep], *(pytest.param(*case, marks=pytest.mark.slow) for case in rest)]
+
+
 def heed_signals() -> None:
     """For a process that is being started: nohup and a shell's & leave signals ignored, which it would inherit."""
     for name in ("SIGHUP", "SIGINT", "SIGTERM"):

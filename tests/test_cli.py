@@ -1,13 +1,17 @@
 """The command line: exit codes, messages, and where they go."""
 
 import errno
+import io
 import json
 import os
 import re
 import signal
 import subprocess
 import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,10 +22,12 @@ from fpsolve.files import alone
 from fpsolve.model.parameters import unit_of
 from fpsolve.output.summary import digits
 from fpsolve.study import sweep
-from tests.conftest import heed_signals
-from tests.test_workflow import HOPELESS, TABLES, TEXT, files
+from tests.conftest import heed_signals, sampled
+from tests.test_workflow import HOPELESS, LEAN, TABLES, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
+BARE = ["--set", "output.eigenfunctions=[]"]
+COMMANDS = [["run", "test.toml", *BARE], ["check", "test.toml"], ["mesh", "a.vtu"], ["--help"], ["--version"]]
 
 
 @pytest.fixture
@@ -32,9 +38,18 @@ def case(tmp_path, monkeypatch):
     return str(path)
 
 
-def test_run_prints_a_table_and_writes_the_results(case, tmp_path, capsys):
-    assert main(["run", case]) == 0
-    out, err = capsys.readouterr()
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    """What a run prints and writes that is made once."""
+    folder, out, err = tmp_path_factory.mktemp("shown"), io.StringIO(), io.StringIO()
+    (folder / "test.toml").write_text(TEXT, encoding="utf-8")
+    with chdir(folder), redirect_stdout(out), redirect_stderr(err):
+        assert main(["run", "test.toml"]) == 0
+    return SimpleNamespace(out=out.getvalue(), err=err.getvalue(), folder=folder / "results/test")
+
+
+def test_run_prints_a_table_and_writes_the_results(shown):
+    out, err = shown.out, shown.err
     for text in (
         "Λ(p)",
         "Eq. (37)",
@@ -47,7 +62,7 @@ def test_run_prints_a_table_and_writes_the_results(case, tmp_path, capsys):
         assert text in out
     assert "\x1b" not in out
     assert "warning" not in err
-    assert "summary.json" in files(tmp_path / "results/test")
+    assert "summary.json" in files(shown.folder)
 
 
 def test_eigenfunctions_that_are_left_out_are_told_once_with_the_remedy(case, tmp_path, capsys):
@@ -57,9 +72,8 @@ def test_eigenfunctions_that_are_left_out_are_told_once_with_the_remedy(case, tm
     said = " ".join(capsys.readouterr().err.split())
     assert said.count("no eigenfunctions are written, as there are more than 10 curves") == 1
     assert "[output] eigenfunctions = [1.5]" in said
-    for asked in ("output.eigenfunctions=[1.5]", 'output.quantities=["moment"]'):
-        assert main(["run", case, *many, "--set", asked]) == 0
-        assert "no eigenfunctions" not in capsys.readouterr().err
+    assert main(["run", case, *many, "--set", LEAN]) == 0
+    assert "no eigenfunctions" not in capsys.readouterr().err
 
 
 def test_out_and_set(case, tmp_path, capsys):
@@ -83,9 +97,8 @@ def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
     assert drawn[1:] == ["A test"]
 
 
-def test_indices_stand_whole_in_short_lines(case, capsys):
-    assert main(["run", case]) == 0
-    lines = [line for line in capsys.readouterr().out.splitlines() if " = " in line and " ± " in line]
+def test_indices_stand_whole_in_short_lines(shown):
+    lines = [line for line in shown.out.splitlines() if " = " in line and " ± " in line]
     assert max(map(len, lines)) <= 80
     for symbols in (("λ", "δ_p"), ("Λ″(0)",), ("N", "R_c", "r_c")):  # the second and the first make no line
         found = [line for line in lines if line.startswith(f"{symbols[0]} = ")]
@@ -97,7 +110,8 @@ def test_indices_stand_whole_in_short_lines(case, capsys):
 
 @pytest.mark.parametrize(("c1", "words"), [("-0.8", "almost surely stable for every r in (0, 1]"), ("0.7", "unstable")])
 def test_why_there_is_no_critical_restitution_is_a_note(case, tmp_path, capsys, c1, words):
-    assert main(["run", case, "--set", f"oscillator.c1={c1}", "--set", "noise.D0=0.1", "--set", "vary={}"]) == 0
+    sets = [f"oscillator.c1={c1}", "noise.D0=0.1", "vary={}", "output.eigenfunctions=[]"]
+    assert main(["run", case, *(f"--set={text}" for text in sets)]) == 0
     out, err = capsys.readouterr()
     assert "r_c = none" in out
     assert f"note: test: no r_c: {words}" in err
@@ -306,7 +320,7 @@ def begin(case, prepare=heed_signals):
     return process
 
 
-@pytest.mark.parametrize("name", ["SIGHUP", "SIGTERM"])
+@pytest.mark.parametrize("name", sampled("SIGTERM", "SIGHUP"))
 def test_signals_end_a_run_as_ctrl_c_does(case, tmp_path, name):
     with begin(case) as process:
         try:
@@ -347,7 +361,7 @@ sys.exit(main(sys.argv[2:]))
 """
 
 
-@pytest.mark.parametrize("name", ["SIGHUP", "SIGTERM", "SIGINT"])
+@pytest.mark.parametrize("name", sampled("SIGTERM", "SIGHUP", "SIGINT"))
 def test_a_signal_while_vtk_is_loaded_ends_a_run_in_order(case, tmp_path, name):
     """Its compiled modules crash where a signal raises an exception in their initialisation."""
     number = getattr(signal, name)
@@ -358,6 +372,7 @@ def test_a_signal_while_vtk_is_loaded_ends_a_run_in_order(case, tmp_path, name):
     assert files(tmp_path / "results/test") == TABLES
 
 
+@pytest.mark.slow
 def test_an_ignored_signal_stays_ignored(case):
     """So that nohup works."""
     with begin(case, lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)) as process:
@@ -387,9 +402,9 @@ def command_line(arguments, unbuffered="", stderr=subprocess.PIPE, **options):
     return subprocess.run(command, env=environment, stderr=stderr, text=True, check=False, timeout=100, **options)
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize(
-    "arguments", [["run", "test.toml"], ["check", "test.toml"], ["mesh", "a.vtu"], ["--help"], ["--version"]]
+    ("arguments", "unbuffered"),
+    sampled(*product(COMMANDS, ["", "1"])),
 )
 def test_a_full_output_is_said_in_one_sentence(case, tmp_path, arguments, unbuffered):
     with Path("/dev/full").open("w", encoding="utf-8") as full:
@@ -418,8 +433,9 @@ def test_any_failure_to_write_is_said_in_one_sentence(case, capsys, monkeypatch,
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("arguments", [["check", "test.toml"], ["--help"], ["--version"]])
+@pytest.mark.parametrize(
+    ("arguments", "unbuffered"), sampled(*product([["check", "test.toml"], ["--help"], ["--version"]], ["", "1"]))
+)
 def test_a_closed_pipe_ends_a_command_quietly(case, arguments, unbuffered):
     read, write = os.pipe()
     os.close(read)
@@ -430,13 +446,16 @@ def test_a_closed_pipe_ends_a_command_quietly(case, arguments, unbuffered):
     assert (done.returncode, done.stderr) == (CLOSED_PIPE, "")
 
 
-def test_full_errors_keep_the_exit_code(case, tmp_path):
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    sampled((["run", "none.toml"], BAD_INPUT), (["run", "test.toml", *BARE], 0), (["nonsense"], BAD_INPUT)),
+)
+def test_full_errors_keep_the_exit_code(case, tmp_path, arguments, code):
     """A run goes on without them."""
-    for arguments, code in ((["run", case], 0), (["run", "none.toml"], BAD_INPUT), (["nonsense"], BAD_INPUT)):
-        with Path("/dev/full").open("w", encoding="utf-8") as full:
-            done = command_line(arguments, stderr=full, stdout=subprocess.DEVNULL)
-        assert done.returncode == code
-    assert "figure.png" in files(tmp_path / "results/test")
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        done = command_line(arguments, stderr=full, stdout=subprocess.DEVNULL)
+    assert done.returncode == code
+    assert (tmp_path / "results/test/figure.png").exists() == (code == 0)
 
 
 def test_a_lost_working_folder_exits_2(case, tmp_path):
@@ -470,14 +489,6 @@ def test_exact_noise_says_that_the_theory_is_for_the_reduced_one(case, capsys):
     out = capsys.readouterr().out
     assert "Eq. (37)*" in out
     assert "* for the noise reduced by Eqs. (12)-(14)" in out
-
-
-def test_a_terminal_without_greek_is_no_obstacle(case):
-    environment = os.environ | {"PYTHONIOENCODING": "ascii"}
-    command = [sys.executable, "-m", "fpsolve.cli", "check", case]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
 
 
 def test_impossible_meshes_exit_2(tmp_path, monkeypatch, capsys):
@@ -563,7 +574,7 @@ def test_theories_outside_their_range_are_noted(tmp_path, capsys):
 
 
 def test_json_prints_the_summary_and_nothing_else(case, tmp_path, capsys):
-    assert main(["run", case, "--json", "--set", "output.eigenfunctions=[]"]) == 0
+    assert main(["run", case, "--json", "--set", LEAN]) == 0
     out, err = capsys.readouterr()
     assert out.count("\n") == 1
     assert json.loads(out) == json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))
@@ -597,14 +608,13 @@ def test_bad_workers(case, tmp_path, capsys, command, options, message):
     assert not (tmp_path / "results").exists()
 
 
-BARE = ["--set", "output.eigenfunctions=[]"]
 LAST = re.compile(r"written: results/test \(2 curves, [\d.]+ s(; \d of 2 known from an earlier run)?\)")
 
 
 def test_the_last_line_tells_the_folder_the_time_and_what_was_known(case, capsys):
     known = []
     for arguments in ([], [], ["--fresh"]):
-        assert main(["run", case, *BARE, *arguments]) == 0
+        assert main(["run", case, "--set", LEAN, *arguments]) == 0
         last = capsys.readouterr().out.splitlines()[-1]
         known.append(LAST.fullmatch(last)[1])
     assert known == [None, "; 2 of 2 known from an earlier run", None]
@@ -641,14 +651,19 @@ def test_quiet_with_json_prints_json_alone(case, capsys):
     assert err == ""
 
 
-def test_an_output_in_ascii_has_words_for_greek(case):
-    environment = os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
-    command = [sys.executable, "-m", "fpsolve.cli", "run", case, *BARE]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    assert "lambda = 0.00108756975 +- " in done.stdout
-    assert "Lambda(p)" in done.stdout
-    assert "?" not in done.stdout
-    assert done.stdout.isascii()
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_an_output_in_ascii_has_words_for_greek(case, command, monkeypatch):
+    streams = {name: io.TextIOWrapper(io.BytesIO(), encoding="ascii") for name in ("stdout", "stderr")}
+    for name, stream in streams.items():
+        monkeypatch.setattr(sys, name, stream)
+    assert main([command, case, *BARE]) == 0
+    monkeypatch.undo()
+    out, err = (streams[name].buffer.getvalue() for name in ("stdout", "stderr"))
+    assert b"?" not in out
+    assert b"Traceback" not in err
+    if command == "run":
+        assert b"lambda = 0.00108756975 +- " in out
+        assert b"Lambda(p)" in out
 
 
 @pytest.mark.parametrize(

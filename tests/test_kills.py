@@ -72,6 +72,7 @@ def kept(folder):
     return {json.loads(line)["key"] for line in lines if line.endswith(b"\n")}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_killed_runs_leave_nothing_torn(case, tmp_path):
     for name in ("first", "whole"):  # the second does not wait for caches; signals must not come after the end

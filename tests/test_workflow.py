@@ -3,11 +3,13 @@
 import csv
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
 from contextlib import nullcontext
 from importlib.metadata import version
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -59,6 +61,18 @@ def write(folder, text, overrides=()):
     return fpsolve.load_case(path, overrides)
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The results and the folder of a case that is run once, by the name of its file, for tests that only look."""
+    folder = tmp_path_factory.mktemp("whole")
+    write(folder, TEXT)
+    return SimpleNamespace(results=fpsolve.run(str(folder / "test.toml"), folder), folder=folder / "test")
+
+
+LEAN = "output={ quantities = ['lyapunov_exponent'] }"
+"""What needs no figure is there at once."""
+
+
 def files(folder):
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
@@ -72,9 +86,9 @@ def beside_records(folder):
     return {name for name in files(folder) if not name.startswith("records/")}
 
 
-def test_summary_has_the_promised_form_and_the_computed_values(case, tmp_path):
-    results = fpsolve.run(case, tmp_path / "out")
-    summary = json.loads((tmp_path / "out" / "test" / "summary.json").read_text(encoding="utf-8"))
+def test_summary_has_the_promised_form_and_the_computed_values(whole):
+    results = whole.results
+    summary = json.loads((whole.folder / "summary.json").read_text(encoding="utf-8"))
     state = ["case", "title", "fpsolve_version", "complete", "planned", "done"]
     facts = ["versions", "command", "host", "started", "wall_seconds", "overrides", "case_text"]
     assert list(summary) == [*state, *facts, "curves"]
@@ -118,24 +132,22 @@ def test_writing_tables_makes_no_curves(case, tmp_path, monkeypatch):
     assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 0)
 
 
-def test_table_holds_every_curve_and_moment(case, tmp_path):
-    results = fpsolve.run(case, tmp_path)
-    with (tmp_path / "test" / "moments.csv").open(newline="", encoding="utf-8") as file:
+def test_table_holds_every_curve_and_moment(whole):
+    with (whole.folder / "moments.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 6
     assert list(rows[0])[:3] == ["noise.D0", "p", "value"]
-    values = np.concatenate([result.moments.value for result in results])
+    values = np.concatenate([result.moments.value for result in whole.results])
     np.testing.assert_array_equal([float(row["value"]) for row in rows], values)
 
 
-def test_all_files_are_there_and_no_temporary_ones(case, tmp_path):
-    fpsolve.run(case, tmp_path / "out")
-    names = files(tmp_path / "out" / "test")
+def test_all_files_are_there_and_no_temporary_ones(whole):
+    names = files(whole.folder)
     expected = {*TABLES, "figure.png", "figure.pdf", "density.vtu", "show.py"}
     assert expected | {"eigenfunctions.pvd", "eigenfunctions-2.pvd"} <= names
     assert not [name for name in names if name.split("/")[-1].startswith(".")]
-    assert (tmp_path / "out" / "test" / "figure.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "out" / "test" / "figure.pdf").read_bytes().startswith(b"%PDF")
+    assert (whole.folder / "figure.png").read_bytes().startswith(b"\x89PNG")
+    assert (whole.folder / "figure.pdf").read_bytes().startswith(b"%PDF")
 
 
 def without_times(folder):
@@ -150,12 +162,14 @@ def without_times(folder):
     return summary, moments, [line.rpartition(",")[0] for line in curves.splitlines()]
 
 
-def test_tables_are_the_same_twice(case, tmp_path):
-    for name in ("first", "second"):
-        fpsolve.run(case, tmp_path / name)
-    assert without_times(tmp_path / "first/test") == without_times(tmp_path / "second/test")
-    first, second = (xarray.load_dataset(tmp_path / name / "test/results.nc") for name in ("first", "second"))
+def test_tables_are_the_same_twice(case, whole, tmp_path):
+    """Of a case, and of the name of its file."""
+    assert [each.curve for each in fpsolve.run(case, tmp_path)] == [each.curve for each in whole.results]
+    assert without_times(tmp_path / "test") == without_times(whole.folder)
+    first, second = (xarray.load_dataset(folder / "results.nc") for folder in (whole.folder, tmp_path / "test"))
     assert first.drop_vars("seconds").equals(second.drop_vars("seconds"))
+    with pytest.raises(CaseError, match=r"other\.toml"):
+        fpsolve.run(tmp_path / "other.toml", tmp_path / "out")
 
 
 def test_no_eigenfunctions_where_none_are_asked_for(tmp_path):
@@ -169,14 +183,13 @@ MANY = 'vary."noise.D0"={start=0.1, stop=1.0, num=11}'
 
 def test_of_many_curves_only_the_first_density_is_written(tmp_path):
     case, calls = write(tmp_path, TEXT.replace("eigenfunctions = [2.0]", ""), [MANY]), []
-    for count in (11, 22):
-        fpsolve.run(case, tmp_path / "out", progress=lambda: calls.append(1))
-        assert len(calls) == count
-        assert {name for name in files(tmp_path / "out/test") if "vt" in name or "pv" in name} == {"density.vtu"}
+    fpsolve.run(case, tmp_path / "out", progress=lambda: calls.append(1))
+    assert len(calls) == 11
+    assert {name for name in files(tmp_path / "out/test") if "vt" in name or "pv" in name} == {"density.vtu"}
 
 
 def test_without_vary_there_is_one_curve(tmp_path):
-    case = write(tmp_path, TEXT.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', ""))
+    case = write(tmp_path, TEXT.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', ""), [LEAN])
     (result,) = fpsolve.run(case, tmp_path / "out")
     summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
     assert summary["curves"][0]["varied"] == {}
@@ -185,6 +198,7 @@ def test_without_vary_there_is_one_curve(tmp_path):
 
 def test_missing_stability_index_is_null_and_said(tmp_path):
     overrides = ["oscillator.omega=10.0", "oscillator.c1=-1.0", "oscillator.restitution=0.5"]
+    overrides += ["output={ quantities = ['stability_index'] }"]
     case = write(tmp_path, TEXT, overrides)
     fpsolve.run(case, tmp_path / "out")
     curve = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"][0]
@@ -338,31 +352,22 @@ def test_tables_are_whole_where_an_interruption_comes_as_they_are_written(case, 
     assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
 
 
-def test_a_run_takes_the_name_of_a_case_file(case, tmp_path):
-    by_name = fpsolve.run(str(tmp_path / "test.toml"), tmp_path / "named")
-    assert [each.curve for each in by_name] == [each.curve for each in fpsolve.run(case, tmp_path / "out")]
-    assert without_times(tmp_path / "named/test") == without_times(tmp_path / "out/test")
-    with pytest.raises(CaseError, match=r"other\.toml"):
-        fpsolve.run(tmp_path / "other.toml", tmp_path / "out")
-
-
-def test_a_run_goes_on_where_it_was_interrupted(case, tmp_path, monkeypatch):
+def test_a_run_goes_on_where_it_was_interrupted(case, whole, tmp_path, monkeypatch):
     """With the numbers of a run that nobody interrupts; files but records are made anew."""
-    fpsolve.run(case, tmp_path / "whole")
     interrupt_curve(monkeypatch, 2)
     with pytest.raises(KeyboardInterrupt):
         fpsolve.run(case, tmp_path / "out")
     interrupt_curve(monkeypatch, 1)  # which is not solved again
     fpsolve.run(case, tmp_path / "out")
     folder = tmp_path / "out/test"
-    assert without_times(folder) == without_times(tmp_path / "whole/test")
-    assert beside_records(folder) == beside_records(tmp_path / "whole/test")
+    assert without_times(folder) == without_times(whole.folder)
+    assert beside_records(folder) == beside_records(whole.folder)
     for name in beside_records(folder):
         (folder / name).unlink()
     interrupt_curve(monkeypatch, 0)
     fpsolve.run(case, tmp_path / "out")
-    assert without_times(folder) == without_times(tmp_path / "whole/test")
-    assert beside_records(folder) == beside_records(tmp_path / "whole/test")
+    assert without_times(folder) == without_times(whole.folder)
+    assert beside_records(folder) == beside_records(whole.folder)
     interrupt_curve(monkeypatch, 1)
     with pytest.raises(KeyboardInterrupt, match=r"^interrupted after 0 of 2 curves; run it again to go on$"):
         fpsolve.run(case, tmp_path / "out", fresh=True)
@@ -377,10 +382,11 @@ SIMULATED = {"monte_carlo.json", "monte_carlo-2.json", "response.vti", "response
     ("exception", "raised", "left"),
     [(KeyboardInterrupt, KeyboardInterrupt, TABLES), (OSError, OutputError, TABLES - {"results.nc"})],
 )
-def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(case, tmp_path, monkeypatch, exception, raised, left):
+def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(
+    case, whole, tmp_path, monkeypatch, exception, raised, left
+):
     """It begins anew and ends in the first curve: there are tables that say so, and the files of others."""
-    fpsolve.run(case, tmp_path)
-    folder = tmp_path / "test"
+    folder = shutil.copytree(whole.folder, tmp_path / "test")
     others = {"monte_carlo.txt", "response-a.vti", "eigenfunctions.png", "figure.svg", "notes/summary.json"}
     (folder / "notes").mkdir()
     for name in others | SIMULATED:
@@ -407,7 +413,8 @@ def test_a_run_with_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(
 def test_a_run_and_a_simulation_of_the_same_parameters_stay_together(case, tmp_path):
     """Each keeps what the other wrote, unless that is of parameters that the case does not have; records stay."""
     folder = tmp_path / "test"
-    first, second = fpsolve.load_case(case.path), fpsolve.load_case(case.path, ["oscillator.omega=2.0"])
+    first = fpsolve.load_case(case.path, [LEAN])
+    second = fpsolve.load_case(case.path, [LEAN, "oscillator.omega=2.0"])
     fpsolve.run(first, tmp_path)
     solved = files(folder)
     parameters = dict(next(first.curves(1)).parameters)
@@ -442,8 +449,8 @@ def test_a_value_that_vary_would_replace_is_refused(tmp_path):
         write(tmp_path, TEXT, ["noise.D0=7"])
 
 
-def test_a_second_run_leaves_no_eigenfunctions_of_the_first(tmp_path):
-    fpsolve.run(write(tmp_path, TEXT), tmp_path / "out")
+def test_a_second_run_leaves_no_eigenfunctions_of_the_first(whole, tmp_path):
+    shutil.copytree(whole.folder, tmp_path / "out/test")
     fpsolve.run(write(tmp_path, TEXT, ["vary={}", "output.eigenfunctions=[-1.0]"]), tmp_path / "out")
     names = {name for name in files(tmp_path / "out/test") if name.startswith("eigenfunctions")}
     assert names == {"eigenfunctions.pvd", "eigenfunctions/p-1.0.vtu"}
@@ -477,7 +484,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 @pytest.mark.parametrize("start", [fpsolve.run, simulate_case])
 def test_what_a_killed_run_left_unfinished_is_removed(tmp_path, start):
     """Of the user's files none is, nor one that a run in a folder below is writing."""
-    case = write(tmp_path, TEXT, ["monte_carlo={ paths = 64, time = 40.0 }"])
+    case = write(tmp_path, TEXT, [LEAN, "monte_carlo={ paths = 64, time = 40.0 }"])
     folder = tmp_path / "test"
     ours = [str(folder / name) for name in ("summary.json", "eigenfunctions-2/p+2.0.vtu", "lower/summary.json")]
     killed = subprocess.run([sys.executable, "-c", KILLED, *ours], check=False)
@@ -557,23 +564,17 @@ def test_a_folder_that_another_run_writes_into_is_refused(case, tmp_path, start)
     assert files(tmp_path / "test") == {"summary.json", "monte_carlo.json"}
 
 
-@pytest.mark.parametrize(("overrides", "count"), [([], 2), (["vary={}"], 3)])
-def test_progress_is_called_once_for_each_set_or_for_each_p_of_one(tmp_path, overrides, count):
-    calls = []
-    for _ in range(2):  # also of what is known
-        fpsolve.run(
-            write(tmp_path, TEXT, [*overrides, "output.eigenfunctions=[]"]),
-            tmp_path / "out",
-            progress=lambda: calls.append(1),
-        )
-    assert len(calls) == 2 * count
-
-
 @pytest.mark.parametrize(
-    "sets", [[], ["vary={}"], ["output.eigenfunctions=[]"], ["vary={}", "output.eigenfunctions=[]"]]
+    "sets",
+    [
+        pytest.param([], marks=pytest.mark.slow),
+        ["vary={}"],
+        [LEAN],
+        pytest.param(["vary={}", "output.eigenfunctions=[]"], marks=pytest.mark.slow),
+    ],
 )
-def test_progress_counts_what_is_known(tmp_path, sets):
-    """Also of a single curve whose eigenfunctions are drawn again."""
+def test_progress_is_called_once_for_each_set_or_for_each_p_of_one(tmp_path, sets):
+    """Also of what is known, and of a single curve whose eigenfunctions are drawn again."""
     case = write(tmp_path, TEXT, sets)
     for _ in range(2):
         calls = []
@@ -637,9 +638,9 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
     assert min(pair.sign_defects) < 1e-4
 
 
-def test_no_cells_are_asked_for_without_a_mesh(case, tmp_path, monkeypatch):
+def test_no_cells_are_asked_for_without_a_mesh(tmp_path, monkeypatch):
     monkeypatch.setattr("fpsolve.analysis.density.MOST_NEGATIVE", -1.0)
-    for result in fpsolve.run(case, tmp_path):
+    for result in fpsolve.run(write(tmp_path, TEXT, ["vary={}"]), tmp_path):
         assert result.warnings[-1].endswith("0% of it is negative; use a smaller rtol")
 
 

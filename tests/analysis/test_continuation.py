@@ -12,6 +12,7 @@ from fpsolve.analysis.curve import TOLERANCE, Sample
 from fpsolve.analysis.scan import FINE, rows_of, scan_row, scanned
 from fpsolve.analysis.special_points import crossings, with_folds, with_points, with_values
 from fpsolve.errors import NotConverged
+from tests.conftest import sampled
 
 NODES = 13
 NAMES = ("x", "y")
@@ -122,7 +123,7 @@ def test_a_circle_that_leaves_the_frame():
     assert branch.at[[0, -1], 0] == pytest.approx([1, 1], abs=0)
 
 
-@pytest.mark.parametrize("beyond", [-1e-3, -1e-6, -1e-9, 0.0, 1e-9, 1e-6, 1e-3])
+@pytest.mark.parametrize("beyond", sampled(1e-9, 0.0, -1e-3, -1e-6, -1e-9, 1e-6, 1e-3, keep=2))
 def test_a_circle_that_about_touches_the_frame(beyond):
     """It is whole, but for what is outside."""
     of = circle(0.5, 0.5, 0.5 + beyond)
@@ -318,7 +319,7 @@ def test_a_cusp_does_not_hang():
     assert sum(map(length, branches)) == pytest.approx(expected, abs=0.01)
 
 
-@pytest.mark.parametrize("longest", [LONGEST, 0.1])
+@pytest.mark.parametrize("longest", sampled(0.1, LONGEST))
 def test_steps_do_not_jump_to_a_neighbour(longest):
     """sin(12 π u) = 0.1 v has 12 lines, closer than the longest step."""
     number, w = 12, 12 * math.pi
@@ -343,6 +344,7 @@ def test_two_close_lines_are_both_found(gap, longest):
     assert sorted(round(length(branch), 4) for branch in branches) == pytest.approx([1, 1], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_nested_circles():
     radii = np.array([0.05, 0.1, 0.12, 0.3, 0.32, 0.45])
 
@@ -515,6 +517,7 @@ def test_many_crossings_are_in_order():
     check(with_points(a, new), wave)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.floats(-1, 1), min_size=10, max_size=10))
 def test_random_cubics(coefficients):

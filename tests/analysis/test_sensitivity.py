@@ -10,6 +10,7 @@ from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.plane import Drive
 from fpsolve.model.systems.vibro_impact import DAMPING
+from tests.conftest import sampled
 from tests.oracles import moment_hierarchy, phase_fraction
 
 RTOL = 1e-11
@@ -53,7 +54,7 @@ def central(theta, key, value_at, step=STEP):
     return (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h)
 
 
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize("seed", sampled(*range(1, 51), keep=8))
 def test_of_a_moment_are_central_differences(seed):
     theta, law, is_exact, p = drawn(seed)
     problem, _ = problem_of(theta, law, is_exact)
@@ -69,7 +70,7 @@ def test_of_a_moment_are_central_differences(seed):
         assert estimate.error_estimate < 1e-6 * max(size, estimate.scale), key
 
 
-@pytest.mark.parametrize("seed", [52, 53, 54, 56, 57, 58])
+@pytest.mark.parametrize("seed", sampled(53, 54, 52, 56, 57, 58, keep=2))
 def test_of_the_indices_are_central_differences(seed):
     theta, law, is_exact, _ = drawn(seed)
     problem, _ = problem_of(theta, law, is_exact)
@@ -155,6 +156,7 @@ def test_against_the_moment_hierarchy():
             assert estimate.value == pytest.approx(central(theta, name, known, 1e-3), rel=1e-8), key
 
 
+@pytest.mark.slow
 def test_heavy_tails_too():
     theta = dict(zip(drawn(0)[0], (1.2, 0.8, 0.1, 0.7, 0.6, 0.8, 1.1), strict=True))
     [found] = sensitivities(problem_of(theta, "delta", True)[0], -0.5).moments

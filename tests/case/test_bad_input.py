@@ -145,7 +145,7 @@ WIDE = between(1e-15, 1e15)
 SIMULATED = ("monte_carlo.p", "monte_carlo.time", "monte_carlo.step")
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     numbers=st.fixed_dictionaries(
         {"omega": WIDE, "D0": WIDE, "tau0": WIDE, "epsilon": between(1e-12, 1e6), "c1": either_sign(5e-324, 1e15)}
@@ -374,7 +374,7 @@ TRIES = [
     *('{ start = 1, stop = 2, num = 3, scale = "log" }', '["exact"]', '["moment", "moment"]'),
     *("{ noise.D0 = [2] }", "[1e308, -1e308]", '"noise.D0"', '"lyapunov_exponent"', "07:32:00"),
 ]
-FUZZ = settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @FUZZ

@@ -163,6 +163,7 @@ def test_wide_cells_of_algebraic_tails_can_be_extended():
     assert abs(result.value[0] - finer.value[0]) <= 3 * result.error_estimate[0]
 
 
+@pytest.mark.slow
 def test_algebraic_tails_are_followed():
     """r₀ = 1.1: the truncation at 4 to 12 noise units that hides Λ(1) = ∞ settles for p = −0.9."""
     noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1)

@@ -18,6 +18,7 @@ from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.plane import Drive, Kick
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
+from tests.conftest import sampled
 from tests.oracles import two_way_rays
 
 ROTATION, STIFFNESS = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))
@@ -71,10 +72,10 @@ def test_the_order_of_convergence():
 
 @pytest.mark.parametrize(
     ("stiffness", "kicks", "noise", "size"),
-    [
+    sampled(
         (STIFFNESS, [(0.4, math.log(0.8))], NOISE, (60, 120)),
         (((0.1, 0.3), (-1.2, 0.2)), [(1.1, -0.3), (2.7, 0.2)], OrnsteinUhlenbeck(alpha=1.5, sigma=1.1), (70, 140)),
-    ],
+    ),
 )
 def test_the_exponent_of_a_density_that_is_smooth(stiffness, kicks, noise, size):
     drives = [FREE, Drive(1, stiffness, identity)]
@@ -91,7 +92,7 @@ def test_the_exponent_of_a_density_that_is_smooth(stiffness, kicks, noise, size)
         assert abs(found.value - expected) <= found.error_estimate + 1e-10
 
 
-@pytest.mark.parametrize("distance", [1e-14, 1e-5, 1e-3])
+@pytest.mark.parametrize("distance", sampled(1e-5, 1e-14, 1e-3))
 def test_corners_that_are_close(distance):
     """At φ₀ and π − φ₀ the phase turns for the same noise: lines of ξ would be too close for numbers."""
     kicks = [(0.4, -0.2), (math.pi - 0.4 + distance, 0.15)]
@@ -103,7 +104,7 @@ def test_corners_that_are_close(distance):
     assert abs(found.value - expected) <= found.error_estimate < 1e-7
 
 
-@pytest.mark.parametrize("p", [1.0, 2.0])
+@pytest.mark.parametrize("p", sampled(1.0, 2.0))
 def test_moments_by_finite_volumes(p):
     """Of the first order: what is left is about as much as half the cells have brought."""
     near = ExponentSolver(PROBLEM, rtol=1e-6).solution(p)
@@ -123,14 +124,14 @@ def test_moments_by_finite_volumes(p):
     assert abs(fine - near.pair.value) < 1.2 * abs(fine - coarse) < 1e-3
 
 
-@pytest.mark.parametrize("p", [1.0, -1.0])
+@pytest.mark.parametrize("p", sampled(1.0, -1.0))
 def test_the_error_is_within_its_estimate(p):
     for rtol in (1e-4, 1e-5):
         found = ExponentSolver(PROBLEM, rtol=rtol).solution(p)
         assert abs(found.pair.value - best(p).pair.value) <= found.error + best(p).error
 
 
-@pytest.mark.parametrize("noise", [NonGaussianNoise(D0=1.0, tau0=1.0, r0=r0) for r0 in (0.7, 0.95, 1.1)])
+@pytest.mark.parametrize("noise", sampled(*(NonGaussianNoise(D0=1.0, tau0=1.0, r0=r0) for r0 in (0.7, 0.95, 1.1))))
 def test_other_noise_has_corners_too(noise):
     """A system stretched by an unstretched one: λ is affine in ln R, and for p = 0 nothing else is singular."""
     values = []
@@ -143,7 +144,7 @@ def test_other_noise_has_corners_too(noise):
     assert low / 3 + 2 * high / 3 == pytest.approx(free, abs=e1 / 3 + 2 * e2 / 3 + e3)
 
 
-@pytest.mark.parametrize("excess", [1e-6, 0.003, 0.03])
+@pytest.mark.parametrize("excess", sampled(0.03, 1e-6, 0.003, keep=2))
 def test_corners_near_the_end_of_the_noise(excess):
     """There P_s ~ (distance to the end)^(1/6) is singular, and the phase runs backward only beyond the corner."""
     noise = NonGaussianNoise(D0=1.0, tau0=1.0, r0=-5.0)
@@ -154,7 +155,7 @@ def test_corners_near_the_end_of_the_noise(excess):
     assert abs(rough.pair.value - fine.pair.value) <= rough.error + fine.error
 
 
-@pytest.mark.parametrize("phase", [0.0, -1e-12, math.pi, 3 * math.pi / 4 - 2 * math.pi])
+@pytest.mark.parametrize("phase", sampled(-1e-12, 0.0, math.pi, 3 * math.pi / 4 - 2 * math.pi))
 def test_cells_are_never_thin_by_rounding(phase):
     problem = Problem(replace(SYSTEM, kicks=[Kick(phase, math.log(0.8))]), NOISE)
     chosen = ExponentSolver(problem, rtol=1e-6).solution(1.0).pair.generator.chosen
@@ -162,6 +163,7 @@ def test_cells_are_never_thin_by_rounding(phase):
     assert np.diff(chosen.phase.lines).min() > 1e-6
 
 
+@pytest.mark.slow
 def test_a_mesh_of_ones_own():
     """The error is larger than what a higher degree changes."""
     problem = Problem(replace(SYSTEM, kicks=[Kick(3 * math.pi / 4, math.log(0.8))]), NOISE)
@@ -171,7 +173,7 @@ def test_a_mesh_of_ones_own():
     assert abs(found.pair.value - best.pair.value) <= found.error + best.error < 1e-5
 
 
-@pytest.mark.parametrize("p", [1.0, -1.0])
+@pytest.mark.parametrize("p", sampled(1.0, -1.0))
 def test_the_power_at_a_corner(p):
     """T ~ |ξ − ξ₀|^s at the ray, s = ½ − (3/π) arcsin(R^p/2): H. P. McKean, J. Math. Kyoto Univ. 2, 1963."""
     pair = best(p).pair
@@ -184,6 +186,7 @@ def test_the_power_at_a_corner(p):
     assert np.mean(slopes) == pytest.approx(0.5 - 3 / math.pi * math.asin(0.8**p / 2), abs=3e-3)
 
 
+@pytest.mark.slow
 def test_sensitivities():
     """∂Λ/∂ε is that of a difference, though the corner moves with ε."""
     [found] = sensitivities(PROBLEM, 1.0, rtol=1e-5).moments

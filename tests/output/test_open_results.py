@@ -1,5 +1,7 @@
 """Results of several runs as one dataset."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -15,18 +17,19 @@ quantities = ["moment"]
 """
 
 
-@pytest.fixture
-def place(tmp_path):
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
     """Runs over different keys, one of them without moments."""
+    folder = tmp_path_factory.mktemp("results")
     for name, texts in {
         "single": (),
         "frequencies": ("vary={'oscillator.omega' = [1.0, 2.0]}", "moments.p=[1.0]"),
         "noises": ("vary={'noise.treatment' = ['exact', 'ou-reduction']}", "output.quantities=['lyapunov_exponent']"),
     }.items():
-        path = tmp_path / f"{name}.toml"
+        path = folder / f"{name}.toml"
         path.write_text(CASE, encoding="utf-8")
-        run(load_case(path, texts), tmp_path)
-    return tmp_path
+        run(load_case(path, texts), folder)
+    return folder
 
 
 def test_runs_over_different_keys_are_one_dataset(place):
@@ -52,9 +55,9 @@ def test_where_there_are_no_results(place):
 
 
 @pytest.mark.parametrize("damage", ["short", "changed"])
-def test_damaged_results_are_named(place, damage):
-    path = place / "single" / "results.nc"
+def test_damaged_results_are_named(place, tmp_path, damage):
+    path = shutil.copytree(place / "single", tmp_path / "single") / "results.nc"
     content = path.read_bytes()
     path.write_bytes(content[:3000] if damage == "short" else b"????".join(content.rsplit(b"OHDR", 1)))
     with pytest.raises(FpsolveError, match=r"single.results\.nc cannot be read: .*; run its case again"):
-        open_results(place / "single")
+        open_results(tmp_path / "single")

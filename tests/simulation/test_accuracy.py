@@ -12,6 +12,7 @@ from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 from tests.simulation.problems import REDUCED, STRONG, exact
 
 
+@pytest.mark.slow
 def test_population_succeeds_where_the_direct_estimator_fails():
     """Λ(4) at ε = 1 to 1 %, by as many paths."""
     reference = exact(STRONG, REDUCED, [4.0])[0]
@@ -24,6 +25,7 @@ def test_population_succeeds_where_the_direct_estimator_fails():
     assert population.estimates[0].standard_error < 2e-3 * reference
 
 
+@pytest.mark.slow
 def test_three_digits_in_seconds():
     """At the default size a moment of strong noise is good to 1e-3."""
     reference = exact(STRONG, REDUCED, [1.0])[0]
@@ -43,6 +45,7 @@ def biases(monkeypatch, oscillator, noise, p, steps, paths, time=None):
     return [(estimate.value / reference - 1, estimate.standard_error / abs(reference)) for estimate in found]
 
 
+@pytest.mark.slow
 def test_weak_order_of_the_exact_noise(monkeypatch):
     """Halving the step divides the bias by 4; the steps are eight and four times the largest that is allowed."""
     noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.9)
@@ -52,6 +55,7 @@ def test_weak_order_of_the_exact_noise(monkeypatch):
     assert coarse / fine == pytest.approx(4, abs=0.3 + 4 * (coarse / fine) * fine_error / fine)
 
 
+@pytest.mark.slow
 def test_weak_order_of_ornstein_uhlenbeck_noise(monkeypatch):
     """The step is more than second order: from αh = 1.2 to 0.6 the bias falls by more than 4."""
     (coarse, error), (fine, fine_error) = biases(monkeypatch, STRONG, UNIT_NOISE, 1.0, (1.2, 0.6), 8192)
@@ -59,6 +63,7 @@ def test_weak_order_of_ornstein_uhlenbeck_noise(monkeypatch):
     assert abs(fine) < abs(coarse) / 4 + 3 * fine_error
 
 
+@pytest.mark.slow
 def test_gap_between_the_reduced_and_the_real_noise():
     """Fig. 1, D₀ = 1, r₀ = 0.95: the reduction (12)-(14) makes Λ(2) larger, by far more than 5 standard errors."""
     found = [

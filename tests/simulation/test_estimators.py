@@ -17,25 +17,26 @@ from fpsolve.simulation import batches, estimators
 from fpsolve.simulation.estimators import simulate
 from fpsolve.simulation.setup import largest_step, transient
 from tests.agreement import cheap_step
-from tests.conftest import FIG1, UNIT_NOISE
+from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.simulation.problems import MODERATE, NOISE, REDUCED, STRONG, exact
 
 
-def test_algebraic_tails():
+@pytest.mark.parametrize("estimator", sampled("direct", "population"))
+def test_algebraic_tails(estimator):
     noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1)
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=0.5)
     reference = exact(oscillator, noise, [-0.4])[0]
-    for estimator in ("direct", "population"):
-        step = cheap_step(oscillator, noise)
-        found = simulate(oscillator, noise, [-0.9, -0.4], estimator=estimator, paths=8192, step=step, seed=6)
-        assert found.estimates[0].value is None
-        assert any("no estimate of Λ(p) at p = -0.9: ‖x‖^p has no variance" in text for text in found.warnings)
-        assert found.estimates[1].value == pytest.approx(reference, abs=4 * found.estimates[1].standard_error)
-        assert found.estimates[1].standard_error < 1.5e-4
+    step = cheap_step(oscillator, noise)
+    found = simulate(oscillator, noise, [-0.9, -0.4], estimator=estimator, paths=8192, step=step, seed=6)
+    assert found.estimates[0].value is None
+    assert any("no estimate of Λ(p) at p = -0.9: ‖x‖^p has no variance" in text for text in found.warnings)
+    assert found.estimates[1].value == pytest.approx(reference, abs=4 * found.estimates[1].standard_error)
+    assert found.estimates[1].standard_error < 1.5e-4
     with pytest.raises(NoSuchExponent, match="infinite"):
         simulate(oscillator, noise, [1.0])
 
 
+@pytest.mark.slow
 def test_slow_noise_carries_a_moment_in_two_places():
     """Λ(2) = 1.129 where the oscillator does not turn, 0.496 where it does: no population passes between them."""
     noise = NonGaussianNoise(D0=0.5, tau0=20.0, r0=1.0)
@@ -46,13 +47,15 @@ def test_slow_noise_carries_a_moment_in_two_places():
     assert any("start in two places differ by 0.6" in text for text in found.warnings)
 
 
-def test_variance_rate():
+@pytest.mark.parametrize("paths", sampled(2048, 8192))
+def test_variance_rate(paths):
     """Λ″(0) from the variance of ln‖x‖."""
-    found = simulate(MODERATE, REDUCED, [], paths=8192, seed=2)
+    found = simulate(MODERATE, REDUCED, [], paths=paths, seed=2)
     reference = ExponentSolver(Problem(MODERATE, REDUCED)).variance_rate().value
     assert found.variance_rate == pytest.approx(reference, abs=4 * found.variance_rate_error + 0.02 * reference)
 
 
+@pytest.mark.slow
 def test_identity_without_impact():
     """Λ(−2) = −ε²c₁ + ε²σ²/(2α²) for Ornstein-Uhlenbeck noise and r = 1."""
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.2, epsilon=0.7)
@@ -88,6 +91,7 @@ def test_one_run_serves_all_orders():
     assert alone.lyapunov_exponent == together.lyapunov_exponent
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_time():
     def peak(time):
         tracemalloc.start()
@@ -100,7 +104,7 @@ def test_memory_does_not_grow_with_time():
     assert peak(800.0) < 1.3 * peak(100.0)
 
 
-@pytest.mark.parametrize("estimator", ["direct", "population"])
+@pytest.mark.parametrize("estimator", sampled("direct", "population"))
 def test_an_interrupt_keeps_what_is_done(estimator):
     calls = []
 

@@ -313,6 +313,7 @@ def wait_for(path):
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_a_real_interrupt(case, out):
     """SIGINT in the middle of a long slice ends the process soon, with the exit code 130 and no file or a whole one."""
     command = [sys.executable, "-m", "fpsolve.cli", "simulate", str(case), "--out", str(out), "--paths", "64"]

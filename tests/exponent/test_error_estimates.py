@@ -1,0 +1,41 @@
+"""Error estimates are neither larger nor smaller than they were: half of one, or twice it, is told."""
+
+import pytest
+
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.mesh import make_mesh
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.problem import Problem
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from tests.conftest import UNIT_NOISE
+
+OSCILLATOR = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.8)
+GAUSSIAN = Problem(OSCILLATOR, UNIT_NOISE)
+BOUNDED = Problem(OSCILLATOR, NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9))
+COARSE = make_mesh(phi_cells=2, phi_degree=5, xi_cells=4, xi_degree=4, xi_min=-5, xi_max=5)
+
+
+@pytest.mark.parametrize(
+    ("problem", "p", "chosen", "of_mesh", "by_modes"),
+    [
+        (GAUSSIAN, -1.0, 9.650e-6, 3.793e-6, 6.461e-5),
+        (GAUSSIAN, 2.0, 3.951e-5, 1.102e-3, 1.026e-2),
+        (BOUNDED, -1.0, 2.705e-6, 6.215e-6, 2.508e-5),
+        (BOUNDED, 2.0, 1.529e-5, 7.826e-6, 7.807e-4),
+    ],
+)
+def test_of_moments(problem, p, chosen, of_mesh, by_modes):
+    """Of a discretisation that is chosen, by its highest modes; of a given mesh, by a finer one."""
+    assert ExponentSolver(problem, rtol=1e-3).solution(p).error == pytest.approx(chosen, rel=0.2)
+    given = ExponentSolver(problem, COARSE).solution(p)
+    assert given.error == pytest.approx(of_mesh, rel=0.2)
+    assert given.error_by_modes == pytest.approx(by_modes, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("problem", "exponent", "variance"), [(GAUSSIAN, 1.123e-6, 1.738e-7), (BOUNDED, 5.172e-6, 1.755e-7)]
+)
+def test_of_indices(problem, exponent, variance):
+    solver = ExponentSolver(problem, rtol=1e-4)
+    assert solver.lyapunov_exponent().error_estimate == pytest.approx(exponent, rel=0.2)
+    assert solver.variance_rate().error_estimate == pytest.approx(variance, rel=0.2)
