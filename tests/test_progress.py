@@ -6,7 +6,7 @@ import re
 import pytest
 from rich.console import Console
 
-from fpsolve.workflow.progress import MOMENTS, PERCENT, POINTS, SETS, SILENT, Bars, Phase, State
+from fpsolve.workflow.progress import MOMENTS, PERCENT, POINTS, SETS, SILENT, Bars, Phase, counted, seconds_left
 
 SOLVING = Phase("case", "solving", 400, SETS)
 
@@ -31,13 +31,15 @@ def console(width=80, **options):
 
 
 def test_the_time_to_go_follows_from_the_sets_of_this_run_alone(clock):
-    state = State(SOLVING, clock)
-    state.advance(300, known=True)
-    clock.now += 60.0
-    assert state.left is None
-    state.advance(20)
-    assert state.left == pytest.approx(80 * 60.0 / 20)
-    assert state.count == "320 of 400 sets"
+    bars = Bars(console(), clock)
+    with bars.bar(SOLVING) as advance:
+        [task] = bars._display.tasks
+        advance(300, known=True)
+        clock.now += 60.0
+        assert seconds_left(task) is None
+        advance(20)
+        assert seconds_left(task) == pytest.approx(80 * 60.0 / 20)
+        assert counted(task) == "320 of 400 sets"
 
 
 @pytest.mark.parametrize(
@@ -51,12 +53,15 @@ def test_the_time_to_go_follows_from_the_sets_of_this_run_alone(clock):
     ],
 )
 def test_what_is_counted(phase, done, failed, told, clock):
-    state = State(phase, clock)
-    state.advance(done, failed=failed)
-    clock.now += 10.0
-    assert state.count == told
-    if phase.total is None:
-        assert state.left is None
+    bars = Bars(console(), clock)
+    with bars.bar(phase) as advance:
+        [task] = bars._display.tasks
+        if done:
+            advance(done, failed=failed)
+        clock.now += 10.0
+        assert counted(task) == told
+        if phase.total is None:
+            assert seconds_left(task) is None
 
 
 def test_a_file_gets_a_line_each_tenth_of_a_long_phase(clock):

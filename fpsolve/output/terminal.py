@@ -33,7 +33,7 @@ SUMMARY, MONTE_CARLO = "summary.json", "monte_carlo*.json"
 
 
 def print_results(case: Case, results: Sequence[CurveResult]) -> None:
-    """Λ(p), or λ and δ_p over a parameter, beside perturbation theory."""
+    """Print Λ(p), or λ and δ_p over a parameter, beside perturbation theory, and the remarks."""
     screen = Screen.of()
     if len(results) > MOST_TABLES or case.figure.x != "p":
         screen.show(curve_grid(case, results))
@@ -53,7 +53,7 @@ def print_warnings(case: Case, results: Sequence[CurveResult], file: str = SUMMA
     """What limits the numbers of the curves, why some are missing, and which theory is not valid.
 
     Args:
-        file: that holds all of it; none where nothing is written.
+        file: that holds all of it; empty where nothing is written.
     """
     _tell(Remarks(case, file), results)
 
@@ -107,7 +107,7 @@ def duration(seconds: float) -> str:
 
 
 def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> None:
-    """Λ(p) and λ by simulation, with the finite elements beside them where these have been solved."""
+    """Print Λ(p) and λ by simulation, beside the finite elements where these have solved them, and the remarks."""
     screen = Screen.of()
     is_short = len(simulated) <= MOST_TABLES
     solved = {result.curve.key: result for result in results}
@@ -116,7 +116,13 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
         for each, result in pairs:
             screen.show(_simulation_grid(case, each, result))
             found = each.result
-            screen.packed(_simulated_indices(each, result))
+            value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
+            exponent = f"{LYAPUNOV_EXPONENT.symbol} = {_with_error(value, error)}"
+            if result and result.lyapunov_exponent:
+                exact = result.lyapunov_exponent.value
+                exponent += f" (finite elements {exact:.6g}, {_deviation(value, error, exact)} s.e. away)"
+            variance = f"{VARIANCE_RATE.symbol} = {_with_error(found.variance_rate, found.variance_rate_error)}"
+            screen.packed([exponent, variance])
             screen.say(f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}")
             screen.lines([""])
     else:
@@ -129,17 +135,6 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
             screen.packed([f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items()], "  ")
             screen.lines([""])
     _tell(Remarks(case, MONTE_CARLO), simulated)
-
-
-def _simulated_indices(simulated: SimulatedCurve, result: CurveResult | None) -> list[str]:
-    """λ, with the value by finite elements where it is known, and Λ″(0)."""
-    found = simulated.result
-    value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
-    text = f"{LYAPUNOV_EXPONENT.symbol} = {_with_error(value, error)}"
-    if result and result.lyapunov_exponent:
-        exact = result.lyapunov_exponent.value
-        text += f" (finite elements {exact:.6g}, {_deviation(value, error, exact)} s.e. away)"
-    return [text, f"{VARIANCE_RATE.symbol} = {_with_error(found.variance_rate, found.variance_rate_error)}"]
 
 
 def _simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
@@ -160,29 +155,23 @@ def _simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult 
 
 
 def _exponent_grid(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Grid:
-    """A row for each curve: λ by simulation and by finite elements; of many the first ones and the extremes."""
+    """A row for each curve, or for more than `MOST_ROWS` those with the least and the largest λ: λ by both methods."""
     compared = [Column("finite elements", 2), Column("s.e. away", 1)] if any(result for _, result in pairs) else []
-    is_digest = len(pairs) > MOST_ROWS
+    is_digest, symbol = len(pairs) > MOST_ROWS, LYAPUNOV_EXPONENT.symbol
     which = [Column("which", is_text=True)] * is_digest
-    columns = [*varied_columns(case), Column(LYAPUNOV_EXPONENT.symbol), Column("± s.e."), *compared, *which]
-    grid = Grid(case.headline, columns)
-    for word, (each, result) in _extremes(pairs) if is_digest else [("", pair) for pair in pairs]:
+    grid = Grid(case.headline, [*varied_columns(case), Column(symbol), Column("± s.e."), *compared, *which])
+    if is_digest:
+        ordered = sorted(pairs, key=lambda pair: pair[0].result.lyapunov_exponent)
+        pairs = [ordered[0], ordered[-1]]
+    words = [f"least {symbol}", f"largest {symbol}"] if is_digest else [""] * len(pairs)
+    for (each, result), word in zip(pairs, words, strict=True):
         value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
-        known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
-        exact = ("", "") if known is None else (f"{known:.6g}", _deviation(value, error, known))
-        varied = map(written, each.curve.varied.values())
-        row = [*varied, sampled(value, error), f"{error:.1e}", *(exact if compared else ())]
+        row = [*map(written, each.curve.varied.values()), sampled(value, error), f"{error:.1e}"]
+        if compared:
+            known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
+            row += ["", ""] if known is None else [f"{known:.6g}", _deviation(value, error, known)]
         grid.rows.append([*row, *[word] * is_digest])
     return grid
-
-
-def _extremes(
-    pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]],
-) -> list[tuple[str, tuple[SimulatedCurve, CurveResult | None]]]:
-    """The curves with the least and the largest λ."""
-    ordered = sorted(pairs, key=lambda pair: pair[0].result.lyapunov_exponent)
-    symbol = LYAPUNOV_EXPONENT.symbol
-    return [(f"least {symbol}", ordered[0]), (f"largest {symbol}", ordered[-1])]
 
 
 def _with_error(value: float, error: float) -> str:
@@ -252,15 +241,14 @@ def print_chart(case: Case, chart: Chart) -> None:
 
 
 def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
-    """What a case expects beside what was computed; of many what differs."""
+    """Print what a case expects beside what was computed; with more than `MOST_ROWS` values those that differ."""
     screen = Screen.of()
     if not comparisons:
         screen.say(f"{case.name}: nothing is expected; add [[expect]] to the case")
         return
     shown = comparisons if len(comparisons) <= MOST_ROWS else [each for each in comparisons if not each.met]
     if shown:
-        grid = _comparison_grid if len(comparisons) <= MOST_TABLES else _short_comparison_grid
-        screen.show(grid(case, shown[:MOST_ROWS]))
+        screen.show(_comparison_grid(case, shown[:MOST_ROWS], is_short=len(comparisons) > MOST_TABLES))
     if len(shown) > MOST_ROWS:
         screen.say(f"{case.name}: {len(shown) - MOST_ROWS} more differ")
     screen.say(agreement(comparisons) if shown else f"{case.name}: {agreement(comparisons)}")
@@ -271,45 +259,27 @@ def agreement(comparisons: Sequence[Comparison]) -> str:
     return f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok"
 
 
-def _short_comparison_grid(case: Case, comparisons: Sequence[Comparison]) -> Grid:
-    """A line for each, with two digits more than the tolerance has."""
-    columns = [Column("quantity"), *varied_columns(case), Column("expected"), Column("±", 2), Column("computed")]
-    grid = Grid(f"{case.name}: {case.headline}", [*columns, Column("difference", 1), Column("")])
+def _comparison_grid(case: Case, comparisons: Sequence[Comparison], *, is_short: bool) -> Grid:
+    """A row for each value: with its source, or in one line, with two digits more than the tolerance has."""
+    first = [Column("quantity"), *varied_columns(case)] if is_short else [Column("quantity", is_text=True)]
+    tolerance = [Column("±", 2)] if is_short else []
+    numbers = [Column("expected"), *tolerance, Column("computed"), Column("difference", 1), Column("")]
+    grid = Grid(f"{case.name}: {case.headline}", [*first, *numbers])
     for item in comparisons:
-        expectation, value = item.expectation, item.value
-        expected = digits(expectation.value, item.tolerance / 100, 12)
-        computed = "none" if value is None else digits(value, item.tolerance / 100, 12)
-        difference = "" if value is None else f"{value - expectation.value:.1e}"
-        varied = map(written, item.varied.values())
-        numbers = [expected, f"{item.tolerance:.0e}", computed, difference]
-        grid.rows.append([_expected(item), *varied, *numbers, _verdict(item)])
-    return grid
-
-
-def _expected(item: Comparison) -> str:
-    """What is compared: "moment, p = 2"."""
-    expectation = item.expectation
-    return expectation.quantity if expectation.p is None else f"{expectation.quantity}, p = {expectation.p:g}"
-
-
-def _verdict(item: Comparison) -> Text:
-    return Text("ok", "green") if item.met else Text("differs", "bold red")
-
-
-def _comparison_grid(case: Case, comparisons: Sequence[Comparison]) -> Grid:
-    numbers = [Column("expected"), Column("computed"), Column("difference", 1), Column("")]
-    grid = Grid(f"{case.name}: {case.headline}", [Column("quantity", is_text=True), *numbers])
-    for item in comparisons:
-        expectation = item.expectation
-        where = "".join(f"\n{key} = {written(value)}" for key, value in item.varied.items())
-        difference = "" if item.value is None else f"{item.value - expectation.value:.1e}"
-        row: list[Cell] = [
-            Text.assemble(f"{_expected(item)}{where}\n", (expectation.source, "dim")),
-            f"{expectation.value:.12g}\n± {item.tolerance:.0e}",
-            "none" if item.value is None else f"{item.value:.12g}",
-            difference,
-            _verdict(item),
-        ]
-        grid.rows.append(row)
-        grid.ends.add(len(grid.rows) - 1)
+        wanted, value = item.expectation, item.value
+        quantity = wanted.quantity if wanted.p is None else f"{wanted.quantity}, p = {wanted.p:g}"
+        error = f"{item.tolerance:.0e}"
+        expected, computed = (
+            "none" if each is None else digits(each, item.tolerance / 100, 12) if is_short else f"{each:.12g}"
+            for each in (wanted.value, value)
+        )
+        row: list[Cell]
+        if is_short:
+            row = [quantity, *map(written, item.varied.values()), expected, error, computed]
+        else:
+            where = "".join(f"\n{key} = {written(each)}" for key, each in item.varied.items())
+            row = [Text.assemble(f"{quantity}{where}\n", (wanted.source, "dim")), f"{expected}\n± {error}", computed]
+            grid.ends.add(len(grid.rows))
+        difference = "" if value is None else f"{value - wanted.value:.1e}"
+        grid.rows.append([*row, difference, Text("ok", "green") if item.met else Text("differs", "bold red")])
     return grid

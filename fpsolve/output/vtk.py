@@ -103,12 +103,14 @@ def write_density(
 
 def write_functions(solved: Solved, curve: Curve, folder: Path) -> None:
     """Write the eigenfunctions of a curve; with the first curve the stationary density too."""
-    stationary, about = solved.stationary, (_numbered(curve), curve.varied)
-    if stationary is not None and curve.number == 1:
-        write_density(folder / "density.vtu", stationary, *about)
-    if stationary is not None and solved.eigenpairs:
+    if solved.stationary is None:
+        return
+    about = ({**curve.parameters, "curve": float(curve.number)}, curve.varied)
+    if curve.number == 1:
+        write_density(folder / "density.vtu", solved.stationary, *about)
+    if solved.eigenpairs:
         copy_show_script(folder)
-        write_eigenfunctions(folder, solved.eigenpairs, stationary, _stem(curve), *about)
+        write_eigenfunctions(folder, solved.eigenpairs, solved.stationary, f"eigenfunctions{curve.suffix}", *about)
 
 
 def write_curves(case: Case, folder: Path) -> Path | None:
@@ -117,8 +119,8 @@ def write_curves(case: Case, folder: Path) -> Path | None:
     The time is the varied value where there is one that is a number, and else the number of the curve; the name of each
     entry tells which, and p. Nothing is written of a single curve.
     """
-    p = case.usual_p
-    names = [(curve, _name(_stem(curve), p)) for curve in (case.curves() if case.shown.size else ())]
+    p, shown = case.usual_p, case.curves() if case.shown.size else ()
+    names = [(curve, _name(f"eigenfunctions{curve.suffix}", p)) for curve in shown]
     there = [(curve, name) for curve, name in names if (folder / name).is_file()]
     if case.planned == 1 or not there:
         return None
@@ -143,17 +145,15 @@ def write_response(simulated: SimulatedCurve, folder: Path) -> None:
     response, curve, found = simulated.response, simulated.curve, simulated.result
     if response is None:
         return
-    pyvista, writers = _libraries()
     path, x, v = folder / f"response{curve.suffix}.vti", response.x_edges, response.v_edges
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
-    grid = pyvista.ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
+    grid = _pyvista().ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
     grid.cell_data["density"] = response.density.ravel(order="F")
     known = {
         "lyapunov_exponent": found.lyapunov_exponent,
         "lyapunov_exponent_error": found.lyapunov_exponent_error,
     }
-    _add(grid, {**known, **_facts(_numbered(curve), curve.varied)})
-    _write_vtk(path, writers.vtkXMLImageDataWriter(), grid)
+    _write(path, grid, {**known, **_facts({**curve.parameters, "curve": float(curve.number)}, curve.varied)})
 
 
 def copy_show_script(directory: Path) -> Path:
@@ -165,17 +165,36 @@ def copy_show_script(directory: Path) -> Path:
 
 def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes), and the first is shown first."""
-    pyvista, writers = _libraries()
-    connectivity = grid.cells()
+    pyvista, connectivity = _pyvista(), grid.cells()
     count, size = connectivity.shape
     cells = np.column_stack([np.full(count, size), connectivity]).ravel()
     kinds = np.full(count, pyvista.CellType.LAGRANGE_QUADRILATERAL, dtype=np.uint8)
     output = pyvista.UnstructuredGrid(cells, kinds, grid.points())
     for name, values in data.items():
         output.point_data[name] = np.broadcast_to(values, (grid.phi.size, grid.z.size)).ravel()
-    _add(output, facts)
     output.GetPointData().SetActiveScalars(next(iter(data)))
-    _write_vtk(path, writers.vtkXMLUnstructuredGridWriter(), output)
+    _write(path, output, facts)
+
+
+def _write(path: Path, grid: Any, facts: Facts) -> None:
+    """Write a grid with field data of one value each; as a text, for VTK itself is silent about a full disk."""
+    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLUnstructuredGridWriter
+
+    for name, value in facts.items():
+        grid.field_data[name] = [value]
+    writer = vtkXMLImageDataWriter() if path.suffix == ".vti" else vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    write_text(path, writer.GetOutputString())
+
+
+def _pyvista() -> Any:
+    """pyvista, which takes half a second. No signal interrupts the import of it and of VTK's writers."""
+    with signals_held():
+        import pyvista
+        import vtkmodules.vtkIOXML  # noqa: F401
+    return pyvista
 
 
 def _facts(parameters: Facts, varied: Collection[str]) -> Facts:
@@ -188,40 +207,8 @@ def _facts(parameters: Facts, varied: Collection[str]) -> Facts:
     return {**parameters, **{name: text.replace("²", "^2") for name, text in words.items() if text}}
 
 
-def _numbered(curve: Curve) -> Facts:
-    """The parameters of a curve, and its number as `curve`."""
-    return {**curve.parameters, "curve": float(curve.number)}
-
-
-def _add(grid: Any, facts: Facts) -> None:
-    """Add field data of one value each."""
-    for name, value in facts.items():
-        grid.field_data[name] = [value]
-
-
-def _write_vtk(path: Path, writer: Any, data: Any) -> None:
-    """Write what a writer of VTK makes of data; as a text, for VTK itself is silent about a full disk."""
-    writer.SetInputData(data)
-    writer.WriteToOutputStringOn()
-    writer.Write()
-    write_text(path, writer.GetOutputString())
-
-
-def _libraries() -> tuple[Any, Any]:
-    """pyvista and the writers of VTK, whose import no signal interrupts; it takes half a second."""
-    with signals_held():
-        import pyvista
-        from vtkmodules import vtkIOXML
-    return pyvista, vtkIOXML
-
-
-def _stem(curve: Curve) -> str:
-    """Of the files of the eigenfunctions of a curve."""
-    return f"eigenfunctions{curve.suffix}"
-
-
 def _name(stem: str, p: float) -> str:
-    """Of the file of an eigenfunction, seen from its collection."""
+    """The file of an eigenfunction, seen from its collection."""
     return f"{stem}/p{p + 0.0:+}.vtu"
 
 

@@ -1,4 +1,4 @@
-"""What can be done with a case: run, simulate, chart and check it; each writes as it goes, and draws in the end."""
+"""What can be done with a case: run, simulate, chart and check it. All but the check write files and then draw."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ from fpsolve.workflow.folders import (
     own_folder,
     saying_if_interrupted,
 )
-from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Advance, Phase, Watch, ignore
+from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Phase, Watch, ignore
 from fpsolve.workflow.sets import Sweep
 from fpsolve.workflow.simulations import Simulations
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What became of a case.
+    """What was done with a case.
 
     Attributes:
         results: its curves, solved; what did not converge is in their `failures`.
         simulated: its curves, simulated.
-        interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty where none came.
-        comparisons: what it expects beside what was computed.
-        known: how many of its curves an earlier run had done.
-        outdated: how many records of its curves another version has written, which are not used.
+        interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
+        comparisons: what the case expects beside what was computed.
+        known: how many of its curves an earlier run had finished.
+        outdated: how many records of its curves another version has written; these are not used.
     """
 
     results: Sequence[CurveResult] = ()
@@ -72,10 +72,10 @@ def run(
     fresh: bool = False,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[CurveResult, ...]:
-    """Solve a case and write `out`/<name of the case>/.
+    """Solve a case, write `out`/<name of the case>/, and return the results, one for each curve.
 
-    Sets that an earlier run finished there, also one that was killed, are not solved again; all other files are made
-    anew, and what a simulation of other parameters wrote is removed. summary.json says whether all curves are there.
+    Sets that an earlier run finished there, also one that was killed, are not solved again. Each run rewrites all other
+    files, and removes what a simulation of other parameters wrote. summary.json says whether all curves are there.
 
     Args:
         case: a case file, or what `load_case` made of it.
@@ -83,7 +83,7 @@ def run(
         jobs: how many processes solve; None for one on each processor.
         scheduler: the address of a Dask scheduler whose workers solve instead, such as "tcp://host:8786".
         fresh: whether to solve all sets anew.
-        progress: called for each curve that is done, of a single one for each p.
+        progress: called once for each curve that is done, or for each p of a case with a single curve.
 
     Raises:
         CaseError: with every fault of the file; nothing is solved.
@@ -92,7 +92,12 @@ def run(
     """
     read = case if isinstance(case, Case) else load_case(case)
     pool = cluster(scheduler) if scheduler else parallel(jobs, read.planned)
-    watch = Watch(bar=lambda phase: nullcontext(_each(progress) if phase.unit else ignore))
+
+    def advance(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
+        for _ in range(count):
+            progress()
+
+    watch = Watch(bar=lambda phase: nullcontext(advance if phase.unit else ignore))
     outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=watch)
     results = tuple(outcome.results)
     if outcome.failures:
@@ -109,9 +114,9 @@ def run_case(
     is_fresh: bool = False,
     watch: Watch = SILENT,
 ) -> Outcome:
-    """Solve a case, simulate it too if `monte_carlo` says so, and draw both in one figure.
+    """Solve a case, simulate it too if `monte_carlo` is true, and draw both in one figure.
 
-    When the simulation is interrupted or fails, the figure shows what was done.
+    When the simulation is interrupted or fails, the figure shows what is done.
 
     Args:
         pool: who solves; this process if none is given.
@@ -152,12 +157,11 @@ def simulate_case(
     is_fresh: bool = False,
     watch: Watch = SILENT,
 ) -> Outcome:
-    """Simulate a case and write monte_carlo.json into `out`/<name of the case>/; further curves have a number.
+    """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further curves monte_carlo-2.json, ….
 
-    What an earlier simulation wrote there is removed first, and a run with other parameters; with c₂ or c₃ > 0 the
-    stationary response is written too.
-    An interrupt (Ctrl-C) ends the simulation, and what is done is estimated and written; curves that are finished are
-    not simulated again the next time.
+    With c₂ or c₃ > 0 the stationary response is written too. What an earlier simulation wrote there is removed first,
+    and a run with other parameters. An interrupt (Ctrl-C) ends the simulation; what is done is estimated and written,
+    and curves that are finished are not simulated again the next time.
 
     Args:
         pool: who simulates, such as a `cluster`; None for all processors of this machine.
@@ -183,8 +187,8 @@ def simulate_case(
 def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = None, watch: Watch = SILENT) -> Chart:
     """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
 
-    Tables are written anew after every branch. What an earlier chart wrote there is removed first, and what was solved
-    or simulated with other parameters.
+    The tables are written again after every branch. What an earlier chart wrote there is removed first, and what was
+    solved or simulated with other parameters.
 
     Args:
         pool: who scans the plane; this process if none is given.
@@ -196,9 +200,16 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
     """
     refuse_no_chart(case)
     chart = Chart((), ())
+
+    def traced() -> str:
+        """How many branches are traced, and where these are."""
+        count = sum(len(line.traces) for line in chart.lines)
+        text = f" after {count} branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines"
+        return f"{text}; what was done is kept in {folder}" if count else text
+
     with (
         own_folder(case, out, (CHART,)) as folder,
-        saying_if_interrupted(lambda: _kept_lines(case, chart, folder), ANEW),
+        saying_if_interrupted(traced, ANEW),
         watch.bar(Phase(case.name, "scan", chart_work(case), NODES)) as progress,
         watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
         writable(folder),
@@ -214,7 +225,7 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
 
 
 def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:
-    """Solve what a case expects, and compare it; nothing is written."""
+    """Solve what a case expects, and return it with the `comparisons`; nothing is written."""
     numerics = Numerics.of(case)
     found: list[CurveResult] = []
     with (
@@ -266,20 +277,3 @@ def _simulate(simulations: Simulations, watch: Watch, simulated: list[SimulatedC
         return ""
     place = f"in the simulation of curve {whole + 1} of {case.planned}"
     return f"interrupted {place}; what was done is kept in {folder}; {AGAIN}"
-
-
-def _kept_lines(case: Case, chart: Chart, folder: Path) -> str:
-    """How many branches of a chart are traced, and where these are."""
-    count = sum(len(line.traces) for line in chart.lines)
-    text = f" after {count} branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines"
-    return f"{text}; what was done is kept in {folder}" if count else text
-
-
-def _each(progress: Callable[[], None]) -> Advance:
-    """Calls it for each step."""
-
-    def advance(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
-        for _ in range(count):
-            progress()
-
-    return advance

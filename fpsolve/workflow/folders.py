@@ -13,19 +13,19 @@ from fpsolve.case.case import Case
 from fpsolve.files import TEMPORARY, alone, writable
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
-SOLVED, SIMULATED = (
-    r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu|show\.py"
-    r"|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)",
-    r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)",
+SOLVED = (
+    r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu"
+    r"|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
 )
-"""The names of the files that a run writes, and of those of a simulation; of a chart, and of proofs."""
+SIMULATED = r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)"
 CHART, PROVEN = r"chart\.(csv|json|png|pdf)", r"proof\.json"
+"""Patterns of the names of the files that a run writes, a simulation, a chart, and proofs."""
 _UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
 
 
 @contextmanager
 def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator[Path]:
-    """The folder of a case, which other runs keep out of; nothing is in it that is replaced, or of other parameters.
+    """The folder of a case for one run alone. Files that match `replaced`, or are of other parameters, are removed.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -55,27 +55,24 @@ def kept(case: Case, done: int, folder: Path | None = None) -> str:
 
 def _agrees(case: Case, folder: Path) -> bool:
     """Whether the tables in a folder are all of parameters that the case has."""
-    tables = [
-        *folder.glob("summary.json"),
-        *folder.glob("monte_carlo*.json"),
-        *folder.glob("chart.json"),
-        *folder.glob("proof.json"),
-    ]
+    patterns = ("summary.json", "monte_carlo*.json", "chart.json", "proof.json")
+    tables = [table for pattern in patterns for table in folder.glob(pattern)]
+    if not tables:
+        return True
+    known = [curve.parameters for curve in case.curves()]
+    whole = {frozenset(each.items()) for each in known}
+
+    def is_known(stated: Mapping[str, Any]) -> bool:
+        """Whether these are the parameters of a curve, or some of them."""
+        is_part = len(stated) < len(known[0])
+        return frozenset(stated.items()) in whole or (is_part and any(stated.items() <= each.items() for each in known))
+
     try:
         contents = [json.loads(table.read_text(encoding="utf-8")) for table in tables]
         found = [curve["parameters"] for content in contents for curve in content.get("curves", [content])]
-        return all(map(_is_among([curve.parameters for curve in case.curves()] if tables else []), found))
-    except (ValueError, KeyError, TypeError, AttributeError):  # it is no table of ours
+        return all(map(is_known, found))
+    except (ValueError, KeyError, TypeError, AttributeError):  # it is not a table of fpsolve
         return False
-
-
-def _is_among(known: Sequence[Mapping[str, Any]]) -> Callable[[Mapping[str, Any]], bool]:
-    """Whether parameters, or those that are stated, are those of one of some curves."""
-    whole = {frozenset(each.items()) for each in known}
-    return lambda each: (
-        frozenset(each.items()) in whole
-        or (len(each) < len(known[0]) and any(each.items() <= one.items() for one in known))
-    )
 
 
 def _remove(folder: Path, names: str) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass
+from typing import Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, Task
+from rich.table import Column
+from rich.text import Text
 
 from fpsolve.case.case import Case
 from fpsolve.study.results import CurveResult, SimulatedCurve
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT = "sets", "p", "nodes", "points", "bounds", "%"
 """What a phase counts."""
@@ -68,80 +70,8 @@ class Watch:
 SILENT = Watch()
 
 
-@dataclass
-class State:
-    """How far a phase is.
-
-    Attributes:
-        phase: which.
-        clock: gives the time in seconds.
-        done, known, failed: steps that are done, those of an earlier run among them, and those that failed.
-        start, end: when it began, and when it ended, if it has.
-        printed, printed_at: how many steps were done as the last line was printed, and when that was.
-    """
-
-    phase: Phase
-    clock: Callable[[], float] = time.monotonic
-    done: int = 0
-    known: int = 0
-    failed: int = 0
-    end: float | None = None
-    printed: int = 0
-    start: float = field(init=False)
-    printed_at: float = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.start = self.printed_at = self.clock()
-
-    def advance(self, count: int = 1, *, failed: int = 0, known: bool = False) -> None:
-        self.done += count
-        self.failed += failed
-        if known:
-            self.known += count
-            self.printed += count
-
-    @property
-    def count(self) -> str:
-        """How far it is: "12 of 400 sets, 3 failed"."""
-        total, unit = self.phase.total, self.phase.unit
-        if not unit:
-            return ""
-        if unit == PERCENT:
-            return f"{self.done / total:.0%}" if total else ""
-        text = f"{self.done} {unit}" if total is None else f"{self.done} of {total} {unit}"
-        return f"{text}, {self.failed} failed" if self.failed else text
-
-    @property
-    def left(self) -> float | None:
-        """Seconds to go, by the rate of the steps that this run has done; None as long as there is none."""
-        total, own = self.phase.total, self.done - self.known
-        if total is None or own <= 0 or self.end is not None:
-            return None
-        return (self.clock() - self.start) * (total - self.done) / own
-
-    @property
-    def remaining(self) -> str:
-        """The time to go, "0:12:30 left"; where that is unknown, or after the end, the time that it has taken."""
-        left, taken = self.left, (self.clock() if self.end is None else self.end) - self.start
-        minutes, seconds = divmod(round(taken if left is None else left), 60)
-        return f"{minutes // 60}:{minutes % 60:02}:{seconds:02}{'' if left is None else ' left'}"
-
-    @property
-    def is_due(self) -> bool:
-        """Whether it is time for a line in a file."""
-        total, now = self.phase.total, self.clock()
-        if not total or not self.phase.unit or self.done >= total or now - self.printed_at < LINE_SECONDS:
-            return False
-        return self.done - self.printed >= LINE_SHARE * total
-
-    def line(self) -> str:
-        """A line for a file, of a phase with a total; the next one is due later."""
-        self.printed_at, self.printed = self.clock(), self.done
-        return f"{self.phase.case}, {self.phase.name}: {self.count}{'' if self.left is None else f', {self.remaining}'}"
-
-
 class Bars:
-    """The phases of one case, also those that are over, in one display.
+    """The phases of one case, also those that are over, in one display; in a file now and then a line.
 
     Args:
         console: of the standard error, if not stated.
@@ -149,50 +79,90 @@ class Bars:
     """
 
     def __init__(self, console: Console | None = None, clock: Callable[[], float] = time.monotonic) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn
-        from rich.table import Column
-
-        def text(content: str, style: str = "none") -> TextColumn:
-            return TextColumn(content, style=style, markup=False, table_column=Column(no_wrap=True))
-
         self.console, self.clock = console or Console(stderr=True), clock
         self.is_live = self.console.is_terminal and not self.console.is_dumb_terminal
         is_roomy = self.console.width >= ROOMY
         self._display = Progress(
-            text("{task.fields[phase].case}, {task.fields[phase].name}" if is_roomy else "{task.fields[phase].name}"),
+            _TextColumn(lambda task: f"{task.fields['phase'].case}, " * is_roomy + task.description),
             BarColumn(bar_width=20 if is_roomy else 4),
-            text("{task.fields[state].count}"),
-            text("{task.fields[state].remaining}", "cyan"),
+            _TextColumn(counted),
+            _TextColumn(timed, "cyan"),
             console=self.console,
             transient=True,
             redirect_stdout=False,
             refresh_per_second=4,
+            get_time=clock,
+            disable=not self.is_live,
         )
         self._open = 0
 
     @contextmanager
     def bar(self, phase: Phase) -> Iterator[Advance]:
         """Shows a phase as long as the body lasts, and those before it."""
-        state = State(phase, self.clock)
-        task = self._display.add_task("", total=phase.total, state=state, phase=phase) if self.is_live else None
+        display = self._display
+        number = display.add_task(phase.name, total=phase.total, phase=phase, known=0, failed=0)
+        task = display.tasks[-1]
+        printed, printed_at = 0, self.clock()
 
         def advance(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
-            state.advance(count, failed=failed, known=known)
-            if task is not None:
-                self._display.update(task, completed=state.done)
-            elif state.is_due:
-                print(state.line(), file=self.console.file, flush=True)
+            nonlocal printed, printed_at
+            earlier = count if known else 0
+            sums = {"known": task.fields["known"] + earlier, "failed": task.fields["failed"] + failed}
+            display.update(number, advance=count, **sums)
+            printed += earlier
+            if self.is_live or not phase.total or not phase.unit or task.completed >= phase.total:
+                return
+            is_far = task.completed - printed >= LINE_SHARE * phase.total
+            if is_far and self.clock() - printed_at >= LINE_SECONDS:
+                left = "" if seconds_left(task) is None else f", {timed(task)}"
+                print(f"{phase.case}, {phase.name}: {counted(task)}{left}", file=self.console.file, flush=True)
+                printed, printed_at = int(task.completed), self.clock()
 
         if self.is_live and not self._open:
-            self._display.start()
+            display.start()
         self._open += 1
         try:
             yield advance
         finally:
-            state.end = self.clock()
-            if task is not None:
-                self._display.update(task, total=max(state.done, 1), completed=max(state.done, 1))
+            display.stop_task(number)
+            display.update(number, total=task.completed or 1, completed=task.completed or not phase.unit)
             self._open -= 1
             if self.is_live and not self._open:
-                self._display.stop()
+                display.stop()
+
+
+def counted(task: Task) -> str:
+    """How far a phase is: "12 of 400 sets, 3 failed"."""
+    phase: Phase = task.fields["phase"]
+    if not phase.unit:
+        return ""
+    if phase.unit == PERCENT:
+        return f"{task.completed / phase.total:.0%}" if phase.total else ""
+    failed, total = task.fields["failed"], "" if phase.total is None else f" of {phase.total}"
+    return f"{int(task.completed)}{total} {phase.unit}{f', {failed} failed' if failed else ''}"
+
+
+def seconds_left(task: Task) -> float | None:
+    """Seconds to go, by the rate of the steps that this run has done; None as long as there is none."""
+    total, own = task.fields["phase"].total, task.completed - task.fields["known"]
+    if total is None or own <= 0 or task.stop_time is not None:
+        return None
+    return (task.elapsed or 0.0) * (total - task.completed) / own
+
+
+def timed(task: Task) -> str:
+    """The time to go, "0:12:30 left"; where that is unknown, or after the end, the time that a phase has taken."""
+    left = seconds_left(task)
+    minutes, seconds = divmod(round(task.elapsed or 0.0 if left is None else left), 60)
+    return f"{minutes // 60}:{minutes % 60:02}:{seconds:02}{'' if left is None else ' left'}"
+
+
+class _TextColumn(ProgressColumn):
+    """A text about each phase, which is not broken."""
+
+    def __init__(self, text: Callable[[Task], str], style: str = "") -> None:
+        super().__init__(Column(no_wrap=True))
+        self.text, self.style = text, style
+
+    def render(self, task: Task) -> Text:
+        return Text(self.text(task), style=self.style)

@@ -1,4 +1,4 @@
-"""The sets of a case, solved by whoever works, kept as they are finished, and told of in tables as they grow."""
+"""The sets of a case: solved by whoever works, kept as they are finished, and written to tables as these grow."""
 
 from __future__ import annotations
 
@@ -49,6 +49,7 @@ class Sweep:
     Args:
         case: whose sets these are.
         folder: where they are kept.
+        is_fresh: whether to solve all of them anew.
     """
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
@@ -57,23 +58,24 @@ class Sweep:
         self.records = Records(self.folder / SOLVED_RECORDS)
         self.results = Results(case, self.records)
         self._tabled = self._settled = 0
+        self._steps_each = max(self.first.p.size, 1) if case.planned == 1 else 1
         if is_fresh:
             self.records.remove()
         self.find()
         self.known = len(self.results)
 
-    def find(self) -> None:
-        """Look for the records of all sets, also those that a worker has finished and not told of."""
-        for curve in self.case.curves() if self.records.look().are_there else ():
-            if self.results.find(curve, self._key(curve)):
-                self._settled += not self._wanted(curve).draws
-
     @property
     def phase(self) -> Phase:
-        """How often `solve` reports progress: once for each set, of a single one for each p."""
+        """What `solve` reports as progress: each set, of a single one each p."""
         if self.case.planned > 1:
             return Phase(self.case.name, "solving", self.case.planned, SETS)
         return Phase(self.case.name, "solving", self._steps_each, MOMENTS)
+
+    def find(self) -> None:
+        """Look for the records of all sets, also those that a worker has finished without reporting them."""
+        for curve in self.case.curves() if self.records.look().are_there else ():
+            if self.results.find(curve, self._key(curve)):
+                self._settled += not self._wanted(curve).draws
 
     def solve(self, pool: Pool, progress: Advance) -> None:
         """Solve what is not known yet; tables are written at the beginning, and as they grow."""
@@ -95,19 +97,15 @@ class Sweep:
                     self.write_tables()
 
     def write_tables(self) -> None:
-        """summary.json and the tables beside it, of what is known."""
+        """Write summary.json and the tables beside it, of what is known."""
         self._tabled = len(self.results)
         write_results(self.case, self.results, self.folder, self.run.facts())
 
     def write_all(self) -> None:
-        """The tables, results.nc, and the series over the curves."""
+        """Write the tables, results.nc, and the series over the curves."""
         self.write_tables()
         write_curves(self.case, self.folder)
         write_dataset(self.case, self.results, self.folder, self.run.facts())
-
-    @property
-    def _steps_each(self) -> int:
-        return max(self.first.p.size, 1) if self.case.planned == 1 else 1
 
     def _wanted(self, curve: Curve) -> Wanted:
         return self.first if curve.number == 1 else self.further
@@ -117,13 +115,13 @@ class Sweep:
 
     def _order(self, curve: Curve) -> Order | None:
         """What is to be done for a curve, or None."""
-        wanted = self._wanted(curve)
-        if self.results.has(curve) and not wanted.draws:
-            return None
-        order, known = Order(curve, wanted, self._key(curve)), self.results.of(curve)
-        if known is None:
-            return order
-        return replace(order, wanted=without_failed(wanted, known.failures), is_known=True)
+        wanted, known = self._wanted(curve), None
+        if self.results.has(curve):
+            if not wanted.draws:
+                return None
+            known = self.results.of(curve)
+        order = Order(curve, wanted, self._key(curve))
+        return order if known is None else replace(order, wanted=without_failed(wanted, known.failures), is_known=True)
 
     def _lost(self, batch: Batch, queue: _Queue) -> list[Found]:
         """What is known of a batch whose worker died; the rest is tried again, set by set, which shows the reason."""

@@ -1,8 +1,8 @@
-"""The curves of a case, simulated here or on a cluster, and kept as they are finished."""
+"""The simulations of a case: each curve is simulated, here or on a cluster, and kept as it is finished."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from fpsolve.case.case import Case
@@ -18,7 +18,7 @@ SIMULATED_RECORDS = "records/simulated"
 
 
 class Simulations:
-    """The simulations of the curves of a case; those that are done already are taken from their records.
+    """The simulations of the curves of a case; finished ones are taken from their records.
 
     Args:
         case: whose curves these are.
@@ -31,37 +31,38 @@ class Simulations:
         self.records = Records(folder / SIMULATED_RECORDS)
         if is_fresh:
             self.records.remove()
-        are_there = self.records.look().are_there
-        self._known = {curve.number for curve in case.curves() if self._found(curve)} if are_there else set[int]()
+        curves = case.curves() if self.records.look().are_there else ()
+        self._known = {curve.number for curve in curves if self._found(curve)}
 
     @property
     def known(self) -> int:
-        """How many were done at the beginning."""
+        """How many were finished at the beginning."""
         return len(self._known)
 
     def curves(self, progress: Advance, pool: Pool | None) -> Iterator[SimulatedCurve]:
-        """All of them, in their order.
+        """The simulations in the order of the curves; an interrupt ends them with what is done.
 
         Args:
             progress: called as often as `simulation_work` counts.
             pool: who simulates; None for all processors of this machine.
         """
         if self._known:
-            progress(sum(simulation_steps(curve) for curve in self.case.curves() if self._is_known(curve)), known=True)
+            known = (curve for curve in self.case.curves() if curve.number in self._known)
+            progress(sum(map(simulation_steps, known)), known=True)
         if pool is None:
             found = simulate_curves(self.case, progress=progress, known=self._found)
         else:
             found = self._by_pool(pool, progress)
         for simulated in found:
-            if not simulated.interrupted and not self._is_known(simulated.curve):
+            if not simulated.interrupted and simulated.curve.number not in self._known:
                 append(self.records.folder, self._key(simulated.curve), record_of(simulated))
             yield simulated
 
-    def _by_pool(self, pool: Pool, progress: Callable[[int], None]) -> Iterator[SimulatedCurve]:
-        """The same, by the workers of a pool; an interrupt ends it with what is done."""
+    def _by_pool(self, pool: Pool, progress: Advance) -> Iterator[SimulatedCurve]:
         done = 0
         with pool:
-            simulated = pool.map(self.task, (curve for curve in self.case.curves() if not self._is_known(curve)))
+            unknown = (curve for curve in self.case.curves() if curve.number not in self._known)
+            simulated = pool.map(self.task, unknown)
             try:
                 for curve in self.case.curves():
                     found = self._found(curve)
@@ -74,11 +75,8 @@ class Simulations:
                 if not done:
                     raise
 
-    def _is_known(self, curve: Curve) -> bool:
-        return curve.number in self._known
-
     def _found(self, curve: Curve) -> SimulatedCurve | None:
-        """Its simulation, if that is known; a record of another form is none."""
+        """Its simulation, if that is known; a record of another form does not count."""
         address = self.records.place(self._key(curve))
         try:
             return None if address is None else simulated_of(self.records.read(address), curve)
