@@ -64,7 +64,7 @@ Out = Annotated[Path, Parameter(help="Folder for the results.")]
 Scheduler = Annotated[
     str, Parameter(help="Address of a Dask scheduler whose workers do the work, e.g. tcp://host:8786.")
 ]
-Fresh = Annotated[bool, Parameter(help="Begin anew, also what an earlier run has finished.", negative="")]
+Fresh = Annotated[bool, Parameter(help="Solve or simulate again what an earlier run has finished.", negative="")]
 Quiet = Annotated[
     bool,
     Parameter(
@@ -108,7 +108,7 @@ def _run(argv: Sequence[str] | None) -> int:
         return INTERRUPTED
     except (OSError, SystemExit) as failure:  # rich exits where a pipe is closed
         _drop_blocked_output()
-        if isinstance(failure, BrokenPipeError | SystemExit):  # nobody reads the output any more, as with `| head -1`
+        if isinstance(failure, BrokenPipeError | SystemExit):  # the reader of the output has gone, as with `| head -1`
             return CLOSED_PIPE
         place, reason = failure.filename or "the output", failure.strerror or failure
         print_error(f"{place} cannot be written: {reason}; send it to another place")
@@ -122,7 +122,7 @@ def print_error(text: str) -> None:
 
     try:
         Console(stderr=True).print(Text(message_of(text).words(CASE_WORDS)), style="bold red", soft_wrap=True)
-    except (OSError, SystemExit):  # nobody can be told
+    except (OSError, SystemExit):  # there is no place left to say it
         _drop_blocked_output()
 
 

@@ -73,7 +73,7 @@ def alone(folder: Path) -> Iterator[None]:
 
     The lock is one of the operating system on a hidden file. It ends with the process, so that a file that a killed run
     leaves does not hinder the next one; else the file is removed with the lock still held. On a file system without
-    locks nobody is kept out: a file that only exists as a lock would outlive a run that another machine kills.
+    locks no run is kept out: a file whose existence is the lock would stay when a run on another machine is killed.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run has it.

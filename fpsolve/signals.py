@@ -78,7 +78,7 @@ def _interrupts_repeated(received: list[int]) -> Iterator[None]:
     Python gives such an exception to `sys.unraisablehook` and to nothing else.
 
     Args:
-        received: the signal that ends the body; empty after Ctrl-C. It is received anew when it comes once more.
+        received: the signal that ends the body; empty after Ctrl-C. It is received again when it comes once more.
     """
     former, main, timers = sys.unraisablehook, threading.main_thread(), list[threading.Timer]()
     # pthread_kill also wakes a main thread that waits; Windows does not have it

@@ -98,7 +98,7 @@ def options(arguments: list[str]) -> argparse.Namespace:
 
 
 def beside_this_file(name: str) -> Path:
-    """A file of the results; ParaView's menus do not tell a script where it lies."""
+    """A file of the results; a script that ParaView's menus run does not know where it lies."""
     script = globals().get("__file__")
     folders = [Path(script).resolve().parent] if script else [Path.cwd(), Path(FOLDER)]
     return next((folder / name for folder in folders if (folder / name).is_file()), folders[-1] / name)
@@ -142,7 +142,7 @@ def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
 
 
 def write_title(reader: Any, view: Any, field: str) -> None:
-    """What tells the curve from others, p and Lambda(p), or of what has no p its name; below the other parameters."""
+    """The title: the varied parameters, p and Lambda(p), or the name of what has no p; below, the other parameters."""
     facts = servermanager.Fetch(reader).GetFieldData()
     of_p = '"p = %g     Lambda(p) = %.6g (1/time)" % (p[0], round(float(Lambda[0]), 14) + 0.0)'
     head = repr("stationary density (p = 0)") if field == "stationary_density" else of_p
@@ -264,7 +264,7 @@ def label_cylinder(view: Any, shape: Any, bounds: tuple[float, ...]) -> None:
 
 
 def beside(nodes: list[tuple[float, ...]], angle: float, at: float, least: float) -> list[float]:
-    """A point a little outside the rim of the cylinder's surface at a height, and not nearer to the axis than told."""
+    """A point a little outside the rim of the cylinder's surface, at a height, and at least so far from the axis."""
     c, s = math.cos(angle), math.sin(angle)
     rim = [math.hypot(x, y) for x, y, z in nodes if abs(z - at) < 1e-6 and x * c + y * s > 0.96 * math.hypot(x, y)]
     radius = max(*rim, least - GAP) + GAP

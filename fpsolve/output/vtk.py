@@ -1,6 +1,6 @@
 """Eigenfunctions and densities as ParaView files: Lagrange quadrilaterals on the full circle, x = φ, y = ξ.
 
-A file shows the elements' polynomials at their `Nodes`, and its field data tell which curve it is of.
+A file shows the elements' polynomials at their `Nodes`; its field data name the curve.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def write_eigenfunctions(
         stationary: the pair at p = 0 of the same oscillator and noise, on any mesh.
         stem: name of the collection and of the folder of its files.
         parameters: of the oscillator and the noise, by dotted keys such as "noise.D0".
-        varied: the keys of those that tell the curve from others.
+        varied: the keys of those that differ between curves.
 
     Returns:
         The files written, the collection first.

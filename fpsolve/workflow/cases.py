@@ -82,7 +82,7 @@ def run(
         out: folder for the results.
         jobs: how many processes solve; None for one on each processor.
         scheduler: the address of a Dask scheduler whose workers solve instead, such as "tcp://host:8786".
-        fresh: whether to solve all sets anew.
+        fresh: whether to solve all sets again.
         progress: called once for each curve that is done, or for each p of a case with a single curve.
 
     Raises:
@@ -120,7 +120,7 @@ def run_case(
 
     Args:
         pool: who solves; this process if none is given.
-        is_fresh: whether to solve all sets anew.
+        is_fresh: whether to solve all sets again.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -165,7 +165,7 @@ def simulate_case(
 
     Args:
         pool: who simulates, such as a `cluster`; None for all processors of this machine.
-        is_fresh: whether to simulate all curves anew.
+        is_fresh: whether to simulate all curves again.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.

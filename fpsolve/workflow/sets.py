@@ -1,4 +1,4 @@
-"""The sets of a case: solved by whoever works, kept as they are finished, and written to tables as these grow."""
+"""The sets of a case: a pool solves them, each is kept as it is finished, and the tables are written as they grow."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
 SOLVED_RECORDS = "records/solved"
 GROWTH = 2
-"""Tables are written anew when they have grown by that factor, so that all of it costs as little as the last ones."""
+"""Tables are rewritten when they have grown by this factor, so that all of it costs as little as the last ones."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Sweep:
     Args:
         case: whose sets these are.
         folder: where they are kept.
-        is_fresh: whether to solve all of them anew.
+        is_fresh: whether to solve all of them again.
     """
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:

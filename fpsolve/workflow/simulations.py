@@ -23,7 +23,7 @@ class Simulations:
     Args:
         case: whose curves these are.
         folder: where they are kept.
-        is_fresh: whether to simulate all of them anew.
+        is_fresh: whether to simulate all of them again.
     """
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
