@@ -115,12 +115,10 @@ class Sweep:
 
     def _order(self, curve: Curve) -> Order | None:
         """What is to be done for a curve, or None."""
-        wanted, known = self._wanted(curve), None
-        if self.results.has(curve):
-            if not wanted.draws:
-                return None
-            known = self.results.of(curve)
-        order = Order(curve, wanted, self._key(curve))
+        wanted = self._wanted(curve)
+        if self.results.has(curve) and not wanted.draws:
+            return None
+        order, known = Order(curve, wanted, self._key(curve)), self.results.of(curve)
         return order if known is None else replace(order, wanted=without_failed(wanted, known.failures), is_known=True)
 
     def _lost(self, batch: Batch, queue: _Queue) -> list[Found]:
