@@ -105,9 +105,11 @@ def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varie
 
 def held_in_words(curve: Curve, varied: Iterable[str], time_unit: str) -> list[str]:
     """The parameters of a curve that are not varied, for below a title, without the nonlinear ones that are 0."""
-    left = {*varied, *(key for key in ("oscillator.c2", "oscillator.c3") if curve.parameters[key] == 0)}
+    known, linear = curve.problem.parameters, curve.problem.differentiable
+    left = {*varied, *(key for key, each in known.items() if each.value == 0 and key not in linear)}
     held = {key: value for key, value in curve.parameters.items() if key not in left}
-    return [parameter_of(key).timed(time_unit).stated(value) for key, value in held.items()]
+    quantities = {key: known[key].quantity if key in known else parameter_of(key) for key in held}
+    return [quantities[key].timed(time_unit).stated(value) for key, value in held.items()]
 
 
 def _summary(case: Case, chart: Chart) -> dict[str, Any]:
