@@ -42,243 +42,211 @@ class Remedy(StrEnum):
 
 Audience = Mapping[Enum, str]
 """Words for remedies, and templates for codes, in place of those for Python."""
-_FAILURE, _WARNING, _NOTE = Severity.FAILURE, Severity.WARNING, Severity.NOTE
 
 
 @unique
 class Code(Enum):
-    """What is said: a name, the severity and the template of its words.
+    """What is said: a name, with its severity and the template of its words.
 
     A template is that of `str.format`. A value that is None is shown as nothing, one of several as a list; after "?" a
     field has the words for a value that is there and, after "¦", for None or False. A `remedy` that the template does
     not name ends the message. The datum `size` tells how bad it is.
     """
 
-    def __init__(self, severity: Severity, template: str) -> None:
-        self.severity, self.template = severity, template
+    def __init__(self, text: str) -> None:
+        severity, _, self.template = text.partition(": ")
+        self.severity = Severity(severity)
 
-    TEXT = _FAILURE, "{text}"
-    PLACED = _FAILURE, "{place}: {reason}"
-    SEVERAL = _FAILURE, "{reasons}"
+    TEXT = "failure: {text}"
+    PLACED = "failure: {place}: {reason}"
+    SEVERAL = "failure: {reasons}"
 
     INFINITE = (
-        _FAILURE,
-        "Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only hide it; "
-        "choose p in [{low:g}, {high:g}], r0 <= 1, {remedy}",
+        "failure: Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
+        "hide it; choose p in [{low:g}, {high:g}], r0 <= 1, {remedy}"
     )
     INFINITE_ON_RAY = (
-        _FAILURE,
-        "Λ({p:g}) is infinite or out of reach: the noise moves the phase to and fro over the ray at {phase:.6g}, where "
-        "‖x‖^p grows by a factor > {factor:.3g} each time; choose a p nearer to 0, or a ray on which no noise acts",
+        "failure: Λ({p:g}) is infinite or out of reach: the noise moves the phase to and fro over the ray at "
+        "{phase:.6g}, where ‖x‖^p grows by a factor > {factor:.3g} each time; choose a p nearer to 0, or a ray on "
+        "which no noise acts"
     )
     INFINITE_VARIANCE = (
-        _FAILURE,
-        "the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3",
+        "failure: the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"
     )
     NO_VARIANCE_RATE = (
-        _FAILURE,
-        "Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time",
+        "failure: Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time"
     )
     RARE_NOWHERE_ZERO = (
-        _FAILURE,
-        "Λ({p:g}) is that of rare paths, which hold the noise far out in its tails, and zero nowhere; choose r0 <= 1, "
-        "{remedy}",
+        "failure: Λ({p:g}) is that of rare paths, which hold the noise far out in its tails, and zero nowhere; choose "
+        "r0 <= 1, {remedy}"
     )
     NO_BOUND = (
-        _FAILURE,
-        "got {key} = {value}; for r0 > 1 the noise of Eq. (7) has algebraic tails: Λ(p) is finite for -1 <= p <= 0 "
-        "only, and no trial function is known to prove a bound there; choose r0 <= 1, {remedy}",
+        "failure: got {key} = {value}; for r0 > 1 the noise of Eq. (7) has algebraic tails: Λ(p) is finite for -1 <= p "
+        "<= 0 only, and no trial function is known to prove a bound there; choose r0 <= 1, {remedy}"
     )
 
-    UNDERFLOW = _FAILURE, "P_s underflows in a cell of the noise; use a narrower interval"
+    UNDERFLOW = "failure: P_s underflows in a cell of the noise; use a narrower interval"
     DEPENDENT = (
-        _FAILURE,
-        "elements of degree {degree} are linearly dependent to rounding, as P_s falls too far within a cell of the "
-        "noise; use more or lower-degree cells, or a narrower interval",
+        "failure: elements of degree {degree} are linearly dependent to rounding, as P_s falls too far within a cell "
+        "of the noise; use more or lower-degree cells, or a narrower interval"
     )
     NO_IMPACT_LINE = (
-        _FAILURE,
-        "{wanted} impact line(s) expected at phi = {place} + k pi, {found} found; put a line of the mesh at each "
-        "impact",
+        "failure: {wanted} impact line(s) expected at phi = {place} + k pi, {found} found; put a line of the mesh at "
+        "each impact"
     )
 
-    NOT_CONVERGED = _FAILURE, "Λ({p:g}) did not converge: {reason}"
-    NOT_SOLVED = _FAILURE, "Λ({p:g}) cannot be solved ({reason})"
-    OUT_OF_RANGE = _FAILURE, "Λ({p:g}) is beyond floating-point numbers ({reason})"
-    FAR_OUT = _FAILURE, "{reason}; this moment is carried by rare paths, with noise far out in its tails"
-    NEAR_ZERO = _FAILURE, "p near 0 goes with p = {p:g}: {reason}"
-    ZERO_NOT_FINER = _FAILURE, "p = 0 did not converge on a finer mesh: {reason}"
+    NOT_CONVERGED = "failure: Λ({p:g}) did not converge: {reason}"
+    NOT_SOLVED = "failure: Λ({p:g}) cannot be solved ({reason})"
+    OUT_OF_RANGE = "failure: Λ({p:g}) is beyond floating-point numbers ({reason})"
+    FAR_OUT = "failure: {reason}; this moment is carried by rare paths, with noise far out in its tails"
+    NEAR_ZERO = "failure: p near 0 goes with p = {p:g}: {reason}"
+    ZERO_NOT_FINER = "failure: p = 0 did not converge on a finer mesh: {reason}"
     HELD_BEYOND = (
-        _FAILURE,
-        "Λ({p:g}) did not converge: it is at least {rate:.3g}, as much as paths grow that hold the noise beyond {z:g} "
-        "standard deviations, and no eigenfunction belongs to them",
+        "failure: Λ({p:g}) did not converge: it is at least {rate:.3g}, as much as paths grow that hold the noise "
+        "beyond {z:g} standard deviations, and no eigenfunction belongs to them"
     )
     NO_EIGENVALUE = (
-        _FAILURE,
-        "the principal eigenvalue at p = {p:g} was not found on this mesh: backward error {residual:.1e} (at most "
-        "{limit:g}), and {size:.1e} of the more positive of T and T* has the wrong sign (at most {most:g})",
+        "failure: the principal eigenvalue at p = {p:g} was not found on this mesh: backward error {residual:.1e} (at "
+        "most {limit:g}), and {size:.1e} of the more positive of T and T* has the wrong sign (at most {most:g})"
     )
     LARGER_EIGENVALUE = (
-        _FAILURE,
-        "at p = {p:g} the eigenvalue {rightmost:.6g} lies right of {value:.6g}, though that has eigenfunctions of one "
-        "sign",
+        "failure: at p = {p:g} the eigenvalue {rightmost:.6g} lies right of {value:.6g}, though that has "
+        "eigenfunctions of one sign"
     )
-    NO_ARNOLDI = _FAILURE, "the Arnoldi iteration for p = {p:g} did not settle"
-    UNKNOWNS_SPENT = _FAILURE, "the next mesh has {unknowns} unknowns, more than budget.unknowns = {most}"
+    NO_ARNOLDI = "failure: the Arnoldi iteration for p = {p:g} did not settle"
+    UNKNOWNS_SPENT = "failure: the next mesh has {unknowns} unknowns, more than budget.unknowns = {most}"
     SECONDS_SPENT = (
-        _FAILURE,
-        "the next mesh needs some {seconds:.2g} s by the clock, more than budget.seconds = {most:g}",
+        "failure: the next mesh needs some {seconds:.2g} s by the clock, more than budget.seconds = {most:g}"
     )
-    MESHES_SPENT = _FAILURE, "{count} meshes were tried"
-    ROUNDED = _FAILURE, "rounding alone may change it by {size:.1e}: use a larger rtol"
+    MESHES_SPENT = "failure: {count} meshes were tried"
+    ROUNDED = "failure: rounding alone may change it by {size:.1e}: use a larger rtol"
     NOTHING_RESOLVED = (
-        _FAILURE,
-        "Λ({p:g}) did not converge: {reason}; no mesh resolved it"
-        "{is_thin:?, as the layers of slow, strong noise are too thin}{last:? ({last})}",
+        "failure: Λ({p:g}) did not converge: {reason}; no mesh resolved it{is_thin:?, as the layers of slow, strong "
+        "noise are too thin}{last:? ({last})}"
     )
     BUDGET_SPENT = (
-        _FAILURE,
-        "Λ({p:g}) did not converge: {reason}; best value {value:.6g} with an estimated error of {error:.1e}, "
-        "{size:.1e} times the tolerance",
+        "failure: Λ({p:g}) did not converge: {reason}; best value {value:.6g} with an estimated error of {error:.1e}, "
+        "{size:.1e} times the tolerance"
     )
     MEANINGLESS = (
-        _FAILURE,
-        "{p:?Λ({p:g})¦{symbol}} = {value:.6g} has an estimated error of {size:.1g}, too much to mean anything",
+        "failure: {p:?Λ({p:g})¦{symbol}} = {value:.6g} has an estimated error of {size:.1g}, too much to mean anything"
     )
     NOT_CONVEX = (
-        _FAILURE,
-        "Λ(p) is not convex between p = {p:g} and p = {other:g}, which the exponent always is: a wrong eigenvalue was "
-        "found",
+        "failure: Λ(p) is not convex between p = {p:g} and p = {other:g}, which the exponent always is: a wrong "
+        "eigenvalue was found"
     )
     KINKED = (
-        _FAILURE,
-        "Λ(p) is not smooth in p: noise with algebraic tails carries the moment far out for some p; use "
-        "moment_lyapunov, which takes each p by itself",
+        "failure: Λ(p) is not smooth in p: noise with algebraic tails carries the moment far out for some p; use "
+        "moment_lyapunov, which takes each p by itself"
     )
-    NOT_INCREASING = _FAILURE, "Λ(p)/p does not increase at p = {p:g}, as convexity demands"
-    INDEX_UNSETTLED = _FAILURE, "the stability index did not settle, last near p = {p:g}"
-    NEGATIVE_DENSITY = _FAILURE, "the {name} at p = {p:g} is not resolved, {size:.0%} of it is negative"
-    SIMULATION_OVERFLOWED = _FAILURE, "the simulation overflowed: some ξ is too large for this step; use a smaller step"
+    NOT_INCREASING = "failure: Λ(p)/p does not increase at p = {p:g}, as convexity demands"
+    INDEX_UNSETTLED = "failure: the stability index did not settle, last near p = {p:g}"
+    NEGATIVE_DENSITY = "failure: the {name} at p = {p:g} is not resolved, {size:.0%} of it is negative"
+    SIMULATION_OVERFLOWED = "failure: the simulation overflowed: some ξ is too large for this step; use a smaller step"
 
     RTOL_MISSED = (
-        _WARNING,
-        "rtol = {rtol:g} is not met at {count} of {of} moments, worst at p = {p:g} with an estimated relative error of "
-        "{size:.1e}; {remedy}, or use a larger rtol",
+        "warning: rtol = {rtol:g} is not met at {count} of {of} moments, worst at p = {p:g} with an estimated relative "
+        "error of {size:.1e}; {remedy}, or use a larger rtol"
     )
     INDEX_RTOL_MISSED = (
-        _WARNING,
-        "rtol = {rtol:g} is not met by {symbol}: {value:.6g} has an estimated error of {error:.1e}; "
-        "{remedy:?{remedy}, or }use a larger rtol",
+        "warning: rtol = {rtol:g} is not met by {symbol}: {value:.6g} has an estimated error of {error:.1e}; "
+        "{remedy:?{remedy}, or }use a larger rtol"
     )
     CARRIED_ELSEWHERE = (
-        _WARNING,
-        "Λ({p:g}) may be larger: {has_tails:?noise with heavy tails¦slow noise} may carry the moment near {z:.3g} "
-        "standard deviations",
+        "warning: Λ({p:g}) may be larger: {has_tails:?noise with heavy tails¦slow noise} may carry the moment near "
+        "{z:.3g} standard deviations"
     )
     UNREADABLE = (
-        _WARNING,
-        "{name} at p = {p:g} is not resolved, {size:.0%} of it has the wrong sign; its errors have next to no effect "
-        "on Λ, but do not read its picture",
+        "warning: {name} at p = {p:g} is not resolved, {size:.0%} of it has the wrong sign; its errors have next to no "
+        "effect on Λ, but do not read its picture"
     )
-    NOTHING_DRAWN = _WARNING, "neither the stationary density nor eigenfunctions are written: {reason}"
+    NOTHING_DRAWN = "warning: neither the stationary density nor eigenfunctions are written: {reason}"
 
-    INDEX_FAILED = _FAILURE, "no {symbols}: {reason}"
-    INDEX_MISSING = _WARNING, "no {symbols}: {reason}"
-    INDEX_ABSENT = _NOTE, "no {symbols}: {reason}"
-    NO_MOMENT = _FAILURE, "as there is no Λ({p:g})"
-    NO_INDEX = _NOTE, _RARE
+    INDEX_FAILED = "failure: no {symbols}: {reason}"
+    INDEX_MISSING = "warning: no {symbols}: {reason}"
+    INDEX_ABSENT = "note: no {symbols}: {reason}"
+    NO_MOMENT = "failure: as there is no Λ({p:g})"
+    NO_INDEX = f"note: {_RARE}"
     NO_ROOT = (
-        _NOTE,
-        "Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded noise "
-        "P(sup ‖x‖ > A) may fall faster than any power of A}",
+        "note: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded "
+        "noise P(sup ‖x‖ > A) may fall faster than any power of A}"
     )
-    NOT_ONE_RAY = _NOTE, "the motion has impacts on {count:?{count}¦no} rays, and only on a single one have they a rate"
-    RARE_IMPACTS = _NOTE, "impacts are too rare to matter, N < {most:.1g}"
-    LOG_OUT_OF_RANGE = _NOTE, "its logarithm is {value:.3g}, beyond ±{most:g}"
-    NO_RESTITUTION = _NOTE, "the motion has no coefficient of restitution"
-    ALWAYS_STABLE = _NOTE, "almost surely stable for every r in (0, 1], as λ without loss is {value:.3g}"
-    ALWAYS_UNSTABLE = _NOTE, "unstable for every r in (0, 1]: it would have to be {value:.3g}"
+    NOT_ONE_RAY = "note: the motion has impacts on {count:?{count}¦no} rays, and only on a single one have they a rate"
+    RARE_IMPACTS = "note: impacts are too rare to matter, N < {most:.1g}"
+    LOG_OUT_OF_RANGE = "note: its logarithm is {value:.3g}, beyond ±{most:g}"
+    NO_RESTITUTION = "note: the motion has no coefficient of restitution"
+    ALWAYS_STABLE = "note: almost surely stable for every r in (0, 1], as λ without loss is {value:.3g}"
+    ALWAYS_UNSTABLE = "note: unstable for every r in (0, 1]: it would have to be {value:.3g}"
 
     RARE_PATHS = (
-        _NOTE,
-        "at p = {p:g} rare paths carry the moment{first:?, at p = {first:g} those¦, those} with noise around {z:.3g} "
-        "standard deviations, of probability 1e-{decades:.0f}"
-        "{near:?; for times up to about {wait:.1g} they hardly count, and E‖x‖^p grows at {near:.3g}}",
+        "note: at p = {p:g} rare paths carry the moment{first:?, at p = {first:g} those¦, those} with noise around "
+        "{z:.3g} standard deviations, of probability 1e-{decades:.0f}{near:?; for times up to about {wait:.1g} they "
+        "hardly count, and E‖x‖^p grows at {near:.3g}}"
     )
     HEAVY_TAILS = (
-        _NOTE,
-        f"algebraic tails: {_RARE}; there is no stability index, and λ is the {ALMOST_EVERY}"
-        "{is_no_slope:?, not Λ′(0)}",
+        f"note: algebraic tails: {_RARE}; there is no stability index, and λ is the {ALMOST_EVERY}"
+        "{is_no_slope:?, not Λ′(0)}"
     )
     UNSEEN_TAILS = (
-        _NOTE,
-        f"algebraic tails: {_RARE}; a simulation shows Λ(p) without these paths, and λ is the {ALMOST_EVERY}",
+        f"note: algebraic tails: {_RARE}; a simulation shows Λ(p) without these paths, and λ is the {ALMOST_EVERY}"
     )
     FAR_FROM_GAUSSIAN = (
-        _NOTE,
-        "the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = {departure:.3g} > {most:g}: it gives "
-        "the noise the variance {reduced:.4g} instead of {variance:.4g}, Eq. (10)",
+        "note: the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = {departure:.3g} > {most:g}: it "
+        "gives the noise the variance {reduced:.4g} instead of {variance:.4g}, Eq. (10)"
     )
     IMPOSSIBLE_BOUNCE = (
-        _NOTE,
-        "1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much; R = {factor:.3g} belongs to the "
-        "delta law alone",
+        "note: 1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much; R = {factor:.3g} belongs "
+        "to the delta law alone"
     )
     STRONG_NOISE = (
-        _NOTE,
-        "Eq. (37) is for weak noise{is_reduced:?, and here for the reduced one}: from |p| = {first:.3g} on, what it "
-        "leaves out, epsilon^4 and higher, exceeds {most:.0%} of its terms, most at p = {p:.3g}, where it is "
-        "{rest:.3g}, {size:.0%}",
+        "note: Eq. (37) is for weak noise{is_reduced:?, and here for the reduced one}: from |p| = {first:.3g} on, what "
+        "it leaves out, epsilon^4 and higher, exceeds {most:.0%} of its terms, most at p = {p:.3g}, where it is "
+        "{rest:.3g}, {size:.0%}"
     )
-    NO_SENSITIVITIES = _NOTE, "no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
+    NO_SENSITIVITIES = "note: no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
     ONE_SIDED = (
-        _NOTE,
-        "the sensitivities to {key} = {value:g} are derivatives from below: above, Λ is infinite or another one",
+        "note: the sensitivities to {key} = {value:g} are derivatives from below: above, Λ is infinite or another one"
     )
 
-    NO_PROBLEM = _FAILURE, "no such problem: {reason}"
-    NOWHERE = _NOTE, "{symbol} exists nowhere in the frame"
-    NO_LINE = _NOTE, "no line {line} was found, though {symbol} changes its sign in the frame"
-    ONE_SIGN = _NOTE, "{side} {is_whole:?everywhere¦wherever it exists} in the frame"
-    LINE_ENDS = _NOTE, "the line {line} ends inside of the frame: {reason}"
-    HOLES = _NOTE, "{symbol} is missing in part of the frame: {reason}"
-    NEWTON_UNSETTLED = _FAILURE, "Newton's method does not settle on it"
-    TOO_SHARP = _FAILURE, "it turns too sharply, as where it meets another branch"
-    TOO_LONG = _FAILURE, "it has more than {count} points"
+    NO_PROBLEM = "failure: no such problem: {reason}"
+    NOWHERE = "note: {symbol} exists nowhere in the frame"
+    NO_LINE = "note: no line {line} was found, though {symbol} changes its sign in the frame"
+    ONE_SIGN = "note: {side} {is_whole:?everywhere¦wherever it exists} in the frame"
+    LINE_ENDS = "note: the line {line} ends inside of the frame: {reason}"
+    HOLES = "note: {symbol} is missing in part of the frame: {reason}"
+    NEWTON_UNSETTLED = "failure: Newton's method does not settle on it"
+    TOO_SHARP = "failure: it turns too sharply, as where it meets another branch"
+    TOO_LONG = "failure: it has more than {count} points"
 
     NO_PATH_VARIANCE = (
-        _WARNING,
-        "no estimate of Λ(p) at p = {p:g}: ‖x‖^p has no variance, as for r0 > 1 the moment of order 2p is infinite; "
-        "use the finite elements",
+        "warning: no estimate of Λ(p) at p = {p:g}: ‖x‖^p has no variance, as for r0 > 1 the moment of order 2p is "
+        "infinite; use the finite elements"
     )
     FEW_PATHS = (
-        _WARNING,
-        "no estimate of Λ(p) at p = {p:g}: too few effective paths carry the mean, {low:.3g}{high:? to {high:.3g}} of "
-        'the {needed} that are needed; use {is_direct:?estimator = "population", or more paths¦more paths}',
+        "warning: no estimate of Λ(p) at p = {p:g}: too few effective paths carry the mean, {low:.3g}{high:? to "
+        '{high:.3g}} of the {needed} that are needed; use {is_direct:?estimator = "population", or more paths¦more '
+        "paths}"
     )
     TWO_PLACES = (
-        _WARNING,
-        "Λ({p:g}): populations that start in two places differ by {gap:.3g}, {size:.0f} standard errors: the noise is "
-        "too slow to pass between them; the larger value is given",
+        "warning: Λ({p:g}): populations that start in two places differ by {gap:.3g}, {size:.0f} standard errors: the "
+        "noise is too slow to pass between them; the larger value is given"
     )
     DRIFTING = (
-        _WARNING,
-        "Λ({p:g}) still drifts: over the simulation it changes by {size:.1f} standard errors, more than {most:g}, "
-        "which its standard error does not cover; use {is_direct:?a longer window¦more time}",
+        "warning: Λ({p:g}) still drifts: over the simulation it changes by {size:.1f} standard errors, more than "
+        "{most:g}, which its standard error does not cover; use {is_direct:?a longer window¦more time}"
     )
-    STOPPED = _WARNING, "stopped early, after {share:.0%} of the time"
+    STOPPED = "warning: stopped early, after {share:.0%} of the time"
     AT_REST = (
-        _WARNING,
-        "no stationary response: λ = {value:.3g} ± {error:.1e} {most:?is not {most:g} standard errors above 0¦is not "
-        "positive}, and with λ < 0 almost every path comes to rest",
+        "warning: no stationary response: λ = {value:.3g} ± {error:.1e} {most:?is not {most:g} standard errors above "
+        "0¦is not positive}, and with λ < 0 almost every path comes to rest"
     )
-    RESPONSE_STOPPED = _WARNING, "the response was stopped early, after {time:.3g}"
-    RESPONSE_NOT_REACHED = _WARNING, "no stationary response: stopped before it was reached"
+    RESPONSE_STOPPED = "warning: the response was stopped early, after {time:.3g}"
+    RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"
 
-    NO_MEMORY = _FAILURE, "not enough memory"
-    WORKER_DIED = _FAILURE, "its worker died, perhaps for lack of memory; {remedy}, and run it again"
-    FAULT = _FAILURE, "{kind}: {text} (a fault of fpsolve, in {file}:{line})"
-    BEING_WRITTEN = _FAILURE, "{place} is being written by another run; wait for it, or {remedy}"
+    NO_MEMORY = "failure: not enough memory"
+    WORKER_DIED = "failure: its worker died, perhaps for lack of memory; {remedy}, and run it again"
+    FAULT = "failure: {kind}: {text} (a fault of fpsolve, in {file}:{line})"
+    BEING_WRITTEN = "failure: {place} is being written by another run; wait for it, or {remedy}"
 
 
 class Message(str):
