@@ -39,6 +39,7 @@ class Quantity:
         equation: what defines it: the number of an equation of the paper, or an equation.
         closed_form: the number of its perturbation theory in the paper; empty where there is none.
         error_source: what its error is estimated from; empty where there is no estimate.
+        comment: more, for who reads the numbers.
     """
 
     name: str
@@ -50,12 +51,13 @@ class Quantity:
     equation: str = ""
     closed_form: str = ""
     error_source: str = ""
+    comment: str = ""
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Those of a variable of xarray: long_name, symbol, units and equation."""
-        known = {"long_name": self.words, "symbol": self.latex, "units": self.unit, "equation": self.equation}
-        return {name: text for name, text in known.items() if text}
+        """Those of a variable of xarray: long_name, symbol, units, equation and comment; no empty ones."""
+        names = {"long_name": "words", "symbol": "latex", "units": "unit", "equation": "equation", "comment": "comment"}
+        return {name: text for name, own in names.items() if (text := getattr(self, own))}
 
     @property
     def title(self) -> str:
@@ -75,8 +77,9 @@ class Quantity:
         return f"{name} = {value:g}{unit.removeprefix(' 1')}"
 
     def error(self, kind: str = "estimated error") -> Quantity:
-        """Its error, of a kind such as "standard error"."""
-        return replace(_plain(self), name=f"{self.name}_error", words=f"{kind} of the {self.words}")
+        """Its error, of a kind such as "standard error"; where it is estimated, the comment says from what."""
+        comment = f"from {self.error_source}" if kind == "estimated error" and self.error_source else ""
+        return replace(_plain(self), name=f"{self.name}_error", words=f"{kind} of the {self.words}", comment=comment)
 
     @property
     def perturbation(self) -> Quantity:

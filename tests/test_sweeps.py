@@ -375,17 +375,17 @@ def test_records_are_read_once(tmp_path, monkeypatch):
     known = Records(tmp_path)
     for number in range(5):
         records.append(tmp_path, f"key{number}", {"number": number})
-        place = known.look().place(f"key{number}")
+        place = known.look().address(f"key{number}")
         assert len(parsed) == number + 1
     [path] = tmp_path.glob("*.jsonl")
     with path.open("ab") as file:
         file.write(b'{"key": "torn')
-    assert known.look().place("key4") == place
+    assert known.look().address("key4") == place
     monkeypatch.undo()
-    assert known.read(known.place("key3")) == {"number": 3}
+    assert known.read(known.address("key3")) == {"number": 3}
     known.remove()
     records.append(tmp_path, "key0", {"number": 10})
-    assert known.look().read(known.place("key0")) == {"number": 10}
+    assert known.look().read(known.address("key0")) == {"number": 10}
 
 
 def test_a_drawing_that_fails_costs_no_numbers(place, monkeypatch):

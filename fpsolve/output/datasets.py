@@ -17,7 +17,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
 from fpsolve.model.kinds import parameter_of
-from fpsolve.model.quantity import SECONDS, STATUS, STORED_MOMENTS, P
+from fpsolve.model.quantity import SECONDS, STATUS, STORED_MOMENTS, P, Quantity
 from fpsolve.output.tables import asked
 from fpsolve.study.results import CurveResult, Status
 
@@ -57,7 +57,7 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
             if numbers := result.index(index):
                 values[:, row] = [*numbers.values()]
         status[row], seconds[row] = result.status, result.seconds
-    columns = [(STORED_MOMENTS[name], values) for name, values in moments.items()]
+    columns: list[tuple[Quantity, Any]] = [(STORED_MOMENTS[name], values) for name, values in moments.items()]
     for index, three in indices.items():
         columns += zip((index, index.error(), index.perturbation), three, strict=True)
     columns += [(STATUS, status), (SECONDS, seconds)]

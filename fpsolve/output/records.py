@@ -45,52 +45,52 @@ class Records:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._places: dict[str, Address] = {}
+        self._addresses: dict[str, Address] = {}
         self._seen: dict[str, int] = {}
 
     def look(self) -> Records:
         """Find what has been written by now, since the last look."""
         for path in self._files():
-            for key, place in _lines(path, self._seen.get(path.name, 0)):
-                self._places[key] = place
-                self._seen[path.name] = place.start + place.size
+            for key, address in _lines(path, self._seen.get(path.name, 0)):
+                self._addresses[key] = address
+                self._seen[path.name] = address.start + address.size
         return self
 
     @property
     def are_there(self) -> bool:
         """Whether there is one at least."""
-        return bool(self._places)
+        return bool(self._addresses)
 
     @property
     def outdated(self) -> int:
         """How many another version of fpsolve has written; they are not read."""
-        return sum(not is_current(key) for key in self._places)
+        return sum(not is_current(key) for key in self._addresses)
 
-    def place(self, key: str) -> Address | None:
+    def address(self, key: str) -> Address | None:
         """Where the record of a key is, if there is one."""
-        return self._places.get(key)
+        return self._addresses.get(key)
 
-    def expect(self, place: Address) -> None:
+    def expect(self, address: Address) -> None:
         """Wait for the file of a record, which a network may show late. Raises `OutputError` where it does not come."""
         until = monotonic() + SHARED_SECONDS
-        while place.file not in self._seen and not (self.folder / place.file).exists():
+        while address.file not in self._seen and not (self.folder / address.file).exists():
             if monotonic() > until:
                 raise OutputError(f"{self.folder} is not where the workers write: they must share it", Remedy.FOLDER)
             sleep(0.5)
-        self._seen.setdefault(place.file, 0)
+        self._seen.setdefault(address.file, 0)
 
-    def read(self, place: Address) -> dict[str, Any]:
+    def read(self, address: Address) -> dict[str, Any]:
         """A record. Raises OSError or ValueError where there is none."""
-        with (self.folder / place.file).open("rb") as file:
-            file.seek(place.start)
-            found = _parsed(file.read(place.size))
+        with (self.folder / address.file).open("rb") as file:
+            file.seek(address.start)
+            found = _parsed(file.read(address.size))
         if found is None:
-            raise ValueError(f"{self.folder / place.file} has changed")
+            raise ValueError(f"{self.folder / address.file} has changed")
         return found[1]
 
     def remove(self) -> None:
         """Start over."""
-        self._places.clear()
+        self._addresses.clear()
         self._seen.clear()
         for path in self._files():
             path.unlink()
@@ -121,7 +121,7 @@ class Results(Sequence[CurveResult]):
 
     def find(self, curve: Curve, key: str) -> bool:
         """Take the result of a curve from the record of a key; whether there is one that can be read."""
-        if (address := self._records.place(key)) is None:
+        if (address := self._records.address(key)) is None:
             return False
         try:
             result_of(self._records.read(address), curve)

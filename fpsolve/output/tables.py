@@ -5,10 +5,17 @@ from __future__ import annotations
 import csv
 import json
 import math
+import platform
+import shlex
+import socket
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from fpsolve import __version__
@@ -29,6 +36,33 @@ if TYPE_CHECKING:
 
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a case, from when this is made.
+
+    Attributes:
+        case: what is run.
+        started: when, in UTC.
+    """
+
+    case: Case
+    started: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+    _clock: float = field(default_factory=monotonic, repr=False)
+
+    def facts(self) -> dict[str, Any]:
+        """Versions, the command, the machine, when and how long until now, and the case as it was written."""
+        packages = {name: version(name) for name in ("numpy", "scipy", "scikit-fem")}
+        return {
+            "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},
+            "command": shlex.join(sys.argv),
+            "host": socket.gethostname(),
+            "started": self.started,
+            "wall_seconds": round(monotonic() - self._clock, 3),
+            "overrides": list(self.case.overrides),
+            "case_text": self.case.text,
+        }
 
 
 def write_results(case: Case, results: Sequence[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
@@ -125,8 +159,8 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
 
 def _row(case: Case, result: CurveResult) -> list[Any]:
     """Each index and its error, empty where there is none, and what became of the curve."""
-    found = [result.index(each) or {"value": "", "error_estimate": ""} for each in asked(case)]
-    numbers = [each[name] for each in found for name in ("value", "error_estimate")]
+    estimates = [result.estimates[each.name] for each in asked(case)]
+    numbers = [number for each in estimates for number in ((each.value, each.error_estimate) if each else ("", ""))]
     solved, wanted = result.moments.p.size, case.p.size if MOMENT.name in case.output.quantities else 0
     return [*numbers, solved, wanted - solved, result.status.name.lower(), round(result.seconds, 6)]
 

@@ -53,7 +53,8 @@ def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSec
 
 def record_of(result: CurveResult | SimulatedCurve) -> Record:
     """All of a result but its curve."""
-    return {name: each.plain(getattr(result, name)) for name, each in _recorded(type(result)).items()}
+    kind: Any = type(result)
+    return {name: each.plain(getattr(result, name)) for name, each in _recorded(kind).items()}
 
 
 def result_of(record: Mapping[str, Any], curve: Curve) -> CurveResult:

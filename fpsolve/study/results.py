@@ -26,7 +26,7 @@ if TYPE_CHECKING:  # which take half a second to import
 
 
 @dataclass(frozen=True, eq=False)
-class Moments:
+class MomentColumns:
     """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
 
     Attributes:
@@ -72,7 +72,7 @@ class CurveResult(Result):
     """
 
     curve: Curve
-    moments: Moments
+    moments: MomentColumns
     estimates: Mapping[str, Estimate | None]
     discretisation: dict[str, Any] | None = None
     warnings: tuple[Message, ...] = ()

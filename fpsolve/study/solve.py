@@ -26,7 +26,7 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STAB
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity
-from fpsolve.study.results import Comparison, CurveResult, Moments, Solved
+from fpsolve.study.results import Comparison, CurveResult, MomentColumns, Solved
 from fpsolve.theory import validity
 from fpsolve.theory.perturbation import second_order
 
@@ -169,10 +169,12 @@ def _functions(solver: ExponentSolver, wanted: Wanted) -> tuple[tuple[PrincipalP
     return pairs, _pair(solver, 0.0) if wanted.density else None
 
 
-def _moments(found: MomentLyapunov) -> Moments:
+def _moments(found: MomentLyapunov) -> MomentColumns:
     """The numbers, with Eq. (37) beside them."""
     theory = second_order(found.solver.problem).moment_exponent(found.p)
-    return Moments(found.p, found.value, found.derivative, found.error_estimate, found.residual, theory, found.rare)
+    return MomentColumns(
+        found.p, found.value, found.derivative, found.error_estimate, found.residual, theory, found.rare
+    )
 
 
 def _solve_indices(

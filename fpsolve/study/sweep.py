@@ -21,7 +21,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message, Remedy, message_of
-from fpsolve.study.results import CurveResult, Moments, Solved
+from fpsolve.study.results import CurveResult, MomentColumns, Solved
 from fpsolve.study.solve import Numerics, Wanted, solve_curve, solve_functions
 
 Kept = TypeVar("Kept")
@@ -121,7 +121,7 @@ def failed(curve: Curve, reason: str) -> CurveResult:
     """A result without numbers."""
     nothing = np.zeros(0)
     failures = (Failure(None, message_of(reason)),)
-    return CurveResult(curve, Moments(*[nothing] * 7), dict.fromkeys(INDICES), failures=failures)
+    return CurveResult(curve, MomentColumns(*[nothing] * 7), dict.fromkeys(INDICES), failures=failures)
 
 
 def lost(curve: Curve) -> CurveResult:

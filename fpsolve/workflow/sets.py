@@ -10,9 +10,8 @@ from pathlib import Path
 from fpsolve.case.case import Case
 from fpsolve.case.curves import Curve
 from fpsolve.output.datasets import write_dataset
-from fpsolve.output.provenance import Run
 from fpsolve.output.records import Address, Records, Results, append
-from fpsolve.output.tables import write_results
+from fpsolve.output.tables import Run, write_results
 from fpsolve.output.vtk import write_curves, write_functions
 from fpsolve.pool import Pool, serial
 from fpsolve.study.records import key_of, record_of
@@ -124,7 +123,7 @@ class Sweep:
     def _lost(self, batch: Batch, queue: _Queue) -> list[Found]:
         """What is known of a batch whose worker died; the rest is tried again, set by set, which shows the reason."""
         self.records.look()
-        places = {order: self.records.place(order.key) for order in batch.orders}
+        places = {order: self.records.address(order.key) for order in batch.orders}
         left = [order for order, place in places.items() if place is None or order.is_known]
         if len(batch.orders) > 1:
             queue.again += [Batch((order,), batch.numerics) for order in left]

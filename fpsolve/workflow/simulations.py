@@ -77,7 +77,7 @@ class Simulations:
 
     def _found(self, curve: Curve) -> SimulatedCurve | None:
         """Its simulation, if that is known; a record of another form does not count."""
-        address = self.records.place(self._key(curve))
+        address = self.records.address(self._key(curve))
         try:
             return None if address is None else simulated_of(self.records.read(address), curve)
         except ValueError:

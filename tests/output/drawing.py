@@ -11,7 +11,7 @@ from fpsolve.case.case import load_case
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.output.figures import draw
-from fpsolve.study.results import CurveResult, Moments
+from fpsolve.study.results import CurveResult, MomentColumns
 from fpsolve.theory.perturbation import second_order
 
 CASE = """
@@ -49,7 +49,9 @@ def _result(case, curve, *, has_failed):
     known = {name: Estimate(each, 0.0, 1.0) for name, each in found.items() if not has_failed and abs(each) <= 20}
     estimates = {**dict.fromkeys(INDICES), **known}
     failures = (Failure(None, "it was too hard"),) if has_failed else ()
-    return CurveResult(curve, Moments(p, value, nothing, nothing, nothing, value, p[:0]), estimates, failures=failures)
+    return CurveResult(
+        curve, MomentColumns(p, value, nothing, nothing, nothing, value, p[:0]), estimates, failures=failures
+    )
 
 
 def drawn_case(folder: Path, sets=(), *, fails=lambda number: False):

@@ -10,6 +10,7 @@ import xarray as xr
 import fpsolve
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
+from fpsolve.model.quantity import MOMENT
 from tests.solving import WEAK_NOISE
 
 TEXT = f"""title = "A test"
@@ -60,6 +61,7 @@ def test_a_product_has_a_dimension_for_each_key(tmp_path):
         assert variable.attrs["units"], name
     assert found.moment.attrs["equation"] == "(1), (19)"
     assert found.moment_perturbation.attrs["equation"] == "(37)"
+    assert found.moment_error.attrs["comment"] == f"from {MOMENT.error_source}"
     assert found.lyapunov_exponent.attrs["equation"] == "(2)"
     assert found.stability_index_perturbation.attrs["equation"] == "(38)"
     assert found["noise.D0"].attrs == {"long_name": "noise intensity", "symbol": "$D_0$", "units": "1/time"}

@@ -32,15 +32,15 @@ def test_what_is_appended_is_read(tmp_path):
     places = [append(tmp_path / "here", f"key{i}", {**VALUES, "i": i}) for i in range(5)]
     records = Records(tmp_path / "here").look()
     for i, place in enumerate(places):
-        assert records.place(f"key{i}") == place
+        assert records.address(f"key{i}") == place
         assert records.read(place) == {**VALUES, "i": i}
-    assert records.place("another") is None
+    assert records.address("another") is None
     [path] = (tmp_path / "here").glob("*")
     assert [json.loads(line)["key"] for line in path.read_text(encoding="utf-8").splitlines()] == [
         f"key{i}" for i in range(5)
     ]
     append(tmp_path / "here", "key1", {"i": "new"})
-    assert records.look().read(records.place("key1")) == {"i": "new"}
+    assert records.look().read(records.address("key1")) == {"i": "new"}
     records.remove()
     assert not Records(tmp_path / "here").look().are_there
 
@@ -59,7 +59,7 @@ def test_each_process_has_a_file(tmp_path):
     append(tmp_path, "key2", VALUES)
     assert len(list(tmp_path.glob("*.jsonl"))) == 3
     records = Records(tmp_path).look()
-    assert all(records.read(records.place(f"key{i}")) == VALUES for i in range(3))
+    assert all(records.read(records.address(f"key{i}")) == VALUES for i in range(3))
 
 
 @pytest.mark.parametrize("damage", [lambda line: line[: len(line) // 2], lambda line: b"\0" * len(line)])
@@ -74,7 +74,7 @@ def test_a_torn_line_is_no_record(tmp_path, damage, which):
     records = Records(tmp_path).look()
     swallowed = {which, which + 1}  # a torn line has no end, so that it takes the next one with it
     for i in range(3):
-        place = records.place(f"key{i}")
+        place = records.address(f"key{i}")
         assert (place is None) == (i in swallowed)
         assert place is None or records.read(place) == {"i": i}
 
@@ -110,7 +110,7 @@ def test_what_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.undo()
     append(tmp_path, "key2", {"i": 2})
     records = Records(tmp_path).look()
-    assert [records.place(f"key{i}") is not None for i in range(3)] == [True, False, True]
+    assert [records.address(f"key{i}") is not None for i in range(3)] == [True, False, True]
 
 
 @pytest.mark.parametrize("text", [TEXT + PRODUCT, TEXT + HOPELESS])
@@ -124,6 +124,9 @@ def test_results_are_the_same_from_their_records(tmp_path, text):
             np.testing.assert_array_equal(getattr(again.moments, name), getattr(result.moments, name))
         assert again.estimates == result.estimates
         assert (again.warnings, again.notes, again.failures) == (result.warnings, result.notes, result.failures)
+        for one, other in zip((*again.warnings, *again.notes), (*result.warnings, *result.notes), strict=True):
+            assert (one.code, one.data) == (other.code, other.data)
+        assert [each.reason.code for each in again.failures] == [each.reason.code for each in result.failures]
         assert again.status == result.status
         assert again.sensitivities.moments == result.sensitivities.moments
         assert again.sensitivities.indices == result.sensitivities.indices

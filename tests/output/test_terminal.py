@@ -15,7 +15,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.output.remarks import print_remark
 from fpsolve.output.screen import Column, Grid, Screen, spelt
 from fpsolve.output.terminal import duration, print_comparisons, print_results, print_simulation, print_warnings
-from fpsolve.study.results import Comparison, CurveResult, Moments
+from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from tests.solving import solve_case
 from tests.test_workflow import TEXT
@@ -125,7 +125,7 @@ def result(curve, D0, **more):
     """A made-up result of a curve."""
     numbers = np.array([D0, 2 * D0])
     theory = 0 * numbers
-    moments = Moments(np.array([-1.0, 2.0]), numbers, theory, 1e-9 * numbers, theory, theory, np.zeros(0))
+    moments = MomentColumns(np.array([-1.0, 2.0]), numbers, theory, 1e-9 * numbers, theory, theory, np.zeros(0))
     estimates = {name: Estimate(D0 * (-1) ** i, 1e-12, 1.0) for i, name in enumerate(INDICES)}
     return CurveResult(curve, moments, estimates, **more)
 
