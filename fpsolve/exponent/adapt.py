@@ -1,32 +1,39 @@
-"""Choosing the discretisation for each p: it is refined until Λ(p) meets a tolerance, or the budget is spent."""
+"""Λ(p) around one place of the noise: the discretisation is chosen for each p, each solve goes on from the nearest p.
+
+A discretisation is refined until Λ(p) meets a tolerance, or the budget is spent.
+"""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Annotated
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from functools import cached_property
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.corners import corners
-from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
+from fpsolve.exponent.places import comparable, is_far_out, other_center, other_places
 from fpsolve.exponent.refine import first, first_far, refined
-from fpsolve.exponent.rival import comparable, rival
 from fpsolve.fem.discretisation import Discretisation
-from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS
+from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, one_thread
 from fpsolve.fem.generator import Generator
+from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.problem import Problem
-from fpsolve.theory.far import far_places
+from fpsolve.theory.far import Place, far_places, outlook
 from fpsolve.theory.frozen import frozen_noise
 
+LOOSE = 1e-3
+"""Share of the rates within which a place is solved before it is compared with others."""
 MAX_STAGES = 30
 WORTH_A_TRY = MAX_DENSE_UNKNOWNS
 """Unknowns of a system that takes less time than finding another one."""
@@ -34,6 +41,14 @@ MOST_RESCALING = 0.1
 """Of ln |p|, on which the place far out depends, for one discretisation."""
 MOST_TILT_AWAY = 0.7
 """How far the tilt of a space may be from the best one at another p."""
+TRIM = 0.8
+"""A smaller space must have at most this share of the unknowns."""
+SMALL_P = 1e-2
+"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
+NEIGHBOURS = 6
+"""How many known eigenfunctions those of another p are interpolated from."""
+Tolerance = Callable[[float, float], float]
+"""The largest error allowed, from p and a value of Λ(p)."""
 SECONDS_PER_UNKNOWN = 3e-8
 """A solve takes about this times the power 1.5 of the number of unknowns; it is corrected by the last one."""
 
@@ -56,93 +71,254 @@ class Budget:
     seconds: Annotated[float, parameter("time for one p", "seconds = 60.0", gt=0)] = 60.0
 
 
-def resolve(
-    problem: Problem,
-    p: float,
-    *,
-    tolerance: Callable[[float], float],
-    rtol: float,
-    budget: Budget,
-    start: Solution | None = None,
-) -> Solution:
-    """A solution whose error of Λ(p) is within a tolerance.
+@dataclass(frozen=True, eq=False)
+class NearPlace:
+    """The eigenvalue around the place of the noise that is nearest to ξ = 0, for all but algebraic tails Λ(p).
 
     Args:
-        p: the moment, not 0, where Λ has no scale.
-        tolerance: the largest error allowed, from a value of Λ(p).
-        rtol: about what that is relative to the size of Λ(p), for a first discretisation.
-        start: a solution at p that does not suffice, to go on from.
+        problem: a motion and its noise.
+        mesh: a mesh for all p; None chooses a discretisation for each p that meets the tolerance.
+        rtol: about what the tolerance is relative to the size of Λ(p).
+        budget: what the choice of a discretisation may cost.
+        tolerance: the usual one.
+        starts: solutions of a problem with parameters close by, by their p.
 
-    Raises:
-        NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
-            `Solution`, or None.
+    Attributes:
+        known: what was solved, by p.
     """
-    meter = _Meter(p, budget)
-    frozen = frozen_noise(problem)
-    center = frozen.center(p) if frozen else 0.0
-    found = _search(problem, start or first(problem, p, center, rtol), tolerance, meter)
-    elsewhere = rival(found.pair)
-    if elsewhere is not None:
-        other = _search(problem, first(problem, p, elsewhere, rtol), tolerance, meter)
-        found = max(found, other, key=lambda each: each.pair.value)
-    return found
+
+    small_p: ClassVar[float] = SMALL_P
+
+    problem: Problem
+    _: KW_ONLY
+    mesh: CylinderMesh | None = None
+    rtol: float
+    budget: Budget
+    tolerance: Tolerance
+    starts: Mapping[float, Solution] = field(default_factory=dict)
+    known: dict[float, Solution] = field(init=False, default_factory=dict)
+    _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
+
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+        """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
+
+        Raises:
+            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
+        """
+        if tolerance is None and p in self._failed:
+            raise self._failed[p]
+        allowed = tolerance or self.tolerance
+        if p not in self.known or (self.mesh is None and not self._meets(self.known[p], allowed)):
+            try:
+                with one_thread():
+                    self.known[p] = self._found(p, allowed)
+            except NotConverged as failure:
+                if tolerance is None:  # a tighter one may be out of reach where this is not
+                    self._failed[p] = failure
+                raise failure from None
+            except MeshError as failure:
+                if self.mesh is not None:
+                    raise
+                told = Message(Code.NOT_CONVERGED, p=p, reason=failure.message, remedy=self.remedy)
+                raise NotConverged(told) from failure
+            except np.linalg.LinAlgError as failure:
+                told = Message(Code.NOT_SOLVED, p=p, reason=str(failure), remedy=self.remedy)
+                raise NotConverged(told) from failure
+            except ArithmeticError as failure:
+                raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
+        return self.known[p]
+
+    @property
+    def remedy(self) -> Remedy:
+        """What to do where it is not resolved."""
+        return Remedy.BUDGET if self.mesh is None else Remedy.MESH
+
+    @property
+    def refinement(self) -> Remedy:
+        """What to do where it should be resolved better."""
+        return Remedy.SMALLER_RTOL if self.mesh is None else Remedy.MESH
+
+    def remedied(self, solve: Callable[[], PrincipalPair]) -> PrincipalPair:
+        """A pair; where it is not found, the failure has the remedy of this branch."""
+        try:
+            return solve()
+        except NotConverged as failure:
+            raise NotConverged(failure.reason, failure.partial, self.remedy) from failure
+
+    def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+        """The solution at ±`SMALL_P` that a smaller p goes with."""
+        side = p or (-1.0 if self.problem.noise.has_algebraic_tails else 1.0)  # where Λ is finite
+        q = math.copysign(SMALL_P, side)
+        try:
+            return self.solution(q, tolerance)
+        except NotConverged as failure:
+            raise NotConverged(Message(Code.NEAR_ZERO, p=q, reason=failure.message), failure.partial) from failure
+
+    def loose(self, p: float, places: Sequence[Place]) -> Solution:
+        """That at p, to compare with other places: where one outdoes it, its eigenvalue is no exact one."""
+        best = max((place.rate for place in places), default=0.0)
+        return self.solution(p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)))
+
+    def _found(self, p: float, tolerance: Tolerance) -> Solution:
+        """A solution that meets a tolerance, or the one on the given mesh."""
+        if self.mesh is not None:
+            coarse, fine = self._given
+            pair = self._tried(coarse, p).pair
+            return Solution(pair, self.remedied(lambda: principal_pair(fine, p, start=pair)))
+        if abs(p) < self.small_p:
+            return self._tried(self.near_zero(p, tolerance).pair.generator, p)
+        start = None
+        for tried in (self._from_start, self._from_nearest):
+            start = tried(p, tolerance) or start
+            if start is not None and self._meets(start, tolerance) and other_center(start.pair) is None:
+                return start
+        return self._searched(p, tolerance, start)
+
+    def _searched(self, p: float, tolerance: Tolerance, start: Solution | None) -> Solution:
+        """A solution within a tolerance from a first discretisation, or from a solution that does not suffice.
+
+        Where slow noise may carry the moment in two places, the larger eigenvalue.
+        """
+        search, frozen = _Search(self.problem, p, tolerance, self.budget), frozen_noise(self.problem)
+        center = frozen.center(p) if frozen else 0.0
+        found = search.run(start or first(self.problem, p, center, self.rtol))
+        elsewhere = other_center(found.pair)
+        if elsewhere is None:
+            return found
+        other = search.run(first(self.problem, p, elsewhere, self.rtol))
+        return max(found, other, key=lambda each: each.pair.value)
+
+    @cached_property
+    def _given(self) -> tuple[Generator, Generator]:
+        """That of the given mesh, and one of four degrees more, whose error hardly counts beside it."""
+        assert self.mesh is not None
+        generator = Generator(self.problem, self.mesh)
+        return generator, generator.enriched().enriched()
+
+    def _from_nearest(self, p: float, tolerance: Tolerance) -> Solution | None:
+        """The solution at p with what was chosen for the nearest p, where that is likely to do."""
+        nearest = min(self.known, key=lambda q: abs(q - p), default=None)
+        if nearest is None:
+            return None
+        generator = self.known[nearest].pair.generator
+        if (chosen := self._trimmed(self.known[nearest], tolerance)) is not generator.chosen:
+            generator = Generator(self.problem, chosen)
+        try:
+            solution = self._tried(generator, p) if self.fits(generator, nearest, p) else None
+        except NotConverged:
+            return None
+        return None if solution is None or self._has_left(solution.pair, nearest) else solution
+
+    def _has_left(self, pair: PrincipalPair, nearest: float) -> bool:
+        """Whether its interval reaches a place far out, which at this p is not the nearest to ξ = 0."""
+        return nearest != pair.p and is_far_out(pair)
+
+    def _from_start(self, p: float, tolerance: Tolerance) -> Solution | None:
+        """The solution at p with what was chosen for it in the problem close by, or None."""
+        if p not in self.starts or corners(self.problem, p):  # which lie elsewhere there
+            return None
+        chosen = self._trimmed(self.starts[p], tolerance)
+        try:
+            return Solution(principal_pair(Generator(self.problem, chosen), p, start=self.starts[p].pair))
+        except (NotConverged, MeshError):
+            return None
+
+    def _tried(self, generator: Generator, p: float) -> Solution:
+        """The solution at p with a generator, from those around p, or from the nearest one."""
+        known = (solution.pair for solution in self.known.values())
+        near = sorted(known, key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
+        return Solution(self.remedied(lambda: principal_pair(generator, p, start=near)))
+
+    def _meets(self, solution: Solution, tolerance: Tolerance) -> bool:
+        """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
+        pair = solution.pair
+        return abs(pair.p) < self.small_p or solution.error <= tolerance(pair.p, pair.value)
+
+    def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Discretisation:
+        """The discretisation of a solution, or a much smaller one that would do."""
+        pair, generator = solution.pair, solution.pair.generator
+        if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
+            return generator.chosen
+        smaller = refined(solution, tolerance(pair.p, pair.value), 0)
+        return smaller if smaller.size <= TRIM * generator.size else generator.chosen
+
+    def fits(self, generator: Generator, q: float, p: float) -> bool:
+        """Whether what serves q is likely to serve p, or so small that it is worth a try."""
+        part, frozen = generator.chosen.noise, frozen_noise(self.problem)
+        if generator.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
+            return False
+        if frozen is None or part.kind != "polynomials":
+            return True
+        if corners(self.problem, p):
+            return False
+        away = abs(frozen.tilt(frozen.center(p)) - part.slope * p) if self.problem.noise.may_tilt else 0.0
+        return away <= MOST_TILT_AWAY
 
 
-def resolve_far(
-    problem: Problem,
-    p: float,
-    *,
-    tolerance: Callable[[float], float],
-    rtol: float,
-    budget: Budget,
-    start: Solution | None = None,
-) -> Solution:
-    """The same for the places far out of algebraic tails, of which there is one at least.
+class FarPlaces(NearPlace):
+    """The largest eigenvalue of the places far out of algebraic tails, at p for which there is one.
 
     Paths that leave the interval of the noise are killed, which makes Λ(p) smaller, but by no more than the tolerance.
     """
-    meter = _Meter(p, budget)
-    places = far_places(problem, p)
-    enough = comparable(max(place.rate for place in places))
-    wanted = [place for place in places if place.rate > enough]
-    if start is not None and len(wanted) == 1:
-        return _search(problem, start, tolerance, meter)
-    found = (_search(problem, first_far(problem, place, rtol), tolerance, meter) for place in wanted)
-    return max(found, key=lambda each: each.pair.value)
 
+    small_p = 0.0
 
-def _search(
-    problem: Problem, start: Solution | Discretisation, tolerance: Callable[[float], float], meter: _Meter
-) -> Solution:
-    """What `resolve` promises, with the tilted density sought where a first discretisation, or a solution, is."""
-    p, pair = meter.p, None
-    if isinstance(start, Discretisation):
-        chosen = start
-    else:
-        chosen, pair = refined(start, tolerance(start.pair.value), 0), start.pair
-    while True:
-        meter.check(chosen)
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         try:
-            pair = principal_pair(Generator(problem, chosen), p, start=pair)
-        except (MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError) as failure:
-            meter.failure, pair = failure, None
-            chosen = chosen.doubled()
-            continue
-        solution = Solution(pair)
-        allowed = tolerance(pair.value)
-        seems_enough = solution.error_by_modes <= allowed
-        error = solution.error if seems_enough else solution.error_by_modes
-        if error <= allowed:
-            return solution
-        meter.note(solution, error, allowed)
-        chosen = chosen.enriched() if seems_enough else refined(solution, allowed, meter.stages)
+            return super().solution(p, tolerance)
+        except NotConverged as failure:
+            raise NotConverged(Message(Code.FAR_OUT, reason=failure.message), failure.partial) from failure
+
+    def _searched(self, p: float, tolerance: Tolerance, start: Solution | None) -> Solution:
+        search, places = _Search(self.problem, p, tolerance, self.budget), far_places(self.problem, p)
+        enough = comparable(max(place.rate for place in places))
+        wanted = [place for place in places if place.rate > enough]
+        if start is not None and len(wanted) == 1:
+            return search.run(start)
+        found = (search.run(first_far(self.problem, place, self.rtol)) for place in wanted)
+        return max(found, key=lambda each: each.pair.value)
+
+    def _has_left(self, pair: PrincipalPair, nearest: float) -> bool:
+        return False
+
+    def fits(self, generator: Generator, q: float, p: float) -> bool:
+        if generator.chosen.is_killed:
+            return abs(math.log(p / q)) < MOST_RESCALING
+        return super().fits(generator, q, p)
+
+
+@dataclass(frozen=True, eq=False)
+class AllPlaces:
+    """Λ(p) of noise with algebraic tails, the larger of the eigenvalues near ξ = 0 and far out.
+
+    Attributes:
+        near, far: what is solved for each.
+    """
+
+    near: NearPlace
+    far: FarPlaces
+
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+        """That of the larger eigenvalue. Raises `NotConverged`."""
+        if p == 0:
+            return self.near.solution(p, tolerance)
+        elsewhere = outlook(self.near.problem, p)
+        elsewhere.refuse(p, elsewhere.highest)
+        near = self.near.loose(p, elsewhere.places)
+        elsewhere.refuse(p, max(near.pair.value + near.error, *(place.rate for place in elsewhere.places), 0.0))
+        far = self.far.solution(p, tolerance) if other_places(near.pair) else None
+        if far is None or far.pair.value - far.error < near.pair.value + 10 * near.error:
+            near = self.near.solution(p, tolerance)
+        return max((each for each in (near, far) if each), key=lambda each: each.pair.value)
 
 
 @dataclass
-class _Meter:
-    """What a search for a discretisation has cost, and the best it has found."""
+class _Search:
+    """For a discretisation that meets a tolerance at p; what it has cost, and the best it has found."""
 
+    problem: Problem
     p: float
+    tolerance: Tolerance
     budget: Budget
     started: float = field(default_factory=time.thread_time)
     stages: int = 0
@@ -151,6 +327,34 @@ class _Meter:
     share: float = math.inf
     failure: Exception | None = None
     last: tuple[float, int] = (0.0, 0)
+
+    def run(self, start: Solution | Discretisation) -> Solution:
+        """A solution within the tolerance, the tilted density sought where a first discretisation, or a solution, is.
+
+        Raises:
+            NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
+                `Solution`, or None.
+        """
+        pair = None
+        if isinstance(start, Solution):
+            chosen, pair = refined(start, self.tolerance(self.p, start.pair.value), 0), start.pair
+        else:
+            chosen = start
+        while True:
+            self.check(chosen)
+            try:
+                pair = principal_pair(Generator(self.problem, chosen), self.p, start=pair)
+            except (MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError) as failure:
+                self.failure, pair = failure, None
+                chosen = chosen.doubled()
+                continue
+            solution, allowed = Solution(pair), self.tolerance(self.p, pair.value)
+            seems_enough = solution.error_by_modes <= allowed
+            error = solution.error if seems_enough else solution.error_by_modes
+            if error <= allowed:
+                return solution
+            self.note(solution, error, allowed)
+            chosen = chosen.enriched() if seems_enough else refined(solution, allowed, self.stages)
 
     def check(self, chosen: Discretisation) -> None:
         """Refuse a stage beyond the budget, and count it."""
@@ -182,17 +386,3 @@ class _Meter:
             said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
         raise NotConverged(told, best, Remedy.BUDGET)
-
-
-def fits(generator: Generator, q: float, p: float) -> bool:
-    """Whether what serves q is likely to serve p, or so small that it is worth a try."""
-    if generator.chosen.is_killed:
-        return abs(math.log(p / q)) < MOST_RESCALING
-    frozen = frozen_noise(generator.problem)
-    if generator.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
-        return False
-    if frozen is None or generator.chosen.noise.kind != "polynomials":
-        return True
-    if corners(generator.problem, p):
-        return False
-    return abs(frozen.tilt(frozen.center(p)) - generator.chosen.noise.slope * p) <= MOST_TILT_AWAY

@@ -4,7 +4,7 @@ For a real shift σ > Λ the resolvent (σ − L)⁻¹ is a positive operator wh
 seen from the right, Λ is the nearest eigenvalue. From there, or quicker from the pair at a neighbouring p,
 two-sided Rayleigh quotient iteration converges cubically. That it found the principal pair is checked by the one
 property that no other pair has: T > 0 and T* > 0 (Perron-Frobenius; one of the two is enough), as far as a mesh can
-tell. It cannot where slow noise has two places between which it hardly ever passes; `adapt.resolve` looks at both, and
+tell. It cannot where slow noise has two places between which it hardly ever passes; `NearPlace` looks at both, and
 for noise with states every search begins on the right.
 """
 

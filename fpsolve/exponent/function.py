@@ -15,11 +15,10 @@ from fpsolve.arrays import FloatArray, real_array, real_numbers
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.branch import best_order
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
-from fpsolve.exponent.rival import misplaced
-from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, missed
+from fpsolve.exponent.places import misplaced
+from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, missed
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, checked_moments, of_problem_too

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -13,31 +13,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_number
+from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.adapt import AllPlaces, Budget, FarPlaces, NearPlace, Tolerance
 from fpsolve.exponent.bordered import second_derivative, slope_rounding
-from fpsolve.exponent.branch import Branch, Tolerance, best_order
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
+from fpsolve.exponent.places import is_far_out, misplaced
 from fpsolve.exponent.refine import WIDER, widened
-from fpsolve.exponent.rival import far_rivals, is_far_out, misplaced
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
-from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
-from fpsolve.theory.far import far_places, grows_far_out, highest_rate, log_tail, refuse_beyond, variance_tail
+from fpsolve.model.problem import Problem, checked_moment, checked_moments
+from fpsolve.theory.far import far_places, grows_far_out, log_tail, variance_tail
 from fpsolve.theory.perturbation import Scale, scale_of
 
 if TYPE_CHECKING:
     import xarray
 
-LOOSE = 1e-3
-"""Share of the rates within which a place is solved before it is compared with others."""
 HARDLY_FINITE = 1e-6
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
@@ -86,10 +83,6 @@ class MomentLyapunov(Result):
         """The eigenpairs, one for each p; solved now where Λ was interpolated. Raises `NotConverged`."""
         return tuple(self.solver.pair(float(p)) for p in self.p)
 
-    def forgetful(self) -> MomentLyapunov:
-        """The same numbers, without the eigenfunctions that the solver keeps."""
-        return replace(self, solver=replace(self.solver, starts={}))
-
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p), Λ′(p), their errors and residuals over p."""
         columns = ("value", "error_estimate", "derivative", "residual")
@@ -116,7 +109,7 @@ class ExponentSolver:
         mesh: a mesh for all p; None chooses a discretisation for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a discretisation may cost.
-        starts: solutions of a problem with parameters close by, by their p, see `Branch`.
+        starts: solutions of a problem with parameters close by, by their p, see `NearPlace`.
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
@@ -141,19 +134,21 @@ class ExponentSolver:
             raise ValueError(f"rtol is {self.rtol!r}; it must be a positive number such as 1e-8")
 
     @cached_property
-    def near(self) -> Branch:
-        """The branch of the place nearest to ξ = 0, which for all noise but that of algebraic tails is Λ(p)."""
-        return self._branch(is_far=False)
+    def near(self) -> NearPlace:
+        """Λ(p) around the place nearest to ξ = 0, for all noise but that of algebraic tails the only one."""
+        own: Any = {"rtol": self.rtol, "budget": self.budget, "tolerance": self.tolerance}
+        return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **own)
 
     @cached_property
-    def far(self) -> Branch:
-        """The branch of the places far out of algebraic tails."""
-        return self._branch(is_far=True)
+    def place(self) -> NearPlace | AllPlaces:
+        """Where Λ(p) is sought: near ξ = 0, and far out where the noise has algebraic tails.
 
-    def _branch(self, is_far: bool) -> Branch:
-        chosen = {"rtol": self.rtol, "budget": self.budget, "tolerance": self.tolerance}
-        own = {} if is_far else {"mesh": self.mesh, "starts": self.starts}
-        return Branch(self.problem, is_far=is_far, **own, **chosen)  # type: ignore[arg-type]
+        On a given mesh only the first is; `misplaced` warns of others.
+        """
+        if self.mesh is not None or not self.problem.noise.has_algebraic_tails:
+            return self.near
+        far = FarPlaces(self.problem, rtol=self.rtol, budget=self.budget, tolerance=self.tolerance)
+        return AllPlaces(self.near, far)
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
@@ -166,18 +161,7 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite.
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
         """
-        p = real_number(p, "p")
-        refuse_infinite(self.problem, p)
-        if self.mesh is not None or p == 0 or not self.problem.noise.has_algebraic_tails:
-            return self.near.solution(p, tolerance)  # on a given mesh `misplaced` warns of other places
-        places = far_places(self.problem, p)
-        refuse_beyond(self.problem, p, highest_rate(self.problem, p))
-        near = self.loose(p)
-        refuse_beyond(self.problem, p, max(near.pair.value + near.error, *(place.rate for place in places), 0.0))
-        far = self.far.solution(p, tolerance) if far_rivals(near.pair) else None
-        if far is None or far.pair.value - far.error < near.pair.value + 10 * near.error:
-            near = self.near.solution(p, tolerance)
-        return max((each for each in (near, far) if each), key=lambda each: each.pair.value)
+        return self.place.solution(checked_moment(p, self.problem), tolerance)
 
     @cached_property
     def scales(self) -> Scale:
@@ -191,11 +175,6 @@ class ExponentSolver:
     def tolerance(self, p: float, value: float) -> float:
         """The largest error allowed of a value of Λ(p)."""
         return self.rtol * max(abs(value), self.scale(p))
-
-    def loose(self, p: float) -> Solution:
-        """That near ξ = 0 at p, to compare with others: where one outdoes it, its eigenvalue is no exact one."""
-        best = max((place.rate for place in far_places(self.problem, p)), default=0.0)
-        return self.near.solution(p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)))
 
     def moments(self, p: ArrayLike, *, progress: Callable[[], None] = lambda: None) -> MomentLyapunov:
         """Λ(p) at several p; `progress` is called after each, also after one that fails.
@@ -302,6 +281,11 @@ class ExponentSolver:
         )
 
 
+def best_order(p: FloatArray) -> Any:
+    """Indices of p, inwards from the largest and then from the smallest: a mesh for a large |p| serves smaller ones."""
+    return np.lexsort((-np.abs(p), p < 0))
+
+
 def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
     """A warning about the p at which the estimated error exceeds rtol, or nothing."""
     size = np.where(p == 0, math.inf, np.maximum(np.abs(value), [solver.scale(float(each)) for each in p]))
@@ -319,7 +303,7 @@ def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> t
     far = [pair for pair in pairs if is_far_out(pair)]
     if not far:
         return ()
-    nears = [solver.loose(pair.p).pair for pair in far]
+    nears = [solver.near.loose(pair.p, far_places(solver.problem, pair.p)).pair for pair in far]
     pair, near = next((each for each in zip(far, nears, strict=True) if not is_far_out(each[1])), (far[0], None))
     z, density = noise_marginal(pair)
     mean = float(z @ density / density.sum())

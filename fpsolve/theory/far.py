@@ -39,7 +39,26 @@ class Place(NamedTuple):
     upper: float
 
 
-def far_places(problem: Problem, p: float) -> list[Place]:
+class Outlook(NamedTuple):
+    """Where a moment may be carried besides the place nearest to ξ = 0.
+
+    Attributes:
+        places: those of algebraic tails, well off ξ = 0, see `far_places`.
+        highest: the highest rate of noise that is held at a z looked at, but for rounding.
+        beyond: about how fast ‖x‖^p grows on paths that hold the noise beyond all z looked at, or −∞.
+    """
+
+    places: tuple[Place, ...] = ()
+    highest: float = math.inf
+    beyond: float = -math.inf
+
+    def refuse(self, p: float, reached: float) -> None:
+        """Refuse a p where paths that hold the noise beyond all z looked at grow as fast as all others, or faster."""
+        if self.beyond > 0 and self.beyond >= reached:
+            raise NotConverged(Message(Code.HELD_BEYOND, p=p, rate=self.beyond, z=FURTHEST))
+
+
+def far_places(problem: Problem, p: float) -> tuple[Place, ...]:
     """The places of the p-th moment, −1 ≤ p < 0, well off ξ = 0, for noise with algebraic tails.
 
     The noise (7) with r₀ > 1 can be held far out at a cost of D m(m + 1)/ξ², D = D₀/τ₀² and m = 1/(r₀ − 1). On the
@@ -61,23 +80,26 @@ def far_places(problem: Problem, p: float) -> list[Place]:
     So Λ has no second root. Where λ, the rate of almost every path, is positive, it is not Λ′(0⁻), which is then 0. And
     e^{Λt} shows up only once the rare paths count, after ln(1/P) over the difference of the rates.
     """
+    return outlook(problem, p).places
+
+
+def outlook(problem: Problem, p: float) -> Outlook:
+    """Where to look for the largest eigenvalue besides ξ = 0: nowhere but for algebraic tails and p ≠ 0."""
+    if p == 0 or not problem.noise.has_algebraic_tails:
+        return Outlook()
     try:
         return _kept(problem, p)
     except TypeError:  # a motion or a noise of the user's own that cannot be hashed
-        return _far_places(problem, p)
+        return _kept.__wrapped__(problem, p)
 
 
 @lru_cache(maxsize=64)
-def _kept(problem: Problem, p: float) -> list[Place]:
-    return _far_places(problem, p)
-
-
-def _far_places(problem: Problem, p: float) -> list[Place]:
+def _kept(problem: Problem, p: float) -> Outlook:
     frozen = frozen_noise(problem)
-    if p == 0 or frozen is None or not problem.noise.has_algebraic_tails:
-        return []
+    assert frozen is not None
     z, _ = frozen.peaks(p)
-    return [_held(problem, p, *_well(frozen, p, float(each))) for each in z[np.abs(z) > NEAR]]
+    places = tuple(_held(problem, p, *_well(frozen, p, float(each))) for each in z[np.abs(z) > NEAR])
+    return Outlook(places, (1 - 1e-6) * float(np.max(frozen.rate(p)[1:-1])), frozen.at_the_ends(p))
 
 
 def grows_far_out(problem: Problem) -> bool:
@@ -119,20 +141,6 @@ def log_tail(problem: Problem, z: float) -> float:
     return float(problem.noise.log_density(xi)) + math.log(abs(xi))
 
 
-def growth_beyond(problem: Problem, p: float) -> float:
-    """About how fast ‖x‖^p grows, for −1 ≤ p < 0, on paths that hold the noise beyond all z looked at, or −∞."""
-    frozen = frozen_noise(problem)
-    if p == 0 or frozen is None or not problem.noise.has_algebraic_tails:
-        return -math.inf
-    return frozen.at_the_ends(p)
-
-
-def highest_rate(problem: Problem, p: float) -> float:
-    """The highest rate of noise that is held anywhere else, but for rounding."""
-    frozen = frozen_noise(problem)
-    return math.inf if frozen is None else (1 - 1e-6) * float(np.max(frozen.rate(p)[1:-1]))
-
-
 def _well(frozen: FrozenNoise, p: float, center: float) -> tuple[float, float]:
     """z from the least favourable one on the way inwards to that on the way outwards."""
     side = math.copysign(1.0, center)
@@ -162,10 +170,3 @@ def _held(problem: Problem, p: float, inner: float, outer: float) -> Place:
     tilted = vector[:, 0] ** 2 / np.exp(size[2:-1:2])
     held = z[2:-1:2][tilted > NEGLIGIBLE * np.max(tilted)]
     return Place(float(value[0]), float(np.min(held)), float(np.max(held)))
-
-
-def refuse_beyond(problem: Problem, p: float, reached: float) -> None:
-    """Refuse a p where paths that hold the noise beyond all z looked at grow as fast as all others, or faster."""
-    beyond = growth_beyond(problem, p)
-    if beyond > 0 and beyond >= reached:
-        raise NotConverged(Message(Code.HELD_BEYOND, p=p, rate=beyond, z=FURTHEST))

@@ -21,7 +21,7 @@ from fpsolve import (
 )
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.rival import is_far_out
+from fpsolve.exponent.places import is_far_out
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model import Drive
@@ -209,7 +209,7 @@ def test_lighter_tails_have_no_place_far_out(r0, p):
     """
     for tau0, epsilon in ((0.1, 0.2), (1.0, 1.0), (20.0, 0.3)):
         case = problem(0.5, tau0, r0, epsilon)
-        assert far_places(case, p) == []
+        assert far_places(case, p) == ()
         frozen, noise = frozen_noise(case), case.noise
         unit = noise.standard_deviation
         end = min(1e4 * frozen.z[-1] * unit, 0.999999999 * noise.half_width)
