@@ -21,7 +21,7 @@ from fpsolve import __version__
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import CaseError, FpsolveError, NotConverged
 from fpsolve.messages import Severity, message_of
-from fpsolve.output.screen import HANDLER
+from fpsolve.output.letters import HANDLER
 from fpsolve.signals import ended_by_signals
 
 if TYPE_CHECKING:

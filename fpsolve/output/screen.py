@@ -5,10 +5,7 @@ Nothing is cut, and no word and no number is broken.
 
 from __future__ import annotations
 
-import codecs
 import re
-import shutil
-import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from textwrap import TextWrapper
@@ -18,16 +15,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from fpsolve.output.letters import spelt
+
 ENDLESS = 1_000_000
 """The width of what is not a terminal."""
 Cell = str | Text
-HANDLER = "fpsolve.spelt"
-"""The name under which `codecs` knows `_spell`, which spells letters that an encoding does not have."""
-_SIGNS = {
-    "′": "'", "″": "''", "−": "-", "–": "-", "±": "+-", "≤": "<=", "≥": ">=", "≠": "!=", "∞": "inf", "×": "x",
-    "·": "*", "‖": "||", "⟨": "<", "⟩": ">", "→": "->", "…": "...", "√": "sqrt", "∂": "d", "ẋ": "x'", "ẍ": "x''",
-    "½": "1/2", "²": "^2", "³": "^3", "⁴": "^4", "“": '"', "”": '"', "’": "'",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -83,7 +75,9 @@ class Screen:
         if not console.file.isatty():
             console = Console(stderr=errors, width=ENDLESS)
         elif console.is_dumb_terminal:
-            size = shutil.get_terminal_size()  # rich takes 80 columns
+            from shutil import get_terminal_size  # with its compression it takes longer than the rest
+
+            size = get_terminal_size()  # rich takes 80 columns
             console = Console(stderr=errors, width=size.columns, height=size.lines)
         return cls(console, console.width)
 
@@ -190,29 +184,3 @@ def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
 
 
 _TIE, _TIED = re.compile(r"(?<=\S) (=|±|<=|<|>) (?=\S)"), "\0"
-
-
-def spelt(text: str, encoding: str) -> str:
-    """A text as an output with this encoding can show it: Greek letters and signs in words, where it has none."""
-    return text.encode(encoding, errors=HANDLER).decode(encoding)
-
-
-def _spell(failure: UnicodeError) -> tuple[str, int]:
-    """For `codecs`: what cannot be encoded, in words of ASCII; "?" where nothing is like it."""
-    if not isinstance(failure, UnicodeEncodeError):
-        raise failure
-    words = []
-    for letter in failure.object[failure.start : failure.end]:
-        name = unicodedata.name(letter, "")
-        case, _, greek = name.removeprefix("GREEK ").partition(" LETTER ")
-        if letter in _SIGNS:
-            words.append(_SIGNS[letter])
-        elif name.startswith("GREEK ") and greek.isalpha():
-            word = "lambda" if greek == "LAMDA" else greek.lower()
-            words.append(word.capitalize() if case == "CAPITAL" else word)
-        else:
-            words.append(unicodedata.normalize("NFKD", letter).encode("ascii", errors="ignore").decode() or "?")
-    return "".join(words), failure.end
-
-
-codecs.register_error(HANDLER, _spell)

@@ -12,8 +12,9 @@ from fpsolve.case.sections import Expectation
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message
+from fpsolve.output.letters import spelt
 from fpsolve.output.remarks import print_remark
-from fpsolve.output.screen import Column, Grid, Screen, spelt
+from fpsolve.output.screen import Column, Grid, Screen
 from fpsolve.output.terminal import duration, print_comparisons, print_results, print_simulation, print_warnings
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
