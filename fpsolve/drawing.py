@@ -121,7 +121,7 @@ def _add_heading(figure: Any, body: Any, title: str, parameters: Sequence[str]) 
     large, small = (_font_size(f"{which}.titlesize") for which in ("figure", "axes"))
     words = [[part for word in line.split(" ") for part in wrap(word, 40)] for line in title.splitlines()]
     if title:
-        lines = "\n".join(in_lines(figure, line, " ", large, room) for line in words)
+        lines = "\n".join(in_lines(figure, line, " ", large, room, has_math=False) for line in words)
         figure.suptitle(lines, parse_math=False)
     if parameters:
         body.suptitle(in_lines(figure, parameters, ", ", small, room), fontsize=small, color="0.3")
@@ -144,7 +144,7 @@ def _add_legend(figure: Any) -> None:
             legend.remove()
 
 
-def in_lines(figure: Any, pieces: Sequence[str], mark: str, size: float, room: float) -> str:
+def in_lines(figure: Any, pieces: Sequence[str], mark: str, size: float, room: float, *, has_math: bool = True) -> str:
     """Pieces with a mark between them in as few lines as fit, these of like lengths, none of the pieces broken.
 
     Args:
@@ -152,12 +152,13 @@ def in_lines(figure: Any, pieces: Sequence[str], mark: str, size: float, room: f
         pieces, mark: words and " ", or parts of a list and ", ".
         size: of the letters, in points.
         room: for a line, in inches.
+        has_math: whether what stands between two "$" is a formula.
     """
     from matplotlib.font_manager import FontProperties
 
     measure = figure.canvas.get_renderer().get_text_width_height_descent
     font, gap = FontProperties(size=size), 0.3 * len(mark) * size / 72
-    widths = [measure(piece, font, "$" in piece)[0] / figure.dpi + gap for piece in pieces]
+    widths = [measure(piece, font, has_math and "$" in piece)[0] / figure.dpi + gap for piece in pieces]
 
     def lines(room: float) -> list[str]:
         found, used = list[list[str]](), math.inf
