@@ -29,7 +29,7 @@ from fpsolve.drawing import (
 )
 from fpsolve.model.kinds import parameter_of
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, STABILITY_INDEX, P, Quantity
-from fpsolve.output.series import STYLES, Series, Telling, numbers_of, texts_of
+from fpsolve.output.series import STYLES, Encoding, Series, numbers_of, texts_of
 
 MOST_VECTORS = 1000
 """Curves up to which a PDF holds each as a line, not all as a picture."""
@@ -120,9 +120,9 @@ def _draw_many(axes: Any, series: Sequence[Series], equation: str, time_unit: st
     """Thin lines and a bar of their colours; the colours, shape (n, 4)."""
     from matplotlib.collections import LineCollection
 
-    told = Telling.of([item.varied for item in series])
-    scale = _colour_scale(told)
-    colours, is_picture = scale.to_rgba(told.colours), len(series) > MOST_VECTORS
+    encoding = Encoding.of([item.varied for item in series])
+    scale = _colour_scale(encoding)
+    colours, is_picture = scale.to_rgba(encoding.colours), len(series) > MOST_VECTORS
     look = {
         "rasterized": is_picture,
         "alpha": 1.0 if len(series) <= 100 else 0.7,
@@ -130,30 +130,30 @@ def _draw_many(axes: Any, series: Sequence[Series], equation: str, time_unit: st
     }
     order = [np.argsort(item.x, kind="stable") for item in series]
     paths = [np.stack([item.x[by], item.y[by]], axis=1) for item, by in zip(series, order, strict=True)]
-    untold = "".join(f", each for {count} values of {parameter_of(key).latex}" for key, count in told.untold)
-    kinds = dict.fromkeys(told.styles)
+    others = "".join(f", each for {count} values of {parameter_of(key).latex}" for key, count in encoding.unencoded)
+    kinds = dict.fromkeys(encoding.styles)
     for kind, style in zip(kinds, STYLES, strict=False):
-        chosen = [i for i, each in enumerate(told.styles) if each == kind]
+        chosen = [i for i, each in enumerate(encoding.styles) if each == kind]
         lines = LineCollection([paths[i] for i in chosen], colors=colours[chosen], linestyles=[style], **look)
         axes.add_collection(lines, autolim=True)
         name = f", {legend(dict(kind), time_unit)}" if len(kinds) > 1 else ""
-        axes.plot([], [], linestyle=style, label=f"finite elements{name}{untold}", **_GREY)
+        axes.plot([], [], linestyle=style, label=f"finite elements{name}{others}", **_GREY)
     _draw_points(axes, series, colours, rasterized=is_picture)
-    _draw_outermost(axes, [series[i] for i in np.argsort(told.colours, kind="stable")], equation)
+    _draw_outermost(axes, [series[i] for i in np.argsort(encoding.colours, kind="stable")], equation)
     axes.autoscale_view()
-    _draw_bar(axes, scale, told, time_unit)
+    _draw_bar(axes, scale, encoding, time_unit)
     return colours
 
 
-def _colour_scale(told: Telling) -> Any:
+def _colour_scale(encoding: Encoding) -> Any:
     """Colours for values, by their logarithms where they are spread so; none is too pale on white."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, LogNorm, Normalize
 
-    norm = LogNorm if scale_of(told.colours) == "log" else Normalize
+    norm = LogNorm if scale_of(encoding.colours) == "log" else Normalize
     dark = ListedColormap(colormaps["viridis"](np.linspace(0, 0.93, 256)))
-    return ScalarMappable(norm(float(told.colours.min()), float(told.colours.max())), dark)
+    return ScalarMappable(norm(float(encoding.colours.min()), float(encoding.colours.max())), dark)
 
 
 def _draw_points(axes: Any, series: Sequence[Series], colours: Any, **style: Any) -> None:
@@ -180,17 +180,17 @@ def _draw_outermost(axes: Any, series: Sequence[Series], equation: str) -> None:
         axes.plot([], [], label=f"perturbation, Eq. {equation}, of {len(chosen)} curves", **style)
 
 
-def _draw_bar(axes: Any, scale: Any, told: Telling, time_unit: str) -> None:
+def _draw_bar(axes: Any, scale: Any, encoding: Encoding, time_unit: str) -> None:
     """The bar of colours, with the name of the key and its unit."""
     from matplotlib.ticker import MaxNLocator
 
     bar = axes.figure.colorbar(scale, ax=axes, pad=0.02)
-    if told.key is None:
+    if encoding.key is None:
         bar.set_label("number of the curve")
         bar.ax.yaxis.set_major_locator(MaxNLocator(6, integer=True))
         return
-    bar.set_label(label_of(parameter_of(told.key).timed(time_unit).attributes, 36))
-    if scale_of(told.colours) == "log":
+    bar.set_label(label_of(parameter_of(encoding.key).timed(time_unit).attributes, 36))
+    if scale_of(encoding.colours) == "log":
         plain_numbers(bar.ax.yaxis)
 
 

@@ -50,23 +50,23 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Telling:
+class Encoding:
     """What tells many curves from each other.
 
     Attributes:
         key: the one whose value a colour tells; None where it tells the number of the curve.
         colours: that value, or the number, of each curve.
         styles: for each curve what its line style tells; the same everywhere where it tells nothing.
-        untold: the other keys, each with how many values it has.
+        unencoded: the other keys, each with how many values it has.
     """
 
     key: str | None
     colours: FloatArray
     styles: tuple[tuple[tuple[str, Value], ...], ...]
-    untold: tuple[tuple[str, int], ...]
+    unencoded: tuple[tuple[str, int], ...]
 
     @classmethod
-    def of(cls, varied: Sequence[Varied]) -> Telling:
+    def of(cls, varied: Sequence[Varied]) -> Encoding:
         """Of the parameters of some curves: a colour for the key with the most values, line styles for a few sets."""
         numbers, texts = numbers_of(varied), texts_of(varied)
         sets = len({tuple(each[key] for key in numbers) for each in varied})
@@ -78,12 +78,12 @@ class Telling:
             return cls(None, colours, _among(varied, texts), ())
         others = [name for name in numbers if name != key] if numbers[key] < sets else []
         styles = _among(varied, [*others, *texts])
-        is_told = len(set(styles)) <= len(STYLES)
+        is_encoded = len(set(styles)) <= len(STYLES)
         return cls(
             key,
             np.array([each[key] for each in varied], dtype=float),
-            styles if is_told else _among(varied, texts),
-            () if is_told else tuple((name, numbers[name]) for name in others),
+            styles if is_encoded else _among(varied, texts),
+            () if is_encoded else tuple((name, numbers[name]) for name in others),
         )
 
 

@@ -199,7 +199,7 @@ def _pyvista() -> Any:
 
 def _facts(parameters: Facts, varied: Collection[str]) -> Facts:
     """The parameters, and the words about them that a picture shows, if there are any, in ASCII."""
-    known = {key: Parameter(value, parameter_of(key), Noise) for key, value in parameters.items()}
+    known = {key: Parameter(value, parameter_of(key), Noise) for key, value in parameters.items() if "." in key}
     words = {
         "varied": parameter_words(known, varied),
         "held": "\n".join(parameter_lines(known, varied)),

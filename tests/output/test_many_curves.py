@@ -11,7 +11,7 @@ from fpsolve.drawing import label_of
 from fpsolve.output.datasets import dataset_of
 from fpsolve.output.figures import draw
 from fpsolve.output.maps import Plane
-from fpsolve.output.series import Telling
+from fpsolve.output.series import Encoding
 from fpsolve.theory.perturbation import second_order
 from tests.output.drawing import case_of, drawn_case, results_of, texts, tick_labels, words
 
@@ -106,7 +106,7 @@ VARIED = [{"a": a, "b": b, "c": c} for a in (1.0, 2.0) for b in (1.0, 2.0, 3.0) 
 
 
 @pytest.mark.parametrize(
-    ("varied", "key", "styles", "untold"),
+    ("varied", "key", "styles", "unencoded"),
     [
         ([{"a": 1.0, "b": 5.0}, {"a": 2.0, "b": 5.0}], "a", 1, ()),
         (VARIED, "b", 4, ()),
@@ -116,9 +116,9 @@ VARIED = [{"a": a, "b": b, "c": c} for a in (1.0, 2.0) for b in (1.0, 2.0, 3.0) 
         ([{"c": "x"}, {"c": "y"}], None, 2, ()),
     ],
 )
-def test_what_tells_curves_from_each_other(varied, key, styles, untold):
-    told = Telling.of(varied)
-    assert (told.key, len(set(told.styles)), told.untold) == (key, styles, untold)
+def test_what_tells_curves_from_each_other(varied, key, styles, unencoded):
+    told = Encoding.of(varied)
+    assert (told.key, len(set(told.styles)), told.unencoded) == (key, styles, unencoded)
     assert told.colours.tolist() == ([each[key] for each in varied] if key else [*range(1, len(varied) + 1)])
 
 
