@@ -82,7 +82,7 @@ class Galerkin:
         return sum(rows[1:], rows[0]).tocsr()
 
     def pair(self, guess: float) -> Pair:
-        """The eigenvalue nearest to a guess of Λ(p), by inverse iteration from a constant."""
+        """The eigenvalue nearest to a guess of Λ(p), by inverse iteration from a constant; NaN where numbers overflow."""
         u = np.zeros(self.matrix.shape[0], complex)
         u[self.waves * self.degrees] = 1.0
         adjoint, value = u, guess
@@ -90,7 +90,8 @@ class Galerkin:
             factors = sparse_lu((self.matrix - value * self.mass).tocsc())
             for _ in range(4):
                 u, adjoint = factors.solve(self.mass @ u), factors.solve(self.mass @ adjoint, "H")
-                u, adjoint = (vector / vector[np.argmax(np.abs(vector))] for vector in (u, adjoint))
+                with np.errstate(all="ignore"):
+                    u, adjoint = (vector / vector[np.argmax(np.abs(vector))] for vector in (u, adjoint))
             value = float(np.real(np.vdot(adjoint, self.matrix @ u) / np.vdot(adjoint, self.mass @ u)))
         centre = np.real(np.vdot(adjoint, self.position @ u) / np.vdot(adjoint, self.mass @ u))
         mean = (self.mass @ u)[self.waves * self.degrees]

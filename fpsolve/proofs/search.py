@@ -73,6 +73,8 @@ def _enlarged(
         except ArithmeticError:
             return
         value = pair.value
+        if not math.isfinite(value):
+            return
         certificate = certificate_of(stated, noise, basis, p, pair)
         if certificate is not None and not objection(certificate):
             idle = 0 if _apart(certificate) < PROGRESS * delta else idle + 1
@@ -126,8 +128,6 @@ def _solved(noise: Cylinder, basis: Basis, p: str | None, guess: float, waves: i
 
 def certificate_of(stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, pair: Pair) -> Certificate | None:
     """The closest bounds that a trial gives, before they are verified; None where there are none."""
-    if not math.isfinite(pair.value):
-        return None
     trial = Trial(noise, None if p is None else ball(p), pair.value, basis, pair.cosine, pair.sine)
     phases = max(128, 16 * len(pair.cosine))
     upper, lower = _sides(trial, phases)

@@ -7,6 +7,16 @@ import mpmath
 import numpy as np
 from numpy.polynomial import chebyshev, hermite_e
 
+OSCILLATOR = {
+    "oscillator.omega": "1.3",
+    "oscillator.restitution": "0.75",
+    "oscillator.c1": "-0.1",
+    "oscillator.epsilon": "0.5",
+    "oscillator.impact": "restitution",
+}
+EXACT = {**OSCILLATOR, "noise.D0": "0.4", "noise.tau0": "0.6", "noise.r0": "0.7", "noise.treatment": "exact"}
+PLAIN = {**OSCILLATOR, "noise.alpha": "1.7", "noise.sigma": "0.9"}
+
 
 def polynomial(powers, z):
     """Σ powers[i] zⁱ."""

@@ -3,7 +3,7 @@
 CASE = """
 title = "Proofs"
 [oscillator]
-epsilon = 0.4
+epsilon = 0.2
 omega = 1.2
 restitution = 0.8
 c1 = 0.1

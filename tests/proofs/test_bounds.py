@@ -12,15 +12,8 @@ from fpsolve.proofs.basis import Core, Whole
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Trial
 from fpsolve.proofs.cells import Cells, Phases
 from fpsolve.proofs.statement import cylinder
+from tests.proofs.by_definition import EXACT
 
-OSCILLATOR = {
-    "oscillator.omega": "1.3",
-    "oscillator.restitution": "0.75",
-    "oscillator.c1": "-0.1",
-    "oscillator.epsilon": "0.5",
-    "oscillator.impact": "restitution",
-}
-EXACT = OSCILLATOR | {"noise.D0": "0.4", "noise.tau0": "0.6", "noise.r0": "0.7", "noise.treatment": "exact"}
 REDUCED = EXACT | {"noise.treatment": "ou-reduction"}
 CASES = {
     "core, bounded": (EXACT, Core(0.1, 0.2, 0.7)),

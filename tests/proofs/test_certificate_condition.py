@@ -7,8 +7,8 @@ import pytest
 from tests.oracles import certificate_condition as condition
 from tests.oracles import certificate_series as cs
 from tests.oracles import certificate_statement as statement
-from tests.proofs.by_definition import applied, trial
-from tests.proofs.test_certificate_series import CASES, EXACT, WHOLE, at_phase, stated
+from tests.proofs.by_definition import EXACT, applied, trial
+from tests.proofs.test_certificate_series import CASES, WHOLE, at_phase, stated
 
 
 def proof(basis, sign):

@@ -10,21 +10,12 @@ from numpy.polynomial import chebyshev, hermite_e
 
 from tests.oracles import certificate_series as cs
 from tests.oracles import certificate_statement as statement
-from tests.proofs.by_definition import applied, element, trial
+from tests.proofs.by_definition import EXACT, PLAIN, applied, element, trial
 
 WHOLE = {"kind": "whole"}
 CORE = {"kind": "core", "centre": 0.21, "scale": 0.3, "gauge": 0.7}
 UNTILTED = {**CORE, "gauge": 0.0}
-OSCILLATOR = {
-    "oscillator.omega": "1.3",
-    "oscillator.restitution": "0.75",
-    "oscillator.c1": "-0.1",
-    "oscillator.epsilon": "0.5",
-    "oscillator.impact": "restitution",
-}
-EXACT = {**OSCILLATOR, "noise.D0": "0.4", "noise.tau0": "0.6", "noise.r0": "0.7", "noise.treatment": "exact"}
 REDUCED = {**EXACT, "noise.treatment": "ou-reduction", "oscillator.impact": "delta"}
-PLAIN = {**OSCILLATOR, "noise.alpha": "1.7", "noise.sigma": "0.9"}
 CASES = [(EXACT, WHOLE, "1.5"), (EXACT, CORE, "-2.5"), (REDUCED, CORE, "1.5"), (PLAIN, CORE, "2.0")]
 CASES += [(EXACT, WHOLE, None), (EXACT, UNTILTED, None), (PLAIN, UNTILTED, None)]
 

@@ -82,7 +82,8 @@ def test_several_processes_write_the_same_file(case, tmp_path):
 
 
 def test_a_width_that_is_not_met_is_told_and_the_bounds_are_kept(case, tmp_path, capsys):
-    assert main(["prove", case, "--width", "1e-30", "--set", "moments.p=[1e-300]", "--quiet"]) == NOT_CONVERGED
+    weak = ["oscillator.epsilon=0.05", "noise.D0=0.1", "moments.p=[1.0]"]
+    assert main(["prove", case, "--width", "1e-30", *(f"--set={each}" for each in weak), "--quiet"]) == NOT_CONVERGED
     assert "(1 curve, 1 not as close as wanted, " in capsys.readouterr().out
     (moment,) = read(tmp_path)["curves"][0]["moments"]
     assert moment["lower"] < moment["upper"]

@@ -28,10 +28,10 @@ def problem(*, reduced=False, impact="delta", **numbers):
         (FIG1, 2.0, 0.013021271916, 8e-8),
         (FIG1 | {"r0": 0.7}, 2.0, 0.007799597190, 4.6e-9),
         (MIDDLE, 2.0, 0.02512405045, 6e-10),
-        (MIDDLE, -1.0, 0.05373157261, 9.2e-9),
-        (STRONG, 1.0, 0.23681957433, 4.2e-6),
-        (STRONG, 4.0, 2.466736467, 1.8e-6),
-        (STRONG, -3.0, 1.051181765, 1e-2),
+        pytest.param(MIDDLE, -1.0, 0.05373157261, 9.2e-9, marks=pytest.mark.slow),
+        pytest.param(STRONG, 1.0, 0.23681957433, 4.2e-6, marks=pytest.mark.slow),
+        pytest.param(STRONG, 4.0, 2.466736467, 1.8e-6, marks=pytest.mark.slow),
+        pytest.param(STRONG, -3.0, 1.051181765, 1e-2, marks=pytest.mark.slow),
         (STRONG | {"r0": 0.95}, 1.0, 0.475228026738, 1e-3),
         (FIG1 | {"reduced": True}, 2.0, 0.014163143653, 1e-9),
         (FIG1 | {"epsilon": 0.3, "reduced": True}, 2.0, 0.129043772, 1e-8),
@@ -62,7 +62,7 @@ def test_without_loss_the_second_moment_is_that_of_the_moment_hierarchy(numbers,
     assert found.lower < value < found.upper
 
 
-@pytest.mark.parametrize("epsilon", [0.2, 0.7])
+@pytest.mark.parametrize("epsilon", [0.2, pytest.param(0.7, marks=pytest.mark.slow)])
 def test_the_second_negative_moment_is_known_without_loss_for_gaussian_noise(epsilon):
     """Λ(−2) = −ε²c₁ + ε²σ²/(2α²), exactly."""
     given = problem(**FIG1 | {"restitution": 1.0, "epsilon": epsilon, "D0": 0.2, "reduced": True})
@@ -76,7 +76,7 @@ def test_the_lyapunov_exponent_agrees_with_the_slope_of_the_moments():
     """Λ is convex and Λ(0) = 0, so that −Λ(−h)/h ≤ λ ≤ Λ(h)/h; both laws differ by more than the bounds."""
     given = problem(**MIDDLE, impact="restitution")
     found = prove_lyapunov_exponent(given)
-    above, below = prove(given, 1e-3).upper / 1e-3, -prove(given, -1e-3).upper / 1e-3
+    above, below = (prove(given, p, width=1e-8).upper / p for p in (1e-3, -1e-3))
     assert found.is_met
     assert below < found.lower < found.upper < above
     assert above - below < 1e-3
@@ -114,7 +114,7 @@ def test_nothing_moves_at_p_zero():
 
 
 def test_a_width_beyond_reach_is_told():
-    found = prove(problem(**FIG1), 1.0, width=1e-30)
+    found = prove(problem(**FIG1 | {"epsilon": 0.05, "D0": 0.1}, reduced=True), 1.0, width=1e-30)
     assert found.is_proven
     assert not found.is_met
     assert found.width < 1e-12
@@ -139,10 +139,16 @@ def test_other_systems_are_refused():
         prove(rotation, fpsolve.OrnsteinUhlenbeck(1.0, 1.0), 1.0)
 
 
-@pytest.mark.parametrize("seed", [102, 103, 104, 105])
+@pytest.mark.parametrize("seed", [103, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (102, 104, 105))])
 def test_random_problems(seed):
     """A hundred others: `python -m tests.random_proofs`."""
     found = random_proofs.outcome(seed)
     assert found.found.is_proven
     assert found.width < 1e-6
     assert found.off <= 1
+
+
+def test_a_shift_next_to_an_eigenvalue_ends_the_search():
+    """p = 1e-300: the matrix shifted by Λ(p) is singular but for what underflows."""
+    found = prove(problem(**FIG1 | {"epsilon": 0.05, "D0": 0.1}, reduced=True), 1e-300, width=1e-30)
+    assert found.lower < 0 < found.upper
