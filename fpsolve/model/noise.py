@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import Coefficient, FloatArray, nothing
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.exact import ExactLaw
 from fpsolve.model.parameters import Parametrised
 
 
@@ -152,6 +153,15 @@ class Noise(Parametrised):
     def derivative(self, name: str) -> NoiseDerivative:
         """∂/∂θ, θ one of the `differentiable` parameters."""
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw | None:
+        """Eq. (7) or (15) in exact numbers, for parameters as decimals by name; None where no proof is known.
+
+        Raises:
+            NoSuchExponent: no bound can be proven for these parameters.
+        """
+        return None
 
     def check_existence(self, p: float) -> None:
         """Refuse a p for which E‖x‖^p is infinite. Raises `NoSuchExponent` for a p that is not among the `moments`."""

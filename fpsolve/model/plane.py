@@ -10,7 +10,7 @@ dφ = h dt and d ln a = q dt with h = e′ᵀA e, q = eᵀA e, e′ = de/dφ: a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, one
+from fpsolve.model.exact import ExactMotion
 from fpsolve.model.parameters import Parametrised
 
 Matrix = Sequence[Sequence[float]]
@@ -221,6 +222,11 @@ class System(Parametrised):
     def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
         """∂/∂θ of the sum of the drives, as drives, and ∂ ln R/∂θ of every kick, nothing where none changes."""
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
+
+    @classmethod
+    def exact_motion(cls, decimals: Mapping[str, str]) -> ExactMotion | None:
+        """The motion in exact numbers, for parameters as decimals by name; None where no proof is known."""
+        return None
 
     def impact_value(self, log_factor: float) -> float:
         """The value of the `impact_parameter` for which the kick has a given ln R; it may be out of range."""

@@ -21,7 +21,7 @@ from fpsolve.output.summary import MOST_ROWS, MOST_TABLES, varied_columns
 from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import plain, verdicts
 from fpsolve.proofs.questions import IndexEnclosure
-from fpsolve.proofs.statement import IMPACT, TREATMENT
+from fpsolve.proofs.statement import DECIMAL
 from fpsolve.study.prove import CurveProof
 
 PROOF = "proof.json"
@@ -42,7 +42,7 @@ def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_wh
 def _curve_text(proof: CurveProof) -> str:
     """A curve as JSON, a line for each bound; numbers among its parameters as the decimals of which the bounds hold."""
     written = {key: _line(value) for key, value in proof.curve.parameters.items()}
-    written |= {key: text for key, text in proof.stated.items() if key not in (IMPACT, TREATMENT)}
+    written |= {key: text for key, text in proof.stated.items() if DECIMAL.fullmatch(text)}
     moments = ",\n".join(f"    {_moment(p, found)}" for p, found in proof.moments)
     parts = {
         "parameters": f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in written.items())}}}",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -12,31 +11,21 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from fpsolve.errors import FpsolveError
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
+from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.proofs.balls import ball, precision
 from fpsolve.proofs.basis import Basis, Core, Whole
-from fpsolve.proofs.statement import DIRECT, EXACT, IMPACT, NOISE, OSCILLATOR, REDUCED, TREATMENT, Parameters
+from fpsolve.proofs.statement import Parameters, check_decimal, exact_halves
 
 MOMENT = "moment"
 MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 16_384, "values": 2**23}
 """Of what a certificate may hold, so that a file cannot ask for more than a machine has."""
-DECIMAL = re.compile(r"-?(\d{1,400}(\.\d{0,1100})?|\.\d{1,1100})([eE][-+]?\d{1,3})?", re.ASCII)
 
 
 class MalformedProof(FpsolveError):
     """A file that is no proof of this program."""
 
 
-def _decimal(text: str) -> str:
-    if not DECIMAL.fullmatch(text):
-        raise ValueError(f"got {text[:40]!r}; must be a decimal number such as '0.95'")
-    return text
-
-
-Decimal = Annotated[str, AfterValidator(_decimal)]
+Decimal = Annotated[str, AfterValidator(check_decimal)]
 Table = Annotated[list[Annotated[list[float], Field(min_length=1, max_length=MOST["columns"])]], Field(min_length=1)]
 
 
@@ -126,33 +115,13 @@ class Certificate(Record):
 
     @model_validator(mode="after")
     def _is_of_an_oscillator(self) -> Self:
-        _check_parameters(self.parameters)
-        is_bounded = self.parameters.get(TREATMENT) == EXACT and float(self.parameters[NOISE[2]]) < 1
-        if self.basis.kind == "whole" and not is_bounded:
+        try:
+            _, law = exact_halves(self.parameters)
+        except NoSuchExponent as failure:
+            raise ValueError(str(failure)) from None
+        if self.basis.kind == "whole" and not law.is_bounded:
             raise ValueError("only bounded noise has a whole support")
         return self
-
-
-def _check_parameters(stated: Mapping[str, str]) -> None:
-    """Refuse what is no parameter set, by the ranges of the models."""
-    direct = DIRECT[0] in stated
-    expected = {*OSCILLATOR, IMPACT, *(DIRECT if direct else (*NOISE, TREATMENT))}
-    if set(stated) != expected:
-        raise ValueError(f"parameters must be {', '.join(sorted(expected))}")
-    numbers = {key: float(_decimal(text)) for key, text in stated.items() if key not in (IMPACT, TREATMENT)}
-    impacts = [str(law) for law in ImpactLaw]
-    for key, words in ((IMPACT, impacts), *(() if direct else ((TREATMENT, [EXACT, REDUCED]),))):
-        if stated[key] not in words:
-            raise ValueError(f"got {key} = {stated[key][:40]!r}; must be {' or '.join(map(repr, words))}")
-    if not direct and stated[TREATMENT] == EXACT and Fraction(stated[NOISE[2]]) > 1:
-        raise ValueError(f"got {NOISE[2]} = {stated[NOISE[2]][:40]}; must be <= 1 for {TREATMENT} = {EXACT!r}")
-    VibroImpactOscillator(
-        **{key.partition(".")[2]: numbers[key] for key in OSCILLATOR}, impact=ImpactLaw(stated[IMPACT])
-    )
-    keys = DIRECT if direct else NOISE
-    noise = (OrnsteinUhlenbeck if direct else NonGaussianNoise)(*(numbers[key] for key in keys))
-    if isinstance(noise, NonGaussianNoise) and stated[TREATMENT] == REDUCED:
-        noise.ou_reduction()
 
 
 @dataclass(frozen=True)

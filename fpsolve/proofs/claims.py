@@ -15,15 +15,13 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from fpsolve.proofs.certificate import MOMENT, Certificate, MalformedProof, Record, follows
-from fpsolve.proofs.statement import IMPACT, TREATMENT
+from fpsolve.proofs.statement import DECIMAL, inert_keys
 from fpsolve.proofs.verify import objection
 
 EXACT = "lower", "upper", "p", "parameters"
 """The keys whose numbers are read as the decimals that they are written as; others are floats."""
 SMALLEST, MOST_DIGITS = -400, 2000
 """Of such a number: the least power of ten, and how many digits it may have; it must be a finite float, too."""
-NONLINEAR = {"oscillator.c2", "oscillator.c3"}
-"""Parameters of the motion far from rest, on which no exponent depends."""
 Stated = Mapping[str, Decimal | str]
 """The parameters of a curve."""
 
@@ -215,8 +213,8 @@ def _as_read(*bounds: Decimal | None) -> Iterator[tuple[Any, ...]]:
 
 def _are_same(stated: Mapping[str, str], parameters: Stated) -> bool:
     """Whether decimals are those of a curve, which has no others but those that do not matter."""
-    read = {key: text if key in (IMPACT, TREATMENT) else Decimal(text) for key, text in stated.items()}
-    return set(parameters) - NONLINEAR == set(read) and all(parameters[key] == read[key] for key in read)
+    read = {key: Decimal(text) if DECIMAL.fullmatch(text) else text for key, text in stated.items()}
+    return set(parameters) - inert_keys(stated) == set(read) and all(parameters[key] == read[key] for key in read)
 
 
 def _first_fault(failure: ValidationError) -> str:

@@ -81,8 +81,9 @@ class Galerkin:
         rows = [sp.diags(bands[d][max(0, 1 - d) : size - max(0, d - 1)], 1 - d, shape=(size, size)) for d in range(3)]
         return sum(rows[1:], rows[0]).tocsr()
 
+    @np.errstate(all="ignore")
     def pair(self, guess: float) -> Pair:
-        """The eigenvalue nearest to a guess of Λ(p), by inverse iteration from a constant; NaN where numbers overflow."""
+        """The eigenvalue nearest to a guess of Λ(p), by inverse iteration from a constant; NaN on overflow."""
         u = np.zeros(self.matrix.shape[0], complex)
         u[self.waves * self.degrees] = 1.0
         adjoint, value = u, guess
@@ -90,8 +91,7 @@ class Galerkin:
             factors = sparse_lu((self.matrix - value * self.mass).tocsc())
             for _ in range(4):
                 u, adjoint = factors.solve(self.mass @ u), factors.solve(self.mass @ adjoint, "H")
-                with np.errstate(all="ignore"):
-                    u, adjoint = (vector / vector[np.argmax(np.abs(vector))] for vector in (u, adjoint))
+                u, adjoint = (vector / vector[np.argmax(np.abs(vector))] for vector in (u, adjoint))
             value = float(np.real(np.vdot(adjoint, self.matrix @ u) / np.vdot(adjoint, self.mass @ u)))
         centre = np.real(np.vdot(adjoint, self.position @ u) / np.vdot(adjoint, self.mass @ u))
         mean = (self.mass @ u)[self.waves * self.degrees]

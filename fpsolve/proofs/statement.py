@@ -12,30 +12,27 @@ with r₀ < 1 it is the end of the support, ν = (1 − r₀)/τ₀ and b = a z/
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from fpsolve.errors import NoSuchExponent
-from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.exact import ExactLaw, ExactMotion
+from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
+from fpsolve.model.parameters import Parametrised
 from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
 from fpsolve.proofs.balls import Balls, ball
 
 if TYPE_CHECKING:
     from flint import arb
 
-EXACT, REDUCED = "exact", "ou-reduction"
-OSCILLATOR = ("oscillator.omega", "oscillator.restitution", "oscillator.c1", "oscillator.epsilon")
-IMPACT, TREATMENT = "oscillator.impact", "noise.treatment"
-NOISE, DIRECT = ("noise.D0", "noise.tau0", "noise.r0"), ("noise.alpha", "noise.sigma")
+DECIMAL = re.compile(r"-?(\d{1,400}(\.\d{0,1100})?|\.\d{1,1100})([eE][-+]?\d{1,3})?", re.ASCII)
+"""A number; words such as "exact" are none."""
 Parameters = Mapping[str, str]
-"""Numbers as decimals, and the two words, by the keys of a case file."""
+"""Numbers as decimals, and words, by the keys of a case file."""
+Kind = TypeVar("Kind", bound=Parametrised)
 
 
 @dataclass(frozen=True)
@@ -86,58 +83,105 @@ def _wave(mean: arb, cosine: arb, sine: arb) -> Balls:
     return np.array([acb(cosine / 2, sine / 2), acb(mean), acb(cosine / 2, -sine / 2)], dtype=object)
 
 
+def linear_values(problem: Problem) -> Mapping[str, float | str]:
+    """The values of the parameters on which the linear problem depends, by their keys."""
+    inert = {f"{half.section}.{name}" for half in problem.halves for name in half.inert}
+    return {key: value for key, value in problem.values.items() if key not in inert}
+
+
 def parameters_of(problem: Problem) -> Parameters:
     """The shortest decimals that are read as the numbers of a problem.
 
     Raises:
-        TypeError: it is not the paper's oscillator with one of its noises.
+        NoSuchExponent: no bound can be proven for these parameters.
+        TypeError: no proof is known for such a system with such a noise.
     """
-    motion, noise = problem.system, problem.noise
-    if not isinstance(motion, VibroImpactOscillator) or not isinstance(noise, OrnsteinUhlenbeck | NonGaussianNoise):
+    stated = {key: value if isinstance(value, str) else repr(value) for key, value in linear_values(problem).items()}
+    system, noise = problem.halves
+    motion, law = problem.system.exact_motion(_named(system, stated)), problem.noise.exact_law(_named(noise, stated))
+    if motion is None or law is None:
         raise TypeError(
-            f"got {type(motion).__name__} with {type(noise).__name__}; proofs are for a VibroImpactOscillator with "
+            f"got {type(system).__name__} with {type(noise).__name__}; proofs are for a VibroImpactOscillator with "
             "OrnsteinUhlenbeck or NonGaussianNoise"
         )
-    stated = {key: repr(getattr(motion, key.partition(".")[2])) for key in OSCILLATOR} | {IMPACT: str(motion.impact)}
-    keys = NOISE if isinstance(noise, NonGaussianNoise) else DIRECT
-    stated |= {key: repr(getattr(noise, key.partition(".")[2])) for key in keys}
-    return stated | {TREATMENT: EXACT} if keys == NOISE else stated
+    return stated
+
+
+def exact_halves(stated: Parameters) -> tuple[ExactMotion, ExactLaw]:
+    """What is stated, in exact numbers.
+
+    Raises:
+        NoSuchExponent: no bound can be proven for these parameters.
+        ValueError: these are no parameters of a system and a noise for which a proof is known, or out of range.
+    """
+    system, noise = _kind(map(system_kind, SYSTEMS), stated), _kind(map(noise_kind, NOISES), stated)
+    expected = _keys(system) | _keys(noise)
+    if set(stated) != expected:
+        raise ValueError(f"parameters must be {', '.join(sorted(expected))}")
+    for name, word in noise.words.items():
+        found = stated[f"{noise.section}.{name}"]
+        if found != word:
+            words = [each.words[name] for each in map(noise_kind, NOISES) if _keys(each) == _keys(noise)]
+            raise ValueError(f"got {noise.section}.{name} = {found[:40]!r}; must be {' or '.join(map(repr, words))}")
+    for half in (system, noise):
+        decimals = {name: text for name, text in _named(half, stated).items() if name not in half.words}
+        numbers = [name for name in decimals if half.fields()[name].annotation is float]
+        half(**decimals | {name: float(check_decimal(decimals[name])) for name in numbers})
+    motion, law = system.exact_motion(_named(system, stated)), noise.exact_law(_named(noise, stated))
+    if motion is None or law is None:
+        raise ValueError(f"no proof is known for {system.__name__} with {noise.__name__}")
+    return motion, law
+
+
+def check_decimal(text: str) -> str:
+    """The text, if it is a decimal number. Raises `ValueError`."""
+    if not DECIMAL.fullmatch(text):
+        raise ValueError(f"got {text[:40]!r}; must be a decimal number such as '0.95'")
+    return text
+
+
+def inert_keys(stated: Parameters) -> set[str]:
+    """The keys of other parameters of such a system and such a noise, on which no exponent depends."""
+    halves = _kind(map(system_kind, SYSTEMS), stated), _kind(map(noise_kind, NOISES), stated)
+    return {f"{half.section}.{name}" for half in halves for name in half.inert}
+
+
+def _kind(kinds: Iterable[type[Kind]], stated: Parameters) -> type[Kind]:
+    """The first of the kinds that have most of these keys, and of these the one whose words are stated."""
+    return max(
+        kinds,
+        key=lambda kind: (
+            len(_keys(kind) & set(stated)),
+            sum(stated.get(f"{kind.section}.{name}") == word for name, word in kind.words.items()),
+        ),
+    )
+
+
+def _keys(kind: type[Parametrised]) -> set[str]:
+    """The keys of the parameters on which the linear problem depends."""
+    return {f"{kind.section}.{name}" for name in (*kind.fields(), *kind.words) if name not in kind.inert}
+
+
+def _named(half: Parametrised | type[Parametrised], stated: Parameters) -> Mapping[str, str]:
+    """What is stated for a system or a noise, by names without their section."""
+    return {key.partition(".")[2]: text for key, text in stated.items() if key.partition(".")[0] == half.section}
 
 
 def cylinder(stated: Parameters) -> Cylinder:
     """Eq. (19) for parameters.
 
     Raises:
-        NoSuchExponent: r₀ > 1 for Eq. (7) as it stands.
+        NoSuchExponent: no bound can be proven for these parameters.
     """
-    omega, restitution, c1, epsilon = (ball(stated[key]) for key in OSCILLATOR)
-    square = epsilon * epsilon
-    loss = square * (1 - restitution)
-    log_factor = -loss if stated[IMPACT] == ImpactLaw.DELTA else (1 - loss).log()
-    nu, slope, unit, is_bounded = _noise(stated)
-    still, driven = square * c1 / 2, epsilon * unit / 2
-    zero = ball(0)
+    motion, law = exact_halves(stated)
+    unit, zero = ball(law.squared_unit).sqrt(), ball(0)
+    omega, still, driven = ball(motion.omega), ball(motion.damping) / 2, ball(motion.drive) * unit / 2
     return Cylinder(
         h=(_wave(omega, zero, still), _wave(zero, zero, driven)),
         q=(_wave(still, -still, zero), _wave(driven, -driven, zero)),
-        kappa=log_factor / zero.pi(),
-        nu=nu,
-        slope=slope,
-        is_bounded=is_bounded,
+        kappa=(ball(motion.log_factor) + ball(motion.factor).log()) / zero.pi(),
+        nu=ball(law.nu),
+        slope=ball(law.slope),
+        is_bounded=law.is_bounded,
         unit=unit,
     )
-
-
-def _noise(stated: Parameters) -> tuple[arb, arb, arb, bool]:
-    """ν, b′(0), the unit, and whether the noise is bounded."""
-    if DIRECT[0] in stated:
-        alpha, sigma = (ball(stated[key]) for key in DIRECT)
-        return 2 * alpha, ball("0.5"), sigma / (2 * alpha).sqrt(), False
-    D0, tau0, r0 = (ball(stated[key]) for key in NOISE)
-    departure = Fraction(stated[NOISE[2]])
-    if stated[TREATMENT] == EXACT and departure != 1:
-        if departure > 1:
-            raise NoSuchExponent(Message(Code.NO_BOUND, key=NOISE[2], value=stated[NOISE[2]], remedy=Remedy.REDUCTION))
-        return (1 - r0) / tau0, 1 / (1 - r0), (2 * D0 / (tau0 * (1 - r0))).sqrt(), True
-    alpha = (5 - 3 * r0) / (2 * (2 - r0) * tau0)
-    return 2 * alpha, ball("0.5"), (2 * D0).sqrt() / tau0 / (2 * alpha).sqrt(), False

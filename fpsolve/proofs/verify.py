@@ -129,7 +129,7 @@ def _objection_within(
             least += [(-bound, bound) for bound in inward if min(values) < -bound < max(values)]
         pulls = (ball(w) * ball(b if w else 0.0) - square * (ball(w) * ball(w)) / 2 for w, b in least)
         if not all((stop - start) / (2 * (right - left)) <= room + pull for pull in pulls):
-            return f"{_NAMES[q]} bound: the mismatch near z = {cell[0]:.6g} is not made up for; "
+            return f"{'upper' if q > 0 else 'lower'} bound: the mismatch near z = {cell[0]:.6g} is not made up for; "
     return ""
 
 
@@ -147,8 +147,5 @@ def _objection_beyond(bounder: Bounder, q: int, side: SideRecord) -> str:
             and noise.nu * slope * kappa >= growth
             and (ball(side.delta) - mismatch) / noise.nu + kappa * (drift - beta) - square * (kappa * kappa) / 2 >= 0
         ):
-            return f"{_NAMES[q]} bound: the trial function does not serve beyond z = {side.nodes[j]:.6g}; "
+            return f"{'upper' if q > 0 else 'lower'} bound: the trial function does not serve beyond z = {side.nodes[j]:.6g}; "
     return ""
-
-
-_NAMES = {UPPER: "upper", LOWER: "lower"}

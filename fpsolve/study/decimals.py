@@ -9,7 +9,7 @@ from decimal import Decimal
 from typing import Any
 
 from fpsolve.case.case import Case
-from fpsolve.proofs.certificate import DECIMAL
+from fpsolve.proofs.statement import DECIMAL
 
 Literals = Mapping[float, str]
 """Decimals by their floats."""

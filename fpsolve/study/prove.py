@@ -23,7 +23,7 @@ from fpsolve.proofs.questions import (
     prove_index,
     refuse_unprovable,
 )
-from fpsolve.proofs.statement import IMPACT, NOISE, OSCILLATOR, TREATMENT, Parameters
+from fpsolve.proofs.statement import Parameters, linear_values
 from fpsolve.study.decimals import Literals, decimal_of, literals_of
 
 ORDERS = "moments.p"
@@ -105,7 +105,8 @@ class Plan:
 
     @cached_property
     def _literals(self) -> Mapping[str, Literals]:
-        return literals_of(self.case, (*OSCILLATOR, *NOISE, ORDERS))
+        keys = (key for curve in self.case.curves(stop=1) for key in linear_values(curve.problem))
+        return literals_of(self.case, (*keys, ORDERS))
 
     @cached_property
     def _orders(self) -> list[str]:
@@ -116,8 +117,10 @@ class Plan:
 
     def stated(self, curve: Curve) -> Parameters:
         """The parameters of the linear motion as the decimals that the case states."""
-        stated = {key: decimal_of(float(curve.parameters[key]), self._literals[key]) for key in (*OSCILLATOR, *NOISE)}
-        return stated | {key: str(curve.parameters[key]) for key in (IMPACT, TREATMENT)}
+        return {
+            key: value if isinstance(value, str) else decimal_of(value, self._literals[key])
+            for key, value in linear_values(curve.problem).items()
+        }
 
     def questions(self) -> Iterator[Question]:
         """All of them, curve by curve."""

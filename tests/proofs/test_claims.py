@@ -297,7 +297,7 @@ def test_certificates_that_do_not_fit_together(data, change, words):
     [
         ('"ou-reduction"', '"exactly"', "'exact' or 'ou-reduction'"),
         ('"oscillator.impact": "delta"', '"oscillator.impact": "hard"', "'delta' or 'restitution'"),
-        ('"noise.r0": "0.9"', '"noise.r0": "1.7"', "need r0 < 5/3"),
+        ('"noise.r0": "0.9"', '"noise.r0": "1.7"', "r0: must be less than 1.666666"),
         ('"oscillator.omega": "1.2"', '"oscillator.omega": "-1.2"', "omega"),
     ],
 )
@@ -310,7 +310,7 @@ def test_no_bound_holds_for_algebraic_tails(proof):
     text = proof.replace('"ou-reduction"', '"exact"').replace(
         '"noise.r0": "0.9"', '"noise.r0": "1.0000000000000000001"'
     )
-    with pytest.raises(MalformedProof, match=r"got noise\.r0 = 1\.0000000000000000001; must be <= 1"):
+    with pytest.raises(MalformedProof, match=r"got noise\.r0 = 1\.0000000000000000001; for r0 > 1"):
         claims_from(text)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -12,6 +13,9 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
+from fpsolve.errors import NoSuchExponent, Remedy
+from fpsolve.messages import Code, Message
+from fpsolve.model.exact import ExactLaw, gaussian_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
@@ -172,6 +176,17 @@ class NonGaussianNoise(Noise):
         end_exponent = 1 / (1 - self.r0) ** 2 if math.isfinite(self.half_width) else 0.0
         return NoiseDerivative(0.0, lambda xi: u(xi) ** 2 * _curvature_of_log((self.r0 - 1) * u(xi)), end_exponent)
 
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        """In units of the end of the support for r₀ < 1, of the standard deviation for r₀ = 1."""
+        D0, tau0, r0 = (Fraction(decimals[name]) for name in ("D0", "tau0", "r0"))
+        if r0 > 1:
+            key = f"{cls.section}.r0"
+            raise NoSuchExponent(Message(Code.NO_BOUND, key=key, value=decimals["r0"], remedy=Remedy.REDUCTION))
+        if r0 == 1:
+            return ReducedNoise.exact_law(decimals)
+        return ExactLaw((1 - r0) / tau0, 1 / (1 - r0), 2 * D0 / (tau0 * (1 - r0)), is_bounded=True)
+
     def at(self, values: Mapping[str, float | str]) -> NonGaussianNoise | ReducedNoise:  # type: ignore[override]
         return _treated(self, values)
 
@@ -211,6 +226,11 @@ class ReducedNoise(GaussianNoise):
     def replaces(self) -> NonGaussianNoise:
         """The noise of Eq. (7)."""
         return NonGaussianNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        D0, tau0, r0 = (Fraction(decimals[name]) for name in ("D0", "tau0", "r0"))
+        return gaussian_law((5 - 3 * r0) / (2 * (2 - r0) * tau0), 2 * D0 / tau0**2)
 
     def derivative(self, name: str) -> NoiseDerivative:
         """∂/∂θ by D₀, τ₀ or r₀ of α₀ = (5 − 3r₀)/(2(2 − r₀)τ₀) and σ₀."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from fractions import Fraction
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -10,6 +12,7 @@ from numpy.typing import ArrayLike
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
+from fpsolve.model.exact import ExactLaw, gaussian_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import DERIVED, STRICT, parameter
@@ -75,6 +78,10 @@ class OrnsteinUhlenbeck(GaussianNoise):
     sigma: Annotated[float, parameter("intensity of its white noise", "", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)]
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        return gaussian_law(Fraction(decimals["alpha"]), Fraction(decimals["sigma"]) ** 2)
 
     def derivative(self, name: str) -> NoiseDerivative:
         return self.by_logarithms(1 / self.sigma, 0.0) if name == "sigma" else self.by_logarithms(0.0, 1 / self.alpha)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
+from fractions import Fraction
 from functools import cached_property
 from typing import Annotated, ClassVar, Self
 
@@ -14,6 +15,7 @@ from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray, identity
+from fpsolve.model.exact import ExactMotion
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import Drive, Kick, System, by_epsilon
@@ -144,6 +146,16 @@ class VibroImpactOscillator(System):
                 return (), (self.epsilon**2 * bounce,)
             case _:
                 return by_epsilon(self), (-2 * self.epsilon * (1 - self.restitution) * bounce,)
+
+    @classmethod
+    def exact_motion(cls, decimals: Mapping[str, str]) -> ExactMotion:
+        omega, restitution, c1, epsilon = (
+            Fraction(decimals[name]) for name in ("omega", "restitution", "c1", "epsilon")
+        )
+        loss, square = epsilon**2 * (1 - restitution), epsilon**2
+        is_delta = decimals["impact"] == ImpactLaw.DELTA
+        factor, log_factor = (Fraction(1), -loss) if is_delta else (1 - loss, Fraction(0))
+        return ExactMotion(omega, square * c1, epsilon, factor, log_factor)
 
     def impact_value(self, log_factor: float) -> float:
         """The r for which this law, with this ε, has a given ln R; it may be no coefficient of restitution."""
