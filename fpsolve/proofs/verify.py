@@ -147,5 +147,6 @@ def _objection_beyond(bounder: Bounder, q: int, side: SideRecord) -> str:
             and noise.nu * slope * kappa >= growth
             and (ball(side.delta) - mismatch) / noise.nu + kappa * (drift - beta) - square * (kappa * kappa) / 2 >= 0
         ):
-            return f"{'upper' if q > 0 else 'lower'} bound: the trial function does not serve beyond z = {side.nodes[j]:.6g}; "
+            name = "upper" if q > 0 else "lower"
+            return f"{name} bound: the trial function does not serve beyond z = {side.nodes[j]:.6g}; "
     return ""

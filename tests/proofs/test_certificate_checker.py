@@ -53,6 +53,7 @@ def problem_of(parameters):
         noise = fpsolve.OrnsteinUhlenbeck(float(words["alpha"]), float(words["sigma"]))
     else:
         noise = fpsolve.NonGaussianNoise(*(float(words[name]) for name in ("D0", "tau0", "r0")))
+        noise = noise if words["treatment"] == "exact" else noise.ou_reduction()
     return fpsolve.Problem(oscillator, noise)
 
 
