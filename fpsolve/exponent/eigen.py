@@ -23,7 +23,6 @@ from fpsolve.arrays import FloatArray, dense, finite, one
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, SingularMatrix
 from fpsolve.exponent.eigenfunction_plot import EigenfunctionPlot
-from fpsolve.exponent.rounding import rounding_of_entries
 from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.factors import Factors
 from fpsolve.fem.generator import Generator, Pencil
@@ -100,10 +99,10 @@ def principal_pair(
         NotConverged: the iteration stalls, or both T and T* change sign: the mesh does not resolve the problem.
             `partial` is the pair that was reached.
     """
-    pairs = [start] if isinstance(start, PrincipalPair) else start
+    pairs, pencil = [start] if isinstance(start, PrincipalPair) else start, generator.at(p)
     searches: list[Callable[[], tuple[FloatArray, FloatArray]]] = [
-        lambda: _carried(pairs, p, generator) if pairs else _simplest(generator, p),
-        lambda: _from_the_right(generator, p),
+        lambda: _carried(pairs, pencil, generator) if pairs else _simplest(pencil, generator),
+        lambda: _from_the_right(pencil, generator),
     ]
     if generator.problem.noise.mixes_slowly:  # states that hardly mix have a positive pair each
         searches.reverse()
@@ -113,7 +112,7 @@ def principal_pair(
             vectors = search()
         except NotConverged:  # the other searches may still find it
             continue
-        found.append(_pair(generator, *rayleigh_iteration(generator.at(p), *vectors)))
+        found.append(_pair(generator, pencil, rayleigh_iteration(pencil, *vectors)))
         if found[-1].residual <= BACKWARD_ERROR_LIMIT and min(found[-1].sign_defects) <= SURELY_POSITIVE:
             return _rightmost(found[-1])
     pair = min(found, key=lambda pair: (pair.residual > BACKWARD_ERROR_LIMIT, min(pair.sign_defects)))
@@ -159,11 +158,11 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
     return values[np.lexsort((values.imag, -values.real))][:k]
 
 
-def _carried(pairs: Sequence[PrincipalPair], p: float, generator: Generator) -> tuple[FloatArray, FloatArray]:
+def _carried(pairs: Sequence[PrincipalPair], pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray]:
     """Both eigenfunctions at p, by Lagrange interpolation between pairs of one generator, or from one of another."""
-    kept = [pair for pair in pairs if pair.generator is generator]
+    p, space, kept = pencil.p, pencil.space, [pair for pair in pairs if pair.generator is generator]
     if not kept:
-        nearest, space = min(pairs, key=lambda pair: abs(pair.p - p)), generator.space(p)
+        nearest = min(pairs, key=lambda pair: abs(pair.p - p))
         if nearest.generator.chosen is generator.chosen:  # the same functions, of a problem close by
             return nearest.right, nearest.left
         return space.carry(nearest.right, nearest.space), space.carry(nearest.left, nearest.space)
@@ -172,9 +171,9 @@ def _carried(pairs: Sequence[PrincipalPair], p: float, generator: Generator) -> 
     return weights @ [pair.right for pair in kept], weights @ [pair.left for pair in kept]
 
 
-def _simplest(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
+def _simplest(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray]:
     """T = T*/P_s = 1 of weak noise, Eqs. (26) and (28); where paths are killed those of noise that rests."""
-    space = generator.space(p)
+    p, space = pencil.p, pencil.space
     if not generator.chosen.is_killed:
         return space.constant, space.constant
     resting = space.xi.mass(lambda xi: p * eigenvalues_at(generator.problem, xi)[0])
@@ -183,14 +182,13 @@ def _simplest(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
     return vector, vector
 
 
-def _from_the_right(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
+def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray]:
     """Right and left vectors near the principal ones, from shifts that start at an upper bound of Λ(p)."""
-    pencil, space = generator.at(p), generator.space(p)
-    shift = generator.upper_bound(p) + 0.25 * generator.unit_rate
-    right, left = _simplest(generator, p)
+    space, shift = pencil.space, generator.upper_bound(pencil.p) + 0.25 * generator.unit_rate
+    right, left = _simplest(pencil, generator)
     for _ in range(2):
         factor = pencil.factorised(shift)
-        right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, p)
+        right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, pencil.p)
         shift -= 0.95 / inverse_distance
     for _ in range(4):
         left = factor.solve_transposed(space.weighed(left))
@@ -220,7 +218,7 @@ class Iterate(NamedTuple):
 
 
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # a start may be useless, as its residual tells then
-def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> tuple[Pencil, Iterate]:
+def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> Iterate:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
     space, operator = pencil.space, pencil.matrix
     best = Iterate(float(y @ (operator @ x) / (y @ space.weighed(x))), math.inf, x, y)
@@ -243,7 +241,7 @@ def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> tuple[Pe
     has_cells = any(axis.is_local and axis.cells.max() >= 0 for axis in space.axes[1:])
     if best.residual > 1e-3 * BACKWARD_ERROR_GOAL or has_cells:
         best = _improved(factor, space, shift, size, best)
-    return pencil, best
+    return best
 
 
 def _improved(factor: Factors, space: TensorSpace, shift: float, size: float, old: Iterate) -> Iterate:
@@ -274,7 +272,7 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
     y = found.y * (norm / (found.y @ space.weighed(x)))
     rounding = _EPS * float(abs(y) @ (abs(operator) @ abs(x))) / norm
     if generator.chosen.is_killed:
-        rounding += rounding_of_entries(generator, p, x, y) / norm
+        rounding += _rounding_of_entries(generator, pencil, x, y) / norm
     if generator.keeps_constants:
         forcing, total = generator.matrix(p, orders=slice(1, None)), weight @ x
         of_noise = space.product([space.phi.constant, space.xi.generator_of_one()])
@@ -313,3 +311,26 @@ def _sign_defects(space: TensorSpace, x: FloatArray, y: FloatArray) -> tuple[flo
         return max(float(np.sum(size[negative]) / np.sum(size)) for size in sizes)
 
     return share(right), share(left)
+
+
+def _rounding_of_entries(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray) -> float:
+    """Bound on the effect of the rounding of matrix entries: far out the mean and the wave of q cancel in them.
+
+    In each cell of φ the entries of ∫ q u v and ∫ h u′ v are right to about eps, also those that are much smaller.
+    """
+    space, p = pencil.space, abs(pencil.p)
+    right, left = (_summed(space, v) for v in (x, y))
+    steepness = space.phi.modes**2 / np.diff(space.phi.lines)[space.phi.cells]
+    slopes = _summed(space, x * np.repeat(steepness, space.xi.size))
+    total = 0.0
+    for drive in generator.problem.system.drives:
+        size = generator.problem.system.epsilon**drive.order
+        q, h = (size * (abs(each.mean) + each.amplitude) for each in (drive.q, drive.h))
+        total += float(np.sum(left * ((p * q * right + h * slopes) @ abs(space.xi.matrix(drive.g)))))
+    return _EPS * total
+
+
+def _summed(space: TensorSpace, coefficients: FloatArray) -> FloatArray:
+    """Sums of absolute values over the functions of each cell of φ, shape (cells, xi.size)."""
+    starts = np.flatnonzero(np.diff(space.phi.cells, prepend=-1))
+    return np.add.reduceat(np.abs(space.table(coefficients)), starts, axis=0)

@@ -192,7 +192,7 @@ def test_sensitivities():
     [found] = sensitivities(PROBLEM, 1.0, rtol=1e-5).moments
     low, high = (ExponentSolver(Problem(replace(SYSTEM, epsilon=e), NOISE), rtol=1e-6) for e in (0.99, 1.01))
     slope = (high.solution(1.0).pair.value - low.solution(1.0).pair.value) / 0.02
-    assert found["oscillator.epsilon"].value == pytest.approx(slope, rel=1e-3)
+    assert found["system.epsilon"].value == pytest.approx(slope, rel=1e-3)
 
 
 def test_a_discretisation_for_another_p_is_not_taken_where_there_is_a_corner():
