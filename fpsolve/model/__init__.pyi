@@ -5,6 +5,7 @@ from .noises.markov_chain import MarkovChain as MarkovChain
 from .noises.non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .noises.non_gaussian import ReducedNoise as ReducedNoise
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
+from .noises.sine_wiener import SineWiener as SineWiener
 from .plane import Drive as Drive
 from .plane import Kick as Kick
 from .plane import System as System

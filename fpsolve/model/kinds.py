@@ -25,6 +25,7 @@ NOISES: Mapping[str, str] = {
     "non-gaussian": "non_gaussian:NonGaussianNoise",
     "ou-reduction": "non_gaussian:ReducedNoise",
     "ornstein-uhlenbeck": "ornstein_uhlenbeck:OrnsteinUhlenbeck",
+    "sine-wiener": "sine_wiener:SineWiener",
     "markov-chain": "markov_chain:MarkovChain",
 }
 

@@ -10,7 +10,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -139,6 +139,32 @@ class Noise(Parametrised):
     def holding_cost(self, xi: FloatArray) -> FloatArray:
         """At which rate paths that hold ξ at these increasing values get rarer, about ⅛σ²((ln P_s)′)²."""
         return 0.125 * self.squared_diffusion(xi) * np.gradient(self.log_density(xi), xi) ** 2
+
+    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """Independent values of ξ from the stationary law, shape (size,)."""
+        raise NotImplementedError
+
+    def step(self, h: float, bias: float = 0.0) -> Any:
+        """One step of length h of dξ = (f(ξ) + σ² b) dt + σ dW, b the bias, for the simulation.
+
+        It is written from this equation alone, without P_s, so that the simulation is a witness of what is made of P_s.
+
+        Returns:
+            A named tuple of numbers whose class has a static method `draw(step, xi, xi_mean, xi_end, push, rng)` that
+            numba can compile: it draws the mean and the end of the noise in one step that begins at `xi`, all of shape
+            (n,), and adds ∫f(ξ) dt to `push` where there may be a bias. Kinds without it are not simulated.
+        """
+        raise NotImplementedError
+
+    @property
+    def largest_step(self) -> float:
+        """The longest step of which `step` makes an error of some 1e-4."""
+        raise NotImplementedError
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether this kind states a `step`."""
+        return type(self).step is not Noise.step
 
     @property
     def replaces(self) -> Noise | None:

@@ -228,6 +228,10 @@ class System(Parametrised):
         """The motion in exact numbers, for parameters as decimals by name; None where no proof is known."""
         return None
 
+    def motion(self, *, smooth: bool = False) -> Any:
+        """The numbers that the simulation moves paths by, see `Motion`; None for kinds that are not simulated."""
+        return None
+
     def impact_value(self, log_factor: float) -> float:
         """The value of the `impact_parameter` for which the kick has a given ln R; it may be out of range."""
         raise NotImplementedError

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from threading import Event
+from typing import Any
 
 import numpy as np
 from numpy.random import SeedSequence, default_rng
@@ -15,8 +16,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.pool import processors
 from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
-from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator
-from fpsolve.simulation.step import Motion, NoiseStep, noise_step, starting_state
+from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator, starting_state
 
 _PORTION_SECONDS = 0.1
 STEP_SECONDS = 2e-8
@@ -43,8 +43,8 @@ class Plan:
     """
 
     noise: Noise
-    motion: Motion
-    noise_step: NoiseStep
+    motion: Any
+    noise_step: Any
     step: float
     p: FloatArray
     estimator: Estimator
@@ -155,7 +155,7 @@ class Population(_Paths):
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
         super().__init__(plan, seed)
         self.p, self.bias, self.expected = p, 0.0, 0.0
-        self._is_biased = p != 0 and not plan.noise.has_algebraic_tails
+        self._is_biased = p != 0 and plan.noise.may_tilt and not plan.noise.has_algebraic_tails
         if is_far and self._is_biased:
             self.bias = p * plan.motion.strength * plan.noise.relaxation_time
         self.tallies = np.zeros(1, TALLIES)
@@ -168,7 +168,7 @@ class Population(_Paths):
         plan = self.plan
         bonus = 0.5 * (plan.noise.diffusion * self.bias) ** 2 * plan.step
         advance_population(
-            plan.motion, noise_step(plan.noise, plan.step, bias=self.bias), plan.step, *self.state, self._log_weights,
+            plan.motion, plan.noise.step(plan.step, self.bias), plan.step, *self.state, self._log_weights,
             self._ancestors, (self.p, self.bias, bonus), steps, self._interval, self._log_z, self.rng,
         )  # fmt: skip
 

@@ -40,7 +40,6 @@ from fpsolve.simulation.setup import (
     simulated_parts,
     transient,
 )
-from fpsolve.simulation.step import motion, noise_step
 
 FEW: Mapping[Estimator, int] = {"direct": 5000, "population": 1000}
 """With fewer effective paths there is no estimate. Direct runs that miss the rare large ‖x‖^p have both more effective
@@ -114,8 +113,8 @@ def _plan(
     wanted = TRANSIENTS if time is None else max(2, round(time / settling))
     return Plan(
         noise=noise,
-        motion=motion(replace(oscillator, c2=0.0, c3=0.0)),
-        noise_step=noise_step(noise, h),
+        motion=oscillator.at(dict.fromkeys(oscillator.inert, 0.0)).motion(),
+        noise_step=noise.step(h),
         step=h,
         p=np.atleast_1d(np.array(p, dtype=float)),
         estimator=estimator,

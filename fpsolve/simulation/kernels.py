@@ -1,4 +1,4 @@
-"""All that numba compiles: the motion, the noise, and the loops over paths. Its cache looks at one file only.
+"""All that numba compiles: the motion, the loops over paths, and the step that the kind of noise states.
 
 Nothing here knows of phases, generators or eigenvalues: the mass is at x ≥ 0, has the velocity ẋ = ω u and obeys
 Eq. (3),
@@ -9,24 +9,28 @@ A step of length h draws the noise at its end and its mean over the step. Then t
 integrates the motion in the frame that rotates with ω (Lawson's method), so that the free flight is exact. An impact
 is sought within the step, to the precision of floating point, and the rest of the step follows after the bounce.
 
-State: x, u and ξ of each path, arrays of shape (n,), changed in place. The coefficients are a `Motion` and a
-`NoiseStep` of step.py.
+State: x, u and ξ of each path, arrays of shape (n,), changed in place. The coefficients are the `Motion` of a system
+and the `step` of a noise.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import overload
+
+from fpsolve.model import noises
 
 _CHUNK = 256
 """Paths that are advanced together, so that they stay in the cache and the processor can take several at once."""
 _ANGLE, _GROWTH = 0.5, 0.125
 """A step with a larger ω h or |g| h is taken in parts: the first could hide impacts, the second costs accuracy."""
 _MOST_PARTS = 10_000
-_NEWTON_STEPS = 5
 RENORMALISED = 4
 """Steps after which a path has the norm 1 again."""
 _RESAMPLED = 0.5
@@ -36,65 +40,39 @@ TALLIES = np.dtype(
 )
 """Of the slices of a population, d being the growth of ln Z beyond what is expected: how many; Σd; Σd²; Σd × the d
 before; Σd × the number of the slice, from 0; Σ effective paths among those of a slice ago; the first and the last d."""
+_FILES = sorted(Path(noises.__file__).parent.glob("*.py"))
+_STEPS = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()[:16]
 _without_cache: Any = njit(nogil=True, error_model="numpy")
 _with_cache: Any = njit(nogil=True, error_model="numpy", cache=True)
 _inlined: Any = njit(nogil=True, error_model="numpy", inline="always")
 
 
 def _compiled(function: Any) -> Any:
-    """A compiled function, kept in numba's cache unless no folder for that can be written to."""
+    """A compiled function, kept in numba's cache unless no folder for that can be written to.
+
+    The cache sees when this file changes, but not when a step does, which therefore is part of the name.
+    """
+    function.__qualname__ += f"_{_STEPS}"
     try:
         return _with_cache(function)
     except RuntimeError:
         return _without_cache(function)
 
 
-@_compiled
-def draw(noise, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
-    """The mean and the end of the noise in one step that begins at `xi`; all of shape (n,).
+def _draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+    """`draw` of the class of a step; this is what numba replaces by it."""
+    raise NotImplementedError
 
-    `push` takes in ∫f(ξ) dt over the step, f without σ² b.
-    """
-    for i in range(xi.size):
-        xi_end[i] = rng.standard_normal()
-    if noise.pull > 0:
-        _draw_implicit(noise, xi, xi_mean, xi_end, push)
-        return
-    for i in range(xi.size):
-        xi_mean[i] = rng.standard_normal()
-    for i in range(xi.size):
-        first, start = xi_end[i], xi[i]
-        xi_end[i] = noise.decay * start + noise.kick * first + noise.end0
-        xi_mean[i] = noise.mean * start + noise.mean1 * first + noise.mean2 * xi_mean[i] + noise.mean0
-        push[i] -= noise.rate * xi_mean[i]
+
+@overload(_draw)
+def _drawn_by_its_kind(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+    return step.instance_class.draw
 
 
 @_compiled
-def _draw_implicit(noise, xi, xi_mean, xi_end, push):  # type: ignore[no-untyped-def]
-    """Eq. (7): the root a ≥ 0 of (y − a)(1 + s a²) = pull a in units of 1/√|c|, s the sign of c, by Newton's method."""
-    unit = math.sqrt(abs(noise.curvature))
-    sign = 1.0 if noise.curvature > 0 else -1.0
-    pull = noise.pull
-    for i in range(xi.size):
-        start = unit * xi[i]
-        before = start - pull * start / (1 + sign * start * start)
-        target = before + unit * (noise.kick * xi_end[i] + noise.end0)
-        y = abs(target)
-        if sign < 0:  # inside the support from the first guess on: the smaller root of (y − a)(1 − a) = k
-            edge = min(y, 1.0)
-            k = pull * edge / (1 + edge)
-            a = 0.5 * (y + 1 - math.sqrt((y - 1) * (y - 1) + 4 * k))
-        else:
-            a = y * (1 + y * y) / (1 + pull + y * y)
-        for _ in range(_NEWTON_STEPS):
-            square = 1 + sign * a * a
-            a += ((y - a) * square - pull * a) / (square + pull - 2 * sign * a * (y - a))
-        if sign < 0:
-            a = min(max(a, 0.0), 1 - 1e-15)
-        end = math.copysign(a, target)
-        push[i] += (before - start + end - target) / unit
-        xi_end[i] = end / unit
-        xi_mean[i] = 0.5 * (xi[i] + xi_end[i])
+def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+    """The mean and the end of the noise in one step that begins at `xi`, see `Noise.step`."""
+    _draw(step, xi, xi_mean, xi_end, push, rng)
 
 
 @_inlined
@@ -213,7 +191,7 @@ def advance(m, noise, h, x, u, xi, log_norm, push, steps, interval, rng):  # typ
     """Advance paths by `steps` steps of length h, in place, and return the number of impacts.
 
     Args:
-        m, noise: a `Motion` and a `NoiseStep` of this h.
+        m, noise: a `Motion` and the `step` of a noise of this h.
         x, u, xi: the state of the paths, shape (n,).
         log_norm: ln ‖(x, u)‖ that has been taken out of the state; after every `interval` steps, and at the end, it
             takes in what the state has grown by, and the state has the norm 1 again. With interval = 0 it is left.

@@ -18,8 +18,7 @@ from fpsolve.model.quantity import IMPACT_RATE
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.kernels import advance_and_count
-from fpsolve.simulation.setup import BATCHES, simulated_parts
-from fpsolve.simulation.step import Motion, NoiseStep, motion, noise_step, starting_state
+from fpsolve.simulation.setup import BATCHES, simulated_parts, starting_state
 
 if TYPE_CHECKING:
     import xarray
@@ -138,7 +137,7 @@ class _Batch:
     """Paths of the nonlinear system, and what has been counted of them."""
 
     def __init__(
-        self, laws: tuple[Motion, NoiseStep, float], steps: int, state: tuple[FloatArray, ...], rng: np.random.Generator
+        self, laws: tuple[Any, Any, float], steps: int, state: tuple[FloatArray, ...], rng: np.random.Generator
     ) -> None:
         self.laws, self.steps, self.rng = laws, steps, rng
         self.x, self.u, self.xi = state
@@ -188,7 +187,7 @@ def stationary_response(
     between = steps * step
     memory = max(1 / exponent, 2 * variance_rate / exponent**2)
     settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
-    laws, size = (motion(oscillator), noise_step(noise, step), step), math.ceil(paths / BATCHES)
+    laws, size = (oscillator.motion(), noise.step(step), step), math.ceil(paths / BATCHES)
     amplitude = math.sqrt(exponent / damping)
     rngs = [np.random.default_rng(each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
     batches = [_Batch(laws, steps, starting_state(noise, size, rng, amplitude), rng) for rng in rngs]

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
-from fpsolve.arrays import real_numbers
+from fpsolve.arrays import FloatArray, real_numbers
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
 from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 Estimator = Literal["direct", "population"]
 BATCHES = 32
@@ -28,14 +25,14 @@ _LONGEST = 1_000_000
 """Steps in a transient, and transients in all; with more, a simulation would not end."""
 
 
-def simulated_parts(problem: Problem) -> tuple[VibroImpactOscillator, Noise]:
+def simulated_parts(problem: Problem) -> tuple[Any, Noise]:
     """The motion and the noise of a problem, if they can be simulated.
 
     Raises:
         FpsolveError: they cannot.
     """
     system, noise = problem.system, problem.noise
-    if isinstance(system, VibroImpactOscillator) and isinstance(noise, NonGaussianNoise | GaussianNoise):
+    if noise.is_simulated and system.motion() is not None:
         return system, noise
     raise FpsolveError(
         "simulation is for a VibroImpactOscillator under OrnsteinUhlenbeck or NonGaussianNoise, but this is a "
@@ -62,32 +59,23 @@ def check_settings(noise: Noise, p: float | Sequence[float], estimator: Estimato
         )
 
 
-def largest_step(oscillator: VibroImpactOscillator, noise: Noise) -> tuple[float, str]:
+def largest_step(oscillator: Any, noise: Noise) -> tuple[float, str]:
     """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
 
-    ω h ≤ ½, ε² |c₁| h ≤ ⅛, ε std(ξ) h ≤ ⅛, α₀ h ≤ ½. For Eq. (7) instead of the last h ≤ τ₀/20; and near the ends of
-    a bounded support, where P_s ~ d^a with a = 1/(1 − r₀), the scheme has the order (a + 1)/2 only, which for a < 3
-    asks for less.
+    ω h ≤ ½, ε² |c₁| h ≤ ⅛, ε std(ξ) h ≤ ⅛, and the `largest_step` of the noise.
     """
     damping = oscillator.epsilon**2 * abs(oscillator.c1)  # may underflow
     limits = {
         "the frequency": 0.5 / oscillator.omega,
         "the damping": 0.125 / damping if damping else math.inf,
         "the strength of the noise": 0.125 / (oscillator.epsilon * noise.standard_deviation),
+        "the correlation time of the noise": noise.largest_step,
     }
-    if isinstance(noise, NonGaussianNoise):
-        share = 0.5 if noise.r0 == 1 else 0.05
-        if noise.r0 < 1:
-            a = noise.end_exponent
-            share = min(share, max(2e-3 * min(a, 1.0) ** 2, a * 1.25e-3 ** (2 / (a + 1))))
-        limits["the correlation time of the noise"] = share * noise.tau0
-    else:
-        limits["the correlation time of the noise"] = 0.5 / noise.alpha  # type: ignore[attr-defined]
     reason = min(limits, key=lambda name: limits[name])
     return limits[reason], reason
 
 
-def transient(oscillator: VibroImpactOscillator, noise: Noise) -> float:
+def transient(oscillator: Any, noise: Noise) -> float:
     """The time after which ln E‖x‖^p grows like Λ(p) t: whole half-turns π/ω, at least two and eight correlation times.
 
     In whole half-turns the oscillation cancels that the start from the stationary law leaves in weak noise.
@@ -96,15 +84,13 @@ def transient(oscillator: VibroImpactOscillator, noise: Noise) -> float:
     return half_turn * max(2, math.ceil(8 * noise.relaxation_time / half_turn))
 
 
-def default_step(oscillator: VibroImpactOscillator, noise: Noise) -> float:
+def default_step(oscillator: Any, noise: Noise) -> float:
     """Half the largest step, or less, so that a half-turn π/ω is a whole number of steps."""
     half_turn = math.pi / oscillator.omega
     return half_turn / math.ceil(half_turn / (0.5 * largest_step(oscillator, noise)[0]))
 
 
-def obstacles(
-    oscillator: VibroImpactOscillator, noise: Noise, *, time: float | None = None, step: float | None = None
-) -> dict[str, str]:
+def obstacles(oscillator: Any, noise: Noise, *, time: float | None = None, step: float | None = None) -> dict[str, str]:
     """Why a simulation with this length and this step would not be right: a sentence for each of "time" and "step"."""
     found = {}
     largest, reason = largest_step(oscillator, noise)
@@ -133,3 +119,11 @@ def obstacles(
     elif time is not None and time > _LONGEST * settling:
         found["time"] = f"got {time:g}; must be <= {_LONGEST * settling:.4g}, a million transients; reduce it"
     return found
+
+
+def starting_state(
+    noise: Noise, paths: int, rng: np.random.Generator, amplitude: float = 1.0
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """x, u and ξ of paths of one amplitude, with uniform phases in front of the wall and stationary noise."""
+    phase = rng.uniform(0, math.pi, paths)
+    return amplitude * np.sin(phase), amplitude * np.cos(phase), noise.sample(paths, rng)

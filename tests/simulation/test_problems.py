@@ -18,7 +18,6 @@ from fpsolve.simulation.batches import PlainBatch, Plan
 from fpsolve.simulation.estimators import simulate
 from fpsolve.simulation.response import stationary_response
 from fpsolve.simulation.setup import PROGRESS_STEPS
-from fpsolve.simulation.step import motion, noise_step
 
 OSCILLATOR = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5, c2=0.3, impact="restitution")
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9)
@@ -105,8 +104,8 @@ def test_a_plan_pickles():
     """A batch that follows the copy goes where one does that follows the plan."""
     plan = Plan(
         noise=NOISE,
-        motion=motion(OSCILLATOR),
-        noise_step=noise_step(NOISE, 0.01),
+        motion=OSCILLATOR.motion(),
+        noise_step=NOISE.step(0.01),
         step=0.01,
         p=np.array([-1.0, 2.0]),
         estimator="direct",

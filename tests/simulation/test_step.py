@@ -11,10 +11,9 @@ from scipy.stats import kstest
 
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.model.systems.vibro_impact import Motion, VibroImpactOscillator
 from fpsolve.simulation.kernels import advance, draw, move
 from fpsolve.simulation.setup import default_step, largest_step
-from fpsolve.simulation.step import Motion, motion, noise_step, stationary_noise
 from tests.conftest import FIG1_NOISE, UNIT_NOISE
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.7, c1=0.2, epsilon=1.0, impact="restitution")
@@ -132,14 +131,14 @@ def test_zhuravlev_map(nonlinear):
     phase = rng.uniform(0, math.pi, n)
     x, u = np.sin(phase), np.cos(phase)
     y, w = -x, -u  # behind the wall, where it is not seen
-    noise, xi = noise_step(UNIT_NOISE, h), stationary_noise(UNIT_NOISE, n, rng)
+    noise, xi = UNIT_NOISE.step(h), UNIT_NOISE.sample(n, rng)
     mean, end, push = np.empty((3, n))
     impacts = 0
     for _ in range(2000):
         draw(noise, xi, mean, end, push, rng)
         rise = 0.5 * (end - xi)
-        impacts += move(motion(oscillator), h, x, u, mean, rise, *room(n))
-        move(motion(oscillator, smooth=True), h, y, w, mean, rise, *room(n))
+        impacts += move(oscillator.motion(), h, x, u, mean, rise, *room(n))
+        move(oscillator.motion(smooth=True), h, y, w, mean, rise, *room(n))
         xi[:] = end
         norm = np.hypot(x, u)
         assert np.all(x >= 0)
@@ -155,7 +154,7 @@ def test_zhuravlev_map(nonlinear):
 def test_transition_of_ornstein_uhlenbeck_noise(a):
     """Moments of (ξ₁, ξ̄) from the response e^(−αs) of ξ to dW: variances and covariance as integrals."""
     noise, h = OrnsteinUhlenbeck(alpha=2.0, sigma=3.0), a / 2.0
-    step = noise_step(noise, h)
+    step = noise.step(h)
 
     def squares(s):
         end, mean = math.exp(-2.0 * s), -math.expm1(-2.0 * s) / a
@@ -171,7 +170,7 @@ def test_transition_of_ornstein_uhlenbeck_noise(a):
 
 def noise_after(noise, xi, time, rng):
     h = default_step(STRONG, noise)
-    step = noise_step(noise, h)
+    step = noise.step(h)
     mean, end, push = np.empty((3, xi.size))
     for _ in range(math.ceil(time / h)):
         draw(step, xi, mean, end, push, rng)
@@ -185,7 +184,7 @@ def test_noise_has_its_stationary_law(r0, origin):
     """A Kolmogorov-Smirnov test of 1e5 independent paths against Eq. (9)."""
     noise = NonGaussianNoise(D0=0.8, tau0=1.3, r0=r0)
     rng = np.random.default_rng([7, int(100 * r0), len(origin)])
-    xi = stationary_noise(noise, 100_000, rng) if origin == "stationary" else np.zeros(100_000)
+    xi = noise.sample(100_000, rng) if origin == "stationary" else np.zeros(100_000)
     xi = noise_after(noise, xi, noise.tau0 * (2 if origin == "stationary" else 6), rng)
     assert np.all(np.abs(xi) < noise.half_width)
     reach = min(noise.half_width, 60 * noise.standard_deviation)
@@ -200,7 +199,7 @@ def test_heavy_tails_are_kept():
     """For r₀ = 1.2, P_s ~ |ξ|^(−10): of 4e5 paths some are beyond 5 std, where a Gaussian would have none."""
     noise = NonGaussianNoise(D0=0.8, tau0=1.0, r0=1.2)
     rng = np.random.default_rng(3)
-    xi = noise_after(noise, stationary_noise(noise, 400_000, rng), 3 * noise.tau0, rng)
+    xi = noise_after(noise, noise.sample(400_000, rng), 3 * noise.tau0, rng)
     far = 5 * noise.standard_deviation
     tail = np.linspace(far, 100 * far, 1_000_001)
     expected = 2 * 400_000 * np.trapezoid(noise.density(tail), tail)
@@ -213,7 +212,7 @@ def test_noise_with_a_bias_has_its_law():
     b, n, h = 0.4, 200_000, 0.02
     for noise in (FIG1_NOISE, FIG1_NOISE.ou_reduction()):
         rng = np.random.default_rng(5)
-        xi, step = stationary_noise(noise, n, rng), noise_step(noise, h, bias=b)
+        xi, step = noise.sample(n, rng), noise.step(h, bias=b)
         mean, end, push = np.empty((2, n)), np.empty(n), np.zeros(n)
         for _ in range(math.ceil(6 * 0.5 / h)):
             draw(step, xi, mean[0], end, push, rng)
@@ -228,13 +227,13 @@ def test_push_is_the_integral_of_the_drift():
     """Exactly for Ornstein-Uhlenbeck noise, whose mean over the step is known; for Eq. (7) by the trapezoidal rule."""
     n, h = 1000, 0.02
     rng = np.random.default_rng(6)
-    xi = stationary_noise(FIG1_NOISE, n, rng)
+    xi = FIG1_NOISE.sample(n, rng)
     mean, end, push = np.empty(n), np.empty(n), np.zeros(n)
-    draw(noise_step(FIG1_NOISE, h), xi, mean, end, push, rng)
+    draw(FIG1_NOISE.step(h), xi, mean, end, push, rng)
     np.testing.assert_allclose(push, h / 2 * (FIG1_NOISE.drift(xi) + FIG1_NOISE.drift(end)), atol=1e-13)
     reduced = FIG1_NOISE.ou_reduction()
     push[:] = 0
-    draw(noise_step(reduced, h), xi, mean, end, push, rng)
+    draw(reduced.step(h), xi, mean, end, push, rng)
     np.testing.assert_allclose(push, h * reduced.drift(mean), atol=1e-13)
 
 
@@ -245,9 +244,9 @@ def test_norms_are_taken_out_of_the_state():
     for interval in (0, 1, 7):
         rng = np.random.default_rng(2)
         phase = rng.uniform(0, math.pi, n)
-        x, u, xi = np.sin(phase), np.cos(phase), stationary_noise(UNIT_NOISE, n, rng)
+        x, u, xi = np.sin(phase), np.cos(phase), UNIT_NOISE.sample(n, rng)
         log_norm, push = np.zeros((2, n))
-        advance(motion(STRONG), noise_step(UNIT_NOISE, h), h, x, u, xi, log_norm, push, 200, interval, rng)
+        advance(STRONG.motion(), UNIT_NOISE.step(h), h, x, u, xi, log_norm, push, 200, interval, rng)
         logs.append(log_norm + np.log(np.hypot(x, u)))
         if interval:
             np.testing.assert_allclose(np.hypot(x, u), 1, rtol=1e-14)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.exact import ExactLaw, gaussian_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, LinearStep, linear_step
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 
 Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
@@ -31,6 +31,51 @@ Departure = Annotated[
 ]
 _SMALL = 0.05
 """Below it a series is closer than a difference of logarithms."""
+
+
+class ImplicitStep(NamedTuple):
+    """The implicit trapezoidal rule for Eq. (7), of weak order 2, which never leaves the support.
+
+    ξ₁ + pull ξ₁/(1 + cξ₁²) = ξ₀ − pull ξ₀/(1 + cξ₀²) + kick ζ + end₀ with pull = h/2τ₀ and ζ normal, and
+    ξ̄ = (ξ₀ + ξ₁)/2.
+    """
+
+    kick: float
+    end0: float
+    pull: float
+    curvature: float
+
+    @staticmethod
+    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+        """One step, see `Noise.step`.
+
+        It is the root a ≥ 0 of (y − a)(1 + s a²) = pull a in units of 1/√|c|, s the sign of c, by Newton's method.
+        """
+        for i in range(xi.size):
+            xi_end[i] = rng.standard_normal()
+        unit = math.sqrt(abs(step.curvature))
+        sign = 1.0 if step.curvature > 0 else -1.0
+        pull = step.pull
+        for i in range(xi.size):
+            start = unit * xi[i]
+            before = start - pull * start / (1 + sign * start * start)
+            target = before + unit * (step.kick * xi_end[i] + step.end0)
+            y = abs(target)
+            if sign < 0:  # inside the support from the first guess on: the smaller root of (y − a)(1 − a) = k
+                edge = min(y, 1.0)
+                k = pull * edge / (1 + edge)
+                a = 0.5 * (y + 1 - math.sqrt((y - 1) * (y - 1) + 4 * k))
+            else:
+                a = y * (1 + y * y) / (1 + pull + y * y)
+            for _ in range(5):
+                square = 1 + sign * a * a
+                a += ((y - a) * square - pull * a) / (square + pull - 2 * sign * a * (y - a))
+            if sign < 0:
+                a = min(max(a, 0.0), 1 - 1e-15)
+            end = math.copysign(a, target)
+            push[i] += (before - start + end - target) / unit
+            xi_end[i] = end / unit
+            xi_mean[i] = 0.5 * (xi[i] + xi_end[i])
 
 
 @told_in_words
@@ -153,6 +198,31 @@ class NonGaussianNoise(Noise):
                 "where the variance (10) is finite"
             )
         return ReducedNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
+
+    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """Eq. (9) as a beta or a Student variable."""
+        if self.r0 == 1:
+            return self.standard_deviation * rng.standard_normal(size)
+        a = 1 / abs(self.r0 - 1)
+        if self.r0 < 1:
+            return self.half_width * (2 * rng.beta(a + 1, a + 1, size) - 1)
+        nu = 2 * a - 1
+        return math.sqrt(2 * self.D0 * a / (self.tau0 * nu)) * rng.standard_t(nu, size)
+
+    def step(self, h: float, bias: float = 0.0) -> ImplicitStep | LinearStep:
+        if self.r0 == 1:
+            return linear_step(1 / self.tau0, self.diffusion, h, bias)
+        force = self.diffusion**2 * bias
+        return ImplicitStep(self.diffusion * math.sqrt(h), force * h, h / (2 * self.tau0), self.curvature)
+
+    @property
+    def largest_step(self) -> float:
+        """τ₀/20; near ends where P_s ~ d^a the scheme has the order (a + 1)/2 only, which for a < 3 asks for less."""
+        share = 0.5 if self.r0 == 1 else 0.05
+        if self.r0 < 1:
+            a = self.end_exponent
+            share = min(share, max(2e-3 * min(a, 1.0) ** 2, a * 1.25e-3 ** (2 / (a + 1))))
+        return share * self.tau0
 
     @property
     def one_sided(self) -> Sequence[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,56 @@ from fpsolve.model.exact import ExactLaw, gaussian_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import DERIVED, STRICT, parameter
+
+
+class LinearStep(NamedTuple):
+    """The exact transition: ξ₁ = decay ξ₀ + kick ζ₁ + end₀ and ξ̄ = mean ξ₀ + mean₁ ζ₁ + mean₂ ζ₂ + mean₀, ζ normal."""
+
+    rate: float
+    decay: float
+    kick: float
+    end0: float
+    mean: float
+    mean1: float
+    mean2: float
+    mean0: float
+
+    @staticmethod
+    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+        """One step, see `Noise.step`."""
+        for i in range(xi.size):
+            xi_end[i] = rng.standard_normal()
+        for i in range(xi.size):
+            xi_mean[i] = rng.standard_normal()
+        for i in range(xi.size):
+            first, start = xi_end[i], xi[i]
+            xi_end[i] = step.decay * start + step.kick * first + step.end0
+            xi_mean[i] = step.mean * start + step.mean1 * first + step.mean2 * xi_mean[i] + step.mean0
+            push[i] -= step.rate * xi_mean[i]
+
+
+def linear_step(alpha: float, sigma: float, h: float, bias: float) -> LinearStep:
+    """That of dξ = (−αξ + σ²b) dt + σ dW."""
+    std, a, force = sigma / math.sqrt(2 * alpha), alpha * h, sigma**2 * bias
+    decay, mean = math.exp(-a), -math.expm1(-a) / a
+    # Variances of ξ₁ and ξ̄ and their covariance, in units of std²; the series avoids cancellation.
+    var_end, covariance = -math.expm1(-2 * a), a * mean**2
+    if a > 0.02:
+        var_mean = (2 * a + 4 * math.expm1(-a) - math.expm1(-2 * a)) / a**2
+    else:
+        var_mean = a * (2 / 3 - a / 2 + 7 * a**2 / 30 - a**3 / 12 + 31 * a**4 / 1260)
+    kick = math.sqrt(var_end)
+    mean1 = covariance / kick
+    return LinearStep(
+        rate=a,
+        decay=decay,
+        kick=std * kick,
+        end0=force / alpha * (1 - decay),
+        mean=mean,
+        mean1=std * mean1,
+        mean2=std * math.sqrt(var_mean - mean1**2),
+        mean0=force / alpha * (1 - mean),
+    )
 
 
 class GaussianNoise(Noise):
@@ -54,6 +104,16 @@ class GaussianNoise(Noise):
     def spectral_density(self, omega: float) -> float:
         """S(ω) = σ₀²/(α₀² + ω²), Eq. (16)."""
         return self.sigma**2 / (self.alpha**2 + omega**2)
+
+    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+        return self.standard_deviation * rng.standard_normal(size)
+
+    def step(self, h: float, bias: float = 0.0) -> LinearStep:
+        return linear_step(self.alpha, self.sigma, h, bias)
+
+    @property
+    def largest_step(self) -> float:
+        return 0.5 / self.alpha
 
     def by_logarithms(self, log_sigma: float, log_alpha: float) -> NoiseDerivative:
         """∂/∂θ from ∂ ln σ₀/∂θ and ∂ ln α₀/∂θ: ln P_s = −z²/2 and z ~ ξ√α₀/σ₀."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from fractions import Fraction
 from functools import cached_property
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +33,20 @@ class ImpactLaw(StrEnum):
 
     DELTA = "delta"
     RESTITUTION = "restitution"
+
+
+class Motion(NamedTuple):
+    """The numbers of Eq. (3): ω, ε, ε²c₁, ε²c₂, ε²c₃ω², and the factor of u at an impact.
+
+    The factor is −R for the mass at its wall, Eq. (3), and R for the smooth coordinate y of Eq. (6).
+    """
+
+    omega: float
+    strength: float
+    linear: float
+    cubic: float
+    rayleigh: float
+    bounce: float
 
 
 DAMPING = ((0.0, 0.0), (0.0, 1.0))
@@ -133,6 +147,18 @@ class VibroImpactOscillator(System):
     def kicks(self) -> tuple[Kick, ...]:  # type: ignore[override]
         """The impacts, where cos φ = 0; to the order ε² both laws lose 1 − r."""
         return (Kick(math.pi / 2, self.log_impact_factor, -self._loss),)
+
+    def motion(self, *, smooth: bool = False) -> Motion:
+        """The coefficients of the system (3), or with `smooth` of Eq. (6) in y, whose modulus is x by Eq. (4)."""
+        square, R = self.epsilon**2, self.impact_factor()
+        return Motion(
+            omega=self.omega,
+            strength=self.epsilon,
+            linear=square * self.c1,
+            cubic=square * self.c2,
+            rayleigh=square * self.c3 * self.omega**2,
+            bounce=R if smooth else -R,
+        )
 
     def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
         """∂/∂θ of the drives and of ln R, θ = ω, r, c₁ or ε."""
