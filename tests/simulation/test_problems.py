@@ -9,6 +9,7 @@ import pytest
 
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
+from fpsolve.model.noise import Noise
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.plane import Drive
 from fpsolve.model.problem import Problem
@@ -25,7 +26,7 @@ PLANE = PlaneSystem([Drive(0, ((0.0, 1.0), (-1.0, 0.0))), Drive(1, DAMPING, iden
 
 
 @dataclass(frozen=True)
-class WhiteNoise:
+class WhiteNoise(Noise):
     """Something that looks like a noise."""
 
     level: float = 1.0

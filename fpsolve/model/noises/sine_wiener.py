@@ -117,4 +117,5 @@ class SineWiener(Noise):
 
     def derivative(self, name: str) -> NoiseDerivative:
         """∂/∂A stretches ξ, and ∂/∂σ is that of σ alone."""
-        return NoiseDerivative(log_scale=1 / self.amplitude) if name == "amplitude" else NoiseDerivative(1 / self.sigma)
+        a = 1 / self.amplitude
+        return NoiseDerivative(a, log_scale=a) if name == "amplitude" else NoiseDerivative(1 / self.sigma)
