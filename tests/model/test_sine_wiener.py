@@ -115,12 +115,12 @@ def test_a_step_has_the_transition_of_the_noise(rng):
     assert np.max(np.abs(end)) <= 0.8
 
 
-@pytest.mark.parametrize(("sigma", "estimator"), [(2.0, "direct"), (1.5, "population")])
-def test_the_simulation_agrees(sigma, estimator):
+@pytest.mark.parametrize(("sigma", "estimator", "paths"), [(2.0, "direct", 2048), (1.5, "population", 8192)])
+def test_the_simulation_agrees(sigma, estimator, paths):
     """λ and Λ(1) of the oscillator with its wall within four standard errors."""
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=-0.1, epsilon=0.6)
     problem = Problem(oscillator, SineWiener(amplitude=1.0, sigma=sigma))
-    found = simulate(problem, 1.0, estimator=estimator, paths=2048, time=150.0, seed=3)
+    found = simulate(problem, 1.0, estimator=estimator, paths=paths, time=80.0, seed=3)
     solver = ExponentSolver(problem)
     exponent = solver.lyapunov_exponent().value
     assert found.lyapunov_exponent == pytest.approx(exponent, abs=4 * found.lyapunov_exponent_error)

@@ -10,7 +10,7 @@ and Λ(p) is the largest real part of an eigenvalue, cut off at |k| ≤ K.
 import numpy as np
 
 
-def moment_exponent(p, damping, stiffness, amplitude, sigma, harmonics=40):
+def moment_exponent(p, damping, stiffness, amplitude, sigma, harmonics=24):
     """Λ(p) for even p."""
     k = np.arange(-harmonics, harmonics + 1)
     n, m = p + 1, k.size
