@@ -16,10 +16,9 @@ from types import SimpleNamespace
 import pytest
 
 from fpsolve import cli
-from fpsolve.case.vary import PARAMETERS
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
-from fpsolve.model.parameters import unit_of
+from fpsolve.model.kinds import parameter_of
 from fpsolve.output.summary import digits
 from fpsolve.study import sweep
 from tests.conftest import heed_signals, sampled
@@ -175,7 +174,7 @@ def test_the_help_names_the_units(command, capsys):
     told = " ".join(re.sub("[│╭╮╰╯─]", " ", capsys.readouterr().out).split())
     units = dict(re.findall(r"(\w+) in ([\w/]+)", told.partition("Units: ")[2].partition(".")[0]))
     keys = {"omega": "oscillator", "c1": "oscillator", "D0": "noise", "tau0": "noise"}
-    assert units == {key: unit_of(PARAMETERS[f"{section}.{key}"]) for key, section in keys.items()}
+    assert units == {key: parameter_of(f"{section}.{key}").unit for key, section in keys.items()}
 
 
 def test_set_takes_negative_values(case):

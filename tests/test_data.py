@@ -14,8 +14,7 @@ from matplotlib.colors import to_hex
 
 import fpsolve
 from fpsolve.analysis import Axis
-from fpsolve.case.curves import make_curve
-from fpsolve.case.sections import NoiseSection
+from fpsolve.case.case import Curve
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent import INDICES
@@ -76,7 +75,7 @@ def response():
 
 
 def curve(p, *indices):
-    curve = make_curve(FIG1, NoiseSection(D0=1.0, tau0=0.5, r0=0.95), {"noise.D0": 0.5})
+    curve = Curve(Problem(FIG1, REDUCED).at({"noise.D0": 0.5}), {"noise.D0": 0.5})
     return solve_curve(curve, Wanted(np.array(p), indices), Numerics(1e-8, Budget(), None)).result
 
 

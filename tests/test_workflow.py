@@ -126,7 +126,7 @@ def test_summary_has_the_promised_form_and_the_computed_values(whole):
 
 def test_writing_tables_makes_no_curves(case, tmp_path, monkeypatch):
     """There may be many, and the tables are written again and again."""
-    monkeypatch.setattr("fpsolve.case.case.make_curve", None)
+    monkeypatch.setattr("fpsolve.case.case.Curve", None)
     write_results(case, [], tmp_path / "out", {})
     summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
     assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 0)

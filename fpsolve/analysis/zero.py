@@ -148,7 +148,13 @@ def said(failure: ValueError) -> str:
     """What is wrong with the parameters of a problem, in one line."""
     if not isinstance(failure, ValidationError):
         return str(failure)
-    faults = ((".".join(map(str, fault["loc"])), fault["msg"]) for fault in failure.errors())
+    faults = (
+        (
+            ".".join(map(str, fault["loc"])),
+            str(fault["ctx"]["error"]) if "error" in fault.get("ctx", {}) else fault["msg"],
+        )
+        for fault in failure.errors()
+    )
     return "; ".join(f"{key}: {text}" if key else text for key, text in faults)
 
 

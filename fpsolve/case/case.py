@@ -1,18 +1,28 @@
-"""A case file: TOML in, a validated `Case` out, or one message for each fault of the file."""
+"""A case file: TOML in, a validated `Case` of one or many `Curve`s out, or one message for each fault of the file."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, InstanceOf, PrivateAttr, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    BeforeValidator,
+    InstanceOf,
+    PrivateAttr,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartSection
-from fpsolve.case.curves import Curve, make_curve
 from fpsolve.case.figure import FigureSection
+from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of, with_system
 from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.output import EIGENFUNCTIONS, OutputSection
 from fpsolve.case.refusals import REFUSALS
@@ -21,30 +31,76 @@ from fpsolve.case.sections import (
     MeshSection,
     Moments,
     MonteCarloSection,
-    NoiseSection,
     Section,
     Text,
+    Value,
     Varied,
 )
 from fpsolve.case.toml import Document, read_document
-from fpsolve.case.vary import Vary
-from fpsolve.case.vary_table import EXAMPLE, vary_of
+from fpsolve.case.vary import EXAMPLE, Vary, assignments, vary_of
 from fpsolve.errors import CaseError, Fault
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.model.parameters import parameter
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.model.noise import Noise
+from fpsolve.model.parameters import Parameter, parameter
+from fpsolve.model.plane import System
+from fpsolve.model.problem import Problem
 
-
-def _from_table(kind: Any) -> BeforeValidator:
-    return BeforeValidator(lambda value: kind(**value) if isinstance(value, dict) else value)
-
-
-COMPUTED = ("oscillator", "noise", "moments", "vary", "mesh")
+COMPUTED = ("oscillator", "system", "noise", "moments", "vary", "mesh")
 """The sections that say what is computed."""
 MOST_DRAWN = 10
 """Of so many curves at most eigenfunctions are written unasked."""
 USUAL_P = 2.0
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One parameter set of a case.
+
+    Attributes:
+        problem: what the solver takes.
+        varied: the parameters that [vary] names, by their dotted keys, such as "noise.D0".
+        number: its place among the curves of its case, from 1 on.
+    """
+
+    problem: Problem
+    varied: Varied
+    number: int = 1
+
+    @property
+    def oscillator(self) -> Any:
+        """The system."""
+        return self.problem.system
+
+    @property
+    def noise(self) -> Noise:
+        """The noise."""
+        return self.problem.noise
+
+    @cached_property
+    def parameters(self) -> Varied:
+        """The values of all parameters by their dotted keys."""
+        return self.problem.values
+
+    @property
+    def key(self) -> tuple[tuple[str, Value], ...]:
+        """What tells it from the other curves of its case."""
+        return tuple(self.varied.items())
+
+    @property
+    def label(self) -> str:
+        """The same for the eye: "noise.D0 = 0.1, noise.r0 = 0.9"."""
+        return assignments(self.varied, "g")
+
+    @property
+    def suffix(self) -> str:
+        """What the names of its files end in: nothing for the first curve, "-2" for the second."""
+        return "" if self.number == 1 else f"-{self.number}"
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether perturbation theory has another noise than this, as for Eq. (7) as it stands."""
+        return self.noise.approximates_spectrum
 
 
 class Case(Section):
@@ -55,12 +111,18 @@ class Case(Section):
     """
 
     title: Annotated[Text, parameter("the heading of its results", 'title = "Fig. 1"')]
-    oscillator: Annotated[
-        VibroImpactOscillator, _from_table(VibroImpactOscillator), parameter("Eq. (3)", "[oscillator]")
+    system: Annotated[
+        InstanceOf[System], BeforeValidator(partial(half_of, "system")), parameter("Eq. (3)", "[oscillator]")
     ]
-    noise: Annotated[NoiseSection, parameter("Eqs. (7)-(8)", "[noise]")]
+    noise: Annotated[
+        InstanceOf[Noise], BeforeValidator(partial(half_of, "noise")), parameter("Eqs. (7)-(8)", "[noise]")
+    ]
     moments: Annotated[Moments, parameter("which p", "[moments]")]
-    budget: Annotated[Budget, _from_table(Budget), parameter("what one p may cost", "[budget]")] = Budget()
+    budget: Annotated[
+        Budget,
+        BeforeValidator(lambda value: Budget(**value) if isinstance(value, dict) else value),
+        parameter("what one p may cost", "[budget]"),
+    ] = Budget()
     vary: Annotated[
         InstanceOf[Vary], BeforeValidator(vary_of), parameter("one curve for each parameter set", EXAMPLE)
     ] = Vary()
@@ -75,6 +137,21 @@ class Case(Section):
     _path: Path = PrivateAttr(default=Path("case.toml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())
     _text: str = PrivateAttr(default="")
+
+    @property
+    def oscillator(self) -> Any:
+        """The system."""
+        return self.system
+
+    @property
+    def problem(self) -> Problem:
+        """What is solved where nothing is varied."""
+        return Problem(self.system, self.noise)
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Its parameters by their dotted keys, with symbol, words and unit."""
+        return self.problem.parameters
 
     @property
     def path(self) -> Path:
@@ -145,15 +222,15 @@ class Case(Section):
 
     def curves(self, start: int = 0, stop: int | None = None) -> Iterator[Curve]:
         """One curve for each set of the varied values, from one place to another; each is made when it is asked for."""
-        places = range(self.planned)[start:stop]
+        places, problem = range(self.planned)[start:stop], self.problem
         return (
-            make_curve(self.oscillator, self.noise, varied, place + 1)
+            Curve(problem.at(varied), varied, place + 1)
             for place, varied in zip(places, self.vary.sets(start, stop), strict=True)
         )
 
     def curve(self, varied: Varied) -> Curve:
         """The case's parameter set with some parameters replaced, by their dotted keys."""
-        return make_curve(self.oscillator, self.noise, varied)
+        return Curve(self.problem.at(varied), varied)
 
     @property
     def headline(self) -> str:
@@ -164,6 +241,15 @@ class Case(Section):
     def caption(self) -> str:
         """The same above its figure, which may have a title of its own."""
         return self._with_changes(self.figure.title or self.title)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether perturbation theory has another noise than some curve."""
+        texts = [key for key in self.vary.keys if self.vary.is_text(key)]
+        told = dict[tuple[Value, ...], Varied]()
+        for varied in self.vary.sets() if texts else [{}]:
+            told.setdefault(tuple(varied[key] for key in texts), varied)
+        return any(self.curve(varied).is_exact for varied in told.values())
 
     def heading(self, curve: Curve) -> str:
         """The headline, with which of the curves."""
@@ -181,6 +267,11 @@ class Case(Section):
     def cylinder_mesh(self) -> CylinderMesh | None:
         """The mesh that the case states; None leaves it to the solver."""
         return self.mesh.mesh(self.path.parent)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _system_by_either_name(cls, data: Any) -> Any:
+        return with_system(data)
 
     @field_validator(*REFUSALS)
     @classmethod
@@ -202,13 +293,14 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
     """
     document = read_document(path, overrides, options)
     faults = list(document.faults)
+    data = document.data
+    context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds_of(data)}
     try:
-        case = Case.model_validate(
-            document.data, context={"folder": Path(path).parent, "varies": bool(document.data.get("vary"))}
-        )
+        case = Case.model_validate(data, context=context)
         faults += _hidden_overrides(case, document)
     except ValidationError as error:
-        faults += [document.fault(*fault) for fault in explain(error, Case)]
+        known = explain(error, sections_of(Case.model_fields, data), parameters_of({}, context) or {})
+        faults += [document.fault(*fault) for fault in known]
     except RecursionError:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
     if faults:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, ValidationError, model_validator
+from pydantic.fields import FieldInfo
 
 from fpsolve.analysis.zero import Axis, Zero, axis_faults, zero_of
 from fpsolve.case.messages import Refusal, nearest, own_faults, refuse, shown
 from fpsolve.case.sections import Section, Text, Values
-from fpsolve.case.vary import VARIABLE
+from fpsolve.case.vary import values_of
 from fpsolve.model.parameters import parameter
-
-NONLINEAR = ("oscillator.c2", "oscillator.c3")
-AXES = tuple(key for key in VARIABLE if key not in NONLINEAR)
-"""The parameters of the linear motion and its noise."""
-
+from fpsolve.model.problem import Problem
 
 _EXAMPLE = 'zero = ["lyapunov_exponent", { moment = 2.0 }]'
 
@@ -35,21 +32,19 @@ class ChartAxis(Section):
         """The same for the solver."""
         return Axis(self.key, self.start, self.stop, self.scale, self.at)
 
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        refuse(self._refusals())
-        return self
-
-    def _refusals(self) -> Iterator[Refusal]:
-        if self.key not in AXES:
-            inert = "; c2 and c3 are not in the linear theory" if self.key in NONLINEAR else ""
-            guess = nearest(self.key, AXES)
-            text = f'got "{self.key}";{guess} must be one of {", ".join(AXES)}{inert}; choose one of them'
-            yield ("key",), self.key, text
+    def refusals(self, problem: Problem, ranges: Mapping[str, FieldInfo]) -> Iterator[Refusal]:
+        """A key that is none to differentiate by, or ends that are out of its range, or not in order."""
+        known = problem.differentiable
+        if self.key not in known:
+            inert = [name for half in problem.halves for name in half.inert]
+            is_inert = any(self.key == f"{half.section}.{name}" for half in problem.halves for name in half.inert)
+            told = f"; {' and '.join(inert)} are not in the linear theory" if is_inert else ""
+            text = f'got "{self.key}";{nearest(self.key, known)} must be one of {", ".join(known)}{told}'
+            yield ("key",), self.key, f"{text}; choose one of them"
             return
         for name in ("start", "stop"):
             try:
-                VARIABLE[self.key].validate_python([getattr(self, name)])
+                values_of(ranges[self.key]).validate_python([getattr(self, name)])
             except ValidationError as error:
                 for detail in own_faults(error):
                     accepted = detail["msg"].replace("Input should be", "must be")

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, model_validator
 from fpsolve.arrays import is_log_spaced
 from fpsolve.case.messages import Refusal, nearest, refuse, repeated_or_unknown, shown, shown_with_kind
 from fpsolve.case.sections import Section, Text, is_number
-from fpsolve.case.vary import ABSCISSAE, WORDS, Vary
+from fpsolve.case.vary import Vary
 from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName
 from fpsolve.model.parameters import parameter
 from fpsolve.model.quantity import Quantity, moment_at
@@ -142,7 +142,7 @@ class FigureSection(Section):
 def other_key(x: str, vary: Vary) -> str | None:
     """The second key of a map over x: of a product over two keys of numbers the other one."""
     several = [key for key in vary.keys if len(vary.values(key)) > 1]
-    is_plane = vary.mode == "product" and len(several) == 2 and x in several and not set(several) & set(WORDS)
+    is_plane = vary.mode == "product" and len(several) == 2 and x in several and not any(map(vary.is_text, several))
     return next((key for key in several if key != x), None) if is_plane else None
 
 
@@ -164,7 +164,7 @@ def figure_refusals(figure: FigureSection, valid: Mapping[str, Any]) -> Iterator
     if "vary" not in valid:
         return
     vary = valid["vary"]
-    known = [key for key in ("p", *vary.keys) if key in ABSCISSAE]
+    known = ["p", *(key for key in vary.keys if not vary.is_text(key))]
     if figure.x not in known:
         text = f";{nearest(figure.x, known)} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
         if figure.x in vary.keys:

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from types import MappingProxyType
 from typing import Any, get_args
 
 from pydantic import ValidationError
@@ -13,7 +14,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from fpsolve.model.parameters import example_of, meaning_of
-from fpsolve.model.words import accepted, choices
+from fpsolve.model.words import accepted, choices, fields_of
 
 _OWN, _RANGE = "own sentence", "range"
 LIST, TABLE = "<list>", "<table>"
@@ -109,28 +110,37 @@ def too_long(detail: Mapping[str, Any]) -> str:
     return f"lists {len(detail['input'])} numbers; must be at most {detail['ctx']['max_length']}; list fewer"
 
 
-def explain(error: ValidationError, model: Any) -> Iterator[tuple[Path, str, str]]:
+def explain(
+    error: ValidationError, fields: Mapping[str, FieldInfo], varied: Mapping[str, FieldInfo] = MappingProxyType({})
+) -> Iterator[tuple[Path, str, str]]:
     """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence.
 
     What is missing where a key is misspelt is not another fault.
+
+    Args:
+        error: with paths from a model.
+        fields: of that model.
+        varied: the ranges of the values of [vary].
     """
     faults = [(tuple(part for part in each["loc"] if part not in (LIST, TABLE)), each) for each in own_faults(error)]
-    misspelt = {_meant(path, model) for path, detail in faults if detail["type"] in _UNKNOWN}
+    if "system" not in fields:  # the file calls it otherwise
+        faults = [(("oscillator", *path[1:]) if path[:1] == ("system",) else path, each) for path, each in faults]
+    misspelt = {_meant(path, fields) for path, detail in faults if detail["type"] in _UNKNOWN}
     for path, detail in faults:
         if detail["type"] != "missing" or path not in misspelt:
-            yield path, _key(path), _sentence(path, dict(detail), model)
+            yield path, _key(path), _sentence(path, dict(detail), fields, varied)
 
 
-def _meant(path: Path, model: Any) -> Path | None:
+def _meant(path: Path, fields: Mapping[str, FieldInfo]) -> Path | None:
     """The path of the known key that an unknown one is most like."""
-    guess = _guess(str(path[-1]), _known_keys(path, model))
+    guess = _guess(str(path[-1]), _known_keys(path, fields))
     return (*path[:-1], *guess.split(".")) if guess else None
 
 
-def _known_keys(path: Path, model: Any) -> list[str]:
+def _known_keys(path: Path, fields: Mapping[str, FieldInfo]) -> list[str]:
     """The keys beside a path, and those of the tables among them."""
-    fields = _model_and_field(path[:-1], model)[0].__pydantic_fields__
-    return [*fields, *_inner_keys(fields)]
+    beside = _beside(path[:-1], fields)[0]
+    return [*beside, *(f"{name}.{key}" for name, field in beside.items() for key in fields_of(field.annotation))]
 
 
 def _key(path: Path) -> str:
@@ -142,7 +152,9 @@ def _key(path: Path) -> str:
     return text
 
 
-def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
+def _sentence(
+    path: Path, detail: Mapping[str, Any], fields: Mapping[str, FieldInfo], varied: Mapping[str, FieldInfo]
+) -> str:
     if detail["type"] == _OWN:
         return str(detail["msg"])
     if detail["type"] == "value_error":
@@ -150,26 +162,20 @@ def _sentence(path: Path, detail: Mapping[str, Any], model: Any) -> str:
     if detail["type"] == "too_long":
         return too_long(detail)
     if detail["type"] in _UNKNOWN:
-        known = _known_keys(path, model)
+        known = _known_keys(path, fields)
         beside = ", ".join(key for key in known if "." not in key)
         return f"unknown key;{nearest(str(path[-1]), known)} known keys: {beside}; rename or remove it"
-    field = _model_and_field(path, model)[1]
+    is_varied = path[0] == "vary" and len(path) > 1
+    field = varied.get(str(path[1]), FieldInfo()) if is_varied else _beside(path, fields)[1]
     must, example = f"must be {accepted(field)} ({meaning_of(field)})", example_of(field)
-    if path[0] == "vary" and len(path) > 1:
-        example = example_of(model.__pydantic_fields__["vary"])
+    if is_varied:
+        example = example_of(fields["vary"])
         must = must.replace("be", "be a non-empty list, each entry", 1) if len(path) == 2 else must
     if detail["type"] == "missing":
         return f"missing; {must}; add it, for example {example}"
     value = detail["input"]
     guess = nearest(value, choices(field.annotation)) if isinstance(value, str) else ""
     return f"got {shown(value)}{_kind(value, detail['type'])}; {must};{guess} write, for example, {example}"
-
-
-def _inner_keys(fields: Mapping[str, FieldInfo]) -> Iterator[str]:
-    """The keys of tables among some fields, with the name of their table."""
-    for name, field in fields.items():
-        for key in getattr(field.annotation, "__pydantic_fields__", ()):
-            yield f"{name}.{key}"
 
 
 def _kind(value: Any, error_type: str) -> str:
@@ -179,18 +185,16 @@ def _kind(value: Any, error_type: str) -> str:
     return f" ({_KINDS.get(type(value), 'a date or time')})"
 
 
-def _model_and_field(path: Path, model: Any) -> tuple[Any, FieldInfo]:
-    """The deepest field on the path and the model in it; a value of [vary] obeys the range of its own key."""
+def _beside(path: Path, fields: Mapping[str, FieldInfo]) -> tuple[Mapping[str, FieldInfo], FieldInfo]:
+    """The fields of the deepest table on a path, and the deepest field on it."""
     field = FieldInfo()
-    for name in str(path[1]).split(".") if path[:1] == ("vary",) and len(path) > 1 else path:
-        if name in getattr(model, "__pydantic_fields__", ()):
-            field = model.__pydantic_fields__[name]
-            model = _nested(field.annotation)
-    return model, field
+    for name in path:
+        if name in fields:
+            field = fields[str(name)]
+            fields = _nested(field.annotation)
+    return fields, field
 
 
-def _nested(annotation: Any) -> Any:
-    """The model inside an annotation such as `tuple[Expectation, ...] | None`."""
-    if hasattr(annotation, "__pydantic_fields__"):
-        return annotation
-    return next(filter(None, map(_nested, get_args(annotation))), None)
+def _nested(annotation: Any) -> Mapping[str, FieldInfo]:
+    """The fields of the table inside an annotation such as `tuple[Expectation, ...] | None`."""
+    return fields_of(annotation) or next(filter(None, map(_nested, get_args(annotation))), {})

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
+from fpsolve.analysis.zero import said
 from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartAxis, ChartSection
-from fpsolve.case.curves import make_curve
 from fpsolve.case.figure import FigureSection, figure_refusals
+from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.messages import Refusal, nearest, shown
 from fpsolve.case.output import OutputSection
 from fpsolve.case.remedies import CASE_WORDS
@@ -32,13 +32,12 @@ from fpsolve.case.sections import (
     Varied,
     same,
 )
-from fpsolve.case.set_file import FileVary
-from fpsolve.case.vary import WORDS, Vary, assignments
-from fpsolve.errors import MeshError, NoSuchExponent
+from fpsolve.case.vary import FileVary, Vary, assignments
+from fpsolve.errors import FpsolveError, MeshError, NoPerturbationTheory, NoSuchExponent
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.simulation.setup import obstacles
+from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.simulation.setup import obstacles, simulated_parts
 from fpsolve.theory.perturbation import second_order
 
 Known = Mapping[str, Any]
@@ -72,11 +71,12 @@ def _of_curves(valid: Known, vary: Vary, *, with_existence: bool = True) -> Iter
 
 def _unsolvable(valid: Known, vary: Vary, *, with_existence: bool = True) -> Iterator[tuple[int, str]]:
     """The places of sets that contradict themselves or overflow, or whose moments are infinite, with the reasons."""
-    if not {"oscillator", "noise", "moments"} <= valid.keys():
+    problem = problem_of(valid)
+    if problem is None or "moments" not in valid:
         return
     p = valid["moments"].values
     for place, varied in enumerate(vary.sets()):
-        reason = _obstacle(valid, varied, p, with_existence=with_existence)
+        reason = _obstacle(problem, varied, p, with_existence=with_existence)
         if reason:
             yield place, _with(varied) + reason
 
@@ -86,27 +86,35 @@ def _with(varied: Varied) -> str:
     return f"with {assignments(varied)}: " if varied else ""
 
 
-def _obstacle(valid: Known, varied: Varied, p: FloatArray, *, with_existence: bool = True) -> str:
+def _obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_existence: bool = True) -> str:
     """Why there is no such curve, or why some Λ(p) of it is infinite, or nothing."""
     extremes = [float(p.max()), float(p.min())]
     try:
-        curve = make_curve(valid["oscillator"], valid["noise"], varied)
+        problem = base.at(varied)
         with np.errstate(all="ignore"):
-            theory = second_order(curve.problem)
-            factors = [curve.oscillator.impact_factor(extreme) for extreme in extremes]
-            sizes = np.append(theory.scale.moment(p), [theory.stability_index, *factors])
-    except ValidationError as error:
-        return str(error.errors()[0]["ctx"]["error"])
+            factors = [math.exp(each * kick.log_factor) for kick in problem.system.kicks for each in extremes]
+            sizes = np.array([*factors, *_sizes(problem, p)])
+    except ValueError as error:
+        return said(error)
     except OverflowError:  # of R^p
         sizes = np.array([math.inf])
     if not np.all(np.isfinite(sizes)):
         return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
     try:
         for extreme in extremes if with_existence else ():
-            curve.noise.check_existence(extreme)
+            refuse_infinite(problem, extreme)
     except NoSuchExponent as error:
         return error.message.words(CASE_WORDS)
     return ""
+
+
+def _sizes(problem: Problem, p: FloatArray) -> list[float]:
+    """The scale of Λ(p) and δ_p of perturbation theory, where that applies."""
+    try:
+        theory = second_order(problem)
+        return [*np.atleast_1d(theory.scale.moment(p)).tolist(), theory.stability_index]
+    except NoPerturbationTheory:
+        return []
 
 
 def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -114,7 +122,7 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
     try:
         with np.errstate(all="ignore"):
             made = mesh.mesh(context.get("folder", Path()))
-            reason = _misfit(made, valid) if made and {"oscillator", "noise", "budget", "vary"} <= valid.keys() else ""
+            reason = _misfit(made, valid) if made and {"system", "noise", "budget", "vary"} <= valid.keys() else ""
     except MeshError as error:
         reason = error.message.words(CASE_WORDS)
     except (OSError, ValueError) as error:
@@ -125,19 +133,20 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
 
 
 def _misfit(mesh: CylinderMesh, valid: Known) -> str:
-    """Why the mesh does not serve some noise, or nothing; in noise units all reduced noises are one, others have r0."""
-    judged = set[float | None]()
-    for varied in valid["vary"].among(("noise.r0", "noise.treatment")):
-        curve = make_curve(valid["oscillator"], valid["noise"], varied)
-        noise, shape = curve.noise, curve.noise.r0 if isinstance(curve.noise, NonGaussianNoise) else None
-        if shape in judged:
+    """Why the mesh does not serve some noise, or nothing; those of one law in noise units are judged once."""
+    judged, base = set[tuple[object, ...]](), valid["noise"]
+    for varied in valid["vary"].among([f"{base.section}.{name}" for name in base.values]):
+        noise = base.at({key.partition(".")[2]: value for key, value in varied.items()})
+        shaping = {f"{noise.section}.{name}": noise.values[name] for name in (*noise.shaped_by, *noise.words)}
+        if (shape := tuple(shaping.items())) in judged:
             continue
         judged.add(shape)
+        told = _with({key: value for key, value in varied.items() if key in shaping})
         chosen = Discretisation.on(mesh, noise)
         size, most = chosen.size, valid["budget"].unknowns
         if size > most:
             return (
-                f"{_with(varied)}makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
+                f"{told}makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
                 "lower degrees, or a larger [budget]"
             )
         try:
@@ -145,23 +154,27 @@ def _misfit(mesh: CylinderMesh, valid: Known) -> str:
                 each.axes([noise], 0.0)
         except MeshError as failure:
             lines = chosen.noise.lines
-            return f"{_with(varied)}from xi = {lines[0]:g} to {lines[-1]:g} {failure}"
+            return f"{told}from xi = {lines[0]:g} to {lines[-1]:g} {failure}"
     return ""
 
 
 def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """The first parameter set for which the time, the step or a p of the simulation is not right."""
-    if not {"oscillator", "noise", "vary"} <= valid.keys():
+    base = problem_of(valid)
+    if base is None or "vary" not in valid:
         return
     p = np.array(section.p or (0.0,))
     vary: Vary = valid["vary"]
     is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
     for place, varied in enumerate(vary.sets()):
         row = f"{vary.file}:{vary.lines[place]}: " if isinstance(vary, FileVary) else ""
-        reason, faults = "" if is_known else _obstacle(valid, varied, p), {}
-        with suppress(ValidationError):  # that is the reason
-            curve = make_curve(valid["oscillator"], valid["noise"], varied)
-            faults = obstacles(curve.oscillator, curve.noise, time=section.time, step=section.step)
+        reason, faults = "" if is_known else _obstacle(base, varied, p), {}
+        with suppress(ValueError):  # that is the reason
+            try:
+                faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
+            except FpsolveError as error:
+                yield (), None, row + _with(varied) + error.message.words(CASE_WORDS)
+                return
         for name, text in faults.items():
             if getattr(section, name) is not None:
                 yield (name,), getattr(section, name), row + _with(varied) + text
@@ -205,32 +218,43 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
             text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {_without('expect')}"
             yield (i, "where", key), value, text
         elif not any(same(value, other) for other in vary.columns[key]):
-            is_possible = isinstance(value, str) == (key in WORDS)
+            is_possible = isinstance(value, str) == vary.is_text(key)
             remedy = f"add it to [vary], {_without('expect')}" if is_possible else "write one of these"
             text = f"got {shown(value)}; must be one of {shown(vary.values(key))}; {remedy}"
             yield (i, "where", key), value, text
 
 
 def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
-    """A frame in which there is no such problem, or where a moment is infinite."""
-    if chart is None or not {"oscillator", "noise"} <= valid.keys():
+    """Axes that are none of this case, or a frame in which there is no such problem or a moment is infinite."""
+    problem, parameters = problem_of(valid), parameters_of(valid, context)
+    if chart is None or problem is None or parameters is None:
         return
-    axes = chart.x, chart.y
-    noise = valid["noise"]
-    highest = max([noise.r0, *(axis.stop for axis in axes if axis.key == "noise.r0")])
-    if noise.treatment == "exact" and highest > 1:
-        axis = next((name for name in ("x", "y") if getattr(chart, name).key == "noise.r0"), None)
-        text = (
-            f"noise.r0 reaches {highest:g} in the frame; for r0 > 1 Λ(p) is infinite or carried by rare paths, and no "
-            'line of stability; let it end at 1, or use treatment = "ou-reduction"'
-        )
-        yield (axis, "stop") if axis else (), highest, text
+    axes = {"x": chart.x, "y": chart.y}
+    found = [
+        ((name, *path), value, text)
+        for name, axis in axes.items()
+        for path, value, text in axis.refusals(problem, parameters)
+    ]
+    yield from found
+    corners = [dict(zip((chart.x.key, chart.y.key), ends, strict=True)) for ends in product(*map(_ends, axes.values()))]
+    if found:
         return
+    for corner in corners:
+        with suppress(ValueError):
+            noise = problem.at(corner).noise
+            if noise.has_algebraic_tails and noise.tails_beyond is not None:
+                limit, most, remedy = noise.tails_beyond
+                key = f"{noise.section}.{limit}"
+                axis = next((name for name, each in axes.items() if each.key == key), None)
+                highest = max([float(problem.values[key]), *(each.stop for each in axes.values() if each.key == key)])
+                text = (
+                    f"{key} reaches {highest:g} in the frame; for {limit} > {most:g} Λ(p) is infinite or carried by "
+                    f"rare paths, and no line of stability; let it end at {most:g}, or {remedy}"
+                )
+                yield (axis, "stop") if axis else (), highest, text
+                return
     p = np.array([zero.p for zero in chart.zero])
-    corners = [dict(zip((each.key for each in axes), ends, strict=True)) for ends in product(*map(_ends, axes))]
-    reason = next(
-        filter(None, (_with(corner) + text for corner in corners if (text := _obstacle(valid, corner, p)))), ""
-    )
+    reason = next(filter(None, (_with(each) + text for each in corners if (text := _obstacle(problem, each, p)))), "")
     if reason:
         yield (), None, f"{reason}; choose another frame"
 

@@ -1,6 +1,6 @@
 """The sections of a case file, each with the rules that it can check by itself.
 
-What keys of the oscillator, the noise and the budget mean stands where these do; the others stand here.
+What keys of the system, the noise and the budget mean stands where these do; the others stand here.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from fpsolve.errors import MeshError
 from fpsolve.exponent.quantities import QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, vertices_at
 from fpsolve.fem.mesh_file import read_mesh
-from fpsolve.model.noises.non_gaussian import CorrelationTime, Departure, Intensity, NonGaussianNoise, ReducedNoise
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
@@ -70,22 +69,6 @@ class Section(BaseModel):
     """A table of a case file: immutable, no unknown keys, no conversions, finite numbers only."""
 
     model_config = STRICT | ConfigDict(frozen=True)
-
-
-class NoiseSection(Section):
-    """[noise]: the parameters of Eqs. (7)-(8), and whether the paper's reduction (12)-(14) replaces them."""
-
-    D0: Intensity
-    tau0: CorrelationTime
-    r0: Annotated[Departure, Field(lt=math.nextafter(5 / 3, 0))]  # at which 5 - 3 r0 is 0 already
-    treatment: Annotated[
-        Literal["ou-reduction", "exact"], parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"')
-    ] = "ou-reduction"
-
-    def process(self) -> ReducedNoise | NonGaussianNoise:
-        """The noise that is solved for."""
-        kind = NonGaussianNoise if self.treatment == "exact" else ReducedNoise
-        return kind(D0=self.D0, tau0=self.tau0, r0=self.r0)
 
 
 class Sweep(Section):

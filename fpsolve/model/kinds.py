@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import Any
+from typing import Any, Literal
 
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parametrised, quantities_of, unknown_parameter
@@ -40,9 +40,17 @@ def noise_kind(name: str) -> type[Noise]:
     return _kind(name, "noises", Noise)
 
 
+def kind_names(room: Literal["systems", "noises"]) -> tuple[str, ...]:
+    """The names of all kinds, those of other packages last."""
+    ours = SYSTEMS if room == "systems" else NOISES
+    return (*ours, *sorted({entry.name for entry in entry_points(group=f"fpsolve.{room}")} - set(ours)))
+
+
 @cache
 def version_of(kind: type[Parametrised]) -> str:
     """The package and version that a kind of others comes from, on which results depend; empty for ours."""
+    if kind.kind in SYSTEMS or kind.kind in NOISES:
+        return ""
     for group in ("fpsolve.systems", "fpsolve.noises"):
         for entry in entry_points(group=group):
             if entry.name == kind.kind and entry.dist is not None and entry.value.partition(":")[0] == kind.__module__:
@@ -51,16 +59,20 @@ def version_of(kind: type[Parametrised]) -> str:
 
 
 @cache
-def _kind(name: str, room: str, base: type[Any]) -> Any:
-    ours = {"systems": SYSTEMS, "noises": NOISES}[room]
+def _kind(name: str, room: Literal["systems", "noises"], base: type[Any]) -> Any:
+    ours = SYSTEMS if room == "systems" else NOISES
     if name in ours:
         module, _, cls = ours[name].partition(":")
         return getattr(import_module(f"fpsolve.model.{room}.{module}"), cls)
     found = entry_points(group=f"fpsolve.{room}", name=name)
     if not found:
-        others = sorted(entry.name for entry in entry_points(group=f"fpsolve.{room}"))
-        raise ValueError(f'got kind = "{name}"; must be one of {", ".join([*ours, *others])}')
-    made = next(iter(found)).load()
+        raise ValueError(f'got kind = "{name}"; must be one of {", ".join(kind_names(room))}')
+    entry = next(iter(found))
+    try:
+        made = entry.load()
+    except Exception as failure:
+        package = entry.dist.name if entry.dist is not None else entry.module
+        raise ValueError(f'kind = "{name}" of {package} cannot be loaded ({failure!r})') from failure
     if not (isinstance(made, type) and issubclass(made, base) and getattr(made, "kind", "") == name):
         raise ValueError(f'kind = "{name}" is {made!r}; must be a subclass of {base.__name__} with kind = "{name}"')
     return made

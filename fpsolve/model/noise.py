@@ -46,6 +46,7 @@ class Noise(Parametrised):
         has_states: whether ξ jumps between states; it then has no density, and what is said of that does not apply.
         mixes_slowly: whether ξ may hardly ever leave some states for others, so that these have a positive eigenpair.
         approximates_spectrum: whether `spectral_density` is that of a process which stands for this one.
+        tails_beyond: the name of a parameter, the value above which P_s has algebraic tails, and what else to do.
         may_tilt: whether functions of ξ gain by a factor exp(s ξ), as where P_s falls to both sides.
     """
 
@@ -53,6 +54,7 @@ class Noise(Parametrised):
     has_states: ClassVar[bool] = False
     mixes_slowly: ClassVar[bool] = False
     approximates_spectrum: ClassVar[bool] = False
+    tails_beyond: ClassVar[tuple[str, float, str] | None] = None
     may_tilt: ClassVar[bool] = True
 
     @property
@@ -88,6 +90,11 @@ class Noise(Parametrised):
     def basis(self) -> Literal["polynomials", "cells", "states"]:
         """What the functions of ξ are made of: orthogonal polynomials of P_s, cells of a line, or states."""
         return "states" if self.has_states else "cells" if self.has_algebraic_tails else "polynomials"
+
+    @property
+    def shaped_by(self) -> Sequence[str]:
+        """The names of the parameters on which the law of ξ in noise units depends, more than on its words."""
+        return tuple(name for name in self.values if name not in self.words)
 
     @property
     def half_width(self) -> float:

@@ -95,18 +95,25 @@ class Parametrised:
         kind: the name by which case files and the registry know it.
         section: the first part of the keys of its parameters, such as "noise".
         words: parameters that the class itself decides, by their names.
+        stated: what case files say of it besides its `fields`, such as the `words`, by its names.
         inert: names of parameters on which the linear problem does not depend.
     """
 
     kind: ClassVar[str] = ""
     section: ClassVar[str]
     words: ClassVar[Mapping[str, str]] = {}
+    stated: ClassVar[Mapping[str, FieldInfo]] = {}
     inert: ClassVar[Sequence[str]] = ()
 
     @classmethod
     def fields(cls) -> Mapping[str, FieldInfo]:
         """The ranges and meanings of the parameters by their names."""
         return getattr(cls, "__pydantic_fields__", {})
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> Parametrised:
+        """What a table of a case file says. Raises `ValueError` where a parameter is out of range."""
+        return cls(**table)
 
     def quantity_of(self, name: str) -> Quantity:
         """What a parameter is."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from itertools import chain
 from types import NoneType, UnionType
@@ -50,10 +50,15 @@ def choices(annotation: Any) -> list[str]:
     return [member.value for member in annotation] if is_enum else []
 
 
+def fields_of(annotation: Any) -> Mapping[str, FieldInfo]:
+    """The fields of a model, or of a kind of system or noise, as in a table of a case file; of others nothing."""
+    return {**getattr(annotation, "__pydantic_fields__", {}), **getattr(annotation, "stated", {})}
+
+
 def _noun(annotation: Any, plural: str = "") -> str:
     """An annotation in words: tuple[float, ...] as "list of finite numbers"."""
-    if hasattr(annotation, "__pydantic_fields__"):
-        return f"table{plural} with the keys {', '.join(annotation.__pydantic_fields__)}"
+    if fields := fields_of(annotation):
+        return f"table{plural} with the keys {', '.join(fields)}"
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         inner = chain.from_iterable(getattr(extra, "metadata", ()) for extra in arguments[1:])

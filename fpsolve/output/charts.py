@@ -15,8 +15,7 @@ from fpsolve.analysis.regions import P_BIFURCATIONS, Regions
 from fpsolve.analysis.stability import SCAN_RTOL, Boundary
 from fpsolve.analysis.zero import RTOL, Axis, Zero
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
 from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
 from fpsolve.files import write_csv, write_json

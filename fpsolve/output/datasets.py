@@ -12,11 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.case.case import Case
-from fpsolve.case.vary import PARAMETERS
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
-from fpsolve.model.kinds import parameter_of
 from fpsolve.model.quantity import SECONDS, STATUS, STORED_MOMENTS, P, Quantity
 from fpsolve.output.tables import asked
 from fpsolve.study.results import CurveResult, Status
@@ -84,7 +82,7 @@ def _coordinates(case: Case) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key in case.vary.keys:
         values = case.vary.values(key) if over != (SET,) else case.vary.columns[key]
-        about = parameter_of(key).attributes if key in PARAMETERS else {}  # a text has no unit
+        about = {} if case.vary.is_text(key) else case.parameters[key].quantity.attributes
         found[key] = ((key,) if over != (SET,) else over, list(values), about)
     if MOMENT.name in case.output.quantities:
         found["p"] = (("p",), case.p, P.attributes)
@@ -142,7 +140,11 @@ def _long(path: Path) -> xr.Dataset:
     over = [name for name in found.dims if name not in ("p", SET)]
     if SET not in found.dims:
         found = found.stack({SET: over}).reset_index(SET) if over else found.expand_dims(SET)
-    held = {key: value for key, value in found.attrs.items() if str(key).partition(".")[0] in ("oscillator", "noise")}
+    held = {
+        key: value
+        for key, value in found.attrs.items()
+        if str(key).partition(".")[0] in ("oscillator", "system", "noise")
+    }
     size = found.sizes[SET]
     labels = {"run": path.parent.name, **held}
     coordinates = {key: (SET, np.full(size, value)) for key, value in labels.items()}

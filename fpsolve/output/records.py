@@ -19,8 +19,7 @@ from secrets import token_hex
 from time import monotonic, sleep
 from typing import Any, overload
 
-from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Case, Curve
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.study.records import is_current, result_of
 from fpsolve.study.results import CurveResult

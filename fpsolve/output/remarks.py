@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from fpsolve.case.case import MOST_DRAWN, Case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.exponent.quantities import STABILITY_INDEX
 from fpsolve.messages import Message, Severity, message_of

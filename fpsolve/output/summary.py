@@ -48,9 +48,7 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
 
     Of more than `MOST_ROWS` curves the extreme and the failed ones have one.
     """
-    key = "noise.treatment"
-    treatments = case.vary.values(key) if key in case.vary.keys else [case.noise.treatment]
-    quantities = _quantities(case, is_exact="exact" in treatments)
+    quantities = _quantities(case, is_exact=case.is_exact)
     is_digest = len(results) > MOST_ROWS
     chosen = _chosen(results, quantities) if is_digest else [("", result) for result in results]
     has_status = len(results) > MOST_TABLES or any(result.status for _, result in chosen)

@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from fpsolve import __version__
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
-from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Case, Curve
 from fpsolve.case.output import SENSITIVITIES
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.exponent.error import MEANINGLESS, Estimate

@@ -15,9 +15,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
-from fpsolve.case.vary import PARAMETERS
+from fpsolve.case.case import Case, Curve
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import xi_marginal
 from fpsolve.exponent.nodes import Nodes
@@ -125,7 +123,7 @@ def write_curves(case: Case, folder: Path) -> Path | None:
     if case.planned == 1 or not there:
         return None
     keys = [key for key in case.vary.keys if len(case.vary.values(key)) > 1]
-    key = keys[0] if len(keys) == 1 and keys[0] in PARAMETERS else ""
+    key = keys[0] if len(keys) == 1 and not case.vary.is_text(keys[0]) else ""
     entries = (
         (float(curve.varied[key]), name, f"{curve.label}, p = {p:g}")
         if key

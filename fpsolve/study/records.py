@@ -20,7 +20,7 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hint
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Curve
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
 from fpsolve.fem.mesh import CylinderMesh

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Curve
 from fpsolve.case.sections import Expectation, Varied
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.eigen import PrincipalPair

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message

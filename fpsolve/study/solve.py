@@ -12,8 +12,7 @@ import numpy as np
 from fpsolve.analysis.density import negative_share, stationary_density
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, solve_sensitivities
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Case, Curve
 from fpsolve.case.output import EIGENFUNCTIONS, SENSITIVITIES
 from fpsolve.case.sections import Expectation
 from fpsolve.errors import NoSuchExponent, NotConverged

@@ -15,8 +15,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Case, Curve
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Failure
 from fpsolve.exponent.quantities import INDICES

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Case, Curve
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import Address, Records, Results, append
 from fpsolve.output.tables import Run, write_results

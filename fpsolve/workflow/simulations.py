@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from fpsolve.case.case import Case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Case, Curve
 from fpsolve.output.records import Records, append
 from fpsolve.pool import Pool
 from fpsolve.study.records import record_of, simulated_of, simulation_key

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fpsolve.case.case import Case, load_case
-from fpsolve.case.curves import Curve
+from fpsolve.case.case import Case, Curve, load_case
 from fpsolve.case.sections import Moments, Sweep
 from fpsolve.case.toml import read_document
 from fpsolve.case.vary import Vary
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.mesh_file import write_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
 from tests.oracles import perturbation
 
@@ -171,9 +171,7 @@ def test_a_curve_holds_every_parameter() -> None:
 def test_defaults_and_integers(write: Write) -> None:
     case = load_case(write(SMALL))
     [curve] = case.curves()
-    assert curve == Curve(
-        case.oscillator, NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.0).ou_reduction(), curve.parameters, {}
-    )
+    assert curve == Curve(Problem(case.oscillator, NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.0).ou_reduction()), {})
     assert isinstance(case.oscillator.omega, float)
     assert case.oscillator.impact is ImpactLaw.DELTA
     assert case.p.tolist() == [2.0, -1.0]

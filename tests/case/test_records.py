@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, get_args
@@ -11,8 +12,10 @@ from pydantic import Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
 from fpsolve.case.case import Case
-from fpsolve.case.vary import ABSCISSAE, PARAMETERS, VARIABLE
+from fpsolve.case.kinds import kinds_of, parameters_of, sections_of
+from fpsolve.case.vary import values_of
 from fpsolve.exponent.adapt import Budget
+from fpsolve.model import words
 from fpsolve.model.kinds import parameter_of
 from fpsolve.model.parameters import STRICT, example_of, symbol_of
 from fpsolve.model.quantity import P
@@ -21,19 +24,16 @@ from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 def fields_of(annotation: Any) -> Mapping[str, FieldInfo]:
     """Those of the model in an annotation, if there is one."""
-    if hasattr(annotation, "__pydantic_fields__"):
-        fields: Mapping[str, FieldInfo] = annotation.__pydantic_fields__
-        return fields
-    return next(filter(None, map(fields_of, get_args(annotation))), {})
+    return words.fields_of(annotation) or next(filter(None, map(fields_of, get_args(annotation))), {})
 
 
-def records(annotation: Any, section: str = "") -> Iterator[tuple[str, FieldInfo]]:
-    for name, field in fields_of(annotation).items():
+def records(fields: Mapping[str, FieldInfo], section: str = "") -> Iterator[tuple[str, FieldInfo]]:
+    for name, field in fields.items():
         yield section + name, field
-        yield from records(field.annotation, f"{section}{name}.")
+        yield from records(fields_of(field.annotation), f"{section}{name}.")
 
 
-RECORDS = dict(records(Case))
+RECORDS = dict(records(sections_of(Case.model_fields, {})))
 KEYS = sorted(key for key, field in RECORDS.items() if "." in key or not example_of(field).startswith("["))
 
 
@@ -58,9 +58,16 @@ def test_examples_of_sections_are_their_headers(key: str) -> None:
     assert example_of(RECORDS[key]).startswith("[[expect]]" if key == "expect" else f"[{key}]")
 
 
+KEYS_OF_FIGURES = {
+    key for key in RECORDS if re.match(r"(oscillator|noise)\.", key) and RECORDS[key].annotation is float
+}
+KEYS_OF_FIGURES |= {"p"}
+
+
 def test_figures_name_what_they_are_drawn_over() -> None:
     assert {
-        key: (symbol_of(field), (P if key == "p" else parameter_of(key)).title) for key, field in ABSCISSAE.items()
+        key: (symbol_of(RECORDS["moments.p" if key == "p" else key]), (P if key == "p" else parameter_of(key)).title)
+        for key in KEYS_OF_FIGURES
     } == {
         "p": ("$p$", "order of the moment $p$"),
         "oscillator.omega": (r"$\omega$", r"natural frequency $\omega$ (rad/time)"),
@@ -76,7 +83,11 @@ def test_figures_name_what_they_are_drawn_over() -> None:
 
 
 def test_what_can_be_varied_has_a_record() -> None:
-    assert PARAMETERS.keys() == VARIABLE.keys() == ABSCISSAE.keys() - {"p"}
+    assert parameters_of({}, {}) is None
+    known = parameters_of({}, {"kinds": kinds_of({})})
+    assert known is not None
+    assert known.keys() == {*KEYS_OF_FIGURES, "oscillator.impact", "noise.treatment"} - {"p"}
+    assert all(values_of(known[key]).validate_python([0.5]) == (0.5,) for key in KEYS_OF_FIGURES - {"p"})
 
 
 @pytest.mark.parametrize(

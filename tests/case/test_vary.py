@@ -18,8 +18,7 @@ from fpsolve.case.sections import Sweep
 from fpsolve.case.vary import Vary, assignments, legend
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
 from fpsolve.theory.perturbation import second_order
 
 TEXT = """\
@@ -97,7 +96,7 @@ def test_a_vary_pickles() -> None:
 def test_curves_are_made_when_they_are_asked_for(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     case = load_case(write('"noise.D0" = { start = 1.0, stop = 2.0, num = 100 }\n"oscillator.c1" = [0.1, 0.2, 0.3]'))
     made = []
-    monkeypatch.setattr("fpsolve.case.case.make_curve", lambda *arguments: made.append(arguments[-1]) or arguments[-1])
+    monkeypatch.setattr("fpsolve.case.case.Curve", lambda *arguments: made.append(arguments[-1]) or arguments[-1])
     assert case.planned == 300
     assert list(itertools.islice(case.curves(297), 2)) == made == [298, 299]
     assert list(case.curves(1, 3)) == [2, 3]
@@ -150,7 +149,7 @@ def test_the_treatment_of_the_noise_and_the_impact_law_vary(write: Write) -> Non
     """Eq. (37) has the reduced noise on every curve; on the exact ones the solution has another."""
     case = load_case(write('noise.treatment = ["ou-reduction", "exact"]\noscillator.impact = ["delta", "restitution"]'))
     curves = list(case.curves())
-    assert [type(curve.noise) for curve in curves] == [OrnsteinUhlenbeck] * 2 + [NonGaussianNoise] * 2
+    assert [type(curve.noise) for curve in curves] == [ReducedNoise] * 2 + [NonGaussianNoise] * 2
     assert [curve.is_exact for curve in curves] == [False, False, True, True]
     assert [curve.oscillator.impact for curve in curves] == ["delta", "restitution"] * 2
     assert curves[3].label == "noise.treatment = exact, oscillator.impact = restitution"

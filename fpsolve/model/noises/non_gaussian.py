@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 from pydantic.dataclasses import dataclass
+from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, Remedy
@@ -29,6 +30,15 @@ Departure = Annotated[
         "departure from Gaussian noise; from 5/3 on the variance (10) is infinite", "r0 = 0.95", "$r_0$", ge=-1e6
     ),
 ]
+TREATMENT = {
+    "treatment": FieldInfo.from_annotated_attribute(
+        Annotated[
+            Literal["ou-reduction", "exact"],
+            parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"'),
+        ],  # type: ignore[arg-type]
+        "ou-reduction",
+    )
+}
 _SMALL = 0.05
 """Below it a series is closer than a difference of logarithms."""
 
@@ -100,12 +110,18 @@ class NonGaussianNoise(Noise):
 
     kind: ClassVar[str] = "non-gaussian"
     words: ClassVar[Mapping[str, str]] = {"treatment": "exact"}
+    stated: ClassVar[Mapping[str, FieldInfo]] = TREATMENT
     approximates_spectrum: ClassVar[bool] = True
+    tails_beyond: ClassVar[tuple[str, float, str] | None] = "r0", 1.0, 'use treatment = "ou-reduction"'
 
     @property
     def curvature(self) -> float:
         """b in 1 + b ξ², the bracket of Eqs. (8)-(9): b = τ₀(r₀ − 1)/(2D₀)."""
         return self.tau0 * (self.r0 - 1) / (2 * self.D0)
+
+    @property
+    def shaped_by(self) -> Sequence[str]:
+        return ("r0",)
 
     @property
     def diffusion(self) -> float:
@@ -257,6 +273,11 @@ class NonGaussianNoise(Noise):
             return ReducedNoise.exact_law(decimals)
         return ExactLaw((1 - r0) / tau0, 1 / (1 - r0), 2 * D0 / (tau0 * (1 - r0)), is_bounded=True)
 
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> NonGaussianNoise | ReducedNoise:
+        words = {name: value for name, value in table.items() if name in TREATMENT}
+        return cls(**{name: value for name, value in table.items() if name not in words}).at(words)
+
     def at(self, values: Mapping[str, float | str]) -> NonGaussianNoise | ReducedNoise:  # type: ignore[override]
         return _treated(self, values)
 
@@ -281,6 +302,7 @@ class ReducedNoise(GaussianNoise):
 
     kind: ClassVar[str] = "ou-reduction"
     words: ClassVar[Mapping[str, str]] = {"treatment": "ou-reduction"}
+    stated: ClassVar[Mapping[str, FieldInfo]] = TREATMENT
 
     @property
     def alpha(self) -> float:  # type: ignore[override]
@@ -310,6 +332,11 @@ class ReducedNoise(GaussianNoise):
             case "tau0":
                 return self.by_logarithms(-1 / self.tau0, -1 / self.tau0)
         return self.by_logarithms(0.0, 1 / (2 - self.r0) - 3 / (5 - 3 * self.r0))
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> NonGaussianNoise | ReducedNoise:
+        words = {name: value for name, value in table.items() if name in TREATMENT}
+        return cls(**{name: value for name, value in table.items() if name not in words}).at(words)
 
     def at(self, values: Mapping[str, float | str]) -> NonGaussianNoise | ReducedNoise:  # type: ignore[override]
         return _treated(self, values)

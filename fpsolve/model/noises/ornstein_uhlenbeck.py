@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Annotated, ClassVar, NamedTuple
 
@@ -77,6 +77,10 @@ class GaussianNoise(Noise):
     @property
     def diffusion(self) -> float:
         return self.sigma
+
+    @property
+    def shaped_by(self) -> Sequence[str]:
+        return ()
 
     @property
     def standard_deviation(self) -> float:
