@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from fpsolve.exponent.fields import Pair
 from fpsolve.exponent.nodes import Nodes
 from fpsolve.model.problem import parameter_lines
 from fpsolve.model.quantity import PHASE, Quantity, density_unit
 from fpsolve.surfaces import Picture, Surface, can_render, flat_picture, picture_in_space
+
+if TYPE_CHECKING:
+    from fpsolve.exponent.eigen import PrincipalPair
 
 FINER = 2
 """So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
@@ -24,9 +26,9 @@ FIELDS = {
 
 
 class EigenfunctionPlot:
-    """A mixin of a `Pair`."""
+    """A mixin of a `PrincipalPair`."""
 
-    def plot(self: Pair, field: Field = "T", *, cylinder: bool = False, cmap: str = "viridis") -> Picture:
+    def plot(self, field: Field = "T", *, cylinder: bool = False, cmap: str = "viridis") -> Picture:
         """Draw an eigenfunction, or the tilted density, over phase and noise.
 
         In space by pyvista where this machine can render, which takes some seconds to find out the first time; else in
@@ -41,7 +43,7 @@ class EigenfunctionPlot:
             ValueError: there is no such field.
             OutputError: the noise has states.
         """
-        surface = surface_of(self, field)
+        surface = surface_of(self, field)  # type: ignore[arg-type]
         if can_render():
             return picture_in_space(surface, cmap, cylinder=cylinder)
         if cylinder:
@@ -53,7 +55,7 @@ class EigenfunctionPlot:
         return flat_picture(surface, cmap)
 
 
-def surface_of(pair: Pair, field: str) -> Surface:
+def surface_of(pair: PrincipalPair, field: str) -> Surface:
     """A function of a pair where it is not negligible, with its words. Raises `ValueError`, `OutputError`."""
     if field not in FIELDS:
         raise ValueError(f"got field = {field!r}; must be one of {', '.join(map(repr, FIELDS))}")

@@ -2,46 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.fem.axis import TensorSpace
-from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import Samples
+
+if TYPE_CHECKING:
+    from fpsolve.exponent.eigen import PrincipalPair
 
 MOST_TILT = 1.5
 UNRESOLVED, MOST_NEGATIVE = 0.1, 0.02
 """The share of an eigenfunction, and of a density, with the wrong sign from which on it misleads."""
-
-
-class Pair(Protocol):
-    """What the functions are made of, see `PrincipalPair`."""
-
-    @property
-    def p(self) -> float:
-        """The moment."""
-
-    @property
-    def value(self) -> float:
-        """Λ(p)."""
-
-    @property
-    def right(self) -> FloatArray:
-        """Coefficients of T."""
-
-    @property
-    def left(self) -> FloatArray:
-        """Coefficients of T*/P_s."""
-
-    @property
-    def generator(self) -> Generator:
-        """What was solved."""
-
-    @property
-    def space(self) -> TensorSpace:
-        """The functions that the coefficients are of."""
 
 
 class Fields(NamedTuple):
@@ -58,7 +31,7 @@ class Fields(NamedTuple):
     product: FloatArray
 
 
-def fields(pair: Pair, at_phi: Any, at_xi: Samples) -> Fields:
+def fields(pair: PrincipalPair, at_phi: Any, at_xi: Samples) -> Fields:
     """T, T* and T T* from the values of the φ-elements at points and samples of the functions of ξ.
 
     T has mean 1 over P_s(ξ)/2π; with a tilt beyond `MOST_TILT`, which leaves T there to rounding, over P_s exp(2s z).
@@ -69,7 +42,7 @@ def fields(pair: Pair, at_phi: Any, at_xi: Samples) -> Fields:
     return Fields(right * factor, left * at_xi.weight / factor, right * left * at_xi.weight)
 
 
-def _mean(pair: Pair) -> float:
+def _mean(pair: PrincipalPair) -> float:
     """That of T over P_s(ξ)/2π, from the coefficients."""
     space, xi = pair.space, pair.space.xi
     if xi.tilt == 0 or abs(xi.tilt) > MOST_TILT:
@@ -79,13 +52,13 @@ def _mean(pair: Pair) -> float:
     return float(xi.measure / factor @ (xi.values @ over_phi) / np.sum(xi.measure / factor**2))
 
 
-def xi_marginal(pair: Pair, at_xi: Samples) -> FloatArray:
+def xi_marginal(pair: PrincipalPair, at_xi: Samples) -> FloatArray:
     """∫ T T* dφ over the mesh at points of ξ, shape (n,)."""
     right, left = (at_xi.values @ pair.space.table(v).T for v in (pair.right, pair.left))
     return np.asarray(np.einsum("zi,zi->z", right, left) * at_xi.weight)
 
 
-def noise_marginal(pair: Pair) -> tuple[FloatArray, FloatArray]:
+def noise_marginal(pair: PrincipalPair) -> tuple[FloatArray, FloatArray]:
     """z and the ξ-marginal of the tilted density at the points of a rule, times their measure."""
     at = pair.space.xi.samples()
     return at.xi / pair.generator.problem.noise.standard_deviation, np.abs(xi_marginal(pair, at)) * at.measure

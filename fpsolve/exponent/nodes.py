@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import OutputError
-from fpsolve.exponent.fields import Fields, Pair, fields, xi_marginal
+from fpsolve.exponent.fields import Fields, fields, xi_marginal
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.fem.phase import PhaseAxis
+
+if TYPE_CHECKING:
+    from fpsolve.exponent.eigen import PrincipalPair
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals; elements of a higher degree are cut into several of them."""
@@ -43,7 +46,7 @@ class Nodes:
     order: int
 
     @classmethod
-    def of(cls, pair: Pair, finer: int = 1) -> Nodes:
+    def of(cls, pair: PrincipalPair, finer: int = 1) -> Nodes:
         """Nodes that show a pair, or so many times more either way; P_s in the adjoint asks for low quadrilaterals.
 
         Raises:
@@ -62,7 +65,7 @@ class Nodes:
         """z of the nodes, each once."""
         return np.append(self.z_cells[:, :-1], self.z_cells[-1, -1])
 
-    def seen(self, pair: Pair) -> Nodes:
+    def seen(self, pair: PrincipalPair) -> Nodes:
         """The same where the tilted density, or that of the noise, is not negligible."""
         noise = pair.generator.problem.noise
         if noise.has_states:  # of which there are no nodes
@@ -71,17 +74,17 @@ class Nodes:
         living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
         return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
 
-    def fields(self, pair: Pair) -> Fields:
+    def fields(self, pair: PrincipalPair) -> Fields:
         """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
         return fields(pair, self.phase_table(pair), self.samples(pair))
 
-    def phase_table(self, pair: Pair) -> FloatArray:
+    def phase_table(self, pair: PrincipalPair) -> FloatArray:
         """Values of the φ-elements at the nodes, shape (φ-nodes, φ-unknowns)."""
         phi, inside = pair.space.phi, _inward(self.phi)
         turned = phi.span * np.floor((inside - phi.lines[0]) / phi.span)
         return phi.at((self.phi - turned).ravel(), (inside - turned).ravel())
 
-    def samples(self, pair: Pair) -> Samples:
+    def samples(self, pair: PrincipalPair) -> Samples:
         """The functions of ξ at the nodes."""
         return _on_a_line(pair).at(self.z)
 
@@ -107,7 +110,7 @@ def _phi_breaks(phi: PhaseAxis) -> FloatArray:
     return np.concatenate([[0.0], inside, [2 * math.pi]])
 
 
-def _z_lines(pair: Pair) -> FloatArray:
+def _z_lines(pair: PrincipalPair) -> FloatArray:
     """The lines of the ξ-cells; of polynomials the interval in which the noise lives along some paths, in noise units.
 
     Outside it P_s and the tilted density are below `FAINT` of their largest values.
@@ -125,14 +128,14 @@ def _z_lines(pair: Pair) -> FloatArray:
     return np.concatenate([[lower], inside[(inside > lower + 0.1) & (inside < upper - 0.1)], [upper]])
 
 
-def _resolution(pair: Pair, lines: FloatArray) -> FloatArray:
+def _resolution(pair: PrincipalPair, lines: FloatArray) -> FloatArray:
     """The height of quadrilaterals, in noise units, that shows P_s in each cell: 1, or more in algebraic tails."""
     if not pair.generator.problem.noise.has_algebraic_tails:
         return np.ones(lines.size - 1)
     return np.maximum(1.0, np.minimum(abs(lines[:-1]), abs(lines[1:])) / 6)
 
 
-def _on_a_line(pair: Pair) -> LineAxis:
+def _on_a_line(pair: PrincipalPair) -> LineAxis:
     """The functions of ξ of a pair. Raises `OutputError` where the noise has states."""
     if pair.generator.problem.noise.has_states:
         raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
