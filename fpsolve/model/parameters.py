@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 from pydantic import ConfigDict, Field
 from pydantic.fields import FieldInfo
 
+from fpsolve.messages import Message
 from fpsolve.model.quantity import Quantity
 
 SIZE = {"ge": 1e-15, "le": 1e15}
@@ -133,6 +134,11 @@ class Parametrised:
     def differentiable(self) -> Sequence[str]:
         """The names of the parameters by which the linear problem can be differentiated."""
         return [name for name, value in self.values.items() if not isinstance(value, str) and name not in self.inert]
+
+    @property
+    def remarks(self) -> Sequence[Message]:
+        """What limits the meaning of these parameters, each with its criterion."""
+        return ()
 
     def at(self, values: Mapping[str, float | str]) -> Self:
         """The same with other values of some parameters, by name. Raises `ValueError` where one is out of range."""

@@ -87,6 +87,11 @@ class Problem:
         """The keys of the parameters by which Λ can be differentiated."""
         return [f"{half.section}.{name}" for half in self.halves for name in half.differentiable]
 
+    @property
+    def remarks(self) -> list[Message]:
+        """What limits the meaning of its parameters: of the noise, then of the system."""
+        return [*self.noise.remarks, *self.system.remarks]
+
     def at(self, values: Mapping[str, float | str]) -> Problem:
         """The problem with other values of some parameters, by their keys. Raises `ValueError`."""
         known = {half.section: half for half in self.halves}

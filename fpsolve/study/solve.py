@@ -125,8 +125,7 @@ def solve_curve(
     notes = (
         validity.heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
         *found.notes,
-        validity.reduction_note(curve.noise),
-        validity.impact_note(curve.oscillator),
+        *curve.problem.remarks,
         validity.weak_noise_note(curve.problem, found.p, found.value),
         *of[Severity.NOTE],
         *(slopes.notes if slopes else ()),

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem
 
@@ -41,12 +40,12 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
 class FrozenNoise:
     """The growth rate F(z; p) of ‖x‖^p on paths that hold the noise at z, and where it is the largest.
 
-    F = p G(ξ) − ⅛σ²((ln P_s)′)². G is the growth rate of ln ‖x‖ with ξ frozen, the largest real part of an eigenvalue
-    of A(ξ): for the paper's oscillator εξ/2 while it oscillates, |εξ| < 2ω, and what the impacts take, the rate of the
-    faster real mode beyond. For p < −1 the paths that stay on the other real mode carry more: (p + 1)·slow − fast. The
-    second term is what holding ξ costs. Slow noise has its tilted density where F is largest, and more than one such
-    place. Far out there is none for r₀ ≤ 1: Gaussian noise is held at a cost ~ξ², bounded noise at one ~1/(distance to
-    its end)², and the gain is at most linear in ξ. Algebraic tails cost ~1/ξ² only, see `far`.
+    F = p G(ξ) − cost, see `Noise.holding_cost`. G is the growth rate of ln ‖x‖ with ξ frozen, the largest real part of
+    an eigenvalue of A(ξ): for the paper's oscillator εξ/2 while it oscillates, |εξ| < 2ω, and what the impacts take,
+    the rate of the faster real mode beyond. For p < −1 the paths that stay on the other real mode carry more:
+    (p + 1)·slow − fast. Slow noise has its tilted density where F is largest, and more than one such place. Far out
+    there is none for r₀ ≤ 1: Gaussian noise is held at a cost ~ξ², bounded noise of Eq. (9) at one ~1/(distance to its
+    end)², and the gain is at most linear in ξ. Algebraic tails cost ~1/ξ² only, see `far`.
 
     Args:
         problem: its noise must not be a chain.
@@ -57,7 +56,7 @@ class FrozenNoise:
 
     def __init__(self, problem: Problem) -> None:
         noise = problem.noise
-        if isinstance(noise, MarkovChain):
+        if noise.has_states:
             raise TypeError("noise with states is held in each of them; there is no z to look for")
         unit = noise.standard_deviation
         furthest = 5 * LARGEST_P * unit * noise_strength(problem.system) * noise.correlation_time
@@ -69,7 +68,7 @@ class FrozenNoise:
         self.z = np.concatenate([-side[:0:-1], side])
         self._faster, self._slower, self._turns = eigenvalues_at(problem, unit * self.z)
         self._slope = np.gradient(noise.log_density(unit * self.z), self.z)
-        self._holding = 0.125 * (noise.diffusion / unit * self._slope) ** 2
+        self._holding = noise.holding_cost(unit * self.z)
 
     def rate(self, p: float) -> FloatArray:
         """F at `z`."""
@@ -103,7 +102,7 @@ class FrozenNoise:
 
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
     """That of a problem; None for a chain, which holds its states."""
-    if isinstance(problem.noise, MarkovChain):
+    if problem.noise.has_states:
         return None
     try:
         return _kept(problem)

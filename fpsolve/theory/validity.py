@@ -2,37 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.noise import Noise
+from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.theory.far import grows_far_out
 from fpsolve.theory.perturbation import second_order
 
-NEAR_GAUSSIAN = 0.1
 WEAK = 0.05
-
-
-def reduction_note(noise: Noise) -> Message | None:
-    """On the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
-    replaced: Any = noise.replaces
-    departure = 0.0 if replaced is None else abs(replaced.r0 - 1)
-    if departure <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
-        return None
-    variances = {"reduced": noise.standard_deviation**2, "variance": replaced.variance}
-    criterion = {"departure": departure, "most": NEAR_GAUSSIAN}
-    return Message(Code.FAR_FROM_GAUSSIAN, **criterion, **variances, remedy=Remedy.NO_REDUCTION)
-
-
-def impact_note(oscillator: VibroImpactOscillator) -> Message | None:
-    """On the delta law where the bounce of Eq. (3) cannot be: 1 − ε²(1 − r) ≤ 0."""
-    left = 1 - oscillator.epsilon**2 * (1 - oscillator.restitution)
-    return None if left > 0 else Message(Code.IMPOSSIBLE_BOUNCE, left=left, factor=oscillator.impact_factor())
 
 
 def heavy_tail_note(problem: Problem, exponent: float | None) -> Message | None:

@@ -14,8 +14,8 @@ from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NoSuchExponent, Remedy
-from fpsolve.messages import Code, Message
+from fpsolve.errors import NoSuchExponent
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.exact import ExactLaw, gaussian_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
@@ -39,6 +39,8 @@ TREATMENT = {
         "ou-reduction",
     )
 }
+NEAR_GAUSSIAN = 0.1
+"""|r₀ − 1| up to which the reduction is made."""
 _SMALL = 0.05
 """Below it a series is closer than a difference of logarithms."""
 
@@ -323,6 +325,16 @@ class ReducedNoise(GaussianNoise):
     def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
         D0, tau0, r0 = (Fraction(decimals[name]) for name in ("D0", "tau0", "r0"))
         return gaussian_law((5 - 3 * r0) / (2 * (2 - r0) * tau0), 2 * D0 / tau0**2)
+
+    @property
+    def remarks(self) -> Sequence[Message]:
+        """On the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
+        departure = abs(self.r0 - 1)
+        if departure <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
+            return ()
+        variances = {"reduced": self.standard_deviation**2, "variance": self.replaces.variance}
+        criterion = {"departure": departure, "most": NEAR_GAUSSIAN}
+        return (Message(Code.FAR_FROM_GAUSSIAN, **criterion, **variances, remedy=Remedy.NO_REDUCTION),)
 
     def derivative(self, name: str) -> NoiseDerivative:
         """∂/∂θ by D₀, τ₀ or r₀ of α₀ = (5 − 3r₀)/(2(2 − r₀)τ₀) and σ₀."""

@@ -15,6 +15,7 @@ from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray, identity
+from fpsolve.messages import Code, Message
 from fpsolve.model.exact import ExactMotion
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
@@ -147,6 +148,12 @@ class VibroImpactOscillator(System):
     def kicks(self) -> tuple[Kick, ...]:  # type: ignore[override]
         """The impacts, where cos φ = 0; to the order ε² both laws lose 1 − r."""
         return (Kick(math.pi / 2, self.log_impact_factor, -self._loss),)
+
+    @property
+    def remarks(self) -> Sequence[Message]:
+        """On the delta law where the bounce of Eq. (3) cannot be: 1 − ε²(1 − r) ≤ 0."""
+        left = 1 - self._loss
+        return () if left > 0 else (Message(Code.IMPOSSIBLE_BOUNCE, left=left, factor=self.impact_factor()),)
 
     def motion(self, *, smooth: bool = False) -> Motion:
         """The coefficients of the system (3), or with `smooth` of Eq. (6) in y, whose modulus is x by Eq. (4)."""
