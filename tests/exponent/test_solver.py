@@ -17,7 +17,7 @@ from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.plane import Drive, Harmonics
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
+from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments, sampled
 from tests.oracles import fourier_hermite, perturbation
 
 STRONG_MESH = make_mesh(phi_cells=12, phi_degree=10, xi_cells=8, xi_degree=10, xi_min=-8, xi_max=12)
@@ -68,12 +68,12 @@ def test_weak_noise_against_fourier_hermite(p, law):
 
 @pytest.mark.parametrize(
     ("epsilon", "p", "value", "rel"),
-    [
+    sampled(
         (1.0, 2.0, 0.886234813612, 1e-9),
         (1.0, 3.0, 3.388172823, 1e-9),
         (1.0, 4.0, 6.938432719, 1e-7),
         (2.0, 2.0, 7.740233350685, 1e-6),
-    ],
+    ),
 )
 def test_strong_noise_finds_the_principal_eigenvalue(epsilon, p, value, rel):
     """α = σ = ω = 1, c₁ = 0, r = 1: the guess of Eq. (37) lies nearer to other eigenvalues."""
@@ -189,6 +189,7 @@ def test_result_keeps_the_order_asked_for_and_does_not_depend_on_it():
     np.testing.assert_array_equal(result.value, backwards.value[::-1])
 
 
+@pytest.mark.slow
 def test_steps_in_p_do_not_lead_to_another_eigenvalue():
     """Slow noise tilts far: the second eigenfunction changes its sign where P_s is negligible, but T T* is not."""
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.8, c1=0.1, epsilon=0.1)
@@ -201,6 +202,7 @@ def test_steps_in_p_do_not_lead_to_another_eigenvalue():
     assert alone.value[0] == pytest.approx(oracle, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_errors_of_algebraic_tails_are_seen():
     """r₀ > 1: a mesh four times as wide, and twice as fine around, moves λ by a few error estimates at most.
 

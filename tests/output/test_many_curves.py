@@ -13,6 +13,7 @@ from fpsolve.output.figures import draw
 from fpsolve.output.maps import Plane
 from fpsolve.output.series import Encoding
 from fpsolve.theory.perturbation import second_order
+from tests.conftest import sampled
 from tests.output.drawing import case_of, drawn_case, results_of, texts, tick_labels, words
 
 NARROW = "figure.width='single column'"
@@ -63,8 +64,11 @@ FIGURES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("narrow", [[], [NARROW]], ids=["wide", "narrow"])
-@pytest.mark.parametrize("name", FIGURES)
+SHOWN = ("one", "eight", "exact and reduced, many", "over a parameter", "map", "long title")
+
+
+@pytest.mark.parametrize("narrow", sampled([], [NARROW]), ids=["wide", "narrow"])
+@pytest.mark.parametrize("name", sampled(*SHOWN, *(name for name in FIGURES if name not in SHOWN), keep=len(SHOWN)))
 def test_all_has_its_place(sound, tmp_path, name, narrow):
     """Legends cover no data, all that is written is on the canvas and readable, and no two texts overlap."""
     drawn_case(tmp_path, [*FIGURES[name], *narrow])
@@ -299,7 +303,9 @@ def test_ten_thousand_curves_take_seconds(tmp_path):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", ["one", "two", "nine", "over a parameter", "fifty over a parameter", "map"])
+@pytest.mark.parametrize(
+    "name", sampled("two", "map", "one", "nine", "over a parameter", "fifty over a parameter", keep=2)
+)
 @pytest.mark.parametrize("most", [0, 1])
 def test_what_failed_leaves_a_figure(sound, tmp_path, name, most):
     """Also where nothing is solved, or one set alone."""

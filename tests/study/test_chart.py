@@ -124,6 +124,7 @@ def test_the_regions_say_what_is_stable_in_them(path, summary):
         assert ("δ_p < -1" in region["name"]) == (solver.pair(-1.0).value < 0)
 
 
+@pytest.mark.slow
 def test_a_line_that_does_not_cross_the_frame_is_said_so(path, tmp_path, capsys):
     overrides = ["chart.x.start=2.5", "chart.x.at=[]", "chart.y.stop=0.05", "chart.zero=[{moment=2.0}]"]
     words = [word for text in overrides for word in ("--set", text)]
@@ -164,6 +165,7 @@ def test_a_phase_for_the_scans_and_one_for_the_points(path, tmp_path):
     assert counts == {"scan": 169, "lines": chart.lines[0].branches[0].x.size}
 
 
+@pytest.mark.slow
 def test_each_step_has_all_that_was_before(path):
     case = load_case(path, ["chart.zero=['lyapunov_exponent']", "chart.x.at=[]"])
     *partial, whole = solve_chart(case)
@@ -172,6 +174,7 @@ def test_each_step_has_all_that_was_before(path):
     np.testing.assert_array_equal(whole.lines[0].branches[0].x, partial[-1].lines[0].branches[0].x)
 
 
+@pytest.mark.slow
 def test_progress_and_rows_are_those_of_the_whole_chart(path):
     """All rows are given to one `map`, so that workers have them while the first line is traced."""
     case, nodes, points, given = load_case(path, ["chart.x.at=[]"]), [], [], []
@@ -188,6 +191,7 @@ def test_progress_and_rows_are_those_of_the_whole_chart(path):
     assert not any(chart.remarks for chart in partial)  # "no line was found" where none is traced yet
 
 
+@pytest.mark.slow
 def test_a_map_and_its_chart_share_a_folder(path, tmp_path):
     """What varies are the two keys of the chart, so that neither removes the other, whichever comes first."""
     sets = ["vary.oscillator.omega=[1.0, 2.0]", "vary.noise.D0=[0.1, 0.2]", "chart.zero=[{moment=2.0}]"]
