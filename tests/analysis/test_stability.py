@@ -21,6 +21,7 @@ from fpsolve.exponent import bordered, eigen
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.markov_chain import MarkovChain
+from tests.conftest import sampled
 
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.95)
 LAMBDA, SECOND, INDEX = "lyapunov_exponent", {"moment": 2.0}, {"stability_index": -1.0}
@@ -57,7 +58,7 @@ def wanted(found, label):
     ]
 
 
-@pytest.mark.parametrize("epsilon", [0.1, 0.5])
+@pytest.mark.parametrize("epsilon", sampled(0.5, 0.1))
 @pytest.mark.parametrize("zero", [LAMBDA, SECOND, INDEX])
 def test_f_is_zero_on_a_line(zero, epsilon):
     """Also if it is solved anew and more tightly, which moves the line by less than its width."""
@@ -72,7 +73,7 @@ def test_f_is_zero_on_a_line(zero, epsilon):
 
 
 @pytest.mark.parametrize("zero", [LAMBDA, SECOND, INDEX])
-@pytest.mark.parametrize("omega", [1.2, 3.0])
+@pytest.mark.parametrize("omega", sampled(3.0, 1.2))
 def test_weak_noise_has_the_lines_of_the_paper(zero, omega):
     """c₁ of Λ₂(p)/p = 0, Eq. (36), is off by O(ε²)."""
     s0, s2 = NOISE.spectral_density(0.0), NOISE.spectral_density(2 * omega)
@@ -208,6 +209,7 @@ def test_a_fold():
     assert abs(off[0][0]) < 0.1 * omega
 
 
+@pytest.mark.slow
 def test_a_fold_of_strong_noise():
     """Against Eq. (38), where the c₁ of δ_p = −4 falls with τ₀, it first rises for ε = 1."""
     noise = NonGaussianNoise(D0=0.3, tau0=0.5, r0=0.9)
@@ -288,6 +290,7 @@ def test_crossings_are_on_both_lines(weak):
     assert not any("crossing" in label for each in of_one for branch in each.branches for label in branch.labels)
 
 
+@pytest.mark.slow
 def test_each_line_of_a_higher_moment_is_on_the_stable_side():
     """Λ(p)/p increases with p, so that at any ω the c₁ of δ_p = −1, λ = 0, Λ(2) = 0 fall in this order."""
     x = replace(OMEGA, at=(0.7, 2.0))
@@ -307,28 +310,33 @@ def density(omega, noise=NOISE):
     return 2 * noise.D0 / noise.tau0**2 / (alpha**2 + 4 * omega**2)
 
 
-@pytest.mark.parametrize("omega", [0.5, 1.0, math.pi])
-def test_almost_sure_stability_ends_at_the_paper_s_damping(omega):
+def test_almost_sure_stability_ends_at_the_paper_s_damping():
     """Section 5: almost-sure stable if c₁ < −S(2ω)/4 + 2ω(1 − r)/π."""
-    [(_, c1)] = wanted(line(LAMBDA, replace(OMEGA, at=(omega,)), epsilon=WEAK), f"at oscillator.omega = {omega:.12g}")
-    assert c1 == pytest.approx(-density(omega) / 4 + 2 * omega * 0.2 / math.pi, abs=1e-4)
+    omegas = (0.5, 1.0, math.pi)
+    found = line(LAMBDA, replace(OMEGA, at=omegas), epsilon=WEAK)
+    for omega in omegas:
+        [(_, c1)] = wanted(found, f"at oscillator.omega = {omega:.12g}")
+        assert c1 == pytest.approx(-density(omega) / 4 + 2 * omega * 0.2 / math.pi, abs=1e-4)
 
 
-@pytest.mark.parametrize("omega", [1.0, 2.0, math.pi])
-def test_almost_sure_stability_ends_at_the_paper_s_restitution(omega):
+def test_almost_sure_stability_ends_at_the_paper_s_restitution():
     """Section 5: almost-sure stable if r < 1 − π(S(2ω) + 4c₁)/(8ω)."""
     y = Axis("oscillator.restitution", 0.5, 1.0)
-    found = line(LAMBDA, replace(OMEGA, at=(omega,)), y, epsilon=WEAK)
-    [(_, r)] = wanted(found, f"at oscillator.omega = {omega:.12g}")
-    assert r == pytest.approx(1 - math.pi * (density(omega) + 4 * 0.1) / (8 * omega), abs=1e-4)
+    omegas = (1.0, 2.0, math.pi)
+    found = line(LAMBDA, replace(OMEGA, at=omegas), y, epsilon=WEAK)
+    for omega in omegas:
+        [(_, r)] = wanted(found, f"at oscillator.omega = {omega:.12g}")
+        assert r == pytest.approx(1 - math.pi * (density(omega) + 4 * 0.1) / (8 * omega), abs=1e-4)
 
 
-@pytest.mark.parametrize("c1", [-0.1, 0.0, 0.1])
-def test_almost_sure_stability_ends_at_the_paper_s_spectral_density(c1):
+def test_almost_sure_stability_ends_at_the_paper_s_spectral_density():
     """Section 5: almost-sure stable if S(2ω) < −4c₁ + 8ω(1 − r)/π, here reached by D₀."""
-    x, y = Axis("oscillator.c1", -0.2, 0.2, at=(c1,)), Axis("noise.D0", 0.1, 10.0, "log")
-    [(_, d0)] = wanted(line(LAMBDA, x, y, epsilon=WEAK, omega=1.5), f"at oscillator.c1 = {c1:g}")
-    assert density(1.5, replace(NOISE, D0=d0)) == pytest.approx(-4 * c1 + 8 * 1.5 * 0.2 / math.pi, rel=1e-3)
+    dampings = (-0.1, 0.0, 0.1)
+    x, y = Axis("oscillator.c1", -0.2, 0.2, at=dampings), Axis("noise.D0", 0.1, 10.0, "log")
+    found = line(LAMBDA, x, y, epsilon=WEAK, omega=1.5)
+    for c1 in dampings:
+        [(_, d0)] = wanted(found, f"at oscillator.c1 = {c1:g}")
+        assert density(1.5, replace(NOISE, D0=d0)) == pytest.approx(-4 * c1 + 8 * 1.5 * 0.2 / math.pi, rel=1e-3)
 
 
 @pytest.mark.parametrize("index", [-1.0, 0.5, 2.0])
@@ -518,6 +526,7 @@ def test_an_axis_is_invertible(scale):
     assert axis.share(-1.0) < 0
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_in_other_processes():
     """Bit for bit; tasks and what they bring are small."""
     problem = Problem(oscillator(0.5), NOISE.ou_reduction())

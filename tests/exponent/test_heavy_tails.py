@@ -221,6 +221,7 @@ def test_lighter_tails_have_no_place_far_out(r0, p):
                 assert gain - 0.5 * (noise.drift(xi) / noise.diffusion) ** 2 < np.max(frozen.rate(p))
 
 
+@pytest.mark.slow
 def test_the_variance_of_the_growth_is_infinite_for_the_heaviest_tails():
     """From r₀ = 7/5 on; below, an interval four times as wide changes it within its error."""
     assert variance_tail(problem(0.5, 1.0, 1.4, 0.3)) == pytest.approx(0, abs=1e-6)
@@ -232,6 +233,7 @@ def test_the_variance_of_the_growth_is_infinite_for_the_heaviest_tails():
     assert abs(found.value - better.value) < found.error_estimate
 
 
+@pytest.mark.slow
 def test_rare_moments_are_told_whatever_else_is_asked():
     """At p = −0.9 the place nearest to ξ = 0 is that far out; the solve at −½ must not follow it there."""
     oscillator = VibroImpactOscillator(omega=2.0, restitution=0.7, c1=-0.05, epsilon=0.3)

@@ -136,6 +136,7 @@ def test_a_line_that_does_not_cross_the_frame_is_said_so(path, tmp_path, capsys)
     assert [region["name"] for region in summary["regions"]] == ["second moment stable"]
 
 
+@pytest.mark.slow
 def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
     calls = iter(range(200))
 
@@ -152,6 +153,7 @@ def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
     assert (tmp_path / "plane" / "chart.png").exists()
 
 
+@pytest.mark.slow
 def test_a_phase_for_the_scans_and_one_for_the_points(path, tmp_path):
     counts, totals = {}, {}
 

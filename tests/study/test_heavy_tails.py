@@ -24,6 +24,8 @@ r0 = 1.1
 treatment = "exact"
 [moments]
 p = [-0.4, -0.1, 0.0]
+[output]
+quantities = ["moment", "lyapunov_exponent", "stability_index"]
 [monte_carlo]
 paths = 64
 time = 40.0
@@ -75,5 +77,6 @@ def test_a_simulation_does_not_see_them(path, tmp_path, capsys):
 
 def test_pictures_of_a_place_far_out_are_small(path, tmp_path):
     """The interval is hundreds of noise units long: cells of the picture grow with the distance."""
-    assert main(["run", str(path), "--out", str(tmp_path), "--set", "output.eigenfunctions=[-0.1]"]) == 0
+    shown = 'output={quantities=["moment", "eigenfunctions"], eigenfunctions=[-0.1]}'
+    assert main(["run", str(path), "--out", str(tmp_path), "--set", shown]) == 0
     assert (tmp_path / "heavy" / "eigenfunctions" / "p-0.1.vtu").stat().st_size < 5e6
