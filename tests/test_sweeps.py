@@ -172,7 +172,8 @@ def test_torn_and_damaged_records_are_solved_again(place):
     content[3] = content[3].replace(b"0.", b"1.", 1) if b"0." in content[3] else content[3][1:]
     content[5] = b"\0" * len(content[5])
     content[-1] = content[-1][: len(content[-1]) // 2]
-    path.write_bytes(b"".join(content))
+    path.unlink()
+    path.with_name("another.jsonl").write_bytes(b"".join(content))  # as another process left it
     run(place, "torn", "--jobs", "1")
     assert_same_results(place, "torn")
     assert len(lines(place, "torn")) - len(content) == 3

@@ -24,8 +24,6 @@ r0 = 1.1
 treatment = "exact"
 [moments]
 p = [-0.4, -0.1, 0.0]
-[output]
-quantities = ["moment", "lyapunov_exponent", "stability_index"]
 [monte_carlo]
 paths = 64
 time = 40.0
@@ -58,13 +56,13 @@ def test_a_positive_exponent_is_no_slope(path, tmp_path):
     for c1, is_slope in (("0.0", False), ("-0.5", True)):
         other = tmp_path / f"c{c1}.toml"
         other.write_text(CASE.replace("c1 = 0.0", f"c1 = {c1}"), encoding="utf-8")
-        (result,) = solve_case(load_case(other))
+        (result,) = solve_case(load_case(other, ["output.quantities=['lyapunov_exponent']"]))
         assert (result.lyapunov_exponent.value < 0) == is_slope
         assert ("not Λ′(0)" in result.notes[0]) != is_slope
 
 
 def test_the_figure_tells_rare_paths_apart(path):
-    case = load_case(path)
+    case = load_case(path, ["output.quantities=['moment']"])
     (result,) = solve_case(case)
     series = _moment_series(case, result, None, with_theory=True)
     np.testing.assert_array_equal(series.rare, [False, True, False])
