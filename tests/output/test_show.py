@@ -161,11 +161,10 @@ def assert_picture(file):
 @pytest.mark.parametrize(
     ("arguments", "picture"),
     sampled(
-        ([], "eigenfunctions.png"),
         (["--cylinder", "--field", "tilted_density"], "eigenfunctions-tilted_density-cylinder.png"),
+        ([], "eigenfunctions.png"),
         (["--field", "T_adjoint"], "eigenfunctions-T_adjoint.png"),
         (["--cylinder", "--p", "2", "--output", "cylinder.png"], "cylinder.png"),
-        keep=2,
     ),
 )
 def test_show_script(paraview, results, arguments, picture):
@@ -257,6 +256,7 @@ def test_words_of_the_picture(paraview, named_results):
     assert [word.strip() for word in grid] == ["", "noise xi (1/time)"]
 
 
+@pytest.mark.slow
 def test_the_stationary_density_is_that_at_p_0(paraview, named_results):
     [((title, _), *_, lowest)] = words(paraview, named_results, "--field", "stationary_density")
     assert title.splitlines() == ["noise.D0 = 0.5 (1/time)", "stationary density (p = 0)"]
@@ -270,11 +270,12 @@ def several_curves(tmp_path_factory):
     return folder / "minimal"
 
 
-def test_the_title_follows_the_curves(paraview, several_curves):
+@pytest.mark.slow
+def test_the_title_follows_the_curves(alone, several_curves):
     titles = [
         title
         for options, times in (([], (0, 0.75)), (["--time", "0.75"], (0,)))
-        for title, *_ in words(paraview, several_curves, "--collection", "curves.pvd", *options, times=times)
+        for title, *_ in words(alone, several_curves, "--collection", "curves.pvd", *options, times=times)
     ]
     assert [title.splitlines()[0] for title, _ in titles] == [f"noise.D0 = {D0} (1/time)" for D0 in (0.5, 0.75, 0.75)]
     assert titles[1] == titles[2]
@@ -296,6 +297,7 @@ def test_show_script_refuses_a_curve_that_is_not_there(paraview, several_curves,
     assert not (several_curves / "refused.png").exists()
 
 
+@pytest.mark.slow
 def test_words_around_the_cylinder(paraview, named_results):
     """Near the rim, whose radius is between 1 and 1.5."""
     [(_, captions, *_)] = words(paraview, named_results, "--cylinder")
@@ -322,6 +324,7 @@ print("and ParaView goes on")
 """
 
 
+@pytest.mark.slow
 def test_show_script_from_the_menu(paraview, results, tmp_path):
     """There neither the script's file nor its folder is known, and an error must not end ParaView."""
     menu = tmp_path / "menu.py"
