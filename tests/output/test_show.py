@@ -180,11 +180,22 @@ def test_show_script(paraview, results, arguments, picture):
     assert {file: file.read_bytes() for file in before} == before
 
 
+@pytest.fixture
+def alone(display):
+    """Runs a script in a process of its own."""
+
+    def run(folder, *arguments):
+        command = ["pvpython", *map(str, arguments)]
+        return subprocess.run(
+            command, cwd=folder, env=display, capture_output=True, text=True, check=False, timeout=300
+        )
+
+    return run
+
+
 @pytest.mark.slow
-def test_show_script_as_a_command(display, results):
-    done = subprocess.run(
-        ["pvpython", "show.py"], cwd=results, env=display, capture_output=True, text=True, check=False
-    )
+def test_show_script_as_a_command(alone, results):
+    done = alone(results, "show.py")
     assert (done.returncode, "p = 2: " in done.stdout) == (0, True), done.stderr
     assert_picture(results / "eigenfunctions.png")
 
