@@ -166,8 +166,8 @@ class PlaneSystem(System):
                 f"the terms, their g or the rays of the kicks change with {name}; only matrices and ln R may"
             )
         weights = _slope_weights(x) / half
-        matrices = np.tensordot(weights, np.array([[drive.matrix for drive in drives] for drives, _ in around]), 1)
-        slopes = weights @ np.array([[kick.log_factor for kick in kicks] for _, kicks in around])
+        matrices = _weighed(weights, [[drive.matrix for drive in drives] for drives, _ in around])
+        slopes = _weighed(weights, [[kick.log_factor for kick in kicks] for _, kicks in around])
         changed = [replace(drive, matrix=a.tolist()) for drive, a in zip(self.drives, matrices, strict=True) if a.any()]
         return tuple(changed), tuple(slopes.tolist()) if slopes.any() else ()
 
@@ -182,6 +182,13 @@ def _form(parts: tuple[Sequence[Drive], Sequence[Kick]]) -> tuple[Any, ...]:
     """What must not change with a parameter."""
     drives, kicks = parts
     return tuple(drive.order for drive in drives), tuple(kick.phase for kick in kicks)
+
+
+def _weighed(weights: FloatArray, values: Any) -> FloatArray:
+    """The sum of values times weights, without what is zero but for rounding."""
+    values = np.array(values)
+    total, sizes = (np.tensordot(w, v, 1) for w, v in ((weights, values), (np.abs(weights), np.abs(values))))
+    return np.where(np.abs(total) > 1e-14 * sizes, total, 0.0)
 
 
 def _slope_weights(x: FloatArray) -> FloatArray:
