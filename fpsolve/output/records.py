@@ -160,7 +160,7 @@ class Results(Sequence[CurveResult]):
 
 
 def append(folder: Path, key: str, record: dict[str, Any]) -> Address:
-    """Add a record to the file of this process in a folder.
+    """Add a record to the file of this process in a folder, on a line of its own also where the last one is torn.
 
     Raises:
         OSError: it cannot be written; nothing is left of it.
@@ -169,9 +169,13 @@ def append(folder: Path, key: str, record: dict[str, Any]) -> Address:
     line = b'{"key": "%s", "crc32": %d, "record": %s}\n' % (key.encode(), zlib.crc32(content), content)
     path = folder / _own_name()
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
     try:
         start = os.fstat(handle).st_size
+        if start:
+            os.lseek(handle, start - 1, os.SEEK_SET)
+            if os.read(handle, 1) != b"\n":
+                start += os.write(handle, b"\n")
         try:
             written = os.write(handle, line)
             if written < len(line):

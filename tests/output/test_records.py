@@ -77,6 +77,11 @@ def test_a_torn_line_is_no_record(tmp_path, damage, which):
         place = records.address(f"key{i}")
         assert (place is None) == (i in swallowed)
         assert place is None or records.read(place) == {"i": i}
+    new = append(tmp_path, "key3", {"i": 3})
+    assert len(list(tmp_path.glob("*"))) == 1
+    for seen in (records, Records(tmp_path)):
+        assert seen.look().address("key3") == new
+        assert seen.read(new) == {"i": 3}
 
 
 def test_every_changed_byte_of_the_numbers_is_seen(tmp_path):
