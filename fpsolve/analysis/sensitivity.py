@@ -41,7 +41,7 @@ from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise
-from fpsolve.model.problem import Direction, Problem, checked_moments, of_problem, with_original
+from fpsolve.model.problem import ParameterDerivative, Problem, checked_moments, of_problem, with_original
 from fpsolve.model.quantity import Quantity, moment_at
 
 SMALL_P = 1e-4
@@ -49,7 +49,7 @@ SMALL_P = 1e-4
 Operator = Callable[[FloatArray], FloatArray]
 
 
-def changed_value(pair: PrincipalPair, by: Direction) -> Estimate:
+def changed_value(pair: PrincipalPair, by: ParameterDerivative) -> Estimate:
     """∂Λ/∂θ on one discretisation, with the error of rounding; the scale is that of the terms of L."""
     generator, x, y = pair.generator, pair.right, pair.left
     terms = list(generator.changed(by, pair.p).terms)
@@ -58,7 +58,7 @@ def changed_value(pair: PrincipalPair, by: Direction) -> Estimate:
     return _summed([KroneckerSum([term]) for term in terms], x, y, pair.space.turns)
 
 
-def changed_slope(around: Bordered, by: Direction) -> Estimate:
+def changed_slope(around: Bordered, by: ParameterDerivative) -> Estimate:
     """∂Λ′/∂θ on one discretisation."""
     pair = around.pair
     zeroth, first = _less(pair, by, 0, changed_value(pair, by).value), _less(pair, by, 1, 0.0)
@@ -67,7 +67,7 @@ def changed_slope(around: Bordered, by: Direction) -> Estimate:
     return _rounded(parts, around.norm)
 
 
-def changed_curvature(around: Bordered, by: Direction) -> Estimate:
+def changed_curvature(around: Bordered, by: ParameterDerivative) -> Estimate:
     """∂Λ″/∂θ at p = 0 on one discretisation."""
     pair, x, y = around.pair, around.pair.right, around.pair.left
     zeroth = _less(pair, by, 0, changed_value(pair, by).value)
@@ -82,7 +82,7 @@ def changed_curvature(around: Bordered, by: Direction) -> Estimate:
     return _rounded(parts, around.norm)
 
 
-def _less(pair: PrincipalPair, by: Direction, k: int, change: float, own: float | None = None) -> Operator:
+def _less(pair: PrincipalPair, by: ParameterDerivative, k: int, change: float, own: float | None = None) -> Operator:
     """∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M − ∂Λ⁽ᵏ⁾/∂θ M."""
     value = own if own is not None else (pair.value, pair.derivative)[k]
     operator, mass = pair.generator.changed(by, pair.p, derivative=k), pair.generator.changed_mass(by, pair.p)
@@ -121,13 +121,13 @@ def sensitivities(
     problem = with_original(problem, original)
     solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
     points = checked_moments(p, problem, may_be_empty=True)
-    return solve_sensitivities(solver, points, problem.directions())
+    return solve_sensitivities(solver, points, problem.derivatives())
 
 
 def solve_sensitivities(
     solver: ExponentSolver,
     p: FloatArray,
-    along: Mapping[str, Direction],
+    along: Mapping[str, ParameterDerivative],
     *,
     indices: Sequence[str] = DIFFERENTIATED,
     root: float | None = None,
@@ -177,7 +177,7 @@ class Gradient:
         along: the directions, by name.
     """
 
-    def __init__(self, solver: ExponentSolver, along: Mapping[str, Direction]) -> None:
+    def __init__(self, solver: ExponentSolver, along: Mapping[str, ParameterDerivative]) -> None:
         self._solver, self._along = solver, along
 
     def moment(self, p: float) -> Slopes:
@@ -213,7 +213,7 @@ class Gradient:
         increase = self._solver.ratio(p)[1]
         return {key: _times(-1 / increase, each) for key, each in self.ratio(p).items()}
 
-    def _each(self, of_direction: Callable[[Direction], Estimate]) -> Slopes:
+    def _each(self, of_direction: Callable[[ParameterDerivative], Estimate]) -> Slopes:
         return {key: of_direction(by) for key, by in self._along.items()}
 
     def _at_zero(self, of_pair: Callable[[Bordered], Estimate]) -> Estimate:
@@ -226,7 +226,7 @@ class Gradient:
         return Bordered(coarse), Bordered(fine)
 
 
-def _one_sided(problem: Problem, along: Mapping[str, Direction]) -> tuple[Message, ...]:
+def _one_sided(problem: Problem, along: Mapping[str, ParameterDerivative]) -> tuple[Message, ...]:
     """Which derivatives are taken from below."""
     noise, values = problem.noise, problem.values
     return tuple(

@@ -22,7 +22,7 @@ from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.parameters import STRICT
-from fpsolve.model.problem import Direction, Problem, refuse_infinite
+from fpsolve.model.problem import ParameterDerivative, Problem, refuse_infinite
 
 RTOL = 1e-10
 """Of F, relative to its scale."""
@@ -201,7 +201,7 @@ class Quantity:
         keys, system = [axis.key for axis in axes], problem.system
         loss = f"{system.section}.{system.impact_parameter}"
         is_affine = (
-            zero.p == 0 and loss in keys and not any(problem.direction(key).kicks for key in keys if key != loss)
+            zero.p == 0 and loss in keys and not any(problem.derivative(key).kicks for key in keys if key != loss)
         )  # ln R changes with one of them
         self._bounce = keys.index(loss) if is_affine else None
         self._solved: dict[float, dict[float, Sample]] = {}
@@ -233,7 +233,7 @@ class Quantity:
         value, error = solver.ratio_alone(self._zero.p)
         if value > 0 > self._zero.p:
             self._refuse_rare(solver)
-        slopes = self._slopes(solver, [problem.direction(axis.key) for axis in self._axes])
+        slopes = self._slopes(solver, [problem.derivative(axis.key) for axis in self._axes])
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
         self._starts = solver.near.known
         scale = solver.scale(self._zero.p) / abs(self._zero.p) if self._zero.p else solver.scales.linear
@@ -246,7 +246,7 @@ class Quantity:
         (first, one), (second, other) = known.items()
         share = (log_factor - first) / (second - first)
         gradient = one.gradient + share * (other.gradient - one.gradient)
-        [rise] = problem.direction(self._axes[bounce].key).kicks
+        [rise] = problem.derivative(self._axes[bounce].key).kicks
         impacts = (other.value - one.value) / (second - first)
         gradient[bounce] = impacts * rise * self._axes[bounce].slope(float(at[bounce]))
         value = one.value + share * (other.value - one.value)
@@ -262,7 +262,7 @@ class Quantity:
         if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
             raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
 
-    def _slopes(self, solver: ExponentSolver, along: Sequence[Direction]) -> FloatArray:
+    def _slopes(self, solver: ExponentSolver, along: Sequence[ParameterDerivative]) -> FloatArray:
         """∂F/∂θ."""
         p = self._zero.p
         if abs(p) >= SMALL_P:

@@ -30,7 +30,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Direction
+from fpsolve.model.problem import ParameterDerivative
 from fpsolve.model.quantity import CRITICAL_IMPACT_FACTOR, CRITICAL_RESTITUTION, IMPACT_RATE
 
 _EPS = sys.float_info.epsilon
@@ -104,7 +104,7 @@ def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
 def _flux(pair: PrincipalPair) -> float:
     """⟨T*, ∂L′(0)/∂ ln R 1⟩ of a pair at p = 0."""
     (kick,) = pair.generator.problem.system.kicks
-    load = pair.generator.changed(Direction(kick.log_factor, kicks=(1.0,)), 0.0, derivative=1)
+    load = pair.generator.changed(ParameterDerivative(kick.log_factor, kicks=(1.0,)), 0.0, derivative=1)
     return float(pair.left @ (load @ pair.right) / (pair.left @ pair.space.weighed(pair.right)))
 
 

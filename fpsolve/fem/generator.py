@@ -18,7 +18,7 @@ from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rate, phase_speed
-from fpsolve.model.problem import Direction, Problem
+from fpsolve.model.problem import ParameterDerivative, Problem
 
 KEPT_SPACES = 16
 MOST_FOR_A_BOUND = 300
@@ -61,7 +61,7 @@ class Generator:
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
         self.phi = chosen.phase.axis()
         self._spaces: dict[float, TensorSpace] = {}
-        self._changes: dict[Direction, tuple[Term, ...]] = {}
+        self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         for kick in problem.system.kicks:
             self.phi.vertices_at(kick.phase)
         self.space(0.0)  # refuses a mesh that cannot be used
@@ -105,7 +105,7 @@ class Generator:
         """
         return self._sum.matrix(self.space(p), p, derivative, orders)
 
-    def changed(self, by: Direction, p: float, *, derivative: int = 0) -> KroneckerSum:
+    def changed(self, by: ParameterDerivative, p: float, *, derivative: int = 0) -> KroneckerSum:
         """The matrix of ∂/∂θ dᵏL/dpᵏ, the functions of φ and ξ held; that of P_s, and so of `mass`, is in it."""
         xi = self.space(p).xi
         if by not in self._changes:
@@ -117,7 +117,7 @@ class Generator:
             parts += [(phase, xi.changed(by.noise, g)) for (g,), phase in phases.items()]
         return KroneckerSum(parts or [(0.0 * self.phi.identity, xi.matrix(one))])
 
-    def changed_mass(self, by: Direction, p: float) -> KroneckerSum | None:
+    def changed_mass(self, by: ParameterDerivative, p: float) -> KroneckerSum | None:
         """∂/∂θ of `mass`; None where the noise does not change."""
         if by.noise is None:
             return None

@@ -25,7 +25,7 @@ from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.model.plane import Drive, Harmonics, Kick, System, is_driven, phase_speed, written_coefficient
-from fpsolve.model.problem import Direction
+from fpsolve.model.problem import ParameterDerivative
 
 ALL_ORDERS = slice(None)
 
@@ -159,7 +159,7 @@ class Terms:
                 size, flux = self._flux(kick, sign)
                 yield self._term(2, Jump(kick.log_factor), size * load, flux, text)
 
-    def changed(self, by: Direction) -> Iterator[Term]:
+    def changed(self, by: ParameterDerivative) -> Iterator[Term]:
         """∂L(p)/∂θ of the same terms where the motion and its kicks change with θ.
 
         Where θ is the size of the speed for the typical ξ it is held: [T] = 0 there but for the error of the elements.

@@ -27,7 +27,7 @@ LINE = 90
 
 
 @dataclass(frozen=True)
-class Direction:
+class ParameterDerivative:
     """∂/∂θ of a problem, all at fixed φ and ξ.
 
     Attributes:
@@ -104,20 +104,20 @@ class Problem:
         system, noise = (half.at(new[half.section]) if half.section in new else half for half in self.halves)
         return Problem(system, noise)  # type: ignore[arg-type]
 
-    def direction(self, key: str) -> Direction:
+    def derivative(self, key: str) -> ParameterDerivative:
         """∂/∂θ by one of the `differentiable` parameters. Raises `ValueError` for others."""
         if key not in self.differentiable:
             raise ValueError(f"got {key}; the parameters to differentiate by are {', '.join(self.differentiable)}")
         section, _, name = key.partition(".")
         theta = float(self.values[key])
         if section == self.noise.section:
-            return Direction(theta, noise=self.noise.derivative(name))
+            return ParameterDerivative(theta, noise=self.noise.derivative(name))
         drives, kicks = self.system.derivative(name)
-        return Direction(theta, drives, kicks)
+        return ParameterDerivative(theta, drives, kicks)
 
-    def directions(self) -> Mapping[str, Direction]:
+    def derivatives(self) -> Mapping[str, ParameterDerivative]:
         """∂/∂θ by all of the `differentiable` parameters, by their keys."""
-        return {key: self.direction(key) for key in self.differentiable}
+        return {key: self.derivative(key) for key in self.differentiable}
 
     @property
     def noise_quantity(self) -> Quantity:

@@ -220,7 +220,7 @@ def _sensitivities(
     return solve_sensitivities(
         solver,
         np.array([p for p in wanted.differentiated if np.any(moments.p == p)]),
-        curve.problem.directions(),
+        curve.problem.derivatives(),
         indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
         root=None if index is None else index.value,
     )

@@ -164,12 +164,12 @@ def test_a_problem_knows_its_parameters():
     other = problem.at({"noise.D0": 2.0, "noise.treatment": "exact", "oscillator.omega": 3.0})
     assert other.noise == NonGaussianNoise(D0=2.0, tau0=0.5, r0=0.95)
     assert other.system.omega == 3.0
-    assert problem.direction("oscillator.c1").theta == 0.1
+    assert problem.derivative("oscillator.c1").theta == 0.1
     for wrong, text in (("noise.x", "unknown"), ("mass.m", "got mass.m; the parameters are oscillator.omega")):
         with pytest.raises(ValueError, match=text):
             problem.at({wrong: 1.0})
     with pytest.raises(ValueError, match=r"got oscillator\.c2; the parameters to differentiate by are"):
-        problem.direction("oscillator.c2")
+        problem.derivative("oscillator.c2")
 
 
 def test_a_reduced_noise_knows_what_it_replaces():
