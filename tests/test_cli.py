@@ -19,7 +19,7 @@ from fpsolve import cli
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.model.kinds import parameter_of
-from fpsolve.output.summary import digits
+from fpsolve.output.terminal import digits
 from fpsolve.study import sweep
 from tests.conftest import heed_signals, sampled
 from tests.test_workflow import HOPELESS, LEAN, TABLES, TEXT, files

@@ -7,12 +7,15 @@ value of a key.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fpsolve.arrays import FloatArray
 from fpsolve.case.figure import MOST_NAMED, FigureSection
+from fpsolve.case.sections import Value, Varied
 from fpsolve.case.vary import legend
 from fpsolve.drawing import (
     COLOURS,
@@ -29,7 +32,6 @@ from fpsolve.drawing import (
 )
 from fpsolve.model.kinds import parameter_of
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, STABILITY_INDEX, P, Quantity
-from fpsolve.output.series import STYLES, Encoding, Series, numbers_of, texts_of
 
 MOST_VECTORS = 1000
 """Curves up to which a PDF holds each as a line, not all as a picture."""
@@ -40,6 +42,81 @@ _TANGENT = 0.2
 """Length of a tangent, as a share of the width of the axes."""
 _GREY: dict[str, Any] = {"color": "0.35"}
 """Of what the legend says of all curves."""
+STYLES = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
+"""Of lines, for up to so many combinations of keys."""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One curve of a figure: finite elements at (x, y), a line of perturbation theory through (line_x, line_y).
+
+    Attributes:
+        varied: the parameters that tell it from the others.
+        simulated: x, y and the standard errors of y from a simulation, shape (3, n).
+        rare: which of the x have moments that rare paths carry, shape (n,).
+        root: the stability index, which is marked on the zero line; None where there is none among the x.
+        slope: λ, which is marked as the tangent at 0; None where it is not.
+    """
+
+    varied: Varied
+    x: FloatArray
+    y: FloatArray
+    line_x: FloatArray = field(default_factory=lambda: np.zeros(0))
+    line_y: FloatArray = field(default_factory=lambda: np.zeros(0))
+    simulated: FloatArray | None = None
+    rare: Any = False
+    root: float | None = None
+    slope: float | None = None
+
+    @property
+    def every(self) -> int:
+        """Of so many x one has a marker."""
+        return max(1, self.x.size // 25)
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """What tells many curves from each other.
+
+    Attributes:
+        key: the one whose value a colour tells; None where it tells the number of the curve.
+        colours: that value, or the number, of each curve.
+        styles: for each curve what its line style tells; the same everywhere where it tells nothing.
+        unencoded: the other keys, each with how many values it has.
+    """
+
+    key: str | None
+    colours: FloatArray
+    styles: tuple[tuple[tuple[str, Value], ...], ...]
+    unencoded: tuple[tuple[str, int], ...]
+
+    @classmethod
+    def of(cls, varied: Sequence[Varied]) -> Encoding:
+        """Of the parameters of some curves: a colour for the key with the most values, line styles for a few sets."""
+        numbers, texts = _several(varied)
+
+        def of_keys(*keys: str) -> tuple[tuple[tuple[str, Value], ...], ...]:
+            return tuple(tuple((key, each[key]) for key in keys) for each in varied)
+
+        sets = len(set(of_keys(*numbers)))
+        key = max(numbers, key=lambda name: numbers[name], default=None)
+        if key is None or (numbers[key] < sets and np.prod([*numbers.values()]) != sets):
+            # none varies, or values side by side, none of which tells the curve
+            return cls(None, np.arange(1.0, len(varied) + 1), of_keys(*texts), ())
+        colours = np.array([each[key] for each in varied], dtype=float)
+        others = [name for name in numbers if name != key] if numbers[key] < sets else []
+        styles = of_keys(*others, *texts)
+        if len(set(styles)) <= len(STYLES):
+            return cls(key, colours, styles, ())
+        return cls(key, colours, of_keys(*texts), tuple((name, numbers[name]) for name in others))
+
+
+def _several(varied: Sequence[Varied]) -> tuple[dict[str, int], list[str]]:
+    """The keys of numbers that have several values, and how many; the keys of texts that have several."""
+    counts = {key: len({each[key] for each in varied}) for key in (varied[0] if varied else ())}
+    several = [key for key, count in counts.items() if count > 1]
+    texts = [key for key in several if isinstance(varied[0][key], str)]
+    return {key: counts[key] for key in several if key not in texts}, texts
 
 
 def write_figure(
@@ -73,7 +150,17 @@ def write_figure(
         colours = (_draw_few if is_few else _draw_many)(axes, series, equation, unit)
         if any(np.any(item.rare) for item in series):
             axes.plot([], [], "o", label="carried by rare paths", markersize=points(7 if is_few else 4), **_GREY)
-        _draw_simulated(axes, series, is_few=is_few)
+        if simulated := [item.simulated for item in series if item.simulated is not None]:
+            sizes = (
+                {"markersize": 5, "elinewidth": 1.1, "capsize": 4} if is_few else {"markersize": 3, "elinewidth": 0.8}
+            )
+            style: dict[str, Any] = {
+                name: points(size) for name, size in {"capsize": 0, "markeredgewidth": 1, **sizes}.items()
+            }
+            every = np.concatenate(simulated, axis=1)
+            draw_dots(
+                axes, *every, label="Monte Carlo ± 2 standard errors", marker=".", color="black", zorder=5, **style
+            )
         axes.margins(x=0.03)
         scale_axis(axes.xaxis, scale_of(np.concatenate([item.x for item in series])), setting.xlim)
         scale_axis(axes.yaxis, "linear", setting.ylim)
@@ -83,8 +170,16 @@ def write_figure(
 
 def _draw_few(axes: Any, series: Sequence[Series], equation: str, time_unit: str) -> Sequence[Any]:
     """A colour and a marker for each curve, named in the legend; the colours."""
-    styles = _styles(series)
-    for item, (colour, marker, line) in zip(series, styles, strict=True):
+    varied = [item.varied for item in series]
+    numbers, texts = _several(varied)
+    kinds = [tuple(each[key] for key in texts) for each in varied]
+    rest = [tuple(value for key, value in each.items() if key not in texts) for each in varied]
+    is_mixed = bool(texts and numbers)  # colours tell numbers, markers and lines texts
+    of_rest, of_kind = ({value: i for i, value in enumerate(dict.fromkeys(values))} for values in (rest, kinds))
+    colours = [COLOURS[(of_rest[each] if is_mixed else i) % len(COLOURS)] for i, each in enumerate(rest)]
+    for i, (item, colour) in enumerate(zip(series, colours, strict=True)):
+        marker = _MARKERS[(of_kind[kinds[i]] if is_mixed else i) % len(_MARKERS)]
+        line: Any = STYLES[of_kind[kinds[i]] % len(STYLES)]
         hollow: dict[str, Any] = {"marker": marker, "color": colour, "markerfacecolor": "none"}
         axes.plot(item.line_x, item.line_y, color=colour, linestyle=line)
         axes.plot(item.x, item.y, linestyle="none", markevery=item.every, **hollow)
@@ -95,34 +190,22 @@ def _draw_few(axes: Any, series: Sequence[Series], equation: str, time_unit: str
     words = "finite elements (not all marked)" if any(item.every > 1 for item in series) else "finite elements"
     axes.plot([], [], "o", markerfacecolor="none", label=words, **_GREY)
     axes.plot([], [], "-", label=f"perturbation, Eq. {equation}", **_GREY)
-    return [colour for colour, *_ in styles]
-
-
-def _styles(series: Sequence[Series]) -> list[tuple[str, str, Any]]:
-    """Colour, marker and line of each: where numbers and texts vary, colours tell the former, the others the latter."""
-    varied = [item.varied for item in series]
-    texts = texts_of(varied) if varied else []
-    kinds = [tuple(each[key] for key in texts) for each in varied]
-    rest = [tuple(value for key, value in each.items() if key not in texts) for each in varied]
-    is_mixed = bool(texts) and bool(numbers_of(varied))
-    number, line = ({value: i for i, value in enumerate(dict.fromkeys(values))} for values in (rest, kinds))
-    return [
-        (
-            COLOURS[(number[rest[i]] if is_mixed else i) % len(COLOURS)],
-            _MARKERS[(line[kinds[i]] if is_mixed else i) % len(_MARKERS)],
-            STYLES[line[kinds[i]] % len(STYLES)],
-        )
-        for i in range(len(series))
-    ]
+    return colours
 
 
 def _draw_many(axes: Any, series: Sequence[Series], equation: str, time_unit: str) -> Any:
-    """Thin lines and a bar of their colours; the colours, shape (n, 4)."""
+    """Thin lines and a bar of their colours, of which none is too pale on white; the colours, shape (n, 4)."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
+    from matplotlib.colors import ListedColormap, LogNorm, Normalize
+    from matplotlib.ticker import MaxNLocator
 
     encoding = Encoding.of([item.varied for item in series])
-    scale = _colour_scale(encoding)
-    colours, is_picture = scale.to_rgba(encoding.colours), len(series) > MOST_VECTORS
+    values, is_log = encoding.colours, scale_of(encoding.colours) == "log"
+    dark = ListedColormap(colormaps["viridis"](np.linspace(0, 0.93, 256)))
+    scale = ScalarMappable((LogNorm if is_log else Normalize)(float(values.min()), float(values.max())), dark)
+    colours, is_picture = scale.to_rgba(values), len(series) > MOST_VECTORS
     look = {
         "rasterized": is_picture,
         "alpha": 1.0 if len(series) <= 100 else 0.7,
@@ -132,85 +215,47 @@ def _draw_many(axes: Any, series: Sequence[Series], equation: str, time_unit: st
     paths = [np.stack([item.x[by], item.y[by]], axis=1) for item, by in zip(series, order, strict=True)]
     others = "".join(f", each for {count} values of {parameter_of(key).latex}" for key, count in encoding.unencoded)
     kinds = dict.fromkeys(encoding.styles)
-    for kind, style in zip(kinds, STYLES, strict=False):
+    for kind, line in zip(kinds, STYLES, strict=False):
         chosen = [i for i, each in enumerate(encoding.styles) if each == kind]
-        lines = LineCollection([paths[i] for i in chosen], colors=colours[chosen], linestyles=[style], **look)
+        lines = LineCollection([paths[i] for i in chosen], colors=colours[chosen], linestyles=[line], **look)
         axes.add_collection(lines, autolim=True)
         name = f", {legend(dict(kind), time_unit)}" if len(kinds) > 1 else ""
-        axes.plot([], [], linestyle=style, label=f"finite elements{name}{others}", **_GREY)
-    _draw_points(axes, series, colours, rasterized=is_picture)
-    _draw_outermost(axes, [series[i] for i in np.argsort(encoding.colours, kind="stable")], equation)
-    axes.autoscale_view()
-    _draw_bar(axes, scale, encoding, time_unit)
-    return colours
+        axes.plot([], [], linestyle=line, label=f"finite elements{name}{others}", **_GREY)
 
-
-def _colour_scale(encoding: Encoding) -> Any:
-    """Colours for values, by their logarithms where they are spread so; none is too pale on white."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import ListedColormap, LogNorm, Normalize
-
-    norm = LogNorm if scale_of(encoding.colours) == "log" else Normalize
-    dark = ListedColormap(colormaps["viridis"](np.linspace(0, 0.93, 256)))
-    return ScalarMappable(norm(float(encoding.colours.min()), float(encoding.colours.max())), dark)
-
-
-def _draw_points(axes: Any, series: Sequence[Series], colours: Any, **style: Any) -> None:
-    """Curves that have but one point, and the points that rare paths carry."""
+    # dots: curves that have but one point, and the points that rare paths carry
     known = [np.isfinite(item.y) for item in series]
-    shown = [
-        (item.x[at], item.y[at], i) for i, (item, at) in enumerate(zip(series, known, strict=True)) if at.sum() == 1
-    ]
-    shown += [(*item.far, i) for i, item in enumerate(series) if np.any(item.rare)]
-    if shown:
-        x, y = (np.concatenate([each[k] for each in shown]) for k in (0, 1))
-        colour = np.repeat(colours[[i for *_, i in shown]], [each[0].size for each in shown], axis=0)
-        axes.scatter(x, y, s=points(4) ** 2, color=colour, **style)
+    far = [np.broadcast_to(item.rare, item.x.shape).astype(bool) for item in series]
+    dots = [(i, at) for i, at in enumerate(known) if at.sum() == 1] + [(i, at) for i, at in enumerate(far) if at.any()]
+    if dots:
+        x, y = (np.concatenate([getattr(series[i], side)[at] for i, at in dots]) for side in "xy")
+        colour = np.repeat(colours[[i for i, _ in dots]], [at.sum() for _, at in dots], axis=0)
+        axes.scatter(x, y, s=points(4) ** 2, color=colour, rasterized=is_picture)
 
-
-def _draw_outermost(axes: Any, series: Sequence[Series], equation: str) -> None:
-    """The perturbation theory of the first, the middle and the last of those that have one."""
-    known = [item for item in series if item.line_x.size]
+    # the perturbation theory of the first, the middle and the last of those that have one
+    theories = [series[i] for i in np.argsort(values, kind="stable") if series[i].line_x.size]
     style = {"linestyle": (0, (2, 2)), "color": "black", "linewidth": points(1.2), "zorder": 3}
-    chosen = [known[i] for i in dict.fromkeys([0, len(known) // 2, len(known) - 1])] if known else []
-    for item in chosen:
-        axes.plot(item.line_x, item.line_y, **style)
-    if chosen:
-        axes.plot([], [], label=f"perturbation, Eq. {equation}, of {len(chosen)} curves", **style)
+    outermost = dict.fromkeys([0, len(theories) // 2, len(theories) - 1]) if theories else ()
+    for place in outermost:
+        axes.plot(theories[place].line_x, theories[place].line_y, **style)
+    if outermost:
+        axes.plot([], [], label=f"perturbation, Eq. {equation}, of {len(outermost)} curves", **style)
 
-
-def _draw_bar(axes: Any, scale: Any, encoding: Encoding, time_unit: str) -> None:
-    """The bar of colours, with the name of the key and its unit."""
-    from matplotlib.ticker import MaxNLocator
-
+    axes.autoscale_view()
     bar = axes.figure.colorbar(scale, ax=axes, pad=0.02)
     if encoding.key is None:
         bar.set_label("number of the curve")
         bar.ax.yaxis.set_major_locator(MaxNLocator(6, integer=True))
-        return
-    bar.set_label(label_of(parameter_of(encoding.key).timed(time_unit).attributes, 36))
-    if scale_of(encoding.colours) == "log":
-        plain_numbers(bar.ax.yaxis)
-
-
-def _draw_simulated(axes: Any, series: Sequence[Series], *, is_few: bool) -> None:
-    """What is simulated, all dots at once."""
-    found = [item.simulated for item in series if item.simulated is not None]
-    if found:
-        size, line, cap = (5, 1.1, 4) if is_few else (3, 0.8, 0)
-        style: dict[str, Any] = {
-            "markersize": points(size),
-            "elinewidth": points(line),
-            "capsize": points(cap),
-            "marker": ".",
-        }
-        style |= {"color": "black", "markeredgewidth": points(1), "zorder": 5}
-        draw_dots(axes, *np.concatenate(found, axis=1), label="Monte Carlo ± 2 standard errors", **style)
+    else:
+        bar.set_label(label_of(parameter_of(encoding.key).timed(time_unit).attributes, 36))
+        if is_log:
+            plain_numbers(bar.ax.yaxis)
+    return colours
 
 
 def _mark(axes: Any, series: Sequence[Series], colours: Any) -> None:
-    """Stability indices as ticks on the zero line, λ as tangents at 0, in the ends that the axes have now."""
+    """Stability indices as ticks on the zero line, λ as tangents at 0, all of one length, in the present ends."""
+    from matplotlib.collections import LineCollection
+
     is_few, rasterized = len(series) <= MOST_NAMED, len(series) > MOST_VECTORS
     roots = [i for i, item in enumerate(series) if item.root is not None]
     if roots:
@@ -221,24 +266,17 @@ def _mark(axes: Any, series: Sequence[Series], colours: Any) -> None:
         words = f"{STABILITY_INDEX.words} {STABILITY_INDEX.latex}"
         tick = {"linestyle": "none", "markersize": points(16), "markeredgewidth": points(2.2)}
         axes.plot([], [], marker="|", label=words, **tick, **_GREY)
-    if any(item.slope is not None for item in series):
-        _draw_tangents(axes, series, colours, points(2.6 if is_few else 1.0))
+    chosen = [i for i, item in enumerate(series) if item.slope is not None]
+    if chosen:
+        left, right = axes.get_xlim()
+        low, high = axes.get_ylim()
+        axes.set(xlim=(left, right), ylim=(low, high))
+        slopes = np.array([series[i].slope for i in chosen])
+        rises = slopes * (right - left) / (high - low) * axes.bbox.height / axes.bbox.width  # on paper
+        half = 0.5 * _TANGENT * (right - left) / np.hypot(1, rises)
+        ends, width = np.stack([half, half * slopes], axis=1), points(2.6 if is_few else 1.0)
+        for colour, wide in (("black", 1.5 * width), ([colours[i] for i in chosen], width)):  # with black rims
+            look: dict[str, Any] = {"colors": colour, "linewidths": wide, "capstyle": "butt", "zorder": 3.5}
+            axes.add_collection(LineCollection(list(np.stack([-ends, ends], axis=1)), **look), autolim=False)
         line = {"linewidth": points(3), "solid_capstyle": "butt", **_GREY}
         axes.plot([], [], label=f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$", **line)
-
-
-def _draw_tangents(axes: Any, series: Sequence[Series], colours: Any, width: float) -> None:
-    """The tangents at 0, all of one length on paper, with black rims."""
-    from matplotlib.collections import LineCollection
-
-    left, right = axes.get_xlim()
-    low, high = axes.get_ylim()
-    axes.set(xlim=(left, right), ylim=(low, high))
-    chosen = [i for i, item in enumerate(series) if item.slope is not None]
-    slopes = np.array([series[i].slope for i in chosen])
-    rises = slopes * (right - left) / (high - low) * axes.bbox.height / axes.bbox.width  # on paper
-    half = 0.5 * _TANGENT * (right - left) / np.hypot(1, rises)
-    ends = np.stack([half, half * slopes], axis=1)
-    for colour, wide in (("black", 1.5 * width), ([colours[i] for i in chosen], width)):
-        style: dict[str, Any] = {"colors": colour, "linewidths": wide, "capstyle": "butt", "zorder": 3.5}
-        axes.add_collection(LineCollection(list(np.stack([-ends, ends], axis=1)), **style), autolim=False)

@@ -19,9 +19,8 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_IN
 from fpsolve.model.kinds import parameter_of
 from fpsolve.model.problem import Problem
 from fpsolve.output.charts import held_in_words, read_line
-from fpsolve.output.curves import write_figure
+from fpsolve.output.curves import Series, write_figure
 from fpsolve.output.maps import Plane, write_map
-from fpsolve.output.series import Series
 from fpsolve.simulation.response import Response
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory.perturbation import scale_of, second_order

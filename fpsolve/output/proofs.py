@@ -17,7 +17,7 @@ from fpsolve.case.vary import written
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.files import write_text
 from fpsolve.output.screen import Cell, Column, Grid, Screen
-from fpsolve.output.summary import MOST_ROWS, MOST_TABLES, varied_columns
+from fpsolve.output.terminal import MOST_ROWS, MOST_TABLES, varied_columns
 from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import plain, verdicts
 from fpsolve.proofs.questions import IndexEnclosure

@@ -52,54 +52,44 @@ class _Group:
         if message.size is not None and (self.message.size is None or message.size > self.message.size):
             self.message, self.curve = message, curve
 
-    def sentence(self, case: Case, of: int, file: str) -> str:
-        """Who, what, whose the numbers are, and where the others are."""
-        if self.curves > MOST_NAMED:
-            who = f"{case.name}: {self.curves} of {of} curves"
-        else:
-            comma = "; " if any("," in label for label in self.labels) else ", "
-            named = " and ".join(filter(None, (comma.join(self.labels[:-1]), self.labels[-1])))
-            who = f"{case.name}, {named}" if named else case.name
-        rest = ""
-        if self.is_varied:
-            whose = "these numbers are of" if self.message.size is None else "most for"
-            rest = f"; {whose} {self.curve.label}" if self.curves > 1 else f"; and {self.count - 1} more like this one"
-            rest += f" (all in {file})" if file else ""
-        return f"{who}: {self.message.words(CASE_WORDS)}{rest}"
 
-
-class Remarks:
-    """The remarks on the curves of a case, which are told in the end.
+def print_remarks(
+    case: Case,
+    found: Sequence[CurveResult | SimulatedCurve],
+    file: str = "",
+    severities: Iterable[Severity] = STYLES,
+) -> None:
+    """Print what is said of the curves of a case on the standard error: who, what, whose numbers, where the others are.
 
     Args:
         case: whose curves these are.
-        file: that holds all of them; none where nothing is written.
-        told: the severities of those that are told.
+        found: what was found of them.
+        file: that holds all messages; none where nothing is written.
+        severities: of the messages that are printed, in this order.
     """
-
-    def __init__(self, case: Case, file: str = "", told: Iterable[Severity] = STYLES) -> None:
-        self.case, self.file = case, file
-        self._groups: dict[Severity, dict[Any, _Group]] = {severity: {} for severity in told}
-        self._curves = 0
-
-    def add(self, found: CurveResult | SimulatedCurve) -> None:
-        """All that is said of a curve."""
-        self._curves += 1
-        texts: dict[Severity, Sequence[str]] = {Severity.WARNING: found.warnings}
-        if isinstance(found, CurveResult):
-            texts |= {Severity.NOTE: found.notes, Severity.FAILURE: [each.reason for each in found.failures]}
-        for severity, groups in self._groups.items():
+    groups: dict[Severity, dict[Any, _Group]] = {severity: {} for severity in severities}
+    for each in found:
+        texts: dict[Severity, Sequence[str]] = {Severity.WARNING: each.warnings}
+        if isinstance(each, CurveResult):
+            texts |= {Severity.NOTE: each.notes, Severity.FAILURE: [failure.reason for failure in each.failures]}
+        for severity, kinds in groups.items():
             for message in map(message_of, texts.get(severity, ())):
-                groups.setdefault(message.kind, _Group(message, found.curve)).add(message, found.curve)
-
-    def tell(self) -> None:
-        """Print them on the standard error."""
-        for severity, groups in self._groups.items():
-            for group in list(groups.values())[:MOST_KINDS]:
-                print_remark(group.sentence(self.case, self._curves, self.file), severity)
-            if (more := len(groups) - MOST_KINDS) > 0:
-                where = f" are in {self.file}" if self.file else ""
-                print_remark(f"{self.case.name}: {more} more of this kind{where}", severity)
+                kinds.setdefault(message.kind, _Group(message, each.curve)).add(message, each.curve)
+    for severity, kinds in groups.items():
+        for group in list(kinds.values())[:MOST_KINDS]:
+            who, rest = f"{case.name}: {group.curves} of {len(found)} curves", ""
+            if group.curves <= MOST_NAMED:
+                comma = "; " if any("," in label for label in group.labels) else ", "
+                named = " and ".join(filter(None, (comma.join(group.labels[:-1]), group.labels[-1])))
+                who = f"{case.name}, {named}" if named else case.name
+            if group.is_varied:
+                whose = "these numbers are of" if group.message.size is None else "most for"
+                more = f"and {group.count - 1} more like this one"
+                rest = f"; {whose} {group.curve.label}" if group.curves > 1 else f"; {more}"
+                rest += f" (all in {file})" if file else ""
+            print_remark(f"{who}: {group.message.words(CASE_WORDS)}{rest}", severity)
+        if (left := len(kinds) - MOST_KINDS) > 0:
+            print_remark(f"{case.name}: {left} more of this kind{f' are in {file}' if file else ''}", severity)
 
 
 def print_remark(text: str, severity: Severity = Severity.NOTE) -> None:

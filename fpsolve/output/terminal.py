@@ -1,35 +1,181 @@
-"""Results as tables on the terminal, for up to ten curves one each, for more a row each."""
+"""Results as tables on the terminal: up to ten curves have one each, more a row each, and of many the extreme ones."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.text import Text
 
 from fpsolve.case.case import Case
 from fpsolve.case.vary import written
-from fpsolve.exponent.quantities import IMPACT_RATE, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE
-from fpsolve.messages import Severity
-from fpsolve.output.remarks import Remarks, print_remark
-from fpsolve.output.screen import Cell, Column, Grid, Screen
-from fpsolve.output.summary import (
-    MOST_ROWS,
-    MOST_TABLES,
-    STAR,
-    counted,
-    curve_grid,
-    digits,
-    index_text,
-    theory_heading,
-    varied_columns,
+from fpsolve.exponent.quantities import (
+    CRITICAL_RESTITUTION,
+    IMPACT_RATE,
+    LYAPUNOV_EXPONENT,
+    MOMENT,
+    STABILITY_INDEX,
+    VARIANCE_RATE,
+    Index,
 )
+from fpsolve.messages import Severity
+from fpsolve.model.quantity import moment_at
+from fpsolve.output.remarks import print_remark, print_remarks
+from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.tables import asked, in_case_words
 from fpsolve.study.chart import Chart, charted
-from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
+from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve, Status
+from fpsolve.theory.far import grows_far_out
 
 SUMMARY, MONTE_CARLO = "summary.json", "monte_carlo*.json"
+MOST_TABLES, MOST_ROWS = 10, 50
+"""Curves that have a table each, and that have a row each."""
+MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
+"""Failed curves that are named among more, p whose Λ has a column, and quantities whose extremes are shown."""
+DIGITS = 7
+BEYOND_RTOL = "beyond rtol"
+MAIN = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
+STAR = "* for the noise reduced by Eqs. (12)-(14)"
+
+
+@dataclass(frozen=True)
+class _Shown(Column):
+    """A column for a number of a curve.
+
+    Attributes:
+        value: gives the number, None where it is not there; None for perturbation theory, of which no extremes are
+            sought.
+        text: gives what is shown of it, also where it is not there.
+    """
+
+    value: Callable[[CurveResult], float | None] | None = None
+    text: Callable[[CurveResult], str] = str
+
+
+def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
+    """A row for each curve: what varies, λ, δ_p, and what else is asked for, or over a parameter the closed forms.
+
+    Of more than `MOST_ROWS` curves the extreme and the failed ones have one.
+    """
+    quantities = _quantities(case)
+    is_digest = len(results) > MOST_ROWS
+    chosen = _chosen(results, quantities) if is_digest else [("", result) for result in results]
+    has_status = len(results) > MOST_TABLES or any(result.status for _, result in chosen)
+    columns = [*varied_columns(case), *quantities]
+    is_whole = all(_state(result) == "converged" for _, result in chosen)
+    columns += [Column("status", 1 if is_whole else 0)] * has_status + [Column("which", is_text=True)] * is_digest
+    is_starred = any("*" in each.heading for each in quantities)
+    grid = Grid(case.headline, columns, remark=STAR if is_starred else "")
+    for which, result in chosen:
+        varied, numbers = map(written, result.curve.varied.values()), (each.text(result) for each in quantities)
+        grid.rows.append([*varied, *numbers, *[_state(result)] * has_status, *[which] * is_digest])
+    return grid
+
+
+def counted(results: Sequence[CurveResult]) -> str:
+    """How many curves have become what, which of them have a row, and where all numbers are."""
+    counts = Counter((result.status, _state(result) == BEYOND_RTOL, _state(result)) for result in results)
+    states = ", ".join(f"{count} {state}" for (*_, state), count in sorted(counts.items()))
+    lacking = sum(bool(result.status) for result in results)
+    is_short = len(results) > MOST_ROWS and lacking > MOST_FAILED
+    shown = f"; of those that are not converged the first {MOST_FAILED} are shown" if is_short else ""
+    return f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc"
+
+
+def _state(result: CurveResult) -> str:
+    """What became of a curve, for the eye; one that converged may be less precise than rtol asks for."""
+    return BEYOND_RTOL if result.status == Status.CONVERGED and result.misses_rtol else result.status.name.lower()
+
+
+def varied_columns(case: Case) -> list[Column]:
+    """A column for each varied key, without its section."""
+    return [Column(key.partition(".")[2]) for key in case.vary.keys]
+
+
+def index_text(index: Index, result: CurveResult, most: int) -> str:
+    """An index of a curve with its digits, or that there is none."""
+    estimate = result.estimates[index.name]
+    if estimate is not None:
+        return digits(estimate.value, estimate.error_estimate, most)
+    return "none" if index == CRITICAL_RESTITUTION or grows_far_out(result.curve.problem) else "none found"
+
+
+def digits(value: float, error: float, most: int = 13) -> str:
+    """A number with the digits that its error leaves, at most so many significant ones; 0 where it leaves none."""
+    if abs(value) <= error:
+        return "0"
+    count = most if error <= 0 else math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
+    return f"{value:#.{min(max(count, 1), most)}g}".rstrip(".")
+
+
+def _quantities(case: Case) -> list[_Shown]:
+    """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
+    ordered = sorted(asked(case), key=lambda index: index not in MAIN)
+    if case.figure.x != "p":
+        return [each for index in ordered if index in MAIN for each in (_index(index, 0), _theory(case, index))]
+    found = [_index(each, rank + 1 if rank > 1 else 0) for rank, each in enumerate(ordered)]
+    p = [float(each) for each in case.p if each] if MOMENT.name in case.output.quantities else []
+    if len(p) > MOST_MOMENTS:
+        p = [] if found else [p[0], p[-1]]
+    return found + [_moment(each, 2 if found else 0) for each in p]
+
+
+def _index(index: Index, rank: int) -> _Shown:
+    def text(result: CurveResult) -> str:
+        is_lost = result.estimates[index.name] is None and result.status != Status.CONVERGED
+        return "" if is_lost else index_text(index, result, DIGITS)
+
+    def value(result: CurveResult) -> float | None:
+        found = result.estimates[index.name]
+        return None if found is None else found.value
+
+    return _Shown(index.symbol, rank, value=value, text=text)
+
+
+def _theory(case: Case, index: Index) -> _Shown:
+    """Its closed form; with a star where some solution is for another noise."""
+    heading = f"Eq. {index.closed_form}{'*' if case.is_exact else ''}"
+    return _Shown(heading, rank=1, text=lambda result: f"{index.theory(result.curve.problem):.6g}")
+
+
+def _moment(p: float, rank: int) -> _Shown:
+    def numbers(result: CurveResult) -> list[tuple[float, float]]:
+        found = result.moments
+        columns = (found.p.tolist(), found.value.tolist(), found.error_estimate.tolist())
+        return [(value, error) for each, value, error in zip(*columns, strict=True) if each == p]
+
+    return _Shown(
+        moment_at(p).symbol,
+        rank,
+        value=lambda result: next((value for value, _ in numbers(result)), None),
+        text=lambda result: next((digits(*pair, most=DIGITS) for pair in numbers(result)), ""),
+    )
+
+
+def _chosen(results: Sequence[CurveResult], quantities: Sequence[_Shown]) -> list[tuple[str, CurveResult]]:
+    """The curves with the extreme values of the first quantities, and some that failed, each with the reason."""
+    shown = [(each.heading, each.value) for each in quantities if each.value is not None]
+    extremes: dict[tuple[str, str], tuple[float, CurveResult]] = {}
+    failed: list[CurveResult] = []
+    for result in results:
+        if result.status and len(failed) < MOST_FAILED:
+            failed.append(result)
+        for heading, value_of in shown[:MOST_EXTREMES]:
+            if (value := value_of(result)) is None:
+                continue
+            for word, sign in (("least", 1), ("largest", -1)):
+                known = extremes.get((word, heading))
+                if known is None or sign * value < sign * known[0]:
+                    extremes[word, heading] = value, result
+    reasons: dict[int, list[str]] = {}
+    curves = {result.curve.number: result for result in failed}
+    for (word, heading), (_, result) in extremes.items():
+        curves[result.curve.number] = result
+        reasons.setdefault(result.curve.number, []).append(f"{word} {heading}")
+    return [(", ".join(reasons.get(number, [])), curves[number]) for number in sorted(curves)]
 
 
 def print_results(case: Case, results: Sequence[CurveResult]) -> None:
@@ -43,7 +189,14 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
         for result in results:
             if result.moments.p.size:
                 screen.show(_moment_grid(case, result))
-            for group in _indices(case, result) if any(result.estimates.values()) else ():
+            groups: list[list[str]] = [[]]  # what concerns impacts apart from the others
+            for index in asked(case) if any(result.estimates.values()) else ():
+                estimate = result.estimates[index.name]
+                error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
+                if index == IMPACT_RATE:
+                    groups.append([])
+                groups[-1].append(f"{index.symbol} = {index_text(index, result, most=9)}{error}")
+            for group in groups:
                 screen.packed(group)
             screen.lines([""])
     print_warnings(case, results)
@@ -55,18 +208,12 @@ def print_warnings(case: Case, results: Sequence[CurveResult], file: str = SUMMA
     Args:
         file: that holds all of it; empty where nothing is written.
     """
-    _tell(Remarks(case, file), results)
+    print_remarks(case, results, file)
 
 
 def print_failures(case: Case, results: Sequence[CurveResult], file: str = SUMMARY) -> None:
     """Why some numbers are missing, and nothing else."""
-    _tell(Remarks(case, file, [Severity.FAILURE]), results)
-
-
-def _tell(remarks: Remarks, found: Sequence[CurveResult | SimulatedCurve]) -> None:
-    for each in found:
-        remarks.add(each)
-    remarks.tell()
+    print_remarks(case, results, file, [Severity.FAILURE])
 
 
 def print_written(folder: Path, what: str, seconds: float, known: str = "") -> None:
@@ -134,7 +281,7 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
             screen.say(f"{case.place(each.curve)}: stationary means")
             screen.packed([f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items()], "  ")
             screen.lines([""])
-    _tell(Remarks(case, MONTE_CARLO), simulated)
+    print_remarks(case, simulated, MONTE_CARLO)
 
 
 def _simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
@@ -193,7 +340,7 @@ def _deviation(value: float, error: float, exact: float) -> str:
 def _moment_grid(case: Case, result: CurveResult) -> Grid:
     """p, Λ(p), Eq. (37) and the difference."""
     is_exact = result.curve.is_exact
-    theory = Column(theory_heading(MOMENT.closed_form, is_exact=is_exact), 1)
+    theory = Column(f"Eq. {MOMENT.closed_form}{'*' if is_exact else ''}", 1)
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
     grid = Grid(case.heading(result.curve), columns, remark=STAR if is_exact else "")
     moments = result.moments
@@ -204,18 +351,6 @@ def _moment_grid(case: Case, result: CurveResult) -> Grid:
         numbers = [digits(value, error), shown, f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"]
         grid.rows.append([f"{p + 0.0:g}", *numbers])
     return grid
-
-
-def _indices(case: Case, result: CurveResult) -> list[list[str]]:
-    """λ, δ_p and Λ″(0), each with its error, and apart from them what concerns impacts; what the case asks for."""
-    groups: list[list[str]] = [[]]
-    for index in asked(case):
-        estimate = result.estimates[index.name]
-        error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
-        if index == IMPACT_RATE:
-            groups.append([])
-        groups[-1].append(f"{index.symbol} = {index_text(index, result, most=9)}{error}")
-    return groups
 
 
 def print_chart(case: Case, chart: Chart) -> None:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fpsolve.drawing import label_of
+from fpsolve.output.curves import Encoding
 from fpsolve.output.datasets import dataset_of
 from fpsolve.output.figures import draw
 from fpsolve.output.maps import Plane
-from fpsolve.output.series import Encoding
 from fpsolve.theory.perturbation import second_order
 from tests.conftest import sampled
 from tests.output.drawing import case_of, drawn_case, results_of, texts, tick_labels, words

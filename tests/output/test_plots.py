@@ -9,9 +9,8 @@ from matplotlib.colors import to_hex
 
 from fpsolve.case.case import load_case
 from fpsolve.exponent.quantities import MOMENT
-from fpsolve.output.curves import write_figure
+from fpsolve.output.curves import Series, write_figure
 from fpsolve.output.figures import draw, write_response_figure
-from fpsolve.output.series import Series
 from fpsolve.simulation.response import MEANS, Response
 from tests.solving import solve_case
 
