@@ -184,7 +184,7 @@ class Case(Section):
     @property
     def shown(self) -> FloatArray:
         """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread, or none."""
-        if EIGENFUNCTIONS not in self.output.quantities or self.leaves_out_eigenfunctions:
+        if EIGENFUNCTIONS not in self.output.quantities or self.leaves_out_eigenfunctions or self.noise.has_states:
             return np.zeros(0)
         if self.output.eigenfunctions is not None:
             wanted = np.array(self.output.eigenfunctions)

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from copy import copy
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
-from fpsolve.case.messages import nearest, refuse, shown_with_kind
+from fpsolve.case.messages import nearest, refuse, shown, shown_with_kind
 from fpsolve.model.kinds import kind_names, noise_kind, system_kind
 from fpsolve.model.parameters import STRICT, Parametrised, parameter
 from fpsolve.model.problem import Problem
@@ -49,18 +49,23 @@ def half_of(half: Half, table: Any) -> Any:
         raise ValidationError.from_exception_data(half, [fault])
     name = table.get("kind")
     kind, known = _kind(half, name), {key: value for key, value in table.items() if key != "kind"}
-    faults = list[InitErrorDetails]()
+    kind_fields, faults = fields_of(kind), list[InitErrorDetails]()
+    for key in [] if kind.takes_any else [key for key in known if key not in kind_fields]:
+        faults.append(InitErrorDetails(type="unexpected_keyword_argument", loc=(key,), input=known.pop(key)))
     for word, field in kind.stated.items():
         if word in known and word in kind.words and name is not None:
             faults.append(InitErrorDetails(type="unexpected_keyword_argument", loc=(word,), input=known.pop(word)))
         elif word in known:
             try:
-                known[word] = TypeAdapter[Any](field.annotation or Any, config=STRICT).validate_python(known[word])
+                accepted: Any = Annotated[field.annotation, Field(), *field.metadata]
+                known[word] = TypeAdapter[Any](accepted, config=STRICT).validate_python(known[word])
             except ValidationError as error:
                 faults += _details(error, (word,))
                 del known[word]
         elif field.is_required():
             faults.append(InitErrorDetails(type="missing", loc=(word,), input=table))
+    if faults and any(field.is_required() for field in kind.stated.values()):
+        raise ValidationError.from_exception_data(half, faults)
     try:
         made = kind.from_table(known)
     except ValidationError as error:
@@ -86,7 +91,8 @@ def _kind(half: Half, name: Any) -> type[Parametrised]:
     names = kind_names(_ROOMS[half]) if name is not None else ()
     if name is not None and name not in names:
         guess = nearest(name, names) if isinstance(name, str) else ""
-        text = f"got {shown_with_kind(name)}; must be one of {', '.join(names)};{guess} write, for example, kind = "
+        got = shown(name) if isinstance(name, str) else shown_with_kind(name)
+        text = f"got {got}; must be one of {', '.join(names)};{guess} write, for example, kind = "
         refuse([(("kind",), name, f'{text}"{names[0]}"')])
     try:
         return _CLASSES[half](name or USUAL[half])

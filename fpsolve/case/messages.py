@@ -19,6 +19,8 @@ from fpsolve.model.words import accepted, choices, fields_of
 _OWN, _RANGE = "own sentence", "range"
 LIST, TABLE = "<list>", "<table>"
 """Tags of a discriminated union: parts of pydantic's error locations that are no keys."""
+DEPENDENT = "cannot be judged, as the kinds of the system and the noise are not known; mend these"
+"""Of a section; which kinds are wrong is another fault."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 _KINDS = {bool: "a boolean", str: "a string", list: "a list", dict: "a table", int: "a number", float: "a number"}
 
@@ -127,7 +129,7 @@ def explain(
         faults = [(("oscillator", *path[1:]) if path[:1] == ("system",) else path, each) for path, each in faults]
     misspelt = {_meant(path, fields) for path, detail in faults if detail["type"] in _UNKNOWN}
     for path, detail in faults:
-        if detail["type"] != "missing" or path not in misspelt:
+        if (detail["type"] != "missing" or path not in misspelt) and detail["msg"] != DEPENDENT:
             yield path, _key(path), _sentence(path, dict(detail), fields, varied)
 
 

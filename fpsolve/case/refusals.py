@@ -33,12 +33,12 @@ from fpsolve.case.sections import (
     same,
 )
 from fpsolve.case.vary import FileVary, Vary, assignments
-from fpsolve.errors import FpsolveError, MeshError, NoPerturbationTheory, NoSuchExponent
+from fpsolve.errors import FpsolveError, MeshError, NoSuchExponent
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.model.problem import Problem, refuse_infinite
 from fpsolve.simulation.setup import obstacles, simulated_parts
-from fpsolve.theory.perturbation import second_order
+from fpsolve.theory.perturbation import second_order_or_none
 
 Known = Mapping[str, Any]
 MAX_CURVES = 1_000_000
@@ -93,7 +93,8 @@ def _obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_existence: b
         problem = base.at(varied)
         with np.errstate(all="ignore"):
             factors = [math.exp(each * kick.log_factor) for kick in problem.system.kicks for each in extremes]
-            sizes = np.array([*factors, *_sizes(problem, p)])
+            theory = second_order_or_none(problem)
+            sizes = np.array([*factors, *([] if theory is None else [*theory.scale.moment(p), theory.stability_index])])
     except ValueError as error:
         return said(error)
     except OverflowError:  # of R^p
@@ -106,15 +107,6 @@ def _obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_existence: b
     except NoSuchExponent as error:
         return error.message.words(CASE_WORDS)
     return ""
-
-
-def _sizes(problem: Problem, p: FloatArray) -> list[float]:
-    """The scale of Λ(p) and δ_p of perturbation theory, where that applies."""
-    try:
-        theory = second_order(problem)
-        return [*np.atleast_1d(theory.scale.moment(p)).tolist(), theory.stability_index]
-    except NoPerturbationTheory:
-        return []
 
 
 def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusal]:

@@ -16,6 +16,7 @@ from pydantic.fields import FieldInfo
 
 from fpsolve.case.kinds import parameters_of
 from fpsolve.case.messages import (
+    DEPENDENT,
     Refusal,
     explain,
     nearest,
@@ -174,7 +175,8 @@ def vary_of(value: Any, info: ValidationInfo) -> Vary:
     if not isinstance(value, dict):
         text = f"got {shown_with_kind(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
         refuse([((), value, text)])
-    if parameters is None:  # then other sections are refused
+    if parameters is None:
+        refuse([((), value, DEPENDENT)])
         return Vary()
     table = flat(value, parameters)
     if "file" in table:

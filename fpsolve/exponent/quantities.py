@@ -17,7 +17,7 @@ from fpsolve.model import quantity
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import MOMENT as MOMENT
 from fpsolve.model.quantity import Quantity as Quantity
-from fpsolve.theory.perturbation import second_order
+from fpsolve.theory.perturbation import second_order_or_none
 
 DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
 """What a figure can show."""
@@ -31,13 +31,18 @@ class Index(Quantity):
     Attributes:
         solve: finds it, from a solver and the `root` of its `MomentLyapunov`, or says why there is none in `interval`.
             Raises `NotConverged`.
-        theory: what perturbation theory makes of it; it may be infinite.
+        theory: what perturbation theory makes of it; it may be infinite, or NaN where that does not apply.
         interval: where it is sought.
     """
 
     solve: Callable[[ExponentSolver, float | None], Estimate | Absent] = field(kw_only=True)
     theory: Callable[[Problem], float] = field(kw_only=True)
     interval: tuple[float, float] = field(kw_only=True)
+
+
+def _theory(problem: Problem, name: str) -> float:
+    """A number of second-order perturbation theory; NaN where that does not apply."""
+    return float(getattr(second_order_or_none(problem), name, math.nan))
 
 
 def _index(
@@ -53,33 +58,33 @@ def _index(
 LYAPUNOV_EXPONENT = _index(
     quantity.LYAPUNOV_EXPONENT,
     solve=lambda solver, _: solver.lyapunov_exponent(),
-    theory=lambda problem: second_order(problem).lyapunov_exponent,
+    theory=lambda problem: _theory(problem, "lyapunov_exponent"),
 )
 STABILITY_INDEX = _index(
     quantity.STABILITY_INDEX,
     solve=lambda solver, root: nonzero_root(solver, guess=root),
-    theory=lambda problem: second_order(problem).stability_index,
+    theory=lambda problem: _theory(problem, "stability_index"),
     interval=SEARCH_INTERVAL,
 )
 VARIANCE_RATE = _index(
     quantity.VARIANCE_RATE,
     solve=lambda solver, _: solver.variance_rate(),
-    theory=lambda problem: second_order(problem).variance_rate,
+    theory=lambda problem: _theory(problem, "variance_rate"),
 )
 IMPACT_RATE = _index(
     quantity.IMPACT_RATE,
     solve=lambda solver, _: impact_rate(solver),
-    theory=lambda problem: second_order(problem).impact_rate,
+    theory=lambda problem: _theory(problem, "impact_rate"),
 )
 CRITICAL_IMPACT_FACTOR = _index(
     quantity.CRITICAL_IMPACT_FACTOR,
     solve=lambda solver, _: critical_impact_factor(solver),
-    theory=lambda problem: second_order(problem).critical_impact_factor,
+    theory=lambda problem: _theory(problem, "critical_impact_factor"),
 )
 CRITICAL_RESTITUTION = _index(
     quantity.CRITICAL_RESTITUTION,
     solve=lambda solver, _: critical_restitution(solver),
-    theory=lambda problem: _restitution(problem, second_order(problem).critical_log_factor),
+    theory=lambda problem: _restitution(problem, _theory(problem, "critical_log_factor")),
     interval=(0.0, 1.0),
 )
 _ALL = (

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from pydantic import ConfigDict, Field
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
 
 from fpsolve.messages import Message
 from fpsolve.model.quantity import Quantity
@@ -70,6 +71,11 @@ def _extra(field: FieldInfo, name: str) -> str:
     return str(extra[name]) if isinstance(extra, dict) else ""
 
 
+def stated_field(annotation: Any, default: Any = ...) -> FieldInfo:
+    """The field of an entry of a table that is no parameter, from `Annotated[type, parameter(…)]`."""
+    return FieldInfo.from_annotated_attribute(annotation, PydanticUndefined if default is ... else default)
+
+
 class Parameter(NamedTuple):
     """A parameter of a problem.
 
@@ -97,6 +103,7 @@ class Parametrised:
         section: the first part of the keys of its parameters, such as "noise".
         words: parameters that the class itself decides, by their names.
         stated: what case files say of it besides its `fields`, such as the `words`, by its names.
+        takes_any: whether any other key of such a table is a parameter.
         inert: names of parameters on which the linear problem does not depend.
     """
 
@@ -104,6 +111,7 @@ class Parametrised:
     section: ClassVar[str]
     words: ClassVar[Mapping[str, str]] = {}
     stated: ClassVar[Mapping[str, FieldInfo]] = {}
+    takes_any: ClassVar[bool] = False
     inert: ClassVar[Sequence[str]] = ()
 
     @classmethod

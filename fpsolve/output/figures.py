@@ -23,7 +23,7 @@ from fpsolve.output.curves import Series, write_figure
 from fpsolve.output.maps import Plane, write_map
 from fpsolve.simulation.response import Response
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.theory.perturbation import scale_of, second_order
+from fpsolve.theory.perturbation import perturbed_moments, scale_of
 
 Pair = tuple[CurveResult, SimulatedCurve | None]
 _NOTHING = np.zeros(0)
@@ -117,7 +117,7 @@ def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | Non
         p,
         result.moments.value,
         line,
-        second_order(result.curve.problem).moment_exponent(line) if line.size else _NOTHING,
+        perturbed_moments(result.curve.problem, line),
         _columns([(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]),
         np.isin(p, result.moments.rare) if result.moments.rare.size else False,
         root=root if root is not None and first <= root <= last else None,
@@ -173,7 +173,7 @@ def _number(case: Case, result: CurveResult) -> float:
 def _theory(case: Case, problem: Problem) -> float:
     """Its perturbation theory, NaN beyond where it is sought."""
     if case.figure.moment is not None:
-        return float(second_order(problem).moment_exponent(case.figure.moment))
+        return float(perturbed_moments(problem, np.array(case.figure.moment)))
     index = INDICES[case.figure.needed]
     value = index.theory(problem)
     return value if index.interval[0] <= value <= index.interval[1] else math.nan

@@ -138,7 +138,12 @@ def _index(index: Index, rank: int) -> _Shown:
 def _theory(case: Case, index: Index) -> _Shown:
     """Its closed form; with a star where some solution is for another noise."""
     heading = f"Eq. {index.closed_form}{'*' if case.is_exact else ''}"
-    return _Shown(heading, rank=1, text=lambda result: f"{index.theory(result.curve.problem):.6g}")
+
+    def text(result: CurveResult) -> str:
+        value = index.theory(result.curve.problem)
+        return "" if math.isnan(value) else f"{value:.6g}"
+
+    return _Shown(heading, rank=1, text=text)
 
 
 def _moment(p: float, rank: int) -> _Shown:

@@ -14,7 +14,7 @@ from fpsolve.analysis.zero import Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.chart import ChartSection
-from fpsolve.errors import FpsolveError
+from fpsolve.errors import FpsolveError, NoPerturbationTheory
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import second_order
@@ -124,7 +124,7 @@ def _closed_forms(
         for j, v in enumerate(shares):
             try:
                 theory = second_order(problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))}))
-            except ValueError:  # no such problem
+            except (ValueError, NoPerturbationTheory):  # no such problem, or not this form of one
                 continue
             linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic
     found = []

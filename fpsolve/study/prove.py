@@ -22,7 +22,7 @@ from fpsolve.proofs.questions import (
     prove_index,
     refuse_unprovable,
 )
-from fpsolve.proofs.statement import Parameters, linear_values
+from fpsolve.proofs.statement import Parameters, linear_values, parameters_of
 from fpsolve.study.decimals import Literals, decimal_of, literals_of
 
 ORDERS = "moments.p"
@@ -151,10 +151,13 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
         raise FpsolveError(f"--width: {failure}") from None
     plan = Plan(case, width)
     for curve in case.curves():
+        place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
         try:
+            parameters_of(curve.problem)
             refuse_unprovable(plan.stated(curve))
+        except TypeError as failure:
+            raise FpsolveError(f"{place}: {failure}") from None
         except NoSuchExponent as failure:
-            place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
             raise NoSuchExponent(Message(Code.PLACED, place=place, reason=failure.message)) from None
 
 

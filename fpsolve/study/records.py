@@ -25,6 +25,7 @@ from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Message, message_of
+from fpsolve.model.kinds import version_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Numerics, Wanted
 
@@ -38,7 +39,7 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
     mesh, budget = numerics.mesh, numerics.budget
     return _digest(
         CurveResult,
-        parameters=dict(curve.parameters),
+        **_of_curve(curve),
         p=wanted.p.tolist(),
         wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated],
         numerics=[numerics.rtol, budget.unknowns, budget.seconds, mesh and codec(CylinderMesh).plain(mesh)],
@@ -47,8 +48,14 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
 
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
     """What the record of a simulation is found by."""
-    parameters, settings = dict(curve.parameters), setting.model_dump(mode="json")
-    return _digest(SimulatedCurve, parameters=parameters, orders=list(orders), setting=settings)
+    settings = setting.model_dump(mode="json")
+    return _digest(SimulatedCurve, **_of_curve(curve), orders=list(orders), setting=settings)
+
+
+def _of_curve(curve: Curve) -> dict[str, Any]:
+    """The parameters, and the system and the noise as they are written, with the versions of other packages' kinds."""
+    kinds = [[repr(half), version_of(type(half))] for half in curve.problem.halves]  # type: ignore[arg-type]
+    return {"parameters": dict(curve.parameters), "kinds": kinds}
 
 
 def record_of(result: CurveResult | SimulatedCurve) -> Record:

@@ -11,7 +11,7 @@ from fpsolve.case.sections import MonteCarloSection
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
 from fpsolve.pool import processors
-from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles
+from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.theory.validity import simulated_tail_note
 
@@ -41,9 +41,13 @@ def refuse_obstacles(case: Case) -> None:
     """
     processors()
     for curve in case.curves():
-        found = obstacles(curve.oscillator, curve.noise, time=case.monte_carlo.time, step=case.monte_carlo.step)
+        place = f"with {curve.label}: " if curve.varied else ""
+        try:
+            parts = simulated_parts(curve.problem)
+        except FpsolveError as failure:
+            raise FpsolveError(f"{case.path}: {place}{failure}") from None
+        found = obstacles(*parts, time=case.monte_carlo.time, step=case.monte_carlo.step)
         for name, sentence in found.items():
-            place = f"with {curve.label}: " if curve.varied else ""
             raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
 
 

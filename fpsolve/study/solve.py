@@ -27,7 +27,7 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns, Solved
 from fpsolve.theory import validity
-from fpsolve.theory.perturbation import second_order
+from fpsolve.theory.perturbation import perturbed_moments
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Numerics:
 def everything(case: Case, number: int = 1) -> Wanted:
     """What [output] names as `quantities`, of the curve with a number; the density goes with what is drawn of it."""
     names = set(case.output.quantities)
-    draws, has_moments = EIGENFUNCTIONS in names, MOMENT.name in names
+    draws, has_moments = EIGENFUNCTIONS in names and not case.noise.has_states, MOMENT.name in names
     slopes = tuple(case.differentiated) if has_moments else ()
     return Wanted(
         case.p if has_moments else np.zeros(0),
@@ -169,7 +169,7 @@ def _functions(solver: ExponentSolver, wanted: Wanted) -> tuple[tuple[PrincipalP
 
 def _moments(found: MomentLyapunov) -> MomentColumns:
     """The numbers, with Eq. (37) beside them."""
-    theory = second_order(found.solver.problem).moment_exponent(found.p)
+    theory = perturbed_moments(found.solver.problem, found.p)
     return MomentColumns(
         found.p, found.value, found.derivative, found.error_estimate, found.residual, theory, found.rare
     )

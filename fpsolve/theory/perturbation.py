@@ -143,6 +143,20 @@ def second_order(problem: Problem) -> SecondOrder:
     return SecondOrder(tuple(map(float, terms)), quadratic, half_turns, float(sum(log_factors)))
 
 
+def second_order_or_none(problem: Problem) -> SecondOrder | None:
+    """The same; None where perturbation theory does not apply."""
+    try:
+        return second_order(problem)
+    except NoPerturbationTheory:
+        return None
+
+
+def perturbed_moments(problem: Problem, p: FloatArray) -> FloatArray:
+    """ε²Λ₂(p), Eq. (37), shape (n,); NaN where perturbation theory does not apply."""
+    theory = second_order_or_none(problem)
+    return np.full(np.shape(p), math.nan) if theory is None else np.asarray(theory.moment_exponent(p), dtype=float)
+
+
 def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: ArrayLike) -> FloatArray:
     """T₁(φ, ξ; p) of Eq. (33) with C = 1 and K(ξ, τ) = ξ exp(−α₀τ); φ and ξ broadcast.
 
@@ -165,10 +179,8 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
 
 def scale_of(problem: Problem) -> Scale:
     """The scale of Λ(p): of perturbation theory, or where that does not apply of norms of the drives."""
-    try:
-        return second_order(problem).scale
-    except NoPerturbationTheory:
-        return _rough_scale(problem)
+    theory = second_order_or_none(problem)
+    return _rough_scale(problem) if theory is None else theory.scale
 
 
 def _rough_scale(problem: Problem) -> Scale:

@@ -8,7 +8,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 from fpsolve.theory.far import grows_far_out
-from fpsolve.theory.perturbation import second_order
+from fpsolve.theory.perturbation import second_order_or_none
 
 WEAK = 0.05
 
@@ -29,7 +29,9 @@ def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> Messa
 
     Eq. (37) is a parabola, convex for every p; what limits it is the p from which on this criterion is broken.
     """
-    theory = second_order(problem)
+    theory = second_order_or_none(problem)
+    if theory is None:
+        return None
     rest = value - theory.moment_exponent(p)
     scale = theory.scale.moment(p)
     shares = np.divide(np.abs(rest), scale, out=np.zeros_like(scale), where=scale > 0)

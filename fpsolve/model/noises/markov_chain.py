@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
+from pydantic import Field
+from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
+from fpsolve.model.parameters import parameter, stated_field
 
 _BALANCED = 1e-12
+Row = Annotated[tuple[float, ...], Field(strict=False)]
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,15 @@ class MarkovChain(Noise):
     kind: ClassVar[str] = "markov-chain"
     has_states: ClassVar[bool] = True
     mixes_slowly: ClassVar[bool] = True
+    stated: ClassVar[Mapping[str, FieldInfo]] = {
+        "states": stated_field(Annotated[Row, parameter("the values of the noise", "states = [-0.5, 0.5]")]),
+        "rates": stated_field(
+            Annotated[
+                Annotated[tuple[Row, ...], Field(strict=False)],
+                parameter("rates from each state to each", "rates = [[-1.0, 1.0], [1.0, -1.0]]"),
+            ]
+        ),
+    }
 
     def __post_init__(self) -> None:
         states, rates = np.array(self.states, dtype=float), np.array(self.rates, dtype=float)

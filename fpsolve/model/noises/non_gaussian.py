@@ -20,7 +20,7 @@ from fpsolve.model.exact import ExactLaw, gaussian_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, LinearStep, linear_step
-from fpsolve.model.parameters import SIZE, STRICT, parameter
+from fpsolve.model.parameters import SIZE, STRICT, parameter, stated_field
 
 Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
 CorrelationTime = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
@@ -31,11 +31,11 @@ Departure = Annotated[
     ),
 ]
 TREATMENT = {
-    "treatment": FieldInfo.from_annotated_attribute(
+    "treatment": stated_field(
         Annotated[
             Literal["ou-reduction", "exact"],
             parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"'),
-        ],  # type: ignore[arg-type]
+        ],
         "ou-reduction",
     )
 }

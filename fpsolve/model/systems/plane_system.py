@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from pydantic import BaseModel, Field
+from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import FloatArray
-from fpsolve.model.parameters import unknown_parameter
+from fpsolve.arrays import FloatArray, identity
+from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
 from fpsolve.model.plane import Drive, Kick, System, by_epsilon
 from fpsolve.model.quantity import Quantity
 
@@ -36,6 +38,32 @@ class Scaled:
         sizes = {"": 1.0, **values}
         scaled = [replace(term, matrix=(sizes[name] * np.array(term.matrix)).tolist()) for name, term in self.terms]
         return scaled, self.kicks
+
+
+Pair = Annotated[tuple[float, float], Field(strict=False)]
+
+
+class StatedTerm(BaseModel):
+    """A term in a case file."""
+
+    model_config = STRICT
+
+    matrix: Annotated[
+        Annotated[tuple[Pair, Pair], Field(strict=False)],
+        parameter("the matrix by which the state is multiplied", "matrix = [[0.0, 1.0], [-1.0, 0.0]]"),
+    ]
+    order: Annotated[int, parameter("the power of epsilon", "order = 0", ge=0)] = 0
+    noise: Annotated[bool, parameter("whether the noise multiplies it", "noise = true")] = False
+    factor: Annotated[str, parameter("the parameter that multiplies it", 'factor = "damping"')] = ""
+
+
+class StatedJump(BaseModel):
+    """A jump in a case file."""
+
+    model_config = STRICT
+
+    phase: Annotated[float, parameter("where the phase passes a ray, in radians", "phase = 1.5707963267948966")]
+    log_factor: Annotated[float, parameter("the logarithm of the factor of the state", "log_factor = -0.1")]
 
 
 @dataclass(frozen=True)
@@ -65,6 +93,22 @@ class PlaneSystem(System):
     named: tuple[tuple[str, float], ...] = ()
 
     kind: ClassVar[str] = "plane"
+    takes_any: ClassVar[bool] = True
+    stated: ClassVar[Mapping[str, FieldInfo]] = {
+        "terms": stated_field(
+            Annotated[
+                Annotated[tuple[StatedTerm, ...], Field(strict=False, min_length=1)],
+                parameter("the terms of the motion", "terms = [{ matrix = [[0.0, 1.0], [-1.0, 0.0]] }]"),
+            ]
+        ),
+        "jumps": stated_field(
+            Annotated[
+                Annotated[tuple[StatedJump, ...], Field(strict=False)],
+                parameter("jumps of the state at rays", "jumps = [{ phase = 0.0, log_factor = -0.1 }]"),
+            ],
+            (),
+        ),
+    }
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "drives", tuple(self.drives))
@@ -128,6 +172,17 @@ class PlaneSystem(System):
                 f"got values of {sorted(named)}; must be of {sorted(names)}, the names that the terms carry"
             )
         return cls.of(Scaled(tuple(terms), tuple(kicks)), epsilon=epsilon, **named)
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> PlaneSystem:
+        named = {name: value for name, value in table.items() if name not in cls.stated}
+        stated: Sequence[StatedTerm] = table["terms"]
+        terms = [
+            (each.factor, Drive(each.order, each.matrix, identity) if each.noise else Drive(each.order, each.matrix))
+            for each in stated
+        ]
+        kicks = [Kick(each.phase, each.log_factor) for each in table.get("jumps", ())]
+        return cls.of_terms(terms, kicks, **named)
 
     @property
     def values(self) -> Mapping[str, float | str]:

@@ -1,0 +1,235 @@
+"""Cases of systems and noises of any kind: plane systems, chains, and a noise that another package registers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.cli import BAD_INPUT, main
+from fpsolve.errors import CaseError
+from fpsolve.model.kinds import noise_kind, version_of
+from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.problem import Problem
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.study.records import key_of
+from fpsolve.study.solve import Numerics, everything
+
+OSCILLATOR = """\
+title = "kinds"
+[oscillator]
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+epsilon = 0.1
+"""
+PLANE = """\
+title = "plane"
+[system]
+kind = "plane"
+damping = 0.1
+terms = [
+    { matrix = [[0, 1], [-1, 0]] },
+    { matrix = [[0, 0], [0, -2]], factor = "damping" },
+    { ORDER, matrix = [[0, 0], [-1, 0]], noise = true },
+]
+"""
+MOMENTS = "[moments]\np = [2.0]\n"
+ONLY = '[output]\nquantities = ["moment", "lyapunov_exponent"]\n'
+MODULE = """\
+from typing import Annotated, ClassVar
+import math
+from pydantic.dataclasses import dataclass
+from fpsolve.model.noise import Noise
+from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
+from fpsolve.model.parameters import SIZE, STRICT, parameter
+
+@dataclass(frozen=True, config=STRICT)
+class Wind(GaussianNoise):
+    gust: Annotated[float, parameter("size of the gusts", "gust = 0.5", "$g$", "1/time", **SIZE)]
+    memory: Annotated[float, parameter("duration of the gusts", "memory = 2.0", "$m$", "time", **SIZE)]
+
+    kind: ClassVar[str] = "wind"
+
+    @property
+    def alpha(self):
+        return 1 / self.memory
+
+    @property
+    def sigma(self):
+        return self.gust * math.sqrt(2 / self.memory)
+
+    def derivative(self, name):
+        return self.by_logarithms(1 / self.gust, 0.0) if name == "gust" else self.by_logarithms(
+            -0.5 / self.memory, -1 / self.memory
+        )
+
+class NoNoise:
+    kind = "no-noise"
+"""
+ENTRIES = (
+    "[fpsolve.noises]\nwind = windy:Wind\nno-noise = windy:NoNoise\nlost = nowhere:Lost\nou-reduction = windy:Wind\n"
+)
+
+
+@pytest.fixture
+def windy(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package that registers a noise."""
+    folder = tmp_path_factory.mktemp("site")
+    (folder / "windy.py").write_text(MODULE, encoding="utf-8")
+    about = folder / "windy-1.5.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: windy\nVersion: 1.5\n", encoding="utf-8")
+    (about / "entry_points.txt").write_text(ENTRIES, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(folder))
+
+
+def write(folder: Path, *parts: str) -> Path:
+    path = folder / "kinds.toml"
+    path.write_text("".join(parts), encoding="utf-8")
+    return path
+
+
+def said(folder: Path, *parts: str) -> list[str]:
+    with pytest.raises(CaseError) as raised:
+        load_case(write(folder, *parts))
+    return [f"{fault.line}: {fault.key}: {fault.sentence}" for fault in raised.value.faults]
+
+
+def solved(path: Path, out: Path) -> dict[str, float]:
+    """Λ(2) of the curves by their labels."""
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    curves = json.loads((out / "kinds/summary.json").read_text(encoding="utf-8"))["curves"]
+    return {str(curve["parameters"]): curve["moments"][0]["value"] for curve in curves}
+
+
+def test_the_system_has_two_names(tmp_path: Path) -> None:
+    noise = "[noise]\nD0 = 1.0\ntau0 = 0.5\nr0 = 0.95\n"
+    usual = load_case(write(tmp_path, OSCILLATOR, noise, MOMENTS))
+    named = OSCILLATOR.replace("[oscillator]", '[system]\nkind = "vibro-impact"')
+    again = load_case(write(tmp_path, named, noise.replace("D0", 'kind = "ou-reduction"\nD0'), MOMENTS))
+    assert again.problem == usual.problem == Problem(usual.oscillator, ReducedNoise(D0=1.0, tau0=0.5, r0=0.95))
+    assert again.curve({"oscillator.omega": 2.0}).parameters["oscillator.omega"] == 2.0
+    exact = load_case(write(tmp_path, OSCILLATOR, noise.replace("D0", 'kind = "non-gaussian"\nD0'), MOMENTS))
+    assert exact.noise == NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
+    [text] = said(tmp_path, OSCILLATOR, named.partition("\n")[2], noise, MOMENTS)
+    assert text.endswith("oscillator: stands beside [system], but a case has one system; remove one of the two")
+
+
+@pytest.mark.parametrize(
+    ("noise", "words"),
+    [
+        ('kind = "wond"', '8: noise.kind: got "wond"; must be one of non-gaussian, '),
+        ('kind = "wond"', '; did you mean "wind"? write, for example, kind = "non-gaussian"'),
+        ("kind = 3", "8: noise.kind: got 3 (a number); must be one of "),
+        ('kind = "no-noise"', "must be a subclass of Noise with kind"),
+        ('kind = "lost"', 'kind = "lost" of windy cannot be loaded (ModuleNotFoundError'),
+        (
+            'kind = "wind"\ngust = 1.0',
+            "7: noise.memory: missing; must be a finite number >= 1e-15 and <= 1e15 (duration",
+        ),
+        ('kind = "wind"\ngust = 1.0\nmemry = 1.0', '10: noise.memry: unknown key; did you mean "memory"? known keys: '),
+        ('kind = "wind"\ngust = 1.0\nmemory = -1.0', "10: noise.memory: got -1.0; must be a finite number >= 1e-15"),
+        ('kind = "ou-reduction"\nD0 = 1.0\ntau0 = 1.0\nr0 = 1.0\ntreatment = "exact"', "12: noise.treatment: unknown"),
+        ('kind = "markov-chain"\nstates = [1.0]\nrates = [[1.0]]', "got (1,) states and (1, 1) rates; must be"),
+        (
+            'kind = "markov-chain"\nstates = 1.0\nrates = [[1.0]]',
+            "9: noise.states: got 1.0 (a number); must be a list ",
+        ),
+        ('kind = "markov-chain"\nstates = [1.0]', "7: noise.rates: missing; must be a list of lists of finite numbers"),
+    ],
+)
+def test_one_message_for_what_is_wrong_with_a_kind(windy: None, tmp_path: Path, noise: str, words: str) -> None:
+    [text] = said(tmp_path, OSCILLATOR, f"[noise]\n{noise}\n", MOMENTS, '[vary]\n"noise.x" = [1.0]\n' * ("wo" in noise))
+    assert words in text
+
+
+def test_a_noise_of_another_package(windy: None, tmp_path: Path) -> None:
+    """Its keys may be varied, drawn over, and be the axes of a chart; its numbers are those of the same law."""
+    noise = '[noise]\nkind = "wind"\ngust = 0.5\nmemory = 2.0\n'
+    rest = '[vary]\n"noise.gust" = [0.5, 1.0]\n[figure]\nx = "noise.gust"\ny = { moment = 2.0 }\n'
+    frame = '[chart]\nzero = ["lyapunov_exponent"]\nx = { key = "noise.gust", start = 0.1, stop = 2.0 }\n'
+    frame += 'y = { key = "noise.memory", start = 0.1, stop = 9.0 }\n'
+    path = write(tmp_path, OSCILLATOR, noise, MOMENTS, ONLY, rest, frame)
+    case = load_case(path)
+    kind = type(case.noise)
+    assert (kind, version_of(kind)) == (noise_kind("wind"), "windy 1.5")  # type: ignore[arg-type]
+    assert case.parameters["noise.gust"].quantity.unit == "1/time"
+    same = load_case(
+        write(tmp_path, OSCILLATOR, '[noise]\nkind = "ornstein-uhlenbeck"\nalpha = 0.5\nsigma = 0.5\n', MOMENTS)
+    )
+    assert same.noise == OrnsteinUhlenbeck(alpha=0.5, sigma=0.5)
+    values = solved(write(tmp_path, OSCILLATOR, noise, MOMENTS, ONLY, rest), tmp_path / "out")
+    [expected] = solved(
+        write(tmp_path, OSCILLATOR, '[noise]\nkind = "ornstein-uhlenbeck"\nalpha = 0.5\nsigma = 0.5\n', MOMENTS, ONLY),
+        tmp_path / "out2",
+    ).values()
+    assert next(iter(values.values())) == pytest.approx(expected, rel=1e-10)
+    text = said(tmp_path, OSCILLATOR, noise, MOMENTS, rest.replace("noise.gust", "noise.D0"))[0]
+    assert text.startswith('14: vary."noise.D0": cannot be varied; ')
+    assert "noise.gust, noise.memory" in text
+    text = said(tmp_path, OSCILLATOR, noise, MOMENTS, frame.replace("noise.gust", "noise.D0"))[0]
+    assert text.startswith('15: chart.x.key: got "noise.D0"; did you mean "noise.gust"? must be one of ')
+
+
+def test_records_depend_on_the_kind_and_its_version(
+    windy: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noise = '[noise]\nkind = "wind"\ngust = 0.5\nmemory = 2.0\n'
+    keys = set()
+    for version in ("windy 1.5", "windy 1.6"):
+        monkeypatch.setattr("fpsolve.study.records.version_of", lambda _, version=version: version)
+        case = load_case(write(tmp_path, OSCILLATOR, noise, MOMENTS))
+        keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
+    assert len(keys) == 2
+
+
+def test_ours_cannot_be_replaced(windy: None) -> None:
+    assert noise_kind("ou-reduction") is ReducedNoise
+    assert version_of(ReducedNoise) == ""  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("order", "has_theory"), [("order = 1", True), ("order = 0", False)])
+def test_a_plane_system_from_a_file(tmp_path: Path, order: str, has_theory: bool) -> None:
+    """ẍ + 0.2ẋ + (1 + ξ)x = 0 under sine-Wiener noise, against the moment hierarchy; noise of order 0 has no theory."""
+    noise = '[noise]\nkind = "sine-wiener"\namplitude = 1.0\nsigma = 1.0\n'
+    rest = '[vary]\n"system.damping" = [0.1, 0.2]\n'
+    path = write(tmp_path, PLANE.replace("ORDER", order), noise, MOMENTS, ONLY, rest)
+    first, second = solved(path, tmp_path / "out").values()
+    assert first == pytest.approx(-0.0773243898649, abs=1e-10)
+    assert second < first
+    summary = json.loads((tmp_path / "out/kinds/summary.json").read_text(encoding="utf-8"))
+    assert (summary["curves"][0]["moments"][0]["perturbation"] is not None) == has_theory
+    assert main(["simulate", str(path)]) == BAD_INPUT
+    assert main(["prove", str(path)]) == BAD_INPUT
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("noise = true", "nois = true", 'system.terms[2].nois: unknown key; did you mean "noise"?'),
+        ("damping = 0.1", "damping = true", "got damping = True; must be a finite number"),
+        ("damping = 0.1", "stiffness = 0.1", "got values of ['stiffness']; must be of ['damping']"),
+        ("[[0, 1], [-1, 0]]", "[[0, 1], [-1]]", "system.terms[0].matrix[1][1]: missing"),
+        ("terms =", "term =", "system.terms: missing; must be a non-empty list of tables with the keys matrix"),
+    ],
+)
+def test_what_is_wrong_with_a_plane_system(tmp_path: Path, old: str, new: str, words: str) -> None:
+    noise = "[noise]\nD0 = 1.0\ntau0 = 0.5\nr0 = 0.95\n"
+    texts = said(tmp_path, PLANE.replace("ORDER", "order = 1").replace(old, new), noise, MOMENTS)
+    assert any(words in text for text in texts)
+
+
+def test_a_chain_from_a_file(tmp_path: Path) -> None:
+    """It has states and no surfaces over (φ, ξ)."""
+    noise = '[noise]\nkind = "markov-chain"\nstates = [-0.5, 0.5]\nrates = [[-1, 1], [1, -1]]\n'
+    path = write(tmp_path, OSCILLATOR, noise, MOMENTS)
+    case = load_case(path)
+    assert case.noise == MarkovChain.telegraph(0.5, 1.0)
+    assert case.oscillator == VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
+    assert solved(path, tmp_path / "out")
+    assert not list((tmp_path / "out/kinds").glob("*.pvd"))
