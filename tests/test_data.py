@@ -451,7 +451,7 @@ def test_parameters():
     values = Problem(strong, UNIT_NOISE).values
     assert values["oscillator.omega"] == 2.0
     assert {"noise.alpha": 1.0, "noise.sigma": 1.0}.items() <= values.items()
-    plane = fpsolve.PlaneSystem(strong.drives, strong.kicks, epsilon=0.5)
+    plane = fpsolve.PlaneSystem(strong.terms, strong.jumps, epsilon=0.5)
     assert Problem(plane, UNIT_NOISE).values["system.epsilon"] == 0.5
     assert Problem(plane, UNIT_NOISE).noise_quantity.unit == "unknown"
 

@@ -134,15 +134,15 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     space, system = pair.space, pair.generator.problem.system
     growth = _density(_of_zero(pair), "adjoint").mean(lambda phi, xi: growth_rate(system, xi)(phi))
     table = space.table(pair.left)
-    for kick in system.kicks:
-        at = space.phi.vertices_at(kick.phase)
+    for jump in system.jumps:
+        at = space.phi.vertices_at(jump.phase)
         for traces, direction in ((space.phi.left_trace[at], 1), (space.phi.right_trace[at], -1)):
 
-            def flux(xi: Any, phi: float = kick.phase, sign: int = direction) -> Any:
+            def flux(xi: Any, phi: float = jump.phase, sign: int = direction) -> Any:
                 return np.maximum(sign * phase_speed(system, xi)(phi), 0)
 
             density = np.sum(traces @ table, axis=0)
-            growth += space.turns * kick.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant))
+            growth += space.turns * jump.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant))
     return growth
 
 

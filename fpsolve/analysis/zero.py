@@ -201,7 +201,7 @@ class Quantity:
         keys, system = [axis.key for axis in axes], problem.system
         loss = f"{system.section}.{system.impact_parameter}"
         is_affine = (
-            zero.p == 0 and loss in keys and not any(problem.derivative(key).kicks for key in keys if key != loss)
+            zero.p == 0 and loss in keys and not any(problem.derivative(key).jumps for key in keys if key != loss)
         )  # ln R changes with one of them
         self._bounce = keys.index(loss) if is_affine else None
         self._solved: dict[float, dict[float, Sample]] = {}
@@ -221,7 +221,7 @@ class Quantity:
         if self._bounce is None:
             return self._sample(at, problem)
         known = self._solved.setdefault(float(at[1 - self._bounce]), {})
-        log_factor = problem.system.kicks[0].log_factor
+        log_factor = problem.system.jumps[0].log_factor
         if len(known) < 2 and log_factor not in known:
             known[log_factor] = self._sample(at, problem)
         return known[log_factor] if log_factor in known else self._between(at, problem, log_factor, known, self._bounce)
@@ -246,7 +246,7 @@ class Quantity:
         (first, one), (second, other) = known.items()
         share = (log_factor - first) / (second - first)
         gradient = one.gradient + share * (other.gradient - one.gradient)
-        [rise] = problem.derivative(self._axes[bounce].key).kicks
+        [rise] = problem.derivative(self._axes[bounce].key).jumps
         impacts = (other.value - one.value) / (second - first)
         gradient[bounce] = impacts * rise * self._axes[bounce].slope(float(at[bounce]))
         value = one.value + share * (other.value - one.value)

@@ -92,7 +92,7 @@ def _obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_existence: b
     try:
         problem = base.at(varied)
         with np.errstate(all="ignore"):
-            factors = [math.exp(each * kick.log_factor) for kick in problem.system.kicks for each in extremes]
+            factors = [math.exp(each * jump.log_factor) for jump in problem.system.jumps for each in extremes]
             theory = second_order_or_none(problem)
             sizes = np.array([*factors, *([] if theory is None else [*theory.scale.moment(p), theory.stability_index])])
     except ValueError as error:

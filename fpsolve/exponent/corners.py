@@ -81,16 +81,16 @@ def corners(problem: Problem, p: float, center: float | None = None) -> list[Cor
         center: about the mean z of the tilted density; None for that where slow noise carries the moment.
     """
     noise, system = problem.noise, problem.system
-    kicks = [kick for kick in system.kicks if kick.log_factor and not is_steady(system, kick)]
-    if not kicks or noise.has_states or (frozen := frozen_noise(problem)) is None:
+    jumps = [jump for jump in system.jumps if jump.log_factor and not is_steady(system, jump)]
+    if not jumps or noise.has_states or (frozen := frozen_noise(problem)) is None:
         return []
     center = frozen.center(p) if center is None else center
     unit, ends = noise.standard_deviation, _interval(noise, center)
     inside = noise.half_width / unit - AT_END
     found = [
-        Corner(kick.phase, float(xi) / unit, math.exp(p * kick.log_factor), min(abs(p), 1.0))
-        for kick in kicks
-        for xi in turning_noise(system, kick, unit * np.clip(ends, -inside, inside))
+        Corner(jump.phase, float(xi) / unit, math.exp(p * jump.log_factor), min(abs(p), 1.0))
+        for jump in jumps
+        for xi in turning_noise(system, jump, unit * np.clip(ends, -inside, inside))
     ]
     places = np.array([center, *(corner.z for corner in found)])
     logs = noise.log_density(unit * places) + 2 * frozen.tilt(center) * places

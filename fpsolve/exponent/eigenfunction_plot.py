@@ -63,7 +63,7 @@ def surface_of(pair: PrincipalPair, field: str) -> Surface:
     nodes, noise = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity
     unit = quantity.unit if name == "right" else density_unit(noise)
     about = {"phi": PHASE.attributes, "xi": noise.attributes, "values": {**quantity.attributes, "units": unit}}
-    rays = {(kick.phase + turn) % (2 * math.pi) for kick in problem.system.kicks for turn in (0, math.pi)}
+    rays = {(jump.phase + turn) % (2 * math.pi) for jump in problem.system.jumps for turn in (0, math.pi)}
     return Surface(
         phi=nodes.phi,
         xi=nodes.unit * nodes.z,

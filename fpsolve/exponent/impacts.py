@@ -49,7 +49,7 @@ def impact_rate(solver: ExponentSolver) -> Estimate | Absent:
     Raises:
         NotConverged: it is not resolved.
     """
-    count = len(solver.problem.system.kicks)
+    count = len(solver.problem.system.jumps)
     if count != 1:
         return Absent(Message(Code.NOT_ONE_RAY, count=count or None))
     value, better = map(_flux, solver.at_zero)
@@ -91,7 +91,7 @@ def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
         return log
     if log.value > 0:
         # λ is affine in ln R, and 0 at ln R_c
-        lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.kicks[0].log_factor)
+        lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[0].log_factor)
         return Absent(Message(Code.ALWAYS_STABLE, value=lossless))
     value = system.impact_value(log.value)
     if value <= 0:
@@ -103,8 +103,8 @@ def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
 
 def _flux(pair: PrincipalPair) -> float:
     """⟨T*, ∂L′(0)/∂ ln R 1⟩ of a pair at p = 0."""
-    (kick,) = pair.generator.problem.system.kicks
-    load = pair.generator.changed(ParameterDerivative(kick.log_factor, kicks=(1.0,)), 0.0, derivative=1)
+    (jump,) = pair.generator.problem.system.jumps
+    load = pair.generator.changed(ParameterDerivative(jump.log_factor, jumps=(1.0,)), 0.0, derivative=1)
     return float(pair.left @ (load @ pair.right) / (pair.left @ pair.space.weighed(pair.right)))
 
 
@@ -115,7 +115,7 @@ def _critical_log_factor(solver: ExponentSolver) -> Estimate | Absent:
         return rate
     if rate.value <= rate.error_estimate:
         return Absent(Message(Code.RARE_IMPACTS, most=rate.value + rate.error_estimate))
-    exponent, own = solver.lyapunov_exponent(), solver.problem.system.kicks[0].log_factor
+    exponent, own = solver.lyapunov_exponent(), solver.problem.system.jumps[0].log_factor
     change = exponent.value / rate.value
     size = abs(own) + max(abs(change), exponent.scale / rate.value)
     error = (exponent.error_estimate + abs(change) * rate.error_estimate) / (rate.value - rate.error_estimate)

@@ -64,14 +64,14 @@ def first_far(problem: Problem, place: Place, rtol: float) -> Discretisation:
 
 
 def _phase(system: System, xi: FloatArray, digits: float, more: int = 0) -> PhaseCells:
-    """Equal cells on a half circle from one kick to where it comes again, and a line at every other kick.
+    """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
 
     There are more where the speed of the phase changes much for some of the ξ.
     """
     speed = phase_speed(system, xi)
     widest = float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
     cells = (8 if widest > 1 else 4 if widest > 0.5 else 2) + more
-    rays = [kick.phase for kick in system.kicks] or [math.pi / 2]
+    rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
     lines = rays[0] + np.linspace(0, math.pi, cells + 1)
     others = rays[0] + np.mod(np.array(rays[1:]) - rays[0], math.pi)
     near = np.min(np.abs(lines[1:-1, None] - others[None]), axis=1, initial=math.inf) < 0.3 * math.pi / cells

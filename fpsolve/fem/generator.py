@@ -52,7 +52,7 @@ class Generator:
         chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
     Raises:
-        MeshError: there is no φ-line at a kick, or a cell's polynomials in the noise cannot be told apart.
+        MeshError: there is no φ-line at a jump, or a cell's polynomials in the noise cannot be told apart.
     """
 
     def __init__(self, problem: Problem, chosen: Discretisation | CylinderMesh) -> None:
@@ -62,8 +62,8 @@ class Generator:
         self.phi = chosen.phase.axis()
         self._spaces: dict[float, TensorSpace] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
-        for kick in problem.system.kicks:
-            self.phi.vertices_at(kick.phase)
+        for jump in problem.system.jumps:
+            self.phi.vertices_at(jump.phase)
         self.space(0.0)  # refuses a mesh that cannot be used
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -147,20 +147,20 @@ class Generator:
         """Whether ⟨P_s, L₀T⟩ = 0 for every T: no path is killed, and the order 0 only rotates uniformly."""
         if self.chosen.is_killed:
             return False
-        free = [drive for drive in self.problem.system.drives if drive.order == 0]
-        return all(drive.h.amplitude == 0 and drive.q.vanishes for drive in free)
+        free = [term for term in self.problem.system.terms if term.order == 0]
+        return all(term.h.amplitude == 0 and term.q.vanishes for term in free)
 
     def upper_bound(self, p: float) -> float:
-        """A number right of Λ(p): the growth rate of E exp ∫ f(ξ) dt, f the supremum over φ of p q and of the kicks.
+        """A number right of Λ(p): the growth rate of E exp ∫ f(ξ) dt, f the supremum over φ of p q and of the jumps.
 
-        The kicks are spread evenly over φ. Where states of a chain move the phase over a ray to and fro, each jump
-        between them may bring a kick more.
+        The jumps are spread evenly over φ. Where states of a chain move the phase over a ray to and fro, each jump
+        between them may bring a jump more.
         """
         system, noise, space = self.problem.system, self.problem.noise, self.space(p)
 
         def fastest(xi: Any) -> Any:
             q, speed = growth_rate(system, xi), phase_speed(system, xi)
-            gains = sum(max(0.0, p * kick.log_factor) for kick in system.kicks)
+            gains = sum(max(0.0, p * jump.log_factor) for jump in system.jumps)
             return p * q.mean + abs(p) * q.amplitude + gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
 
         if space.xi.size > MOST_FOR_A_BOUND:
@@ -168,7 +168,7 @@ class Generator:
         else:
             driven = space.xi.matrix(None) + space.xi.mass(fastest)
             growth = float(np.max(scipy.linalg.eigvals(finite(driven), space.xi.matrix(one)).real))
-        for kick in system.kicks:
-            if noise.largest_jump_rate and crosses_both_ways(system, kick, space.xi.support):
-                growth += noise.largest_jump_rate * math.expm1(max(0.0, p * kick.log_factor))
+        for jump in system.jumps:
+            if noise.largest_jump_rate and crosses_both_ways(system, jump, space.xi.support):
+                growth += noise.largest_jump_rate * math.expm1(max(0.0, p * jump.log_factor))
         return growth

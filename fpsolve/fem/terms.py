@@ -1,12 +1,12 @@
 """The tilted generator L(p) = L₀ + ε L₁ + ε² L₂ of Eq. (19), term by term, in weak form.
 
-For trial T and test w, every integral weighted by P_s(ξ), a drive ε^n g(ξ) A x with h = e′ᵀA e and q = eᵀA e gives
+For trial T and test w, every integral weighted by P_s(ξ), a term ε^n g(ξ) A x with h = e′ᵀA e and q = eᵀA e gives
 
     ∫ P_s ε^n g h w T_φ + p ε^n ∫ P_s g q w T,
 
 and at each φ-vertex the point load ∫ P_s (v {w} − ½θ [w]) [T], with the phase speed v = Σ ε^n g h, the mean {w} and the
 jump [w] = w(φ⁺) − w(φ⁻) of its two traces. θ = |v| is upwinding; for polynomials of ξ, which cannot follow its kink, θ
-is its size for the typical ξ, |Σ ε^n h| over what no noise drives + Σ ε^n |h| (mean of g²)^½ over the rest. A kick
+is its size for the typical ξ, |Σ ε^n h| over what no noise drives + Σ ε^n |h| (mean of g²)^½ over the rest. A jump
 makes the load that of R^p T(φ⁺) − T(φ⁻), on w(φ⁻), as the phase runs forward, or of T(φ⁺) − R^p T(φ⁻), on w(φ⁺): an
 impact is exactly a point load, for which θ must be |v|.
 """
@@ -24,7 +24,7 @@ from scipy.sparse import diags, issparse
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.kronecker import KroneckerSum
-from fpsolve.model.plane import Drive, Harmonics, Kick, System, is_driven, phase_speed, written_coefficient
+from fpsolve.model.plane import CoefficientMatrix, Harmonics, Jump, System, is_driven, phase_speed, written_coefficient
 from fpsolve.model.problem import ParameterDerivative
 
 ALL_ORDERS = slice(None)
@@ -42,7 +42,7 @@ class Power:
 
 
 @dataclass(frozen=True)
-class Jump:
+class JumpPower:
     """The coefficient R^p − 1."""
 
     log_factor: float
@@ -55,7 +55,7 @@ class Jump:
 
 
 @dataclass(frozen=True)
-class JumpSlope:
+class JumpPowerSlope:
     """The coefficient ∂R^p/∂ ln R = p R^p."""
 
     log_factor: float
@@ -67,7 +67,7 @@ class JumpSlope:
         return grown * math.exp(p * log)
 
 
-OfMoment = Power | Jump | JumpSlope
+OfMoment = Power | JumpPower | JumpPowerSlope
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +134,8 @@ class Terms:
         self.phi, self.xi = space.phi, space.axes[noise]
         self._vertices, self._jump = self.phi.lines[:-1], self.phi.right_trace - self.phi.left_trace
         is_exact = np.full(self._vertices.size, self.xi.is_local)  # where θ = |v|
-        for kick in system.kicks:
-            is_exact[self.phi.vertices_at(kick.phase)] = True
+        for ray in system.jumps:
+            is_exact[self.phi.vertices_at(ray.phase)] = True
         speed = phase_speed(system, self.xi.support[:, None])(self._vertices)
         # the sign of v at those of these vertices where it is the same for all ξ, otherwise 0
         direction = np.where(is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0), 0.0)
@@ -150,23 +150,23 @@ class Terms:
     def whole(self) -> Iterator[Term]:
         """L(p) of Eq. (19)."""
         yield self._term(0, Power(0), self.phi.identity, None, "L_ξ, the generator of the noise")
-        for drive in self.system.drives:
-            yield from self._driven(drive)
+        for term in self.system.terms:
+            yield from self._driven(term)
         yield from self._penalties()
-        for kick in self.system.kicks:
-            text = f"(R^p − 1) |dφ/dt| δ(φ − {kick.phase:.6g} mod π), R = {math.exp(kick.log_factor):.6g}"
-            for load, sign in self._loads(kick):
-                size, flux = self._flux(kick, sign)
-                yield self._term(2, Jump(kick.log_factor), size * load, flux, text)
+        for ray in self.system.jumps:
+            text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
+            for load, sign in self._loads(ray):
+                size, flux = self._flux(ray, sign)
+                yield self._term(2, JumpPower(ray.log_factor), size * load, flux, text)
 
     def changed(self, by: ParameterDerivative) -> Iterator[Term]:
-        """∂L(p)/∂θ of the same terms where the motion and its kicks change with θ.
+        """∂L(p)/∂θ of the same terms where the motion and its jumps change with θ.
 
         Where θ is the size of the speed for the typical ξ it is held: [T] = 0 there but for the error of the elements.
         """
-        text, moved = "∂/∂θ", Moved(self.system.epsilon, by.drives)
-        for drive in by.drives:
-            yield from self._driven(drive)
+        text, moved = "∂/∂θ", Moved(self.system.epsilon, by.terms)
+        for term in by.terms:
+            yield from self._driven(term)
         for j in self._two_way:
             yield self._term(
                 0,
@@ -175,24 +175,24 @@ class Terms:
                 self._faster(moved, float(self._vertices[j])),
                 text,
             )
-        for kick, change in zip(self.system.kicks, by.kicks or np.zeros(len(self.system.kicks)), strict=True):
-            for load, sign in self._loads(kick):
+        for ray, change in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
+            for load, sign in self._loads(ray):
                 if change:
-                    size, flux = self._flux(kick, sign)
-                    yield self._term(2, JumpSlope(kick.log_factor), change * size * load, flux, text)
-                if by.drives:
-                    yield self._term(2, Jump(kick.log_factor), load, self._more_flux(moved, kick, sign), text)
+                    size, flux = self._flux(ray, sign)
+                    yield self._term(2, JumpPowerSlope(ray.log_factor), change * size * load, flux, text)
+                if by.terms:
+                    yield self._term(2, JumpPower(ray.log_factor), load, self._more_flux(moved, ray, sign), text)
 
-    def _driven(self, drive: Drive) -> Iterator[Term]:
+    def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h ∂φ with the loads at the φ-vertices, and p q."""
-        size, text = self.system.epsilon**drive.order, _prefix(drive)
-        if not drive.h.vanishes:
-            loads = self._trace.T @ _rows(drive.h(self._vertices), self._jump)
-            along = size * (self.phi.convection(drive.h) + loads)
-            yield self._term(drive.order, Power(0), along, drive.g, f"{text}{_written(drive.h)} ∂φ")
-        if not drive.q.vanishes:
-            along = size * self.phi.mass(drive.q)
-            yield self._term(drive.order, Power(1), along, drive.g, f"p {text}{_written(drive.q)}")
+        size, text = self.system.epsilon**term.order, _prefix(term)
+        if not term.h.vanishes:
+            loads = self._trace.T @ _rows(term.h(self._vertices), self._jump)
+            along = size * (self.phi.convection(term.h) + loads)
+            yield self._term(term.order, Power(0), along, term.g, f"{text}{_written(term.h)} ∂φ")
+        if not term.q.vanishes:
+            along = size * self.phi.mass(term.q)
+            yield self._term(term.order, Power(1), along, term.g, f"p {text}{_written(term.q)}")
 
     def _penalties(self) -> Iterator[Term]:
         """−½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|."""
@@ -208,20 +208,20 @@ class Terms:
         xi, constant = self.xi, self.xi.constant
         total = constant @ (xi.matrix(one) @ constant)
         steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
-        for drive in self.system.drives:
-            speed = self.system.epsilon**drive.order * drive.h(self._vertices)
-            if not is_driven(drive.g):
-                steady += float(drive.g(0.0)) * speed
+        for term in self.system.terms:
+            speed = self.system.epsilon**term.order * term.h(self._vertices)
+            if not is_driven(term.g):
+                steady += float(term.g(0.0)) * speed
             else:
-                square = xi.mass(lambda xi, g=drive.g: g(xi) ** 2)
+                square = xi.mass(lambda xi, g=term.g: g(xi) ** 2)
                 driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
         return np.asarray(abs(steady) + driven)
 
-    def _loads(self, kick: Kick) -> Iterator[tuple[Any, int]]:
-        """A kick's loads beyond continuity: w(φ⁻) T(φ⁺) where the phase runs forward, 1, else w(φ⁺) T(φ⁻), −1."""
-        at = self.phi.vertices_at(kick.phase)
+    def _loads(self, ray: Jump) -> Iterator[tuple[Any, int]]:
+        """A jump's loads beyond continuity: w(φ⁻) T(φ⁺) where the phase runs forward, 1, else w(φ⁺) T(φ⁻), −1."""
+        at = self.phi.vertices_at(ray.phase)
         left, right = self.phi.left_trace[at], self.phi.right_trace[at]
-        speed = self._speed(kick.phase)(self.xi.support)
+        speed = self._speed(ray.phase)(self.xi.support)
         for load, sign in ((left.T @ right, 1), (right.T @ left, -1)):
             if np.any(sign * speed > 0):
                 yield load, sign
@@ -238,18 +238,18 @@ class Terms:
         """∂|dφ/dt|/∂θ at φ."""
         return lambda xi: np.sign(phase_speed(self.system, xi)(phi)) * phase_speed(moved, xi)(phi)
 
-    def _flux(self, kick: Kick, sign: int) -> tuple[float, Coefficient]:
-        """max(± dφ/dt, 0) at a kick: a number, times a function of ξ."""
-        at = self._speed(kick.phase)
+    def _flux(self, ray: Jump, sign: int) -> tuple[float, Coefficient]:
+        """max(± dφ/dt, 0) at the ray of a jump: a number, times a function of ξ."""
+        at = self._speed(ray.phase)
         speed = at(self.xi.support)
         if np.ptp(speed) <= 1e-12 * np.max(np.abs(speed)):
             return abs(float(speed[0])), one
         return 1.0, lambda xi: np.maximum(sign * at(xi), 0)
 
-    def _more_flux(self, moved: Moved, kick: Kick, sign: int) -> Coefficient:
+    def _more_flux(self, moved: Moved, ray: Jump, sign: int) -> Coefficient:
         """Its ∂/∂θ."""
-        at = self._speed(kick.phase)
-        return lambda xi: np.where(sign * at(xi) > 0, sign * phase_speed(moved, xi)(kick.phase), 0.0)
+        at = self._speed(ray.phase)
+        return lambda xi: np.where(sign * at(xi) > 0, sign * phase_speed(moved, xi)(ray.phase), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,8 +257,8 @@ class Moved(System):
     """∂/∂θ of a motion, as a motion."""
 
     epsilon: float
-    drives: tuple[Drive, ...]
-    kicks: tuple[Kick, ...] = ()
+    terms: tuple[CoefficientMatrix, ...]
+    jumps: tuple[Jump, ...] = ()
 
 
 def _rows(factors: FloatArray, matrix: Any) -> Any:
@@ -271,9 +271,9 @@ def power_of_epsilon(order: int) -> str:
     return "ε" if order == 1 else "ε" + str(order).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-def _prefix(drive: Drive) -> str:
+def _prefix(term: CoefficientMatrix) -> str:
     """ε^n g(ξ)."""
-    return (f"{power_of_epsilon(drive.order)} " if drive.order else "") + written_coefficient(drive.g)
+    return (f"{power_of_epsilon(term.order)} " if term.order else "") + written_coefficient(term.g)
 
 
 def _written(harmonics: Harmonics) -> str:

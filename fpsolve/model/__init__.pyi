@@ -6,8 +6,8 @@ from .noises.non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .noises.non_gaussian import ReducedNoise as ReducedNoise
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .noises.sine_wiener import SineWiener as SineWiener
-from .plane import Drive as Drive
-from .plane import Kick as Kick
+from .plane import CoefficientMatrix as CoefficientMatrix
+from .plane import Jump as Jump
 from .plane import System as System
 from .problem import Problem as Problem
 from .systems.plane_system import PlaneSystem as PlaneSystem

@@ -10,6 +10,7 @@ dφ = h dt and d ln a = q dt with h = e′ᵀA e, q = eᵀA e, e′ = de/dφ: a 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -137,7 +138,7 @@ def is_driven(g: Constant | Linear | Function) -> bool:
 
 
 @dataclass(frozen=True)
-class Drive:
+class CoefficientMatrix:
     """One term of the motion, ε^order g(ξ) A x.
 
     Args:
@@ -176,7 +177,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Kick:
+class Jump:
     """x⁺ = R x⁻ where the phase passes φ or φ + π, in either direction.
 
     Args:
@@ -206,21 +207,33 @@ class System(Parametrised):
 
     Attributes:
         epsilon: ε.
-        drives: the terms of the motion, one at least.
-        kicks: the rays at which the state is stretched.
+        terms: the terms of the motion, one at least.
+        jumps: the rays at which the state is stretched.
         noise_unit: the unit of ξ.
-        impact_parameter: the name of a parameter that is in ln R of the only kick and nowhere else; empty for none.
+        impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
     """
 
     section: ClassVar[str] = "system"
     noise_unit: ClassVar[str] = "unknown"
     impact_parameter: ClassVar[str] = ""
     epsilon: float
-    drives: Sequence[Drive]
-    kicks: Sequence[Kick]
+    terms: Sequence[CoefficientMatrix]
+    jumps: Sequence[Jump]
 
-    def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
-        """∂/∂θ of the sum of the drives, as drives, and ∂ ln R/∂θ of every kick, nothing where none changes."""
+    @property
+    def drives(self) -> Sequence[CoefficientMatrix]:
+        """Deprecated: `terms`."""
+        warnings.warn("drives are called terms now", DeprecationWarning, stacklevel=2)
+        return self.terms
+
+    @property
+    def kicks(self) -> Sequence[Jump]:
+        """Deprecated: `jumps`."""
+        warnings.warn("kicks are called jumps now", DeprecationWarning, stacklevel=2)
+        return self.jumps
+
+    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
+        """∂/∂θ of the sum of the terms, as terms, and ∂ ln R/∂θ of every jump, nothing where none changes."""
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
 
     @classmethod
@@ -233,7 +246,7 @@ class System(Parametrised):
         return None
 
     def impact_value(self, log_factor: float) -> float:
-        """The value of the `impact_parameter` for which the kick has a given ln R; it may be out of range."""
+        """The value of the `impact_parameter` for which the jump has a given ln R; it may be out of range."""
         raise NotImplementedError
 
     def impact_slope(self, log_factor: float) -> float:
@@ -241,66 +254,65 @@ class System(Parametrised):
         raise NotImplementedError
 
 
-def by_epsilon(system: System) -> tuple[Drive, ...]:
-    """∂/∂ε of Σ ε^n g(ξ) A x, as drives."""
+def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:
+    """∂/∂ε of Σ ε^n g(ξ) A x, as terms."""
     return tuple(
-        Drive(drive.order - 1, (drive.order * np.array(drive.matrix)).tolist(), drive.g)
-        for drive in system.drives
-        if drive.order
+        CoefficientMatrix(term.order - 1, (term.order * np.array(term.matrix)).tolist(), term.g)
+        for term in system.terms
+        if term.order
     )
 
 
 def matrix_at(system: System, xi: ArrayLike, orders: slice = slice(None)) -> FloatArray:
-    """A(ξ) = Σ ε^n g(ξ) A over the drives of some orders, shape (*ξ.shape, 2, 2)."""
+    """A(ξ) = Σ ε^n g(ξ) A over the terms of some orders, shape (*ξ.shape, 2, 2)."""
     xi = np.asarray(xi, dtype=float)
     total = np.zeros((*xi.shape, 2, 2))
-    wanted = range(1 + max(drive.order for drive in system.drives))[orders]
-    for drive in system.drives:
-        if drive.order in wanted:
-            total += system.epsilon**drive.order * drive.g(xi)[..., None, None] * np.array(drive.matrix)
+    wanted = range(1 + max(term.order for term in system.terms))[orders]
+    for term in system.terms:
+        if term.order in wanted:
+            total += system.epsilon**term.order * term.g(xi)[..., None, None] * np.array(term.matrix)
     return total
 
 
 def phase_speed(system: System, xi: ArrayLike) -> Harmonics:
     """dφ/dt at ξ as a function of φ: in Eq. (17) ω + ε h₁ξ + ε² h₂."""
-    return _total(system, [drive.h for drive in system.drives], xi)
+    return _total(system, [term.h for term in system.terms], xi)
 
 
 def growth_rate(system: System, xi: ArrayLike) -> Harmonics:
     """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
-    return _total(system, [drive.q for drive in system.drives], xi)
+    return _total(system, [term.q for term in system.terms], xi)
 
 
-def crosses_both_ways(system: System, kick: Kick, xi: ArrayLike) -> bool:
-    """Whether the phase passes the ray of a kick forward for some of the ξ and backward for others."""
-    speed = phase_speed(system, xi)(kick.phase)
+def crosses_both_ways(system: System, jump: Jump, xi: ArrayLike) -> bool:
+    """Whether the phase passes the ray of a jump forward for some of the ξ and backward for others."""
+    speed = phase_speed(system, xi)(jump.phase)
     return bool(np.min(speed) < 0 < np.max(speed))
 
 
-def is_steady(system: System, kick: Kick) -> bool:
-    """Whether no noise changes the speed of the phase at the ray of a kick, but for rounding."""
+def is_steady(system: System, jump: Jump) -> bool:
+    """Whether no noise changes the speed of the phase at the ray of a jump, but for rounding."""
     return all(
-        not is_driven(drive.g) or abs(float(drive.h(kick.phase))) <= 1e-12 * drive.h.amplitude
-        for drive in system.drives
+        not is_driven(term.g) or abs(float(term.h(jump.phase))) <= 1e-12 * term.h.amplitude for term in system.terms
     )
 
 
-def turning_noise(system: System, kick: Kick, ends: FloatArray) -> FloatArray:
-    """The ξ between two ends for which the phase turns at the ray of a kick, from forward to backward or back."""
+def turning_noise(system: System, jump: Jump, ends: FloatArray) -> FloatArray:
+    """The ξ between two ends for which the phase turns at the ray of a jump, from forward to backward or back."""
     xi = np.linspace(ends[0], ends[1], SAMPLES)
-    backward = phase_speed(system, xi)(kick.phase) < 0
+    backward = phase_speed(system, xi)(jump.phase) < 0
     at = np.flatnonzero(backward[1:] != backward[:-1])
 
     def speed(xi: float) -> float:
-        return float(phase_speed(system, xi)(kick.phase))
+        return float(phase_speed(system, xi)(jump.phase))
 
     return np.array([brentq(speed, xi[i], xi[i + 1], xtol=1e-14, rtol=1e-14) for i in at])
 
 
 def _total(system: System, parts: Sequence[Harmonics], xi: ArrayLike) -> Harmonics:
-    """Σ ε^n g(ξ) of the harmonics of all drives."""
+    """Σ ε^n g(ξ) of the harmonics of all terms."""
     xi = np.asarray(xi, dtype=float)
-    sizes = [system.epsilon**drive.order * drive.g(xi) for drive in system.drives]
+    sizes = [system.epsilon**term.order * term.g(xi) for term in system.terms]
     return Harmonics(
         *(
             sum((size * getattr(part, name) for size, part in zip(sizes, parts, strict=True)), start=np.zeros_like(xi))
@@ -324,14 +336,14 @@ def angular_frequency(system: System) -> float:
     square = float(squared_frequency(a))
     if square > 0:
         return math.sqrt(square)
-    sizes = [system.epsilon**drive.order * float(np.linalg.norm(drive.matrix)) for drive in system.drives]
+    sizes = [system.epsilon**term.order * float(np.linalg.norm(term.matrix)) for term in system.terms]
     return float(np.linalg.norm(a)) or max(sizes) or 1.0
 
 
 def noise_strength(system: System) -> float:
     """Σ ε^n |b| max|q| over g = a + bξ, b = 1 for other g: d ln a/dt for ξ = 1; for the paper's oscillator ε."""
     total = 0.0
-    for drive in system.drives:
-        slope = abs((affine(drive.g) or (0.0, 1.0))[1])
-        total += slope * system.epsilon**drive.order * float(abs(drive.q.mean) + drive.q.amplitude)
+    for term in system.terms:
+        slope = abs((affine(term.g) or (0.0, 1.0))[1])
+        total += slope * system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
     return total

@@ -17,7 +17,7 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import Parameter, Parametrised
-from fpsolve.model.plane import Drive, System, crosses_both_ways
+from fpsolve.model.plane import CoefficientMatrix, System, crosses_both_ways
 from fpsolve.model.quantity import NOISE, Quantity
 
 P = ParamSpec("P")
@@ -32,14 +32,14 @@ class ParameterDerivative:
 
     Attributes:
         theta: the value of θ.
-        drives: Σ ε^n g(ξ) A x of these is ∂/∂θ of the motion.
-        kicks: ∂ ln R/∂θ of each of the kicks of the motion; empty where none changes.
+        terms: Σ ε^n g(ξ) A x of these is ∂/∂θ of the motion.
+        jumps: ∂ ln R/∂θ of each of the jumps of the motion; empty where none changes.
         noise: that of the noise; None where it does not change.
     """
 
     theta: float
-    drives: tuple[Drive, ...] = ()
-    kicks: tuple[float, ...] = ()
+    terms: tuple[CoefficientMatrix, ...] = ()
+    jumps: tuple[float, ...] = ()
     noise: NoiseDerivative | None = None
 
 
@@ -112,8 +112,8 @@ class Problem:
         theta = float(self.values[key])
         if section == self.noise.section:
             return ParameterDerivative(theta, noise=self.noise.derivative(name))
-        drives, kicks = self.system.derivative(name)
-        return ParameterDerivative(theta, drives, kicks)
+        terms, jumps = self.system.derivative(name)
+        return ParameterDerivative(theta, terms, jumps)
 
     def derivatives(self) -> Mapping[str, ParameterDerivative]:
         """∂/∂θ by all of the `differentiable` parameters, by their keys."""
@@ -185,12 +185,12 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     """
     noise, system = problem.noise, problem.system
     noise.check_existence(p)
-    if not any(p * kick.log_factor > math.log(2.0) for kick in system.kicks):
+    if not any(p * jump.log_factor > math.log(2.0) for jump in system.jumps):
         return
     xi, most = noise.reached, math.e if noise.has_states else 2.0
-    for kick in system.kicks:
-        if p * kick.log_factor > math.log(most) and crosses_both_ways(system, kick, xi):
-            raise NoSuchExponent(Message(Code.INFINITE_ON_RAY, p=p, phase=kick.phase, factor=most))
+    for jump in system.jumps:
+        if p * jump.log_factor > math.log(most) and crosses_both_ways(system, jump, xi):
+            raise NoSuchExponent(Message(Code.INFINITE_ON_RAY, p=p, phase=jump.phase, factor=most))
 
 
 def checked_moment(p: Any, problem: Problem) -> float:

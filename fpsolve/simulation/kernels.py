@@ -72,7 +72,7 @@ def _drawn_by_its_kind(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no
 @_compiled
 def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
     """The mean and the end of the noise in one step that begins at `xi`, see `Noise.step`."""
-    _draw(step, xi, xi_mean, xi_end, push, rng)
+    _draw(step, xi, xi_mean, xi_end, push, rng)  # type: ignore[no-untyped-call]
 
 
 @_inlined

@@ -23,13 +23,13 @@ FURTHEST = 1e12
 def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, Any]:
     """Growth rates of ln ‖x‖ at ξ, that of the faster mode first, and whether the phase turns.
 
-    Where A(ξ) has real eigenvalues they are the rates; where the phase turns, their common real part and the kicks,
+    Where A(ξ) has real eigenvalues they are the rates; where the phase turns, their common real part and the jumps,
     each once in half a turn.
     """
     a = matrix_at(problem.system, xi)
     half, square = 0.5 * (a[..., 0, 0] + a[..., 1, 1]), squared_frequency(a)
     root, turns = np.sqrt(np.abs(square)), square > 0
-    turning = half + root / math.pi * sum(kick.log_factor for kick in problem.system.kicks)
+    turning = half + root / math.pi * sum(jump.log_factor for jump in problem.system.jumps)
     larger = half + np.copysign(root, half)  # in size; the other one from the determinant, without cancellation
     determinant = a[..., 0, 0] * a[..., 1, 1] - a[..., 0, 1] * a[..., 1, 0]
     other = np.divide(determinant, larger, out=np.zeros_like(larger), where=larger != 0)

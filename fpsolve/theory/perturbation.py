@@ -119,28 +119,28 @@ def second_order(problem: Problem) -> SecondOrder:
     """
     system, noise = problem.system, problem.noise
     frame, omega = _rotating_frame(system)
-    terms: list[float] = []
+    parts: list[float] = []
     driven = np.zeros((2, 2))
-    for drive in system.drives:
-        offset, slope = affine(drive.g) or (math.nan, math.nan)
-        if drive.order == 1 and offset == 0:
-            driven += slope * np.array(drive.matrix)
-        elif drive.order != 1 and slope == 0:
-            terms.append(offset * system.epsilon**drive.order * _growth(drive.matrix, frame).mean)
-        elif not (drive.order >= 2 and offset == 0):
+    for term in system.terms:
+        offset, slope = affine(term.g) or (math.nan, math.nan)
+        if term.order == 1 and offset == 0:
+            driven += slope * np.array(term.matrix)
+        elif term.order != 1 and slope == 0:
+            parts.append(offset * system.epsilon**term.order * _growth(term.matrix, frame).mean)
+        elif not (term.order >= 2 and offset == 0):
             raise NoPerturbationTheory(
-                f"perturbation theory is for motions whose noise enters as epsilon xi; a drive of order {drive.order} "
-                f"with g = {written_coefficient(drive.g).strip() or 1} is not of that form"
+                f"perturbation theory is for motions whose noise enters as epsilon xi; a term of order {term.order} "
+                f"with g = {written_coefficient(term.g).strip() or 1} is not of that form"
             )
     if abs(noise.mean) > 1e-12 * noise.standard_deviation:
         raise NoPerturbationTheory(f"perturbation theory is for noise of mean 0, but it has {noise.mean:g}")
     q, strength = _growth(driven, frame), system.epsilon**2 * noise.spectral_density(2 * omega)
-    half_turns, log_factors = omega / math.pi, [kick.second_order for kick in system.kicks]
-    terms += [half_turns * log_factor for log_factor in log_factors]
-    terms.append(strength / 2 * q.amplitude**2)
+    half_turns, log_factors = omega / math.pi, [jump.second_order for jump in system.jumps]
+    parts += [half_turns * log_factor for log_factor in log_factors]
+    parts.append(strength / 2 * q.amplitude**2)
     at_rest = system.epsilon**2 * noise.spectral_density(0.0)
     quadratic = float(at_rest / 2 * q.mean**2 + strength / 4 * q.amplitude**2)
-    return SecondOrder(tuple(map(float, terms)), quadratic, half_turns, float(sum(log_factors)))
+    return SecondOrder(tuple(map(float, parts)), quadratic, half_turns, float(sum(log_factors)))
 
 
 def second_order_or_none(problem: Problem) -> SecondOrder | None:
@@ -178,25 +178,25 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
 
 
 def scale_of(problem: Problem) -> Scale:
-    """The scale of Λ(p): of perturbation theory, or where that does not apply of norms of the drives."""
+    """The scale of Λ(p): of perturbation theory, or where that does not apply of norms of the terms."""
     theory = second_order_or_none(problem)
     return _rough_scale(problem) if theory is None else theory.scale
 
 
 def _rough_scale(problem: Problem) -> Scale:
-    """Constant drives by the largest |q|, noise of strength c by c min(1, c τ), kicks once in a half-turn."""
+    """Constant terms by the largest |q|, noise of strength c by c min(1, c τ), jumps once in a half-turn."""
     system, noise = problem.system, problem.noise
     steady, driven = 0.0, 0.0
-    for drive in system.drives:
-        size = system.epsilon**drive.order * float(abs(drive.q.mean) + drive.q.amplitude)
-        if not is_driven(drive.g):
-            steady += abs(float(drive.g(0.0))) * size
+    for term in system.terms:
+        size = system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
+        if not is_driven(term.g):
+            steady += abs(float(term.g(0.0))) * size
         else:
-            typical = np.asarray(drive.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
+            typical = np.asarray(term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
             driven += size * float(np.sqrt(np.mean(typical**2)))
-    kicks = sum(abs(kick.log_factor) for kick in system.kicks) * angular_frequency(system) / math.pi
+    jumps = sum(abs(jump.log_factor) for jump in system.jumps) * angular_frequency(system) / math.pi
     driven *= min(1.0, driven * noise.correlation_time)
-    return Scale(steady + kicks + driven, driven)
+    return Scale(steady + jumps + driven, driven)
 
 
 def _growth(matrix: Any, frame: FloatArray) -> Harmonics:

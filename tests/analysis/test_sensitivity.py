@@ -8,7 +8,7 @@ from fpsolve.analysis.sensitivity import SMALL_P, sensitivities
 from fpsolve.arrays import identity
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.plane import Drive
+from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.systems.vibro_impact import DAMPING
 from tests.conftest import sampled
 from tests.oracles import moment_hierarchy, phase_fraction
@@ -144,7 +144,7 @@ def test_against_the_moment_hierarchy():
     def known(at):
         oscillator, noise = parts(at)
         relaxation, force = phase_fraction._noise(oscillator, noise, 40, 0.0)
-        free = moment_hierarchy.rates_of_monomials(oscillator.drives[0].matrix, 2)
+        free = moment_hierarchy.rates_of_monomials(oscillator.terms[0].matrix, 2)
         total = np.kron(relaxation, np.eye(3)) + np.kron(np.eye(40), free)
         total += np.kron(force, moment_hierarchy.rates_of_monomials(DAMPING, 2))
         return float(np.max(np.linalg.eigvals(total).real))
@@ -208,10 +208,12 @@ def test_a_motion_of_ones_own():
     noise = OrnsteinUhlenbeck(alpha=1.0, sigma=0.8)
 
     def value(epsilon):
-        system = PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity)], epsilon=epsilon)
+        system = PlaneSystem(
+            [CoefficientMatrix(0, rotation), CoefficientMatrix(1, stiffness, identity)], epsilon=epsilon
+        )
         return ExponentSolver(Problem(system, noise), rtol=RTOL).pair(2.0).value
 
-    system = PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity)], epsilon=0.6)
+    system = PlaneSystem([CoefficientMatrix(0, rotation), CoefficientMatrix(1, stiffness, identity)], epsilon=0.6)
     [found] = sensitivities(system, noise, 2.0, rtol=RTOL).moments
     expected = (value(0.6 + 1e-4) - value(0.6 - 1e-4)) / 2e-4
     assert found["system.epsilon"].value == pytest.approx(expected, rel=1e-6)

@@ -15,16 +15,16 @@ from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick
+from fpsolve.model.plane import CoefficientMatrix, Jump
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from tests.conftest import sampled
 from tests.oracles import two_way_rays
 
 ROTATION, STIFFNESS = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))
-FREE, DRIVEN = Drive(0, ROTATION), Drive(1, STIFFNESS, identity)
+FREE, DRIVEN = CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, STIFFNESS, identity)
 NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
-SYSTEM = PlaneSystem([FREE, DRIVEN], [Kick(0.4, math.log(0.8))])
+SYSTEM = PlaneSystem([FREE, DRIVEN], [Jump(0.4, math.log(0.8))])
 PROBLEM = Problem(SYSTEM, NOISE)
 TURN = -math.sqrt(2) / math.cos(0.4) ** 2
 """z at which dφ/dt = 1 + ξ cos² φ is 0 at the ray, ξ = z/√2."""
@@ -35,12 +35,10 @@ def best(p):
     return ExponentSolver(PROBLEM, rtol=3e-8 if p > 0 else 1e-7).solution(p)
 
 
-def waves(drives):
+def waves(terms):
     """h and q of a system without and with the noise, as tuples."""
     return tuple(
-        tuple(
-            tuple(float(getattr(getattr(drive, name), part)) for part in ("mean", "cosine", "sine")) for drive in drives
-        )
+        tuple(tuple(float(getattr(getattr(term, name), part)) for part in ("mean", "cosine", "sine")) for term in terms)
         for name in ("h", "q")
     )
 
@@ -55,8 +53,8 @@ def test_corners_lie_where_the_phase_turns_at_the_ray():
     "problem",
     [
         Problem(SYSTEM, MarkovChain.telegraph(2.0, 1.0)),
-        Problem(replace(SYSTEM, kicks=[Kick(0.4, 0.0)]), NOISE),
-        Problem(replace(SYSTEM, kicks=[Kick(math.pi / 2, -0.2)]), NOISE),  # dφ/dt = 1 there
+        Problem(replace(SYSTEM, jumps=[Jump(0.4, 0.0)]), NOISE),
+        Problem(replace(SYSTEM, jumps=[Jump(math.pi / 2, -0.2)]), NOISE),  # dφ/dt = 1 there
         Problem(replace(SYSTEM, epsilon=0.1), NOISE),  # seventeen standard deviations away
     ],
 )
@@ -71,23 +69,23 @@ def test_the_order_of_convergence():
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "kicks", "noise", "size"),
+    ("stiffness", "jumps", "noise", "size"),
     sampled(
         (STIFFNESS, [(0.4, math.log(0.8))], NOISE, (60, 120)),
         (((0.1, 0.3), (-1.2, 0.2)), [(1.1, -0.3), (2.7, 0.2)], OrnsteinUhlenbeck(alpha=1.5, sigma=1.1), (70, 140)),
     ),
 )
-def test_the_exponent_of_a_density_that_is_smooth(stiffness, kicks, noise, size):
-    drives = [FREE, Drive(1, stiffness, identity)]
+def test_the_exponent_of_a_density_that_is_smooth(stiffness, jumps, noise, size):
+    terms = [FREE, CoefficientMatrix(1, stiffness, identity)]
     expected, coarse = (
         two_way_rays.lyapunov_exponent(
-            *waves(drives), kicks, alpha=noise.alpha, std=noise.standard_deviation, harmonics=k, polynomials=n
+            *waves(terms), jumps, alpha=noise.alpha, std=noise.standard_deviation, harmonics=k, polynomials=n
         )
         for k, n in (size, (2 * size[0] // 3, 2 * size[1] // 3))
     )
     assert abs(expected - coarse) < 1e-10
     for rtol in (1e-4, 1e-6):
-        problem = Problem(PlaneSystem(drives, [Kick(*kick) for kick in kicks]), noise)
+        problem = Problem(PlaneSystem(terms, [Jump(*jump) for jump in jumps]), noise)
         found = ExponentSolver(problem, rtol=rtol).lyapunov_exponent()
         assert abs(found.value - expected) <= found.error_estimate + 1e-10
 
@@ -96,10 +94,10 @@ def test_the_exponent_of_a_density_that_is_smooth(stiffness, kicks, noise, size)
 @pytest.mark.parametrize("distance", [1e-14, 1e-5, 1e-3])
 def test_corners_that_are_close(distance):
     """At φ₀ and π − φ₀ the phase turns for the same noise: lines of ξ would be too close for numbers."""
-    kicks = [(0.4, -0.2), (math.pi - 0.4 + distance, 0.15)]
-    problem = Problem(replace(SYSTEM, kicks=[Kick(*kick) for kick in kicks]), NOISE)
+    jumps = [(0.4, -0.2), (math.pi - 0.4 + distance, 0.15)]
+    problem = Problem(replace(SYSTEM, jumps=[Jump(*jump) for jump in jumps]), NOISE)
     expected = two_way_rays.lyapunov_exponent(
-        *waves(SYSTEM.drives), kicks, alpha=1.0, std=math.sqrt(0.5), harmonics=50, polynomials=100
+        *waves(SYSTEM.terms), jumps, alpha=1.0, std=math.sqrt(0.5), harmonics=50, polynomials=100
     )
     found = ExponentSolver(problem, rtol=1e-7).lyapunov_exponent()
     assert abs(found.value - expected) <= found.error_estimate < 1e-7
@@ -112,7 +110,7 @@ def test_moments_by_finite_volumes(p):
     near = ExponentSolver(PROBLEM, rtol=1e-6).solution(p)
     coarse, fine = (
         two_way_rays.moment_lyapunov(
-            *waves(SYSTEM.drives),
+            *waves(SYSTEM.terms),
             (0.4, math.log(0.8)),
             p,
             alpha=1.0,
@@ -138,7 +136,7 @@ def test_other_noise_has_corners_too(noise):
     """A system stretched by an unstretched one: λ is affine in ln R, and for p = 0 nothing else is singular."""
     values = []
     for log in (-0.2, 0.1, 0.0):
-        problem = Problem(replace(SYSTEM, kicks=[Kick(0.4, log)]), noise)
+        problem = Problem(replace(SYSTEM, jumps=[Jump(0.4, log)]), noise)
         assert bool(corners(problem, -0.5)) == (log != 0)
         found = ExponentSolver(problem, rtol=1e-6).lyapunov_exponent()
         values.append((found.value, found.error_estimate))
@@ -159,7 +157,7 @@ def test_corners_near_the_end_of_the_noise(excess):
 
 @pytest.mark.parametrize("phase", sampled(-1e-12, 0.0, math.pi, 3 * math.pi / 4 - 2 * math.pi))
 def test_cells_are_never_thin_by_rounding(phase):
-    problem = Problem(replace(SYSTEM, kicks=[Kick(phase, math.log(0.8))]), NOISE)
+    problem = Problem(replace(SYSTEM, jumps=[Jump(phase, math.log(0.8))]), NOISE)
     chosen = ExponentSolver(problem, rtol=1e-6).solution(1.0).pair.generator.chosen
     assert np.diff(chosen.noise.lines).min() > 1e-3
     assert np.diff(chosen.phase.lines).min() > 1e-6
@@ -168,7 +166,7 @@ def test_cells_are_never_thin_by_rounding(phase):
 @pytest.mark.slow
 def test_a_mesh_of_ones_own():
     """The error is larger than what a higher degree changes."""
-    problem = Problem(replace(SYSTEM, kicks=[Kick(3 * math.pi / 4, math.log(0.8))]), NOISE)
+    problem = Problem(replace(SYSTEM, jumps=[Jump(3 * math.pi / 4, math.log(0.8))]), NOISE)
     given = make_mesh(phi_cells=8, phi_degree=8, xi_cells=16, xi_degree=8)
     found = ExponentSolver(problem, given).solution(1.0)
     best = ExponentSolver(problem, rtol=1e-6).solution(1.0)

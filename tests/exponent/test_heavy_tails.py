@@ -24,7 +24,7 @@ from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.places import is_far_out
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.model import Drive
+from fpsolve.model import CoefficientMatrix
 from fpsolve.theory import far_places, frozen_noise
 from fpsolve.theory.far import grows_far_out, variance_tail
 from tests.conftest import sampled
@@ -193,7 +193,10 @@ def test_a_given_mesh_is_warned_of():
 def test_what_cannot_be_reached_is_refused():
     """Noise in the stiffness, with damping: at ξ → ∞ ‖x‖ falls at the rate of the damping, however far out."""
     rotation, stiffness, damping = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, -0.4))
-    system = PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity), Drive(2, damping)], epsilon=0.8)
+    system = PlaneSystem(
+        [CoefficientMatrix(0, rotation), CoefficientMatrix(1, stiffness, identity), CoefficientMatrix(2, damping)],
+        epsilon=0.8,
+    )
     case = Problem(system, NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1))
     assert grows_far_out(case)
     with pytest.raises(NotConverged, match=r"at least 0\.0128, as much as paths grow that hold the noise beyond"):

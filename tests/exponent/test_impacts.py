@@ -18,7 +18,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick, crosses_both_ways
+from fpsolve.model.plane import CoefficientMatrix, Jump, crosses_both_ways
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -120,7 +120,7 @@ def test_a_motion_that_is_stable_without_loss_has_no_critical_restitution(law):
     gain = critical_impact_factor(each)
     assert gain.value > 1
     gaining = solver(
-        PlaneSystem(STRONG.drives[:2] + replace(STRONG, c1=-0.5).drives[2:], [Kick(math.pi / 2, math.log(gain.value))]),
+        PlaneSystem(STRONG.terms[:2] + replace(STRONG, c1=-0.5).terms[2:], [Jump(math.pi / 2, math.log(gain.value))]),
         each.problem.noise,
     )
     assert gaining.lyapunov_exponent().value == pytest.approx(0, abs=1e-7)
@@ -138,8 +138,12 @@ def test_a_motion_that_no_loss_makes_stable_has_no_critical_restitution():
 
 def test_the_telegraph_with_a_wall():
     """Reference values of λ with and without the wall, which tests of chains have, by independent computations."""
-    drives = [Drive(0, ROTATION), Drive(1, ((0.0, 0.0), (-1.0, 0.0)), identity), Drive(0, ((0.0, 0.0), (0.0, -0.1)))]
-    walled = PlaneSystem(drives, [Kick(math.pi / 2, math.log(0.9))])
+    terms = [
+        CoefficientMatrix(0, ROTATION),
+        CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), identity),
+        CoefficientMatrix(0, ((0.0, 0.0), (0.0, -0.1))),
+    ]
+    walled = PlaneSystem(terms, [Jump(math.pi / 2, math.log(0.9))])
     each = solver(walled, MarkovChain.telegraph(amplitude=0.5, rate=1.0), rtol=1e-11)
     rate = (-0.0659526129896 + 0.0329794566817) / math.log(0.9)
     assert impact_rate(each).value == pytest.approx(rate, abs=1e-11)
@@ -149,10 +153,13 @@ def test_the_telegraph_with_a_wall():
 
 @pytest.mark.parametrize("turn", [1.0, -1.0])
 def test_crossings_of_a_ray_that_noise_acts_on_count_in_both_directions(turn):
-    drives = [Drive(0, ((0.0, turn), (-turn, 0.0))), Drive(1, ((0.4, 0.2), (0.9, -0.7)), identity)]
-    systems = [PlaneSystem(drives, [Kick(0.7, log)]) for log in (-0.1, 0.2)]
+    terms = [
+        CoefficientMatrix(0, ((0.0, turn), (-turn, 0.0))),
+        CoefficientMatrix(1, ((0.4, 0.2), (0.9, -0.7)), identity),
+    ]
+    systems = [PlaneSystem(terms, [Jump(0.7, log)]) for log in (-0.1, 0.2)]
     noise = MarkovChain((-2.0, 0.1, 1.7), ((0, 1.0, 0.4), (0.7, 0, 0.3), (0.2, 0.9, 0)))
-    assert crosses_both_ways(systems[0], systems[0].kicks[0], np.array(noise.states))
+    assert crosses_both_ways(systems[0], systems[0].jumps[0], np.array(noise.states))
     solvers = [solver(system, noise) for system in systems]
     low, high = (each.lyapunov_exponent().value for each in solvers)
     for each in solvers:
@@ -161,7 +168,7 @@ def test_crossings_of_a_ray_that_noise_acts_on_count_in_both_directions(turn):
 
 @pytest.mark.parametrize(("count", "words"), [(0, "no rays"), (2, "2 rays")])
 def test_impacts_on_no_ray_or_several_have_no_rate(count, words):
-    system = PlaneSystem(STRONG.drives, [Kick(phase, -0.1) for phase in (0.4, 1.5)[:count]])
+    system = PlaneSystem(STRONG.terms, [Jump(phase, -0.1) for phase in (0.4, 1.5)[:count]])
     absent = impact_rate(solver(system, GAUSSIAN))
     assert not absent
     assert words in absent.reason

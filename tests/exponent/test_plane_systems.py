@@ -16,7 +16,7 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick, matrix_at
+from fpsolve.model.plane import CoefficientMatrix, Jump, matrix_at
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -24,11 +24,15 @@ from tests.conftest import UNIT_NOISE
 from tests.oracles import moment_hierarchy
 
 
-def oscillator(omega=1.0, b=0.05, kicks=(), epsilon=1.0):
+def oscillator(omega=1.0, b=0.05, jumps=(), epsilon=1.0):
     """ẍ + 2bẋ + (ω² + ε ξ) x = 0 in (x, ẋ/ω)."""
     rotation, stiffness = ((0.0, omega), (-omega, 0.0)), ((0.0, 0.0), (-1 / omega, 0.0))
     damping = ((0.0, 0.0), (0.0, -2 * b))
-    return PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity), Drive(0, damping)], kicks, epsilon)
+    return PlaneSystem(
+        [CoefficientMatrix(0, rotation), CoefficientMatrix(1, stiffness, identity), CoefficientMatrix(0, damping)],
+        jumps,
+        epsilon,
+    )
 
 
 TELEGRAPH = MarkovChain.telegraph(amplitude=0.5, rate=1.0)
@@ -50,7 +54,7 @@ def test_telegraph_noise_in_the_stiffness():
 
 def test_telegraph_noise_with_a_wall():
     """A wall that keeps 0.9 of the speed; λ = λ₀ + N ln R, N the impacts per time."""
-    walled = Problem(oscillator(kicks=[Kick(math.pi / 2, math.log(0.9))]), TELEGRAPH)
+    walled = Problem(oscillator(jumps=[Jump(math.pi / 2, math.log(0.9))]), TELEGRAPH)
     solver = ExponentSolver(walled, rtol=1e-11)
     assert solver.lyapunov_exponent().value == pytest.approx(-0.0659526129896, abs=1e-12)
     assert furstenberg_khasminskii(solver.pair(0.0)) == pytest.approx(-0.0659526129896, abs=1e-10)
@@ -65,7 +69,10 @@ def random_problem(rng):
     turn = rng.uniform(0.5, 3)
     rotation = np.array([[0, turn], [-turn, 0]]) + rng.uniform(-0.3, 0.3, (2, 2))
     return Problem(
-        PlaneSystem([Drive(0, rotation), Drive(1, rng.uniform(-1, 1, (2, 2)), identity)], epsilon=rng.uniform(0.1, 1)),
+        PlaneSystem(
+            [CoefficientMatrix(0, rotation), CoefficientMatrix(1, rng.uniform(-1, 1, (2, 2)), identity)],
+            epsilon=rng.uniform(0.1, 1),
+        ),
         noise,
     )
 
@@ -83,7 +90,9 @@ def test_random_chains_against_their_exact_moment_equations(seed):
 def test_motions_that_do_not_turn(seed):
     """Order 0 is any matrix, so that the phase may rest where nothing drives it."""
     rng = np.random.default_rng(seed)
-    system = PlaneSystem([Drive(0, rng.uniform(-1, 1, (2, 2))), Drive(1, rng.uniform(-1, 1, (2, 2)), identity)])
+    system = PlaneSystem(
+        [CoefficientMatrix(0, rng.uniform(-1, 1, (2, 2))), CoefficientMatrix(1, rng.uniform(-1, 1, (2, 2)), identity)]
+    )
     problem = Problem(system, MarkovChain.telegraph(rng.uniform(0.3, 1), rng.uniform(0.5, 3)))
     result = moment_lyapunov(problem, [2.0], rtol=1e-9)
     assert result.value[0] == pytest.approx(exact(problem, 2), abs=max(3 * result.error_estimate[0], 1e-10))
@@ -93,7 +102,9 @@ def test_states_that_hardly_mix_give_the_larger_exponent():
     """Each state alone would do, with a positive eigenfunction of its own as far as rounding can tell."""
     for order in (1, -1):
         chain = MarkovChain((0.4 * order, -0.2 * order), ((0, 1e-9), (1e-9, 0)))
-        growth = PlaneSystem([Drive(0, ((0.0, 1.0), (-1.0, 0.0))), Drive(1, ((1.0, 0.0), (0.0, 1.0)), identity)])
+        growth = PlaneSystem(
+            [CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))), CoefficientMatrix(1, ((1.0, 0.0), (0.0, 1.0)), identity)]
+        )
         assert moment_lyapunov(Problem(growth, chain), [2.0]).value[0] == pytest.approx(0.8 if order > 0 else 0.4, 1e-6)
 
 
@@ -128,43 +139,47 @@ def test_gaussian_noise_in_the_stiffness_against_its_moment_equations():
 
 def test_the_choice_of_coordinates_does_not_matter():
     """x → S x changes h and q, the mesh and the wall's ray, but not Λ."""
-    base = Problem(oscillator(kicks=[Kick(math.pi / 2, math.log(0.9))]), TELEGRAPH)
+    base = Problem(oscillator(jumps=[Jump(math.pi / 2, math.log(0.9))]), TELEGRAPH)
     change = np.array([[1.0, 0.3], [-0.4, 1.2]])
     inverse = np.linalg.inv(change)
-    drives = [Drive(drive.order, change @ np.array(drive.matrix) @ inverse, drive.g) for drive in base.system.drives]
+    terms = [
+        CoefficientMatrix(term.order, change @ np.array(term.matrix) @ inverse, term.g) for term in base.system.terms
+    ]
     ray = change @ np.array([math.cos(math.pi / 2), -math.sin(math.pi / 2)])
-    kicks = [Kick(math.atan2(-ray[1], ray[0]), math.log(0.9))]
-    other = Problem(PlaneSystem(drives, kicks), TELEGRAPH)
+    jumps = [Jump(math.atan2(-ray[1], ray[0]), math.log(0.9))]
+    other = Problem(PlaneSystem(terms, jumps), TELEGRAPH)
     values = [moment_lyapunov(problem, [-1.0, 2.0], rtol=1e-10).value for problem in (base, other)]
     np.testing.assert_allclose(values[0], values[1], atol=1e-10)
 
 
 def test_a_kick_on_a_ray_where_noise_moves_the_phase():
     """The wall in another place: the phase may pass it in both directions. λ by the flux through the ray is Λ′(0)."""
-    system = oscillator(kicks=[Kick(0.4, math.log(0.8))])
+    system = oscillator(jumps=[Jump(0.4, math.log(0.8))])
     strong = Problem(system, MarkovChain.telegraph(amplitude=1.8, rate=0.7))
     pair = ExponentSolver(strong, rtol=1e-10).pair(0.0)
     assert furstenberg_khasminskii(pair) == pytest.approx(pair.derivative, abs=1e-10)
     free = Problem(oscillator(), strong.noise)
     for p in (-0.5, 1.0):  # a stretch by 1 is none
-        still = Problem(oscillator(kicks=[Kick(0.4, 0.0)]), strong.noise)
+        still = Problem(oscillator(jumps=[Jump(0.4, 0.0)]), strong.noise)
         values = [moment_lyapunov(problem, [p], rtol=1e-10).value[0] for problem in (free, still)]
         assert values[0] == pytest.approx(values[1], abs=1e-9)
 
 
 def test_several_kicks():
     """With a rotation alone every half-turn passes each ray once: Λ = p ω Σ ln R/π."""
-    kicks = [Kick(phase, math.log(R)) for phase, R in ((0.3, 0.9), (1.1, 0.7), (2.9, 1.2))]
-    system = PlaneSystem([Drive(0, ((0.0, 2.0), (-2.0, 0.0))), Drive(1, np.zeros((2, 2)), identity)], kicks)
+    jumps = [Jump(phase, math.log(R)) for phase, R in ((0.3, 0.9), (1.1, 0.7), (2.9, 1.2))]
+    system = PlaneSystem(
+        [CoefficientMatrix(0, ((0.0, 2.0), (-2.0, 0.0))), CoefficientMatrix(1, np.zeros((2, 2)), identity)], jumps
+    )
     result = moment_lyapunov(Problem(system, TELEGRAPH), [-1.0, 2.0], rtol=1e-10)
     wanted = np.array([-1.0, 2.0]) * 2.0 * math.log(0.9 * 0.7 * 1.2) / math.pi
     np.testing.assert_allclose(result.value, wanted, rtol=1e-10)
 
 
 def test_the_paper_from_its_parts():
-    """A `PlaneSystem` of the oscillator's drives and kicks is the oscillator, to the last bit."""
+    """A `PlaneSystem` of the oscillator's terms and jumps is the oscillator, to the last bit."""
     paper = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5)
-    parts = PlaneSystem(paper.drives, paper.kicks, paper.epsilon)
+    parts = PlaneSystem(paper.terms, paper.jumps, paper.epsilon)
     values = [moment_lyapunov(Problem(system, UNIT_NOISE), [1.0, 2.0]).value for system in (paper, parts)]
     assert np.array_equal(*values)
 
@@ -206,13 +221,13 @@ ROTATION = ((0.0, 1.0), (-1.0, 0.0))
 
 
 def test_slow_noise_is_sought_on_both_sides():
-    """Symmetric noise does not know the sign of its drive: the far place may lie at ξ < 0 although p > 0."""
+    """Symmetric noise does not know the sign of its term: the far place may lie at ξ < 0 although p > 0."""
     noise = OrnsteinUhlenbeck(alpha=0.05, sigma=0.05)
     values = []
     for sign in (1, -1):
-        driven = Drive(1, ((0.0, 0.0), (0.0, sign * 1.0)), identity)
-        drives = [Drive(0, ROTATION), driven, Drive(2, ((0.0, 0.0), (0.0, 0.1)))]
-        system = PlaneSystem(drives, [Kick(math.pi / 2, math.log(0.8))])
+        driven = CoefficientMatrix(1, ((0.0, 0.0), (0.0, sign * 1.0)), identity)
+        terms = [CoefficientMatrix(0, ROTATION), driven, CoefficientMatrix(2, ((0.0, 0.0), (0.0, 0.1)))]
+        system = PlaneSystem(terms, [Jump(math.pi / 2, math.log(0.8))])
         values.append(moment_lyapunov(Problem(system, noise), [2.0]).value[0])
     assert values[0] == pytest.approx(values[1], rel=1e-7)
     assert values[0] == pytest.approx(1.12906, rel=1e-4)  # populations: 1.12902 ± 2e-5
@@ -220,12 +235,14 @@ def test_slow_noise_is_sought_on_both_sides():
 
 def test_a_ray_that_is_crossed_to_and_fro():
     """T lives at the ray: with k jumps in unit time each brings R^p or R^−p, Λ = k (cosh(p ln R) − 1) but for e^−2π…"""
-    system = PlaneSystem([Drive(0, ROTATION, identity)], [Kick(0.3, 0.5)])
+    system = PlaneSystem([CoefficientMatrix(0, ROTATION, identity)], [Jump(0.3, 0.5)])
     result = moment_lyapunov(Problem(system, MarkovChain.telegraph(1.0, 5.0)), [2.0])
     assert result.value[0] == pytest.approx(5 * (math.cosh(1.0) - 1), rel=1e-6)
     with pytest.raises(NoSuchExponent, match=r"to and fro over the ray at 0\.3"):
         moment_lyapunov(Problem(system, MarkovChain.telegraph(1.0, 50.0)), [4.0])
-    moved = PlaneSystem([Drive(0, ROTATION), Drive(1, ((0.0, 0.0), (-1.0, 0.0)), identity)], [Kick(0.4, 0.5)])
+    moved = PlaneSystem(
+        [CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), identity)], [Jump(0.4, 0.5)]
+    )
     with pytest.raises(NoSuchExponent, match="is infinite or out of reach"):
         moment_lyapunov(Problem(moved, UNIT_NOISE), [1.5])
 
@@ -233,7 +250,9 @@ def test_a_ray_that_is_crossed_to_and_fro():
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 def test_a_ray_that_all_matrices_keep(rtol):
     """On x₂ = 0 the growth is 0.3 for ever, and no other motion grows faster in the mean."""
-    system = PlaneSystem([Drive(0, ((0.3, 1.0), (0.0, -0.5))), Drive(1, ((0.0, 0.0), (0.0, 1.0)), identity)])
+    system = PlaneSystem(
+        [CoefficientMatrix(0, ((0.3, 1.0), (0.0, -0.5))), CoefficientMatrix(1, ((0.0, 0.0), (0.0, 1.0)), identity)]
+    )
     result = moment_lyapunov(Problem(system, MarkovChain.telegraph(1.0, 1.0)), [1.0], rtol=rtol)
     assert result.value[0] == pytest.approx(0.3, abs=1e-6)
 
@@ -248,13 +267,13 @@ def cube(xi):
 
 def test_fast_elliptic_rotation_does_not_hide_the_principal_eigenvalue():
     """A wrong eigenvalue has eigenfunctions of nearly one sign on a coarse mesh and on a finer one."""
-    drives = [
-        Drive(0, ((0.742, -1.834), (-0.300, 1.384))),
-        Drive(0, ((0.0, -1.5), (1.0, 0.3))),
-        Drive(0, ((-1.719, -0.581), (-1.235, -1.086)), square),
-        Drive(3, ((-1.172, 1.896), (-1.741, 1.163)), cube),
+    terms = [
+        CoefficientMatrix(0, ((0.742, -1.834), (-0.300, 1.384))),
+        CoefficientMatrix(0, ((0.0, -1.5), (1.0, 0.3))),
+        CoefficientMatrix(0, ((-1.719, -0.581), (-1.235, -1.086)), square),
+        CoefficientMatrix(3, ((-1.172, 1.896), (-1.741, 1.163)), cube),
     ]
     chain = MarkovChain((-2.466, -1.282, -3.378), ((0, 3.053, 0), (0, 0, 1.328), (1.661, 0, 0)))
-    problem = Problem(PlaneSystem(drives, epsilon=1.5), chain)
+    problem = Problem(PlaneSystem(terms, epsilon=1.5), chain)
     for rtol in (1e-7, 1e-8):
         assert moment_lyapunov(problem, [4.0], rtol=rtol).value[0] == pytest.approx(exact(problem, 4), rel=1e-6)

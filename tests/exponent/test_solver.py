@@ -14,7 +14,7 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Harmonics
+from fpsolve.model.plane import CoefficientMatrix, Harmonics
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
@@ -110,12 +110,12 @@ def test_without_noise_only_the_impacts_are_left(p, law):
 @pytest.mark.parametrize("restitution", [1.0, 0.8])
 def test_decoupled_phase_is_exactly_quadratic(monkeypatch, restitution, p):
     """h ≡ 0: Λ = p(ε²c₁/2 + ω ln R/π) + p²ε²(2S(0) + S(2ω))/16 for any ε."""
-    turning = Drive.h.func
+    turning = CoefficientMatrix.h.func
 
-    def h(drive):
-        return turning(drive) if drive.order == 0 else Harmonics(0.0, 0.0, 0.0)
+    def h(term):
+        return turning(term) if term.order == 0 else Harmonics(0.0, 0.0, 0.0)
 
-    monkeypatch.setattr(Drive, "h", property(h))
+    monkeypatch.setattr(CoefficientMatrix, "h", property(h))
     noise = OrnsteinUhlenbeck(alpha=1.5, sigma=0.8)
     oscillator = VibroImpactOscillator(omega=1.2, restitution=restitution, c1=0.2, epsilon=0.4)
     mesh = make_mesh(phi_cells=2, phi_degree=16, xi_cells=6, xi_degree=12, xi_min=-9, xi_max=9)

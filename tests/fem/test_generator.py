@@ -10,10 +10,10 @@ from fpsolve.exponent.eigen import spectrum
 from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.fem.terms import Jump, Power
+from fpsolve.fem.terms import JumpPower, Power
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.plane import Drive
+from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -100,17 +100,17 @@ def cube(xi):
 def test_noise_may_enter_by_any_function():
     chain = MarkovChain((-1.0, 0.5), ((0, 1), (1, 0)))
     matrix = ((0.1, 0.2), (0.3, -0.4))
-    rotation = Drive(0, ((0.0, 1.0), (-1.0, 0.0)))
+    rotation = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))
     mesh = make_mesh(phi_cells=3)
     mesh = replace(mesh, z_lines=[])
-    cubed = Generator(Problem(PlaneSystem([rotation, Drive(1, matrix, cube)]), chain), mesh)
+    cubed = Generator(Problem(PlaneSystem([rotation, CoefficientMatrix(1, matrix, cube)]), chain), mesh)
     direct = MarkovChain((-1.0, 0.125), chain.rates)
-    plain = Generator(Problem(PlaneSystem([rotation, Drive(1, matrix, identity)]), direct), mesh)
+    plain = Generator(Problem(PlaneSystem([rotation, CoefficientMatrix(1, matrix, identity)]), direct), mesh)
     assert_same(cubed.matrix(1.5), plain.matrix(1.5).toarray())
     assert "cube(ξ)" in str(cubed)
 
 
-@pytest.mark.parametrize("coefficient", [Power(0), Power(1), Power(2), Power(3), Jump(-0.2), Jump(0.0)])
+@pytest.mark.parametrize("coefficient", [Power(0), Power(1), Power(2), Power(3), JumpPower(-0.2), JumpPower(0.0)])
 @pytest.mark.parametrize("derivative", [0, 1, 2])
 def test_coefficients_and_their_derivatives(coefficient, derivative):
     p, h = 1.3, 1e-4

@@ -14,7 +14,7 @@ from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.terms import Terms, TermSum
-from fpsolve.model.plane import Drive
+from fpsolve.model.plane import CoefficientMatrix
 from tests.oracles import two_noises
 
 ROTATION, STIFFNESS, DAMPING = ((0.0, 1.0), (-1.0, -0.1)), ((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, -1.0))
@@ -22,12 +22,12 @@ NOISES = OrnsteinUhlenbeck(alpha=1.0, sigma=0.3), OrnsteinUhlenbeck(alpha=0.7, s
 
 
 def pencil(p, cells=4, degree=8, count=11):
-    """L(p) of ẍ + (0.1 + ξ₂)ẋ + (1 + ξ₁)x = 0: what ξ₁ drives with the rotation, and what ξ₂ drives."""
+    """L(p) of ẍ + (0.1 + ξ₂)ẋ + (1 + ξ₁)x = 0: what ξ₁ terms with the rotation, and what ξ₂ terms."""
     lines = np.linspace(np.pi / 2, 3 * np.pi / 2, cells + 1)
     phase = PhaseAxis(lines, np.full(cells, degree))
     space = TensorSpace([phase, *(PolynomialAxis(noise, count) for noise in NOISES)])
-    first = PlaneSystem([Drive(0, ROTATION), Drive(1, STIFFNESS, identity)])
-    second = PlaneSystem([Drive(1, DAMPING, identity)])
+    first = PlaneSystem([CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, STIFFNESS, identity)])
+    second = PlaneSystem([CoefficientMatrix(1, DAMPING, identity)])
     terms = [*Terms(first, space, 1).whole(), *Terms(second, space, 2).whole()]
     return Pencil(p, space, TermSum(terms).matrix(space, p))
 

@@ -18,7 +18,7 @@ from fpsolve import (
 )
 from fpsolve.arrays import Constant, Linear
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import Drive, Kick, ReducedNoise, noise_kind, system_kind
+from fpsolve.model import CoefficientMatrix, Jump, ReducedNoise, noise_kind, system_kind
 from fpsolve.model.kinds import NOISES, SYSTEMS
 from fpsolve.model.plane import affine, coefficient, is_driven
 from fpsolve.theory.perturbation import second_order
@@ -45,7 +45,9 @@ def scaled(xi, size):
 
 
 def driven(g, matrix=STIFFNESS):
-    return PlaneSystem([Drive(0, ROTATION), Drive(0, DAMPING), Drive(1, matrix, g)], epsilon=0.3)
+    return PlaneSystem(
+        [CoefficientMatrix(0, ROTATION), CoefficientMatrix(0, DAMPING), CoefficientMatrix(1, matrix, g)], epsilon=0.3
+    )
 
 
 @pytest.mark.parametrize(
@@ -67,10 +69,18 @@ def test_any_callable_is_the_coefficient_that_it_computes(g):
 def test_a_constant_function_is_no_noise_and_a_factor_is_one():
     """g = 2ξ is g = ξ with twice the matrix, g = 3 a constant with three times the matrix."""
     own = PlaneSystem(
-        [Drive(0, ROTATION), Drive(0, DAMPING, lambda xi: 3.0), Drive(1, STIFFNESS, lambda xi: 2 * xi)], epsilon=0.3
+        [
+            CoefficientMatrix(0, ROTATION),
+            CoefficientMatrix(0, DAMPING, lambda xi: 3.0),
+            CoefficientMatrix(1, STIFFNESS, lambda xi: 2 * xi),
+        ],
+        epsilon=0.3,
     )
     triple, double = (np.multiply(k, a).tolist() for k, a in ((3, DAMPING), (2, STIFFNESS)))
-    plain = PlaneSystem([Drive(0, ROTATION), Drive(0, triple), Drive(1, double, Linear())], epsilon=0.3)
+    plain = PlaneSystem(
+        [CoefficientMatrix(0, ROTATION), CoefficientMatrix(0, triple), CoefficientMatrix(1, double, Linear())],
+        epsilon=0.3,
+    )
     one, other = (Problem(each, NOISE) for each in (own, plain))
     assert second_order(one).moment_exponent(2.0) == pytest.approx(second_order(other).moment_exponent(2.0), rel=1e-14)
     assert ExponentSolver(one).scale(2.0) == pytest.approx(ExponentSolver(other).scale(2.0), rel=1e-14)
@@ -98,17 +108,32 @@ def test_what_is_affine(g, line):
     assert is_driven(coefficient(g)) == (line is None or line[1] != 0)
 
 
+def test_former_names_warn():
+    from fpsolve import model
+
+    with pytest.warns(DeprecationWarning, match="Drive is called CoefficientMatrix now"):
+        assert model.Drive is CoefficientMatrix
+    with pytest.warns(DeprecationWarning, match="drives are called terms now"):
+        system = PlaneSystem(drives=[CoefficientMatrix(0, ROTATION)])
+    with pytest.warns(DeprecationWarning, match="kicks are called jumps now"):
+        assert system.kicks == ()
+    with pytest.warns(DeprecationWarning, match="drives are called terms now"):
+        assert system.drives == system.terms
+
+
 def test_no_function_is_refused():
     with pytest.raises(TypeError, match=r"got g = 3\.0; must be a function of xi"):
-        Drive(0, ROTATION, 3.0)
+        CoefficientMatrix(0, ROTATION, 3.0)
 
 
 def pendulum(omega, damping, loss):
     """Powers and a wall, so that no derivative is that of a linear function."""
-    free = Drive(0, ((0.0, omega), (-omega, 0.0)))
-    return [free, Drive(0, ((0.0, 0.0), (0.0, -(damping**2)))), Drive(1, STIFFNESS, Linear())], [
-        Kick(math.pi / 2, math.log(1 - loss))
-    ]
+    free = CoefficientMatrix(0, ((0.0, omega), (-omega, 0.0)))
+    return [
+        free,
+        CoefficientMatrix(0, ((0.0, 0.0), (0.0, -(damping**2)))),
+        CoefficientMatrix(1, STIFFNESS, Linear()),
+    ], [Jump(math.pi / 2, math.log(1 - loss))]
 
 
 def test_derivatives_by_named_parameters():
@@ -137,10 +162,14 @@ def test_sensitivities_to_named_parameters_are_differences():
 
 
 def test_terms_that_carry_their_parameters():
-    terms = [("", Drive(0, ROTATION)), ("c", Drive(0, ((0.0, 0.0), (0.0, -1.0)))), ("s", Drive(1, STIFFNESS, Linear()))]
+    terms = [
+        ("", CoefficientMatrix(0, ROTATION)),
+        ("c", CoefficientMatrix(0, ((0.0, 0.0), (0.0, -1.0)))),
+        ("s", CoefficientMatrix(1, STIFFNESS, Linear())),
+    ]
     system = PlaneSystem.of_terms(terms, c=0.2, s=1.0, epsilon=0.3)
     assert moment_lyapunov(system, NOISE, 2.0).value[0] == moment_lyapunov(driven(Linear()), NOISE, 2.0).value[0]
-    assert system.at({"c": 0.5}).drives[1].matrix == ((0.0, 0.0), (0.0, -0.5))
+    assert system.at({"c": 0.5}).terms[1].matrix == ((0.0, 0.0), (0.0, -0.5))
     assert dict(system.at({"epsilon": 0.1}).values) == {"epsilon": 0.1, "c": 0.2, "s": 1.0}
     assert pickle.loads(pickle.dumps(system)) == system
     with pytest.raises(ValueError, match=r"got values of \['c'\]; must be of \['c', 's'\]"):

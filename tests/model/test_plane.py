@@ -7,7 +7,7 @@ import pytest
 
 from fpsolve.arrays import identity
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick, angular_frequency, growth_rate, matrix_at, phase_speed
+from fpsolve.model.plane import CoefficientMatrix, Jump, angular_frequency, growth_rate, matrix_at, phase_speed
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator, h1, q1
@@ -18,11 +18,11 @@ ROTATION = ((0.0, 1.3), (-1.3, 0.0))
 
 def test_h_and_q_of_any_matrix(rng):
     matrix = rng.normal(size=(2, 2))
-    drive = Drive(1, matrix)
+    term = CoefficientMatrix(1, matrix)
     e = np.stack([np.cos(PHI), -np.sin(PHI)])
     turned = np.stack([-np.sin(PHI), -np.cos(PHI)])
-    np.testing.assert_allclose(drive.q(PHI), np.einsum("in,ij,jn->n", e, matrix, e), atol=1e-14)
-    np.testing.assert_allclose(drive.h(PHI), np.einsum("in,ij,jn->n", turned, matrix, e), atol=1e-14)
+    np.testing.assert_allclose(term.q(PHI), np.einsum("in,ij,jn->n", e, matrix, e), atol=1e-14)
+    np.testing.assert_allclose(term.h(PHI), np.einsum("in,ij,jn->n", turned, matrix, e), atol=1e-14)
 
 
 def test_the_papers_functions_follow_from_its_matrices():
@@ -37,14 +37,16 @@ def test_the_papers_functions_follow_from_its_matrices():
     np.testing.assert_allclose(phase_speed(oscillator, xi)(PHI), speed, atol=1e-14)
     growth = 0.3 * q1(PHI) * xi + 0.3**2 * oscillator.q2(PHI)
     np.testing.assert_allclose(growth_rate(oscillator, xi)(PHI), growth, atol=1e-14)
-    (kick,) = oscillator.kicks
-    assert (kick.phase, kick.log_factor) == (math.pi / 2, oscillator.log_impact_factor)
+    (jump,) = oscillator.jumps
+    assert (jump.phase, jump.log_factor) == (math.pi / 2, oscillator.log_impact_factor)
     assert angular_frequency(oscillator) == 1.3
 
 
 def test_polar_form_against_the_motion_itself(rng):
     """A small step of ẋ = A x moves φ by h dt and ln a by q dt."""
-    system = PlaneSystem([Drive(0, ROTATION), Drive(1, rng.normal(size=(2, 2)), identity)], epsilon=0.7)
+    system = PlaneSystem(
+        [CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, rng.normal(size=(2, 2)), identity)], epsilon=0.7
+    )
     xi, phi, dt = 0.9, 2.1, 1e-6
     x = np.array([math.cos(phi), -math.sin(phi)])
     moved = x + dt * matrix_at(system, xi) @ x
@@ -53,26 +55,29 @@ def test_polar_form_against_the_motion_itself(rng):
 
 
 def test_the_unit_of_rates():
-    assert angular_frequency(PlaneSystem([Drive(0, ((0, 2.0), (-0.5, 0)))])) == pytest.approx(1.0)
-    assert angular_frequency(PlaneSystem([Drive(0, ((-0.1, 1.0), (-1.0, -0.3)))])) == pytest.approx(
+    assert angular_frequency(PlaneSystem([CoefficientMatrix(0, ((0, 2.0), (-0.5, 0)))])) == pytest.approx(1.0)
+    assert angular_frequency(PlaneSystem([CoefficientMatrix(0, ((-0.1, 1.0), (-1.0, -0.3)))])) == pytest.approx(
         abs(np.linalg.eigvals([[-0.1, 1.0], [-1.0, -0.3]])[0].imag)
     )
-    assert angular_frequency(PlaneSystem([Drive(0, ((0, 3.0), (0, 0)))])) == 3.0
-    assert angular_frequency(PlaneSystem([Drive(1, ((0, 3.0), (0, 0)))], epsilon=0.5)) == 1.5
+    assert angular_frequency(PlaneSystem([CoefficientMatrix(0, ((0, 3.0), (0, 0)))])) == 3.0
+    assert angular_frequency(PlaneSystem([CoefficientMatrix(1, ((0, 3.0), (0, 0)))], epsilon=0.5)) == 1.5
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Drive(0, ((1, 2), (3,))), "inhomogeneous|two rows of two finite numbers"),
-        (lambda: Drive(0, ((1, 2), (3, math.nan))), "two rows of two finite numbers"),
-        (lambda: Drive(-1, ROTATION), "a whole number >= 0"),
-        (lambda: Drive(0.5, ROTATION), "a whole number >= 0"),
-        (lambda: Kick(math.inf, 0.0), "both must be finite"),
-        (lambda: Kick(0.0, -math.inf), "both must be finite"),
+        (lambda: CoefficientMatrix(0, ((1, 2), (3,))), "inhomogeneous|two rows of two finite numbers"),
+        (lambda: CoefficientMatrix(0, ((1, 2), (3, math.nan))), "two rows of two finite numbers"),
+        (lambda: CoefficientMatrix(-1, ROTATION), "a whole number >= 0"),
+        (lambda: CoefficientMatrix(0.5, ROTATION), "a whole number >= 0"),
+        (lambda: Jump(math.inf, 0.0), "both must be finite"),
+        (lambda: Jump(0.0, -math.inf), "both must be finite"),
         (lambda: PlaneSystem([]), "needs one at least"),
-        (lambda: PlaneSystem([Drive(0, ROTATION)], epsilon=0.0), "a positive number"),
-        (lambda: PlaneSystem([Drive(0, ROTATION)], [Kick(0.1, 1), Kick(0.1 + math.pi, 1)]), "differ modulo pi"),
+        (lambda: PlaneSystem([CoefficientMatrix(0, ROTATION)], epsilon=0.0), "a positive number"),
+        (
+            lambda: PlaneSystem([CoefficientMatrix(0, ROTATION)], [Jump(0.1, 1), Jump(0.1 + math.pi, 1)]),
+            "differ modulo pi",
+        ),
     ],
 )
 def test_what_is_no_motion_is_refused(make, message):
@@ -81,7 +86,7 @@ def test_what_is_no_motion_is_refused(make, message):
 
 
 def test_a_problem_in_one_argument_or_two():
-    system, noise = PlaneSystem([Drive(0, ROTATION)]), OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
+    system, noise = PlaneSystem([CoefficientMatrix(0, ROTATION)]), OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
 
     @of_problem
     def parts(problem, p, *, rtol=1.0):

@@ -12,7 +12,7 @@ from fpsolve import PlaneSystem, VibroImpactOscillator, boundary, moment_lyapuno
 from fpsolve.analysis.zero import Axis
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.noise_axes import PolynomialAxis
-from fpsolve.model import Drive, Problem, SineWiener, noise_kind
+from fpsolve.model import CoefficientMatrix, Problem, SineWiener, noise_kind
 from fpsolve.simulation.kernels import draw
 from tests.oracles.harmonics import moment_exponent, white_noise_exponent
 
@@ -22,7 +22,7 @@ UNIT = SineWiener(amplitude=1.0, sigma=1.0)
 def spring(damping, stiffness):
     """ẍ + damping ẋ + (stiffness + ξ) x = 0."""
     free = ((0.0, 1.0), (-stiffness, -damping))
-    return [Drive(0, free), Drive(1, ((0.0, 0.0), (-1.0, 0.0)), lambda xi: xi)]
+    return [CoefficientMatrix(0, free), CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), lambda xi: xi)]
 
 
 def of(damping=0.2, stiffness=1.0, amplitude=1.0, sigma=1.0):

@@ -77,15 +77,15 @@ def expected_mismatch(of, phi, z, p):
     u, u_phi, u_z, u_zz = sampled(of, phi, z)
     omega, r, c1, epsilon = 1.3, 0.75, -0.1, 0.5
     kappa, unit, nu = math.log(1 - epsilon**2 * (1 - r)) / math.pi, float(noise.unit), float(noise.nu)
-    drive = epsilon * unit * z + epsilon**2 * c1
+    term = epsilon * unit * z + epsilon**2 * c1
     h1, q1 = 0.5 * np.sin(2 * phi), 0.5 * (1 - np.cos(2 * phi))
-    speed = omega + drive * h1
+    speed = omega + term * h1
     b = float(noise.slope) * z / (1 - z * z if noise.is_bounded else 1)
     beta = of.basis.gauge
     diffused = nu * (0.5 * u_zz + (beta - b) * u_z + (0.5 * beta**2 - b * beta) * u)
     if p is None:
-        return diffused + speed * u_phi + drive * q1 + kappa * speed - of.mu
-    return (diffused + speed * u_phi + p * (drive * q1 + kappa * speed) * u) / u - of.mu
+        return diffused + speed * u_phi + term * q1 + kappa * speed - of.mu
+    return (diffused + speed * u_phi + p * (term * q1 + kappa * speed) * u) / u - of.mu
 
 
 @pytest.mark.parametrize("p", [P, None])
@@ -153,10 +153,10 @@ def test_what_is_left_where_u_is_held(name, sign):
     beta, nu = of.basis.gauge, float(noise.nu)
 
     def left(z):
-        drive = 0.5 * float(noise.unit) * z + 0.25 * -0.1
+        term = 0.5 * float(noise.unit) * z + 0.25 * -0.1
         h1, q1 = 0.5 * np.sin(2 * phi), 0.5 * (1 - np.cos(2 * phi))
-        kappa, speed = math.log(1 - 0.25 * 0.25) / math.pi, 1.3 + drive * h1
-        rest = speed * u_phi / u + P * (drive * q1 + kappa * speed)
+        kappa, speed = math.log(1 - 0.25 * 0.25) / math.pi, 1.3 + term * h1
+        rest = speed * u_phi / u + P * (term * q1 + kappa * speed)
         return rest + nu * (beta**2 / 2 - beta * float(noise.drift(ball(z)))) - of.mu
 
     growth = sign * (left(z + 1e-5) - left(z - 1e-5)) / 2e-5

@@ -134,7 +134,7 @@ def test_numbers_that_are_none_are_refused(p, width):
 
 
 def test_other_systems_are_refused():
-    rotation = fpsolve.PlaneSystem([fpsolve.model.Drive(0, ((0.0, 1.0), (-1.0, 0.0)))])
+    rotation = fpsolve.PlaneSystem([fpsolve.model.CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))])
     with pytest.raises(TypeError, match="VibroImpactOscillator"):
         prove(rotation, fpsolve.OrnsteinUhlenbeck(1.0, 1.0), 1.0)
 

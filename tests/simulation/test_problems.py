@@ -11,7 +11,7 @@ from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.plane import Drive
+from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import DAMPING, VibroImpactOscillator
@@ -22,7 +22,7 @@ from fpsolve.simulation.setup import PROGRESS_STEPS
 
 OSCILLATOR = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5, c2=0.3, impact="restitution")
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9)
-PLANE = PlaneSystem([Drive(0, ((0.0, 1.0), (-1.0, 0.0))), Drive(1, DAMPING, identity)])
+PLANE = PlaneSystem([CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))), CoefficientMatrix(1, DAMPING, identity)])
 
 
 @dataclass(frozen=True)

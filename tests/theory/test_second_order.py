@@ -11,7 +11,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import Drive, Kick
+from fpsolve.model.plane import CoefficientMatrix, Jump
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -60,25 +60,29 @@ def test_what_is_left_out_is_of_higher_order(seed, noise, order, slack, p):
     driven, damped = rng.uniform(-1, 1, (2, 2, 2))
     rests = []
     for epsilon in (0.04, 0.02):
-        kicks = [Kick(0.4, -0.3 * epsilon**2), Kick(1.9, 0.5 * epsilon**2)]
-        drives = [Drive(0, ellipse), Drive(1, driven, identity), Drive(2, damped)]
-        problem = Problem(PlaneSystem(drives, kicks, epsilon), noise)
+        jumps = [Jump(0.4, -0.3 * epsilon**2), Jump(1.9, 0.5 * epsilon**2)]
+        terms = [CoefficientMatrix(0, ellipse), CoefficientMatrix(1, driven, identity), CoefficientMatrix(2, damped)]
+        problem = Problem(PlaneSystem(terms, jumps, epsilon), noise)
         value = ExponentSolver(problem, rtol=1e-9).pair(p).value
         rests.append(abs(value - second_order(problem).moment_exponent(p)) / epsilon**2)
     assert math.log2(rests[0] / rests[1]) == pytest.approx(order, abs=slack)
 
 
 @pytest.mark.parametrize(
-    ("drives", "noise", "message"),
+    ("terms", "noise", "message"),
     [
-        ([Drive(0, ((1.0, 0.0), (0.0, -1.0)))], None, "that rotate without noise"),
-        ([Drive(0, ROTATION), Drive(1, ROTATION)], None, "a drive of order 1 with g = 1"),
-        ([Drive(0, ROTATION), Drive(1, ROTATION, np.tanh)], None, "with g = tanh"),
-        ([Drive(0, ROTATION), Drive(1, ROTATION, identity)], MarkovChain((0, 1), ((0, 1), (1, 0))), "noise of mean 0"),
+        ([CoefficientMatrix(0, ((1.0, 0.0), (0.0, -1.0)))], None, "that rotate without noise"),
+        ([CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, ROTATION)], None, "a term of order 1 with g = 1"),
+        ([CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, ROTATION, np.tanh)], None, "with g = tanh"),
+        (
+            [CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, ROTATION, identity)],
+            MarkovChain((0, 1), ((0, 1), (1, 0))),
+            "noise of mean 0",
+        ),
     ],
 )
-def test_where_the_theory_does_not_apply_it_says_so_and_errors_have_a_scale(drives, noise, message):
-    problem = Problem(PlaneSystem(drives, epsilon=0.5), noise or OrnsteinUhlenbeck(alpha=1.0, sigma=1.0))
+def test_where_the_theory_does_not_apply_it_says_so_and_errors_have_a_scale(terms, noise, message):
+    problem = Problem(PlaneSystem(terms, epsilon=0.5), noise or OrnsteinUhlenbeck(alpha=1.0, sigma=1.0))
     with pytest.raises(NoPerturbationTheory, match=message):
         second_order(problem)
     scale = scale_of(problem)
@@ -88,11 +92,16 @@ def test_where_the_theory_does_not_apply_it_says_so_and_errors_have_a_scale(driv
 @pytest.mark.parametrize("turn", [1.3, -1.3])
 def test_the_first_order_eigenfunction_solves_its_equation(turn):
     """L₀T₁ = −p q ξ, Eq. (32), forward and backward rotation alike."""
-    drives = [Drive(0, ((0.0, turn), (-turn, 0.0))), Drive(1, ((0.2, -0.7), (0.4, 1.0)), identity)]
-    problem = Problem(PlaneSystem(drives), OrnsteinUhlenbeck(alpha=0.7, sigma=1.0))
+    terms = [
+        CoefficientMatrix(0, ((0.0, turn), (-turn, 0.0))),
+        CoefficientMatrix(1, ((0.2, -0.7), (0.4, 1.0)), identity),
+    ]
+    problem = Problem(PlaneSystem(terms), OrnsteinUhlenbeck(alpha=0.7, sigma=1.0))
     phi, h = np.linspace(0, 3, 7), 1e-5
     at, after, before = (first_order_eigenfunction(problem, 1.4, x, 0.9) for x in (phi, phi + h, phi - h))
-    residual = -0.7 * at + turn * (after - before) / (2 * h) + 1.4 * 0.9 * drives[1].q(phi)
+    residual = -0.7 * at + turn * (after - before) / (2 * h) + 1.4 * 0.9 * terms[1].q(phi)
     np.testing.assert_allclose(residual, 0, atol=1e-8)
     with pytest.raises(NoPerturbationTheory):
-        first_order_eigenfunction(Problem(PlaneSystem([*drives, Drive(1, ROTATION)]), problem.noise), 1.4, phi, 0.9)
+        first_order_eigenfunction(
+            Problem(PlaneSystem([*terms, CoefficientMatrix(1, ROTATION)]), problem.noise), 1.4, phi, 0.9
+        )

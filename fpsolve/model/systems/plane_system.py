@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import wraps
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -13,11 +15,11 @@ from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
-from fpsolve.model.plane import Drive, Kick, System, by_epsilon
+from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
 from fpsolve.model.quantity import Quantity
 
-Parts = Sequence[Drive] | tuple[Sequence[Drive], Sequence[Kick]]
-"""The terms of a system, or these and its kicks."""
+Parts = Sequence[CoefficientMatrix] | tuple[Sequence[CoefficientMatrix], Sequence[Jump]]
+"""The terms of a system, or these and its jumps."""
 NODES, REACH, LEAST = 9, 0.05, 0.05
 """Values of a parameter for a derivative, how far they go in shares of it, and the least size that it counts as."""
 
@@ -28,16 +30,16 @@ class Scaled:
 
     Attributes:
         terms: pairs of a name, or "" for none, and a term.
-        kicks: which do not change.
+        jumps: which do not change.
     """
 
-    terms: Sequence[tuple[str, Drive]]
-    kicks: Sequence[Kick] = ()
+    terms: Sequence[tuple[str, CoefficientMatrix]]
+    jumps: Sequence[Jump] = ()
 
-    def __call__(self, **values: float) -> tuple[Sequence[Drive], Sequence[Kick]]:
+    def __call__(self, **values: float) -> tuple[Sequence[CoefficientMatrix], Sequence[Jump]]:
         sizes = {"": 1.0, **values}
         scaled = [replace(term, matrix=(sizes[name] * np.array(term.matrix)).tolist()) for name, term in self.terms]
-        return scaled, self.kicks
+        return scaled, self.jumps
 
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
@@ -66,28 +68,47 @@ class StatedJump(BaseModel):
     log_factor: Annotated[float, parameter("the logarithm of the factor of the state", "log_factor = -0.1")]
 
 
+def _renamed(kind: type[System]) -> type[System]:
+    """A class that also takes `drives` and `kicks`, which its `terms` and `jumps` were called; deprecated."""
+    changed: Any = kind
+    made = changed.__init__
+
+    @wraps(made)
+    def __init__(self: Any, *given: Any, **named: Any) -> None:
+        for old, new in (("drives", "terms"), ("kicks", "jumps")):
+            if old in named:
+                warnings.warn(f"{old} are called {new} now", DeprecationWarning, stacklevel=2)
+                named[new] = named.pop(old)
+        made(self, *given, **named)
+
+    changed.__init__ = __init__
+    return kind
+
+
+@_renamed
 @dataclass(frozen=True)
 class PlaneSystem(System):
     """A linear system in the plane from its parts, see `System`.
 
     >>> from fpsolve.arrays import identity
     >>> rotation, stiffness = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))
-    >>> PlaneSystem([Drive(0, rotation), Drive(1, stiffness, identity)]).epsilon  # ẍ + (1 + ξ) x = 0
+    >>> terms = CoefficientMatrix(0, rotation), CoefficientMatrix(1, stiffness, identity)  # ẍ + (1 + ξ) x = 0
+    >>> PlaneSystem(terms).epsilon
     1.0
 
     Args:
-        drives: one at least.
-        kicks: stretches at rays.
+        terms: one at least.
+        jumps: stretches at rays.
         epsilon: ε > 0.
         build: makes both from parameters, see `of`, which is the usual way.
         named: the values of these parameters by their names.
 
     Raises:
-        ValueError: there is no drive, or ε is not a positive number.
+        ValueError: there is no term, or ε is not a positive number.
     """
 
-    drives: Sequence[Drive]
-    kicks: Sequence[Kick] = ()
+    terms: Sequence[CoefficientMatrix]
+    jumps: Sequence[Jump] = ()
     epsilon: float = 1.0
     build: Callable[..., Parts] | None = None
     named: tuple[tuple[str, float], ...] = ()
@@ -111,14 +132,14 @@ class PlaneSystem(System):
     }
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "drives", tuple(self.drives))
-        object.__setattr__(self, "kicks", tuple(self.kicks))
-        rays = np.sort(np.mod([kick.phase for kick in self.kicks], math.pi))
+        object.__setattr__(self, "terms", tuple(self.terms))
+        object.__setattr__(self, "jumps", tuple(self.jumps))
+        rays = np.sort(np.mod([jump.phase for jump in self.jumps], math.pi))
         if np.any(np.diff(np.append(rays, rays[:1] + math.pi)) < 1e-6) and rays.size > 1:
-            raise ValueError(f"got kicks at {[kick.phase for kick in self.kicks]}; their phases must differ modulo pi")
-        if not self.drives or not (math.isfinite(self.epsilon) and self.epsilon > 0):
+            raise ValueError(f"got jumps at {[jump.phase for jump in self.jumps]}; their phases must differ modulo pi")
+        if not self.terms or not (math.isfinite(self.epsilon) and self.epsilon > 0):
             raise ValueError(
-                f"got {len(self.drives)} drives and epsilon = {self.epsilon}; needs one at least, and a positive number"
+                f"got {len(self.terms)} terms and epsilon = {self.epsilon}; needs one at least, and a positive number"
             )
 
     @classmethod
@@ -126,13 +147,13 @@ class PlaneSystem(System):
         """The system that a function makes from named parameters, by each of which it has sensitivities and charts.
 
         >>> def beam(omega, damping):  # ẍ + 2 damping ẋ + (omega² + ξ) x = 0
-        ...     free = Drive(0, ((0.0, 1.0), (-(omega**2), -2 * damping)))
-        ...     return [free, Drive(1, ((0.0, 0.0), (-1.0, 0.0)), lambda xi: xi)]
+        ...     free = CoefficientMatrix(0, ((0.0, 1.0), (-(omega**2), -2 * damping)))
+        ...     return [free, CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), lambda xi: xi)]
         >>> PlaneSystem.of(beam, omega=2.0, damping=0.1).values["damping"]
         0.1
 
         Args:
-            build: takes the parameters by name and returns the terms, or the terms and the kicks; smooth in each, with
+            build: takes the parameters by name and returns the terms, or the terms and the jumps; smooth in each, with
                 the same number of both for all values; a function of a module, so that results can be pickled.
             epsilon: ε > 0.
             named: the values of the parameters.
@@ -143,23 +164,28 @@ class PlaneSystem(System):
         for name, value in named.items():
             if isinstance(value, str | bool) or not math.isfinite(value):
                 raise ValueError(f"got {name} = {value!r}; must be a finite number")
-        drives, kicks = _parts(build, named)
-        return cls(drives, kicks, epsilon, build, tuple((name, float(value)) for name, value in named.items()))
+        terms, jumps = _parts(build, named)
+        return cls(terms, jumps, epsilon, build, tuple((name, float(value)) for name, value in named.items()))
 
     @classmethod
     def of_terms(
-        cls, terms: Sequence[tuple[str, Drive]], kicks: Sequence[Kick] = (), *, epsilon: float = 1.0, **named: float
+        cls,
+        terms: Sequence[tuple[str, CoefficientMatrix]],
+        jumps: Sequence[Jump] = (),
+        *,
+        epsilon: float = 1.0,
+        **named: float,
     ) -> Self:
         """The system whose terms are multiplied by named parameters.
 
         >>> stiffness, damping = ((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, -2.0))
-        >>> free = Drive(0, ((0.0, 1.0), (-1.0, 0.0)))
-        >>> PlaneSystem.of_terms([("", free), ("c", Drive(0, damping))], c=0.1).drives[1].matrix
+        >>> free = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))
+        >>> PlaneSystem.of_terms([("", free), ("c", CoefficientMatrix(0, damping))], c=0.1).terms[1].matrix
         ((0.0, 0.0), (0.0, -0.2))
 
         Args:
             terms: pairs of the name of a parameter, or "" for none, and a term.
-            kicks: stretches at rays.
+            jumps: stretches at rays.
             epsilon: ε > 0.
             named: the values of the parameters.
 
@@ -171,18 +197,23 @@ class PlaneSystem(System):
             raise ValueError(
                 f"got values of {sorted(named)}; must be of {sorted(names)}, the names that the terms carry"
             )
-        return cls.of(Scaled(tuple(terms), tuple(kicks)), epsilon=epsilon, **named)
+        return cls.of(Scaled(tuple(terms), tuple(jumps)), epsilon=epsilon, **named)
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> PlaneSystem:
         named = {name: value for name, value in table.items() if name not in cls.stated}
         stated: Sequence[StatedTerm] = table["terms"]
         terms = [
-            (each.factor, Drive(each.order, each.matrix, identity) if each.noise else Drive(each.order, each.matrix))
+            (
+                each.factor,
+                CoefficientMatrix(each.order, each.matrix, identity)
+                if each.noise
+                else CoefficientMatrix(each.order, each.matrix),
+            )
             for each in stated
         ]
-        kicks = [Kick(each.phase, each.log_factor) for each in table.get("jumps", ())]
-        return cls.of_terms(terms, kicks, **named)
+        jumps = [Jump(each.phase, each.log_factor) for each in table.get("jumps", ())]
+        return cls.of_terms(terms, jumps, **named)
 
     @property
     def values(self) -> Mapping[str, float | str]:
@@ -203,11 +234,11 @@ class PlaneSystem(System):
             return replace(self, epsilon=new["epsilon"])
         return type(self).of(self.build, **new)
 
-    def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
+    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂ε, or ∂/∂θ by the derivative of the polynomial through the matrices for `NODES` values of θ around it.
 
         Raises:
-            ValueError: the number of terms or the rays of the kicks change with θ.
+            ValueError: the number of terms or the rays of the jumps change with θ.
         """
         if name == "epsilon":
             return by_epsilon(self), ()
@@ -216,27 +247,33 @@ class PlaneSystem(System):
         half = REACH * max(abs(named[name]), LEAST)
         x = np.cos(np.pi * np.arange(NODES) / (NODES - 1))
         around = [_parts(self.build, {**named, name: named[name] + half * each}) for each in x]
-        if any(_form(each) != _form((self.drives, self.kicks)) for each in around):
+        if any(_form(each) != _form((self.terms, self.jumps)) for each in around):
             raise ValueError(
-                f"the terms, their g or the rays of the kicks change with {name}; only matrices and ln R may"
+                f"the terms, their g or the rays of the jumps change with {name}; only matrices and ln R may"
             )
         weights = _slope_weights(x) / half
-        matrices = _weighed(weights, [[drive.matrix for drive in drives] for drives, _ in around])
-        slopes = _weighed(weights, [[kick.log_factor for kick in kicks] for _, kicks in around])
-        changed = [replace(drive, matrix=a.tolist()) for drive, a in zip(self.drives, matrices, strict=True) if a.any()]
+        matrices = _weighed(weights, [[term.matrix for term in terms] for terms, _ in around])
+        slopes = _weighed(weights, [[jump.log_factor for jump in jumps] for _, jumps in around])
+        changed = [replace(term, matrix=a.tolist()) for term, a in zip(self.terms, matrices, strict=True) if a.any()]
         return tuple(changed), tuple(slopes.tolist()) if slopes.any() else ()
 
 
-def _parts(build: Callable[..., Parts], named: Mapping[str, float]) -> tuple[Sequence[Drive], Sequence[Kick]]:
-    """The terms and the kicks that a function makes."""
+def _parts(
+    build: Callable[..., Parts], named: Mapping[str, float]
+) -> tuple[Sequence[CoefficientMatrix], Sequence[Jump]]:
+    """The terms and the jumps that a function makes."""
     made: Any = build(**named)
-    return made if isinstance(made, tuple) and len(made) == 2 and not isinstance(made[0], Drive) else (made, ())
+    return (
+        made
+        if isinstance(made, tuple) and len(made) == 2 and not isinstance(made[0], CoefficientMatrix)
+        else (made, ())
+    )
 
 
-def _form(parts: tuple[Sequence[Drive], Sequence[Kick]]) -> tuple[Any, ...]:
+def _form(parts: tuple[Sequence[CoefficientMatrix], Sequence[Jump]]) -> tuple[Any, ...]:
     """What must not change with a parameter."""
-    drives, kicks = parts
-    return tuple(drive.order for drive in drives), tuple(kick.phase for kick in kicks)
+    terms, jumps = parts
+    return tuple(term.order for term in terms), tuple(jump.phase for jump in jumps)
 
 
 def _weighed(weights: FloatArray, values: Any) -> FloatArray:

@@ -19,7 +19,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.exact import ExactMotion
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
-from fpsolve.model.plane import Drive, Kick, System, by_epsilon
+from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
 
 IMPACT_PHASES = (math.pi / 2, 3 * math.pi / 2)
 """φ in [0, 2π] where cos φ = 0: the mass is at the wall."""
@@ -56,12 +56,12 @@ DAMPING = ((0.0, 0.0), (0.0, 1.0))
 
 def h1(phi: ArrayLike) -> FloatArray:
     """h₁(φ) = ½ sin 2φ, Eq. (18), e′ᵀA e of `DAMPING`."""
-    return Drive(1, DAMPING).h(phi)
+    return CoefficientMatrix(1, DAMPING).h(phi)
 
 
 def q1(phi: ArrayLike) -> FloatArray:
     """q₁(φ) = ½(1 − cos 2φ), Eq. (18), eᵀA e of `DAMPING`."""
-    return Drive(1, DAMPING).q(phi)
+    return CoefficientMatrix(1, DAMPING).q(phi)
 
 
 @told_in_words
@@ -139,15 +139,19 @@ class VibroImpactOscillator(System):
         return math.exp(p * self.log_impact_factor)
 
     @cached_property
-    def drives(self) -> tuple[Drive, ...]:  # type: ignore[override]
+    def terms(self) -> tuple[CoefficientMatrix, ...]:  # type: ignore[override]
         """Free oscillation, noise and damping in (x, ẋ/ω): dφ = ω dt; ε ξ (h₁, q₁); ε² c₁ (h₁, q₁), Eqs. (17)-(18)."""
         rotation = ((0.0, self.omega), (-self.omega, 0.0))
-        return Drive(0, rotation), Drive(1, DAMPING, identity), Drive(2, ((0.0, 0.0), (0.0, self.c1)))
+        return (
+            CoefficientMatrix(0, rotation),
+            CoefficientMatrix(1, DAMPING, identity),
+            CoefficientMatrix(2, ((0.0, 0.0), (0.0, self.c1))),
+        )
 
     @property
-    def kicks(self) -> tuple[Kick, ...]:  # type: ignore[override]
+    def jumps(self) -> tuple[Jump, ...]:  # type: ignore[override]
         """The impacts, where cos φ = 0; to the order ε² both laws lose 1 − r."""
-        return (Kick(math.pi / 2, self.log_impact_factor, -self._loss),)
+        return (Jump(math.pi / 2, self.log_impact_factor, -self._loss),)
 
     @property
     def remarks(self) -> Sequence[Message]:
@@ -167,14 +171,14 @@ class VibroImpactOscillator(System):
             bounce=R if smooth else -R,
         )
 
-    def derivative(self, name: str) -> tuple[tuple[Drive, ...], tuple[float, ...]]:
-        """∂/∂θ of the drives and of ln R, θ = ω, r, c₁ or ε."""
+    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
+        """∂/∂θ of the terms and of ln R, θ = ω, r, c₁ or ε."""
         bounce = 1.0 if self.impact == ImpactLaw.DELTA else 1 / (1 - self._loss)
         match name:
             case "omega":
-                return (Drive(0, ((0.0, 1.0), (-1.0, 0.0))),), ()
+                return (CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))),), ()
             case "c1":
-                return (Drive(2, DAMPING),), ()
+                return (CoefficientMatrix(2, DAMPING),), ()
             case "restitution":
                 return (), (self.epsilon**2 * bounce,)
             case _:
@@ -202,8 +206,8 @@ class VibroImpactOscillator(System):
 
     def h2(self, phi: ArrayLike) -> FloatArray:
         """h₂(φ) = c₁ h₁(φ); the impact adds nothing, as sin 2φ vanishes where it acts."""
-        return self.drives[2].h(phi)
+        return self.terms[2].h(phi)
 
     def q2(self, phi: ArrayLike) -> FloatArray:
         """q₂(φ) = c₁ q₁(φ) between impacts; the impact itself is `log_impact_factor`."""
-        return self.drives[2].q(phi)
+        return self.terms[2].q(phi)
