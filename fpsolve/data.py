@@ -138,7 +138,10 @@ def dataset(
     """
     import xarray
 
-    joined = {name: value if isinstance(value, int | float | str) else "\n".join(value) for name, value in more.items()}
+    joined = {
+        name: value if isinstance(value, int | float) else str(value) if isinstance(value, str) else "\n".join(value)
+        for name, value in more.items()
+    }  # a message is a text and more, which no file can hold
     known = {name: value for name, value in joined.items() if value != ""}
     about = {"title": f"{title} by {method}", "method": method, **parameters, **known, "fpsolve_version": __version__}
     variables, places = (
