@@ -45,6 +45,7 @@ from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parameter, parameter
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
+from fpsolve.model.quantity import Quantity
 
 COMPUTED = ("oscillator", "system", "noise", "moments", "vary", "mesh")
 """The sections that say what is computed."""
@@ -152,6 +153,10 @@ class Case(Section):
     def parameters(self) -> Mapping[str, Parameter]:
         """Its parameters by their dotted keys, with symbol, words and unit."""
         return self.problem.parameters
+
+    def about(self, key: str) -> Quantity:
+        """What a parameter is, in the time unit of [figure]."""
+        return self.parameters[key].quantity.timed(self.figure.time_unit)
 
     @property
     def path(self) -> Path:

@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -29,8 +29,8 @@ from fpsolve.case.messages import (
 )
 from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.case.sections import MAX_MOMENTS, Sweep, Value, Values, flat, same
-from fpsolve.model.kinds import parameter_of
 from fpsolve.model.parameters import STRICT, meaning_of
+from fpsolve.model.quantity import Quantity
 from fpsolve.model.words import accepted, choices
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
@@ -134,9 +134,9 @@ def assignments(varied: Mapping[str, Value], style: str = "") -> str:
     return ", ".join(f"{key} = {written(value, style)}" for key, value in varied.items())
 
 
-def legend(varied: Mapping[str, Value], time_unit: str = "time") -> str:
-    r"""The same for a figure: "$D_0$ = 0.1/time, treatment = exact"."""
-    return ", ".join(parameter_of(key).timed(time_unit).stated(value) for key, value in varied.items())
+def legend(varied: Mapping[str, Value], about: Callable[[str], Quantity]) -> str:
+    r"""The same for a figure, by what the keys are: "$D_0$ = 0.1/time, treatment = exact"."""
+    return ", ".join(about(key).stated(value) for key, value in varied.items())
 
 
 def groups(values: Sequence[Value]) -> list[int]:

@@ -19,7 +19,6 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
 from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
 from fpsolve.files import write_csv, write_json
-from fpsolve.model.kinds import parameter_of
 from fpsolve.output.tables import head, in_case_words
 from fpsolve.study.chart import Chart, charted
 
@@ -53,7 +52,7 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
     paths = [folder / "chart.png", folder / "chart.pdf"]
     with figure_for(paths, case.headline, held, Format(height=4.0)) as figure:
         axes = figure.add_subplot()
-        label_axes(axes, *(parameter_of(key).timed(unit).attributes for key in keys))
+        label_axes(axes, *(case.about(key).attributes for key in keys))
         for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
             scale_axis(axis, side.scale, (side.start, side.stop))
         small = {} if chart.regions is None else _shade(axes, chart.regions, frame)
@@ -107,8 +106,7 @@ def held_in_words(curve: Curve, varied: Iterable[str], time_unit: str) -> list[s
     known, linear = curve.problem.parameters, curve.problem.differentiable
     left = {*varied, *(key for key, each in known.items() if each.value == 0 and key not in linear)}
     held = {key: value for key, value in curve.parameters.items() if key not in left}
-    quantities = {key: known[key].quantity if key in known else parameter_of(key) for key in held}
-    return [quantities[key].timed(time_unit).stated(value) for key, value in held.items()]
+    return [known[key].quantity.timed(time_unit).stated(value) for key, value in held.items()]
 
 
 def _summary(case: Case, chart: Chart) -> dict[str, Any]:

@@ -6,7 +6,7 @@ value of a key.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -128,6 +128,7 @@ def write_figure(
     *,
     parameters: Sequence[str] = (),
     setting: FigureSection | None = None,
+    about: Callable[[str], Quantity] = parameter_of,
     is_reduced: bool = False,
 ) -> None:
     """Draw one quantity over x for several curves, and write it to files whose endings tell the format.
@@ -137,17 +138,18 @@ def write_figure(
         paths: .png, .pdf or what else matplotlib writes.
         parameters: what holds for all curves, for below the title.
         setting: how the figure is set; None as without a [figure].
+        about: what a parameter is, by its key.
         is_reduced: the lines are for the Ornstein-Uhlenbeck reduction of the noise, the markers are not.
     """
     setting = setting or FigureSection()
     unit, is_few = setting.time_unit, len(series) <= MOST_NAMED
     with figure_for(paths, title, parameters, FORMATS[setting.width]) as figure:
         axes = figure.add_subplot()
-        over = P if x == "p" else parameter_of(x)
+        over = P if x == "p" else about(x)
         label_axes(axes, over.timed(unit).attributes, y.timed(unit).attributes)
         mark_zero(axes)
         equation = y.closed_form + (", reduced noise" if is_reduced else "")
-        colours = (_draw_few if is_few else _draw_many)(axes, series, equation, unit)
+        colours = (_draw_few if is_few else _draw_many)(axes, series, equation, about)
         if any(np.any(item.rare) for item in series):
             axes.plot([], [], "o", label="carried by rare paths", markersize=points(7 if is_few else 4), **_GREY)
         if simulated := [item.simulated for item in series if item.simulated is not None]:
@@ -168,7 +170,7 @@ def write_figure(
         _mark(axes, series, colours)
 
 
-def _draw_few(axes: Any, series: Sequence[Series], equation: str, time_unit: str) -> Sequence[Any]:
+def _draw_few(axes: Any, series: Sequence[Series], equation: str, about: Callable[[str], Quantity]) -> Sequence[Any]:
     """A colour and a marker for each curve, named in the legend; the colours."""
     varied = [item.varied for item in series]
     numbers, texts = _several(varied)
@@ -186,14 +188,14 @@ def _draw_few(axes: Any, series: Sequence[Series], equation: str, time_unit: str
         if np.any(item.rare):
             chosen = np.broadcast_to(item.rare, item.x.shape) & (np.arange(item.x.size) % item.every == 0)
             axes.plot(item.x[chosen], item.y[chosen], marker, color=colour)
-        axes.plot([], [], linestyle=line, label=legend(item.varied, time_unit), **hollow)
+        axes.plot([], [], linestyle=line, label=legend(item.varied, about), **hollow)
     words = "finite elements (not all marked)" if any(item.every > 1 for item in series) else "finite elements"
     axes.plot([], [], "o", markerfacecolor="none", label=words, **_GREY)
     axes.plot([], [], "-", label=f"perturbation, Eq. {equation}", **_GREY)
     return colours
 
 
-def _draw_many(axes: Any, series: Sequence[Series], equation: str, time_unit: str) -> Any:
+def _draw_many(axes: Any, series: Sequence[Series], equation: str, about: Callable[[str], Quantity]) -> Any:
     """Thin lines and a bar of their colours, of which none is too pale on white; the colours, shape (n, 4)."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -213,13 +215,13 @@ def _draw_many(axes: Any, series: Sequence[Series], equation: str, time_unit: st
     }
     order = [np.argsort(item.x, kind="stable") for item in series]
     paths = [np.stack([item.x[by], item.y[by]], axis=1) for item, by in zip(series, order, strict=True)]
-    others = "".join(f", each for {count} values of {parameter_of(key).latex}" for key, count in encoding.unencoded)
+    others = "".join(f", each for {count} values of {about(key).latex or key}" for key, count in encoding.unencoded)
     kinds = dict.fromkeys(encoding.styles)
     for kind, line in zip(kinds, STYLES, strict=False):
         chosen = [i for i, each in enumerate(encoding.styles) if each == kind]
         lines = LineCollection([paths[i] for i in chosen], colors=colours[chosen], linestyles=[line], **look)
         axes.add_collection(lines, autolim=True)
-        name = f", {legend(dict(kind), time_unit)}" if len(kinds) > 1 else ""
+        name = f", {legend(dict(kind), about)}" if len(kinds) > 1 else ""
         axes.plot([], [], linestyle=line, label=f"finite elements{name}{others}", **_GREY)
 
     # dots: curves that have but one point, and the points that rare paths carry
@@ -246,7 +248,7 @@ def _draw_many(axes: Any, series: Sequence[Series], equation: str, time_unit: st
         bar.set_label("number of the curve")
         bar.ax.yaxis.set_major_locator(MaxNLocator(6, integer=True))
     else:
-        bar.set_label(label_of(parameter_of(encoding.key).timed(time_unit).attributes, 36))
+        bar.set_label(label_of(about(encoding.key).attributes, 36))
         if is_log:
             plain_numbers(bar.ax.yaxis)
     return colours

@@ -16,7 +16,6 @@ from fpsolve.case.sections import Value, Varied, same
 from fpsolve.drawing import Format, draw_bars, figure_for
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
-from fpsolve.model.kinds import parameter_of
 from fpsolve.model.problem import Problem
 from fpsolve.output.charts import held_in_words, read_line
 from fpsolve.output.curves import Series, write_figure
@@ -41,7 +40,7 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     held = held_in_words(results[0].curve, case.vary.keys, setting.time_unit)
     if other := map_key(setting, case.vary):
         plane = _plane(case, results, (setting.x, other), folder)
-        write_map(plane, setting.quantity, case.caption, paths, parameters=held, setting=setting)
+        write_map(plane, setting.quantity, case.caption, paths, parameters=held, setting=setting, about=case.about)
         return
     samples = {each.curve.key: each for each in simulated}
     pairs = [(result, samples.get(result.curve.key)) for result in results]
@@ -53,7 +52,7 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     is_exact = any(result.curve.is_exact for result in results)
     write_figure(
         series, setting.x, setting.quantity, case.caption, paths,
-        parameters=held, setting=setting, is_reduced=is_exact,
+        parameters=held, setting=setting, about=case.about, is_reduced=is_exact,
     )  # fmt: skip
 
 
@@ -70,7 +69,7 @@ def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path)
         held = held_in_words(result.curve, (), case.figure.time_unit)
         with figure_for(_paths(folder, f"sensitivities{result.curve.suffix}"), case.headline, held) as figure:
             words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
-            draw_bars(figure.add_subplot(xlabel=words), bars, [parameter_of(key).latex for key in found.theta])
+            draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).latex or key for key in found.theta])
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.case.figure import FigureSection
 from fpsolve.drawing import FORMATS, draw_colours, figure_for, label_axes, points, scale_axis, scale_of
-from fpsolve.model.kinds import parameter_of
 from fpsolve.model.quantity import Quantity
 
 _BETWEEN = "#00C800"
@@ -54,11 +53,12 @@ def write_map(
     *,
     parameters: Sequence[str] = (),
     setting: FigureSection,
+    about: Callable[[str], Quantity],
 ) -> None:
     """Draw a map, and write it to files whose endings tell the format."""
     with figure_for(paths, title, parameters, FORMATS[setting.width]) as figure:
         axes, edges = figure.add_subplot(), (_edges(plane.x), _edges(plane.y))
-        label_axes(axes, *(parameter_of(key).timed(setting.time_unit).attributes for key in plane.keys))
+        label_axes(axes, *(about(key).attributes for key in plane.keys))
         _draw_values(axes, plane, edges, quantity.timed(setting.time_unit).attributes)
         for axis, values, ends, limits in (
             (axes.xaxis, plane.x, edges[0], setting.xlim),

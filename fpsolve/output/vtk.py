@@ -20,10 +20,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import xi_marginal
 from fpsolve.exponent.nodes import Nodes
 from fpsolve.files import write_text
-from fpsolve.model.kinds import parameter_of
-from fpsolve.model.noise import Noise
-from fpsolve.model.parameters import Parameter
-from fpsolve.model.problem import parameter_lines, parameter_words
+from fpsolve.model.problem import Problem, parameter_lines, parameter_words
 from fpsolve.signals import signals_held
 from fpsolve.study.results import SimulatedCurve, Solved
 
@@ -58,7 +55,7 @@ def write_eigenfunctions(
         The files written, the collection first.
     """
     names = {pair.p: _name(stem, pair.p) for pair in sorted(pairs, key=lambda pair: pair.p)}
-    facts = _facts(parameters, varied)
+    facts = _facts(parameters, varied, stationary.generator.problem)
     for pair in pairs:
         grid = Nodes.of(pair)
         found = grid.fields(pair)
@@ -95,7 +92,7 @@ def write_density(
         "z": grid.z,
     }
     known = {"p": 0.0, "Lambda": 0.0, "lyapunov_exponent": stationary.derivative}
-    _write_grid(path, grid, data, {**known, **_facts(parameters, varied)})
+    _write_grid(path, grid, data, {**known, **_facts(parameters, varied, stationary.generator.problem)})
     return path
 
 
@@ -151,7 +148,9 @@ def write_response(simulated: SimulatedCurve, folder: Path) -> None:
         "lyapunov_exponent": found.lyapunov_exponent,
         "lyapunov_exponent_error": found.lyapunov_exponent_error,
     }
-    _write(path, grid, {**known, **_facts({**curve.parameters, "curve": float(curve.number)}, curve.varied)})
+    _write(
+        path, grid, {**known, **_facts({**curve.parameters, "curve": float(curve.number)}, curve.varied, curve.problem)}
+    )
 
 
 def copy_show_script(directory: Path) -> Path:
@@ -195,9 +194,9 @@ def _pyvista() -> Any:
     return pyvista
 
 
-def _facts(parameters: Facts, varied: Collection[str]) -> Facts:
-    """The parameters, and the words about them that a picture shows, if there are any, in ASCII."""
-    known = {key: Parameter(value, parameter_of(key), Noise) for key, value in parameters.items() if "." in key}
+def _facts(parameters: Facts, varied: Collection[str], problem: Problem) -> Facts:
+    """The parameters, and the words about those of a problem that a picture shows, if there are any, in ASCII."""
+    known = {key: each._replace(value=parameters[key]) for key, each in problem.parameters.items() if key in parameters}
     words = {
         "varied": parameter_words(known, varied),
         "held": "\n".join(parameter_lines(known, varied)),

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from fpsolve.case.case import load_case
+from fpsolve.case.vary import legend
 from fpsolve.cli import BAD_INPUT, main
 from fpsolve.errors import CaseError
 from fpsolve.model.kinds import noise_kind, version_of
@@ -186,6 +187,16 @@ def test_records_depend_on_the_kind_and_its_version(
         case = load_case(write(tmp_path, OSCILLATOR, noise, MOMENTS))
         keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
     assert len(keys) == 2
+
+
+def test_figures_speak_of_the_parameters_of_the_case(tmp_path: Path) -> None:
+    """Two kinds may have a parameter of one name."""
+    noise = '[noise]\nkind = "sine-wiener"\namplitude = 1.0\nsigma = 1.0\n'
+    case = load_case(write(tmp_path, OSCILLATOR, noise, MOMENTS, '[figure]\ntime_unit = "s"\n'))
+    quantities = {key: each.quantity for key, each in case.parameters.items()}
+    assert case.about("noise.sigma").latex == quantities["noise.sigma"].latex == r"$\sigma$"
+    assert "time" not in case.about("noise.amplitude").unit
+    assert legend({"noise.amplitude": 2.0}, case.about) == "$A$ = 2/s"
 
 
 def test_ours_cannot_be_replaced(windy: None) -> None:
