@@ -22,7 +22,7 @@ from pydantic import (
 from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartSection
 from fpsolve.case.figure import FigureSection
-from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of, with_system
+from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of, varying, with_system
 from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.output import EIGENFUNCTIONS, OutputSection
 from fpsolve.case.refusals import REFUSALS
@@ -227,9 +227,9 @@ class Case(Section):
 
     def curves(self, start: int = 0, stop: int | None = None) -> Iterator[Curve]:
         """One curve for each set of the varied values, from one place to another; each is made when it is asked for."""
-        places, problem = range(self.planned)[start:stop], self.problem
+        places, problem = range(self.planned)[start:stop], varying(self.problem)
         return (
-            Curve(problem.at(varied), varied, place + 1)
+            Curve(problem(varied), varied, place + 1)
             for place, varied in zip(places, self.vary.sets(start, stop), strict=True)
         )
 

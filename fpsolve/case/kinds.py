@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from copy import copy
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
@@ -161,3 +162,23 @@ def problem_of(valid: Mapping[str, Any]) -> Problem | None:
     """The problem of the sections that are valid, if both halves are."""
     halves = valid.get("system"), valid.get("noise")
     return None if None in halves else Problem(*halves)  # type: ignore[arg-type]
+
+
+def varying(problem: Problem) -> Callable[[Mapping[str, float | str]], Problem]:
+    """Gives the problem with other values of some parameters, as `Problem.at`; halves that are the same are shared."""
+
+    @lru_cache(maxsize=1024)
+    def half(section: str, values: tuple[tuple[str, float | str], ...]) -> Any:
+        changed = problem.at(dict(values)) if values else problem
+        return changed.system if section == problem.system.section else changed.noise
+
+    def at(varied: Mapping[str, float | str]) -> Problem:
+        sections = (each.section for each in problem.halves)
+        return Problem(
+            *(
+                half(section, tuple(item for item in varied.items() if item[0].partition(".")[0] == section))
+                for section in sections
+            )
+        )
+
+    return at

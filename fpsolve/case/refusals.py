@@ -20,7 +20,7 @@ from fpsolve.analysis.zero import said
 from fpsolve.arrays import FloatArray
 from fpsolve.case.chart import ChartAxis, ChartSection
 from fpsolve.case.figure import FigureSection, figure_refusals
-from fpsolve.case.kinds import parameters_of, problem_of
+from fpsolve.case.kinds import parameters_of, problem_of, varying
 from fpsolve.case.messages import Refusal, nearest, shown
 from fpsolve.case.output import OutputSection
 from fpsolve.case.remedies import CASE_WORDS
@@ -74,9 +74,9 @@ def _unsolvable(valid: Known, vary: Vary, *, with_existence: bool = True) -> Ite
     problem = problem_of(valid)
     if problem is None or "moments" not in valid:
         return
-    p = valid["moments"].values
+    p, at = valid["moments"].values, varying(problem)
     for place, varied in enumerate(vary.sets()):
-        reason = _obstacle(problem, varied, p, with_existence=with_existence)
+        reason = _obstacle(at, varied, p, with_existence=with_existence)
         if reason:
             yield place, _with(varied) + reason
 
@@ -86,11 +86,11 @@ def _with(varied: Varied) -> str:
     return f"with {assignments(varied)}: " if varied else ""
 
 
-def _obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_existence: bool = True) -> str:
+def _obstacle(at: Callable[[Varied], Problem], varied: Varied, p: FloatArray, *, with_existence: bool = True) -> str:
     """Why there is no such curve, or why some Λ(p) of it is infinite, or nothing."""
     extremes = [float(p.max()), float(p.min())]
     try:
-        problem = base.at(varied)
+        problem = at(varied)
         with np.errstate(all="ignore"):
             factors = [math.exp(each * jump.log_factor) for jump in problem.system.jumps for each in extremes]
             theory = second_order_or_none(problem)
@@ -160,7 +160,7 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
     for place, varied in enumerate(vary.sets()):
         row = f"{vary.file}:{vary.lines[place]}: " if isinstance(vary, FileVary) else ""
-        reason, faults = "" if is_known else _obstacle(base, varied, p), {}
+        reason, faults = "" if is_known else _obstacle(base.at, varied, p), {}
         with suppress(ValueError):  # that is the reason
             try:
                 faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
@@ -246,7 +246,9 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
                 yield (axis, "stop") if axis else (), highest, text
                 return
     p = np.array([zero.p for zero in chart.zero])
-    reason = next(filter(None, (_with(each) + text for each in corners if (text := _obstacle(problem, each, p)))), "")
+    reason = next(
+        filter(None, (_with(each) + text for each in corners if (text := _obstacle(problem.at, each, p)))), ""
+    )
     if reason:
         yield (), None, f"{reason}; choose another frame"
 
