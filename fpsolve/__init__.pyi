@@ -7,7 +7,7 @@ from .errors import CaseError as CaseError
 from .errors import FpsolveError as FpsolveError
 from .errors import NotConverged as NotConverged
 from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
-from .exponent.moments import moment_lyapunov as moment_lyapunov
+from .exponent.function import moment_lyapunov as moment_lyapunov
 from .exponent.quantities import lyapunov_exponent as lyapunov_exponent
 from .exponent.quantities import stability_index as stability_index
 from .exponent.solver import ExponentSolver as ExponentSolver

@@ -388,8 +388,7 @@ def mesh(
 
     Example: fpsolve mesh meshes/graded.vtu --phi-cells 3 --xi-cells 8 --grading 2
     """
-    from fpsolve.fem.mesh import make_mesh
-    from fpsolve.fem.mesh_file import write_mesh
+    from fpsolve.fem.mesh import make_mesh, write_mesh
 
     made = make_mesh(
         phi_cells=phi_cells,

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator

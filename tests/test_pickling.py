@@ -9,8 +9,7 @@ import pytest
 
 from fpsolve.errors import CaseError, Fault, NotConverged
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.exponent.function import MomentLyapunovFunction
-from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
@@ -36,7 +35,7 @@ def test_a_pair_of_strong_noise_is_little_more_than_its_vectors(strong_pair):
     assert len(pickle.dumps(strong_pair)) < strong_pair.right.nbytes + strong_pair.left.nbytes + 5000 < 200_000
     pair = copied(strong_pair)
     assert np.array_equal(pair.right, strong_pair.right)
-    residual = pair.generator.matrix(1.0) @ pair.right - pair.value * (pair.generator.mass(1.0) @ pair.right)
+    residual = pair.generator.matrix(1.0) @ pair.right - pair.value * (pair.generator.space(1.0).mass @ pair.right)
     assert np.linalg.norm(residual) < 1e-9 * np.linalg.norm(pair.right)
 
 

@@ -36,8 +36,8 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import one_thread
-from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise

@@ -143,7 +143,7 @@ def _misfit(mesh: CylinderMesh, valid: Known) -> str:
             )
         try:
             for each in (chosen, chosen.enriched().enriched()):  # the finer one tells the error
-                each.axes([noise], 0.0)
+                each.noise.axis(noise, 0.0)
         except MeshError as failure:
             lines = chosen.noise.lines
             return f"{told}from xi = {lines[0]:g} to {lines[-1]:g} {failure}"

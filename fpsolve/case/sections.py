@@ -20,8 +20,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
 from fpsolve.errors import MeshError
 from fpsolve.exponent.quantities import QuantityName
-from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, vertices_at
-from fpsolve.fem.mesh_file import read_mesh
+from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh, vertices_at
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 

@@ -1,6 +1,7 @@
 """Λ(p) around one place of the noise: the discretisation is chosen for each p, each solve goes on from the nearest p.
 
-A discretisation is refined until Λ(p) meets a tolerance, or the budget is spent.
+A discretisation is refined until Λ(p) meets a tolerance, or the budget is spent. Noise may carry a moment in another
+place than the one that was found: then both are solved.
 """
 
 from __future__ import annotations
@@ -8,26 +9,28 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
-from functools import cached_property
+from dataclasses import KW_ONLY, dataclass, field, replace
+from functools import cached_property, partial
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
+from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
-from fpsolve.exponent.corners import corners
+from fpsolve.exponent.corners import corners, graded_more, resolving
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.places import comparable, is_far_out, other_center, other_places
-from fpsolve.exponent.refine import first, first_far, refined
-from fpsolve.fem.discretisation import Discretisation
+from fpsolve.exponent.fields import noise_marginal
+from fpsolve.fem.discretisation import MOST_DEGREE, Cells, Discretisation, NoisePart, PhaseCells, Polynomials, States
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
+from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.model.plane import System, phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.far import Place, far_places, outlook
 from fpsolve.theory.frozen import frozen_noise
@@ -47,6 +50,17 @@ SMALL_P = 1e-2
 """For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
 NEIGHBOURS = 6
 """How many known eigenfunctions those of another p are interpolated from."""
+FREE_STAGES = 4
+"""From this number of stages on, no cell is made coarser."""
+SHARE = 0.05
+"""Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
+CORNERS = 0.3
+"""Share that all cells at corners may lack."""
+FEWEST_CELLS, FALL_PER_CELL = 4, 8.0
+"""Of a first discretisation of a place far out, and of ln P_s in one of its cells."""
+WIDER = 4.0
+COMPARABLE = 0.6
+"""Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
 Tolerance = Callable[[float, float], float]
 """The largest error allowed, from p and a value of Λ(p)."""
 SECONDS_PER_UNKNOWN = 3e-8
@@ -88,6 +102,7 @@ class NearPlace:
     """
 
     small_p: ClassVar[float] = SMALL_P
+    is_far: ClassVar[bool] = False
 
     problem: Problem
     _: KW_ONLY
@@ -138,10 +153,10 @@ class NearPlace:
         """What to do where it should be resolved better."""
         return Remedy.SMALLER_RTOL if self.mesh is None else Remedy.MESH
 
-    def remedied(self, solve: Callable[[], PrincipalPair]) -> PrincipalPair:
-        """A pair; where it is not found, the failure has the remedy of this branch."""
+    def pair_on(self, generator: Generator, p: float, start: PrincipalPair | Sequence[PrincipalPair]) -> PrincipalPair:
+        """The principal pair; where it is not found, the failure has the remedy of this place."""
         try:
-            return solve()
+            return principal_pair(generator, p, start=start)
         except NotConverged as failure:
             raise NotConverged(failure.reason, failure.partial, self.remedy) from failure
 
@@ -164,12 +179,12 @@ class NearPlace:
         if self.mesh is not None:
             coarse, fine = self._given
             pair = self._tried(coarse, p).pair
-            return Solution(pair, self.remedied(lambda: principal_pair(fine, p, start=pair)))
+            return Solution(pair, self.pair_on(fine, p, pair))
         if abs(p) < self.small_p:
             return self._tried(self.near_zero(p, tolerance).pair.generator, p)
         start = None
-        for tried in (self._from_start, self._from_nearest):
-            start = tried(p, tolerance) or start
+        for attempt in (self._from_start, self._from_nearest):
+            start = attempt(p, tolerance) or start
             if start is not None and self._meets(start, tolerance) and other_center(start.pair) is None:
                 return start
         return self._searched(p, tolerance, start)
@@ -179,13 +194,12 @@ class NearPlace:
 
         Where slow noise may carry the moment in two places, the larger eigenvalue.
         """
-        search, frozen = _Search(self.problem, p, tolerance, self.budget), frozen_noise(self.problem)
-        center = frozen.center(p) if frozen else 0.0
-        found = search.run(start or first(self.problem, p, center, self.rtol))
+        search = _Search(self.problem, p, tolerance, self.budget)
+        found = search.run(start or first(self.problem, p, self.rtol))
         elsewhere = other_center(found.pair)
         if elsewhere is None:
             return found
-        other = search.run(first(self.problem, p, elsewhere, self.rtol))
+        other = search.run(first(self.problem, p, self.rtol, elsewhere))
         return max(found, other, key=lambda each: each.pair.value)
 
     @cached_property
@@ -207,11 +221,9 @@ class NearPlace:
             solution = self._tried(generator, p) if self.fits(generator, nearest, p) else None
         except NotConverged:
             return None
-        return None if solution is None or self._has_left(solution.pair, nearest) else solution
-
-    def _has_left(self, pair: PrincipalPair, nearest: float) -> bool:
-        """Whether its interval reaches a place far out, which at this p is not the nearest to ξ = 0."""
-        return nearest != pair.p and is_far_out(pair)
+        if solution is None or (nearest != p and not self.is_far and is_far_out(solution.pair)):
+            return None  # its interval may reach a place far out, which at this p is not the nearest to ξ = 0
+        return solution
 
     def _from_start(self, p: float, tolerance: Tolerance) -> Solution | None:
         """The solution at p with what was chosen for it in the problem close by, or None."""
@@ -227,7 +239,7 @@ class NearPlace:
         """The solution at p with a generator, from those around p, or from the nearest one."""
         known = (solution.pair for solution in self.known.values())
         near = sorted(known, key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
-        return Solution(self.remedied(lambda: principal_pair(generator, p, start=near)))
+        return Solution(self.pair_on(generator, p, near))
 
     def _meets(self, solution: Solution, tolerance: Tolerance) -> bool:
         """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
@@ -261,7 +273,7 @@ class FarPlaces(NearPlace):
     Paths that leave the interval of the noise are killed, which makes Λ(p) smaller, but by no more than the tolerance.
     """
 
-    small_p = 0.0
+    small_p, is_far = 0.0, True
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         try:
@@ -277,9 +289,6 @@ class FarPlaces(NearPlace):
             return search.run(start)
         found = (search.run(first_far(self.problem, place, self.rtol)) for place in wanted)
         return max(found, key=lambda each: each.pair.value)
-
-    def _has_left(self, pair: PrincipalPair, nearest: float) -> bool:
-        return False
 
     def fits(self, generator: Generator, q: float, p: float) -> bool:
         if generator.chosen.is_killed:
@@ -335,11 +344,10 @@ class _Search:
             NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
                 `Solution`, or None.
         """
-        pair = None
         if isinstance(start, Solution):
             chosen, pair = refined(start, self.tolerance(self.p, start.pair.value), 0), start.pair
         else:
-            chosen = start
+            chosen, pair = start, None
         while True:
             self.check(chosen)
             try:
@@ -386,3 +394,139 @@ class _Search:
             said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
         raise NotConverged(told, best, Remedy.BUDGET)
+
+
+def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Discretisation:
+    """A first discretisation, small, for a tilted density around some z; None for where slow noise carries it."""
+    noise, system, digits = problem.noise, problem.system, -math.log10(rtol)
+    frozen = frozen_noise(problem)
+    if frozen is None:  # the noise has states
+        return Discretisation(_phase(system, noise.reached, digits), (States(noise.reached.size),))
+    unit, center = noise.standard_deviation, frozen.center(p) if center is None else center
+    end = noise.half_width / unit
+    phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
+    part: NoisePart
+    if noise.basis == "cells":  # their lines on both sides, further apart further out
+        steps = np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
+        side = np.append(steps[steps < 0.8 * (12.0 + abs(center))], 12.0 + abs(center))
+        part = Cells(np.concatenate([-side[:0:-1], side]), round(2 + digits / 2))
+    else:
+        slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
+        part = Polynomials(round(digits / 2) + (3 if math.isinf(end) else 5), slope)
+    chosen = Discretisation(phase, (part,))
+    found = corners(problem, p, center)
+    return resolving(found, chosen, noise, center, rtol) if found else chosen
+
+
+def first_far(problem: Problem, place: Place, rtol: float) -> Discretisation:
+    """A first discretisation, with cells even in ln |ξ|, for a place far out."""
+    digits, unit = -math.log10(rtol), problem.noise.standard_deviation
+    fall = abs(np.subtract(*_log_density(problem.noise, np.array([place.lower, place.upper]))))
+    cells = max(FEWEST_CELLS, math.ceil(fall / FALL_PER_CELL))
+    lines = place.lower * np.exp(math.log(place.upper / place.lower) * np.linspace(0, 1, cells + 1))
+    phase = _phase(problem.system, unit * lines[[0, -1]], digits, 1)
+    return Discretisation(phase, (Cells(lines, round(2 + digits / 2), is_killed=True),))
+
+
+def _phase(system: System, xi: FloatArray, digits: float, more: int = 0) -> PhaseCells:
+    """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
+
+    There are more where the speed of the phase changes much for some of the ξ.
+    """
+    speed = phase_speed(system, xi)
+    widest = float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
+    cells = (8 if widest > 1 else 4 if widest > 0.5 else 2) + more
+    rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
+    lines = rays[0] + np.linspace(0, math.pi, cells + 1)
+    others = rays[0] + np.mod(np.array(rays[1:]) - rays[0], math.pi)
+    near = np.min(np.abs(lines[1:-1, None] - others[None]), axis=1, initial=math.inf) < 0.3 * math.pi / cells
+    lines = np.sort(np.concatenate([lines[:1], lines[1:-1][~near], lines[-1:], others]))
+    degree = round(np.clip(digits + 2 - (widest > 0.5) * 4, 4, MOST_DEGREE))
+    return PhaseCells(lines, np.full(lines.size - 1, degree))
+
+
+def widened(generator: Generator) -> Discretisation:
+    """That of a generator on an interval `WIDER` times as wide, where that is one of algebraic tails."""
+    chosen, lines = generator.chosen, generator.chosen.noise.lines
+    if not (lines.size and generator.problem.noise.has_algebraic_tails):
+        return chosen
+    steps = WIDER ** np.linspace(0, 1, 4)[1:]
+    wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
+    return chosen.with_noise(replace(chosen.noise, lines=wide))
+
+
+def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation:
+    """A discretisation on which every cell should lack no more than its share of the tolerance."""
+    pair, share = solution.pair, SHARE * tolerance
+    chosen, noise = pair.generator.chosen, pair.generator.problem.noise
+    new = chosen.refined(solution.effects, share, stages < FREE_STAGES)
+    if chosen.noise.lines.size:
+        lower, upper = solution.truncation
+        new = new.with_noise(new.noise.reaching((lower / share, upper / share), partial(_log_density, noise)))
+        if any(np.any(each.at_corners) for each in solution.effects if each):
+            lacking = [float(np.sum(each.of_cells[each.at_corners])) for each in solution.effects if each]
+            new = graded_more(solution.corners, new, [each / (CORNERS * tolerance) for each in lacking])
+    return new if new.size > chosen.size or solution.error_by_modes <= tolerance else new.raised()
+
+
+def _log_density(noise: Noise, z: FloatArray) -> FloatArray:
+    """ln P_s of a diffusion."""
+    return noise.log_density(noise.standard_deviation * z)
+
+
+def other_center(pair: PrincipalPair) -> float | None:
+    """Another z, far from the tilted density of a pair, where paths that hold the noise grow about as fast, or None.
+
+    Between two such places slow noise hardly ever passes: each has its own pair with T > 0 as far as that can be
+    told, and only the larger eigenvalue is Λ. For algebraic tails see `other_places`.
+    """
+    frozen = frozen_noise(pair.generator.problem)
+    if frozen is None or pair.generator.problem.noise.has_algebraic_tails:
+        return None
+    z, rate = frozen.peaks(pair.p)
+    if z.size < 2:
+        return None
+    at, density = noise_marginal(pair)
+    mean = float(at @ density / density.sum())
+    width = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
+    far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
+    return float(z[far][np.argmax(rate[far])]) if np.any(far) else None
+
+
+def other_places(pair: PrincipalPair) -> list[Place]:
+    """The other places of algebraic tails where paths that hold the noise grow about as fast as that of a pair."""
+    return [each for each, holds in _places(pair) if not holds and each.rate > comparable(pair.value)]
+
+
+def is_far_out(pair: PrincipalPair) -> bool:
+    """Whether a pair is that of a place far out in algebraic tails, whatever found it."""
+    return any(holds for _, holds in _places(pair))
+
+
+def _places(pair: PrincipalPair) -> list[tuple[Place, bool]]:
+    """The places of algebraic tails, and whether the tilted density of a pair lies there."""
+    places = far_places(pair.generator.problem, pair.p)
+    if not places:
+        return []
+    at, density = noise_marginal(pair)
+    mean = float(at @ density / density.sum())
+    return [(place, place.lower <= mean <= place.upper) for place in places]
+
+
+def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
+    """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
+    if mesh is None:  # then both places have been looked at
+        return ()
+    for pair in pairs:
+        places, z = other_places(pair), other_center(pair)
+        if places:
+            z = math.sqrt(places[0].lower * places[0].upper) * math.copysign(1, places[0].lower)
+        if z is not None:
+            has_tails = pair.generator.problem.noise.has_algebraic_tails
+            return (Message(Code.CARRIED_ELSEWHERE, p=pair.p, has_tails=has_tails, z=z, remedy=Remedy.REACH),)
+    return ()
+
+
+def comparable(value: float) -> float:
+    """The growth rate from which on a place may outdo one with a value."""
+    return value - (1 - COMPARABLE) * abs(value)

@@ -106,10 +106,12 @@ def resolving(
     """
     lower, upper = _interval(noise, center)
     even = np.linspace(lower, upper, math.ceil((upper - lower) / WIDTH) + 1)
-    lines = _with(chosen.noise.lines if chosen.noise.lines.size else even, _z(found))
+    lines, z = chosen.noise.lines if chosen.noise.lines.size else even, _z(found)
+    far = np.min(np.abs(lines[1:-1, None] - z), axis=1) > 0.3 * np.min(np.diff(lines))
+    lines = np.unique(np.concatenate([lines[:1], lines[1:-1][far], lines[-1:], z]))
     phase = replace(chosen.phase, degrees=np.minimum(DEGREE, chosen.phase.degrees))
     cells = Discretisation(phase, (Cells(lines, DEGREE),))
-    to_end = noise.half_width / noise.standard_deviation - np.max(np.abs(_z(found)))
+    to_end = noise.half_width / noise.standard_deviation - np.max(np.abs(z))
     levels = max(math.ceil(math.log2(WIDTH / min(to_end, WIDTH))), *(corner.levels(rtol) for corner in found))
     return _graded(found, cells, levels, levels)
 
@@ -173,12 +175,6 @@ def _interval(noise: Noise, center: float) -> FloatArray:
     end = noise.half_width / noise.standard_deviation
     lower, upper = min(center, 0.0) - REACH, max(center, 0.0) + REACH
     return np.array([-end if -end > lower - WIDTH else lower, end if end < upper + WIDTH else upper])
-
-
-def _with(lines: FloatArray, places: FloatArray) -> FloatArray:
-    """Lines with some more, instead of those close to them."""
-    far = np.min(np.abs(lines[1:-1, None] - places), axis=1) > 0.3 * np.min(np.diff(lines))
-    return np.unique(np.concatenate([lines[:1], lines[1:-1][far], lines[-1:], places]))
 
 
 def _are(lines: FloatArray, places: FloatArray) -> Any:

@@ -22,7 +22,7 @@ from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator
 from fpsolve.arrays import FloatArray, dense, finite, one
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, SingularMatrix
-from fpsolve.exponent.eigenfunction_plot import EigenfunctionPlot
+from fpsolve.exponent.fields import EigenfunctionPlot
 from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.factors import Factors
 from fpsolve.fem.generator import Generator, Pencil
@@ -112,27 +112,21 @@ def principal_pair(
             vectors = search()
         except NotConverged:  # the other searches may still find it
             continue
-        found.append(_pair(generator, pencil, rayleigh_iteration(pencil, *vectors)))
-        if found[-1].residual <= BACKWARD_ERROR_LIMIT and min(found[-1].sign_defects) <= SURELY_POSITIVE:
-            return _rightmost(found[-1])
-    pair = min(found, key=lambda pair: (pair.residual > BACKWARD_ERROR_LIMIT, min(pair.sign_defects)))
-    if not (pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= POSITIVE):
-        limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
-        told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=min(pair.sign_defects), **limits)
-        raise NotConverged(told, pair, Remedy.BOTH_AXES)
-    return _rightmost(pair)
-
-
-def _rightmost(pair: PrincipalPair) -> PrincipalPair:
-    """The pair; for a chain and few unknowns only after a look at the whole spectrum.
-
-    States may hardly mix, or the phase not leave a ray: then other pairs have a positive T, or T*, too.
-    """
-    generator = pair.generator
+        pair = _pair(generator, pencil, rayleigh_iteration(pencil, *vectors))
+        if pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= SURELY_POSITIVE:
+            break
+        found.append(pair)
+    else:
+        pair = min(found, key=lambda pair: (pair.residual > BACKWARD_ERROR_LIMIT, min(pair.sign_defects)))
+        if not (pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= POSITIVE):
+            limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
+            told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=min(pair.sign_defects), **limits)
+            raise NotConverged(told, pair, Remedy.BOTH_AXES)
+    # states may hardly mix, or the phase not leave a ray: then other pairs have a positive T, or T*, too
     if generator.problem.noise.mixes_slowly and generator.size <= SURVEYED_UNKNOWNS:
-        rightmost = spectrum(generator, pair.p, 1)[0]
+        rightmost = spectrum(generator, p, 1)[0]
         if abs(rightmost - pair.value) > 1e-6 * max(abs(rightmost), generator.unit_rate):
-            told = Message(Code.LARGER_EIGENVALUE, p=pair.p, rightmost=rightmost.real, value=pair.value)
+            told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost.real, value=pair.value)
             raise NotConverged(told, pair, Remedy.PHASE)
     return pair
 
@@ -151,7 +145,7 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
         raise ValueError(f"{size} unknowns; the whole spectrum takes at most {MAX_DENSE_UNKNOWNS}: use a coarser mesh")
     if not 1 <= k <= size:
         raise ValueError(f"k is {k}; it must be from 1 to the number of unknowns, {size}")
-    root = scipy.linalg.cholesky(finite(generator.mass(p).toarray()), lower=True)
+    root = scipy.linalg.cholesky(finite(generator.space(p).mass.toarray()), lower=True)
     half = scipy.linalg.solve_triangular(root, finite(generator.matrix(p).toarray()), lower=True)
     matrix = scipy.linalg.solve_triangular(root, half.T, lower=True).T
     values = scipy.linalg.eigvals(matrix, overwrite_a=True)

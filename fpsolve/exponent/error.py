@@ -17,14 +17,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.corners import Corner, corners, left_on_mesh, slow_shares
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.fem.axis import along
 from fpsolve.fem.discretisation import ModeEffects
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.kronecker import along
-from fpsolve.fem.noise_axes import CellAxis
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.quantity import UNNAMED
 
@@ -130,8 +129,15 @@ class Solution:
 
     @cached_property
     def effects(self) -> tuple[ModeEffects | None, ...]:
-        """Those of φ, and those of ξ if it has elements."""
-        return mode_effects(self.pair)
+        """Those of φ, and those of ξ if it has elements, with T singular in some cells where there are corners."""
+        found, chosen = mode_effects(self.pair), self.pair.generator.chosen
+        if not (chosen.noise.lines.size and self.corners):
+            return found
+        phi, xi = found
+        assert phi is not None
+        assert xi is not None
+        slow = slow_shares(self.corners, chosen, (phi.degrees, xi.degrees))
+        return replace(phi, corners=slow[0]), replace(xi, corners=slow[1])
 
     @cached_property
     def truncation(self) -> tuple[float, float]:
@@ -143,7 +149,14 @@ class Solution:
         """Estimate of the error of `pair.value`: discretisation, truncation and rounding."""
         if self.finer is not None:
             return self._beside(self.finer) + self._other
-        return max(self.error_by_modes, self._beside_enriched + self._other if self._corners else 0.0)
+        if not self.corners:
+            return self.error_by_modes
+        generator = self.pair.generator
+        try:
+            finer = principal_pair(generator.enriched(), self.pair.p, start=self.pair)
+        except (NotConverged, MeshError):
+            return math.inf
+        return max(self.error_by_modes, self._beside(finer) + self._other)
 
     @cached_property
     def error_by_modes(self) -> float:
@@ -155,23 +168,14 @@ class Solution:
         return sum(self.truncation) + self.pair.rounding
 
     @cached_property
-    def _corners(self) -> list[Corner]:
+    def corners(self) -> list[Corner]:
+        """Where T is singular."""
         return corners(self.pair.generator.problem, self.pair.p)
-
-    @property
-    def _beside_enriched(self) -> float:
-        """By two degrees more."""
-        generator = self.pair.generator
-        try:
-            finer = Generator(generator.problem, generator.chosen.enriched())
-            return self._beside(principal_pair(finer, self.pair.p, start=self.pair))
-        except (NotConverged, MeshError):
-            return math.inf
 
     def _beside(self, finer: PrincipalPair) -> float:
         """What is missing, by that of a finer pair."""
         degrees = (int(np.max(pair.generator.chosen.phase.degrees)) for pair in (self.pair, finer))
-        return abs(finer.value - self.pair.value) * left_on_mesh(self._corners, *degrees)
+        return abs(finer.value - self.pair.value) * left_on_mesh(self.corners, *degrees)
 
 
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
@@ -196,35 +200,23 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
             shares = np.abs(left * mask * image).sum(axis=others)[high]
             effects.append(np.bincount(axis.cells[high], shares, minlength=count) / abs(norm))
         found.append(ModeEffects(degrees, effects[0], effects[1], axis.slowest))
-    return _with_corners(pair, found)
-
-
-def _with_corners(pair: PrincipalPair, effects: list[ModeEffects | None]) -> tuple[ModeEffects | None, ...]:
-    """The same where T is singular in some cells."""
-    (phi, *others), chosen = effects, pair.generator.chosen
-    if phi is None or others[0] is None or not chosen.noise.lines.size:
-        return tuple(effects)
-    found, xi = corners(pair.generator.problem, pair.p), others[0]
-    if not found:
-        return tuple(effects)
-    slow = slow_shares(found, chosen, (phi.degrees, xi.degrees))
-    return replace(phi, corners=slow[0]), replace(xi, corners=slow[1])
+    return tuple(found)
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:
     """Bounds on what the two ends of an interval of cells change in Λ: ½σ² ∫ P_s |T_z| T* dφ / ∫ T T* there."""
-    xi = pair.space.xi
     if not pair.generator.chosen.noise.lines.size:
         return 0.0, 0.0
-    return _end_effect(pair, xi, 0), _end_effect(pair, xi, -1)
+    lines = pair.space.xi.line.lines
+    return _end_effect(pair, lines[[0, 1]]), _end_effect(pair, lines[[-1, -2]])
 
 
-def _end_effect(pair: PrincipalPair, xi: CellAxis, end: int) -> float:
-    """½σ² P_s |∂T| T* at an end; the slope is the largest in the last cell, as no flux makes it 0 at the end itself.
+def _end_effect(pair: PrincipalPair, lines: FloatArray) -> float:
+    """½σ² P_s |∂T| T* at the first of two lines; the slope is the largest between them, as no flux makes it 0 there.
 
     Where paths are killed T and T* are 0 at the end, and ½σ² P_s |∂T ∂T*| times the last cell bounds what it hides.
     """
-    space, lines = pair.space, xi.line.lines[[-1, -2] if end else [0, 1]]
+    space, xi = pair.space, pair.space.xi
     z = lines[0] + (lines[1] - lines[0]) * np.linspace(0, 1, 9)
     right, left = (xi.values_at(z) @ space.table(v).T for v in (pair.right, pair.left))
     adjoint = left[1] * (lines[1] - lines[0]) / (z[1] - z[0]) if xi.is_killed else left[0]

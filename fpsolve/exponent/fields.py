@@ -1,13 +1,26 @@
-"""The functions that a pair of eigenvectors stands for: T, T* and their product."""
+"""The functions that a pair of eigenvectors stands for, T, T* and their product; nodes that show them, and pictures.
+
+The nodes are those of Lagrange quadrilaterals on the full circle, x = φ, y = ξ. They show the elements' polynomials,
+not an interpolation through shared nodes: nodes are doubled at every φ-line of the mesh and carry the one-sided limits
+there, so that the jump T(φ⁻) = R^p T(φ⁺) of an impact is seen. A half circle is repeated, as everything in Eq. (19) is
+π-periodic, and its cells are cut at φ = 0 and 2π.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+import math
+import warnings
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.fem.noise_axes import Samples
+from fpsolve.errors import OutputError
+from fpsolve.fem.noise_axes import LineAxis, Samples
+from fpsolve.model.problem import parameter_lines
+from fpsolve.model.quantity import PHASE, Quantity, density_unit
+from fpsolve.surfaces import Picture, Surface, can_render, flat_picture, picture_in_space
 
 if TYPE_CHECKING:
     from fpsolve.exponent.eigen import PrincipalPair
@@ -15,6 +28,20 @@ if TYPE_CHECKING:
 MOST_TILT = 1.5
 UNRESOLVED, MOST_NEGATIVE = 0.1, 0.02
 """The share of an eigenfunction, and of a density, with the wrong sign from which on it misleads."""
+MAX_ORDER = 4
+"""Largest degree of the quadrilaterals; elements of a higher degree are cut into several of them."""
+FAINT = 1e-6
+NEGLIGIBLE = 1e-3
+"""A picture shows the ξ at which a density exceeds this share of its maximum."""
+FINER = 2
+"""So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
+Field = Literal["T", "T_adjoint", "tilted_density"]
+FIELDS = {
+    "T": ("right", Quantity("T", "T", "eigenfunction", "$T$")),
+    "T_adjoint": ("adjoint", Quantity("T_adjoint", "T*", "adjoint eigenfunction", "$T^*$")),
+    "tilted_density": ("product", Quantity("tilted_density", "T T*", "tilted density", r"$T\,T^*$")),
+}
+"""By the names that they have in files for ParaView: those among `Fields`, and what they are."""
 
 
 class Fields(NamedTuple):
@@ -36,20 +63,13 @@ def fields(pair: PrincipalPair, at_phi: Any, at_xi: Samples) -> Fields:
 
     T has mean 1 over P_s(ξ)/2π; with a tilt beyond `MOST_TILT`, which leaves T there to rounding, over P_s exp(2s z).
     """
-    space = pair.space
+    space, xi, mean = pair.space, pair.space.xi, 1.0
+    if 0 < abs(xi.tilt) <= MOST_TILT:
+        own, over_phi = xi.samples().factor, space.phi.constant @ space.table(pair.right) / space.phi.span
+        mean = float(xi.measure / own @ (xi.values @ over_phi) / np.sum(xi.measure / own**2))
     right, left = (space.evaluate(v, at_phi, at_xi.values) for v in (pair.right, pair.left))
-    factor = at_xi.factor / _mean(pair)
+    factor = at_xi.factor / mean
     return Fields(right * factor, left * at_xi.weight / factor, right * left * at_xi.weight)
-
-
-def _mean(pair: PrincipalPair) -> float:
-    """That of T over P_s(ξ)/2π, from the coefficients."""
-    space, xi = pair.space, pair.space.xi
-    if xi.tilt == 0 or abs(xi.tilt) > MOST_TILT:
-        return 1.0
-    factor = xi.samples().factor
-    over_phi = space.phi.constant @ space.table(pair.right) / space.phi.span
-    return float(xi.measure / factor @ (xi.values @ over_phi) / np.sum(xi.measure / factor**2))
 
 
 def xi_marginal(pair: PrincipalPair, at_xi: Samples) -> FloatArray:
@@ -62,3 +82,172 @@ def noise_marginal(pair: PrincipalPair) -> tuple[FloatArray, FloatArray]:
     """z and the ξ-marginal of the tilted density at the points of a rule, times their measure."""
     at = pair.space.xi.samples()
     return at.xi / pair.generator.problem.noise.standard_deviation, np.abs(xi_marginal(pair, at)) * at.measure
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Nodes of the quadrilaterals: a block of them for each φ-cell or part of one, continuous in ξ.
+
+    Attributes:
+        phi: φ of the nodes, shape (blocks, nodes of a block); the ends are the φ-lines, 0 and 2π.
+        z_cells: z of the nodes, shape (ξ-cells, nodes of a cell), with the ends of neighbours equal.
+        unit: ξ/z.
+        order: degree of the quadrilaterals.
+    """
+
+    phi: FloatArray
+    z_cells: FloatArray
+    unit: float
+    order: int
+
+    @classmethod
+    def of(cls, pair: PrincipalPair, finer: int = 1) -> Nodes:
+        """Nodes that show a pair, or so many times more either way; P_s in the adjoint asks for low quadrilaterals.
+
+        Raises:
+            OutputError: the noise has states.
+        """
+        space, lines = pair.space, _z_lines(pair)
+        degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
+        order = min(MAX_ORDER, max(degrees))
+        # P_s is shown by quadrilaterals as high as a noise unit, or higher in algebraic tails
+        has_tails, inner = pair.generator.problem.noise.has_algebraic_tails, np.minimum(abs(lines[:-1]), abs(lines[1:]))
+        tall = math.ceil(np.max(np.diff(lines) / np.maximum(1.0, inner / 6 if has_tails else 1.0)) - 1e-9)
+        starts = np.sort(np.mod(space.phi.lines[:-1], space.phi.span))
+        starts = np.concatenate([starts + k * space.phi.span for k in range(space.phi.turns)])
+        breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
+        phi = _nodes(breaks, order, finer * _parts(degrees[0], order))
+        z = _nodes(lines, order, finer * max(tall, _parts(pair.generator.chosen.noise.degree, order)))
+        return cls(phi, z, pair.generator.problem.noise.standard_deviation, order)
+
+    @property
+    def z(self) -> FloatArray:
+        """z of the nodes, each once."""
+        return np.append(self.z_cells[:, :-1], self.z_cells[-1, -1])
+
+    def seen(self, pair: PrincipalPair) -> Nodes:
+        """The same where the tilted density, or that of the noise, is not negligible."""
+        noise = pair.generator.problem.noise
+        if noise.has_states:  # of which there are no nodes
+            return self
+        densities = self.fields(pair).product.max(axis=0), noise.density(self.unit * self.z)
+        living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
+        return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
+
+    def fields(self, pair: PrincipalPair) -> Fields:
+        """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
+        return fields(pair, self.phase_table(pair), self.samples(pair))
+
+    def phase_table(self, pair: PrincipalPair) -> FloatArray:
+        """Values of the φ-elements at the nodes, shape (φ-nodes, φ-unknowns)."""
+        phi = pair.space.phi
+        # contracted a little, as they then tell from which side a line of the mesh is seen
+        inside = self.phi + 1e-6 * (self.phi.mean(axis=1, keepdims=True) - self.phi)
+        turned = phi.span * np.floor((inside - phi.lines[0]) / phi.span)
+        return phi.at((self.phi - turned).ravel(), (inside - turned).ravel())
+
+    def samples(self, pair: PrincipalPair) -> Samples:
+        """The functions of ξ at the nodes."""
+        return _on_a_line(pair).at(self.z)
+
+    def points(self) -> FloatArray:
+        """(φ, ξ, 0), φ slowest, shape (points, 3)."""
+        phi, xi = np.meshgrid(self.phi.ravel(), self.unit * self.z, indexing="ij")
+        return np.stack([phi.ravel(), xi.ravel(), np.zeros(phi.size)], axis=1)
+
+    def cells(self) -> Any:
+        """Points of each quadrilateral in VTK's order, shape (cells, (order + 1)²)."""
+        k, (blocks, nodes) = self.order, self.phi.shape
+        columns = (np.arange(blocks)[:, None] * nodes + np.arange(0, nodes - 1, k)).ravel()
+        corners = columns[:, None] * self.z.size + np.arange(0, self.z.size - 1, k)
+        inner = range(1, k)
+        edges = [*((i, 0) for i in inner), *((k, j) for j in inner), *((i, k) for i in inner), *((0, j) for j in inner)]
+        i, j = np.transpose([(0, 0), (k, 0), (k, k), (0, k), *edges, *((i, j) for j in inner for i in inner)])
+        return corners.reshape(-1, 1) + i * self.z.size + j
+
+
+def _z_lines(pair: PrincipalPair) -> FloatArray:
+    """The lines of the ξ-cells; of polynomials the interval in which the noise lives along some paths, in noise units.
+
+    Outside it P_s and the tilted density are below `FAINT` of their largest values.
+    """
+    xi, noise = _on_a_line(pair), pair.generator.problem.noise
+    if pair.generator.chosen.noise.lines.size or noise.has_states:
+        return pair.generator.chosen.noise.lines
+    end = noise.half_width / noise.standard_deviation
+    reach = min(end, 12.0 + abs(xi.center))
+    z = np.linspace(-reach, reach, 2001)[1:-1]
+    tilted, stationary = np.abs(xi_marginal(pair, xi.at(z))), noise.density(noise.standard_deviation * z)
+    seen = z[(tilted > FAINT * tilted.max()) | (stationary > FAINT * stationary.max())]
+    lower, upper = max(math.floor(seen[0]), -end), min(math.ceil(seen[-1]), end)
+    inside = np.arange(math.floor(lower) + 1, math.ceil(upper))
+    return np.concatenate([[lower], inside[(inside > lower + 0.1) & (inside < upper - 0.1)], [upper]])
+
+
+def _on_a_line(pair: PrincipalPair) -> LineAxis:
+    """The functions of ξ of a pair. Raises `OutputError` where the noise has states."""
+    if pair.generator.problem.noise.has_states:
+        raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
+    return pair.space.xi
+
+
+def _parts(degree: int, order: int) -> int:
+    """Into how many polynomials of degree `order` one of `degree` is cut: one where that is exact."""
+    return 1 if degree <= order else math.ceil(degree / order) + 1
+
+
+def _nodes(breaks: FloatArray, order: int, parts: int) -> FloatArray:
+    """Equidistant nodes in each interval, shape (intervals, parts·order + 1)."""
+    t = np.linspace(0, 1, parts * order + 1)
+    return breaks[:-1, None] * (1 - t) + breaks[1:, None] * t
+
+
+class EigenfunctionPlot:
+    """A mixin of a `PrincipalPair`."""
+
+    def plot(self, field: Field = "T", *, cylinder: bool = False, cmap: str = "viridis") -> Picture:
+        """Draw an eigenfunction, or the tilted density, over phase and noise.
+
+        In space by pyvista where this machine can render, which takes some seconds to find out the first time; else in
+        the plane by matplotlib.
+
+        Args:
+            field: "T", "T_adjoint", or their product "tilted_density".
+            cylinder: whether φ goes around a cylinder; only where this machine can render.
+            cmap: the colours, by matplotlib's names.
+
+        Raises:
+            ValueError: there is no such field.
+            OutputError: the noise has states.
+        """
+        surface = surface_of(self, field)  # type: ignore[arg-type]
+        if can_render():
+            return picture_in_space(surface, cmap, cylinder=cylinder)
+        if cylinder:
+            warnings.warn(
+                "nothing can be rendered here, so that the plane is drawn; for a cylinder install OpenGL, as by "
+                "apt-get install libegl1 libgl1-mesa-dri",
+                stacklevel=2,
+            )
+        return flat_picture(surface, cmap)
+
+
+def surface_of(pair: PrincipalPair, field: str) -> Surface:
+    """A function of a pair where it is not negligible, with its words. Raises `ValueError`, `OutputError`."""
+    if field not in FIELDS:
+        raise ValueError(f"got field = {field!r}; must be one of {', '.join(map(repr, FIELDS))}")
+    (name, quantity), problem = FIELDS[field], pair.generator.problem
+    nodes, noise = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity
+    unit = quantity.unit if name == "right" else density_unit(noise)
+    about = {"phi": PHASE.attributes, "xi": noise.attributes, "values": {**quantity.attributes, "units": unit}}
+    rays = {(jump.phase + turn) % (2 * math.pi) for jump in problem.system.jumps for turn in (0, math.pi)}
+    return Surface(
+        phi=nodes.phi,
+        xi=nodes.unit * nodes.z,
+        values=getattr(nodes.fields(pair), name),
+        about=about,
+        name=quantity.symbol,
+        title=f"p = {pair.p:g}, Λ(p) = {round(pair.value, 14) + 0.0:.6g} (1/time)",
+        lines=parameter_lines(problem.parameters),
+        impacts=sorted(rays),
+    )

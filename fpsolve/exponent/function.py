@@ -1,10 +1,12 @@
-"""Λ as a function of p: a Chebyshev interpolant of Λ(p)/p, with λ, Λ″(0) and the stability index from it."""
+"""Λ at several p, one by one or as a function: a Chebyshev interpolant of Λ(p)/p, with the stability index from it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from itertools import repeat
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -14,14 +16,13 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray, real_array, real_numbers
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.adapt import Budget, misplaced
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Absent, Estimate, checked
-from fpsolve.exponent.places import misplaced
+from fpsolve.exponent.error import Absent, Estimate, Failure, checked
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, missed
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem, checked_moments, of_problem_too
+from fpsolve.messages import Code, Message, message_of
+from fpsolve.model.problem import Problem, checked_moments, of_problem, of_problem_too
 from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, STABILITY_INDEX, P, moment_at
 from fpsolve.theory.far import grows_far_out
 
@@ -37,6 +38,9 @@ SHOWN = 201
 """So many p of the interval are drawn."""
 LEVELS = (3, 5, 9, 17, 33, 65)
 """Numbers of nodes tried; each has the nodes of the one before, and new ones between them."""
+
+FEW_MOMENTS = 9
+"""Up to so many p are solved one by one."""
 
 
 class MomentLyapunovFunction(Result):
@@ -80,7 +84,12 @@ class MomentLyapunovFunction(Result):
         solver: ExponentSolver | None = None,
         progress: Callable[[], None] = lambda: None,
     ) -> None:
-        self.interval = _checked_interval(interval, problem)
+        low, high = (float(end) for end in checked_moments(list(interval), problem))
+        if not low < high:
+            raise ValueError(f"the interval of p is {interval}; its ends must increase")
+        if grows_far_out(problem):
+            raise NotConverged(Message(Code.KINKED))
+        self.interval = low, high
         self.solver = solver or ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
         self.interpolation_error, self._among, self._allowed = math.inf, among, SHARE * self._tolerance(1.0, 0.0)
         most = LEVELS[-1] if among is None else max(FEW_NODES, 3 * among.size // 10)
@@ -121,7 +130,10 @@ class MomentLyapunovFunction(Result):
         """Λ(p) at several p; the residual is the largest of the nodes."""
         points = checked_moments(p, self.solver.problem)
         value, error = self(points), self.error_estimate(points)
-        _check(self.solver, points, value, error)
+        for point, each, bound in zip(points.tolist(), value.tolist(), error.tolist(), strict=True):
+            if point != 0:
+                estimate = Estimate(each, bound, self.solver.scale(point), quantity=moment_at(point))
+                checked(estimate, self.solver.near.remedy, point)
         return MomentLyapunov(
             p=points,
             value=value,
@@ -154,7 +166,15 @@ class MomentLyapunovFunction(Result):
 
     def to_xarray(self, p: ArrayLike | None = None) -> xarray.Dataset:
         """Λ(p) with its derivatives and errors at some p, `SHOWN` of the interval if none are given."""
-        return _dataset(self, np.linspace(*self.interval, SHOWN) if p is None else real_numbers(p, "p"))
+        p = np.linspace(*self.interval, SHOWN) if p is None else real_numbers(p, "p")
+        numbers = {
+            MOMENT: self(p),
+            MOMENT.error(): self.error_estimate(p),
+            DERIVATIVE: self.derivative(p),
+            SECOND_DERIVATIVE: self.second_derivative(p),
+        }
+        method, values = "finite elements and interpolation", self.solver.problem.values
+        return dataset(MOMENT.words, method, numbers, {P: p}, values, rtol=self.solver.rtol)
 
     def _said(self) -> str:
         return "p from {:g} to {:g}, {} solved".format(*self.interval, self.nodes.size)
@@ -175,7 +195,10 @@ class MomentLyapunovFunction(Result):
             ratios[i] = self.solver.ratio(float(self.nodes[i]), self._tolerance)
             progress()
         values, slopes, self._errors = ratios.T
-        self._series = _hermite_interpolant(x, values, slopes, self.interval)
+        basis, half = np.eye(2 * x.size), 0.5 * (self.interval[1] - self.interval[0])
+        conditions = np.concatenate([chebval(x, basis).T, chebval(x, chebder(basis, axis=0)).T / x.size])
+        coefficients = np.linalg.solve(conditions, np.concatenate([values, slopes * half / x.size]))
+        self._series = Chebyshev(coefficients, domain=self.interval)
         self.interpolation_error = 2 * float(np.max(np.abs(self._series.coef[-3:])))
 
     @property
@@ -189,25 +212,6 @@ class MomentLyapunovFunction(Result):
         return self.solver.rtol * abs(p) * self.solver.scales.linear
 
 
-def _check(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> None:
-    """Refuse values whose errors leave them no meaning. Raises `NotConverged`."""
-    for point, each, bound in zip(p.tolist(), value.tolist(), error.tolist(), strict=True):
-        if point != 0:
-            checked(Estimate(each, bound, solver.scale(point), quantity=moment_at(point)), solver.near.remedy, point)
-
-
-def _dataset(function: MomentLyapunovFunction, p: FloatArray) -> xarray.Dataset:
-    """What a function is at some p."""
-    numbers = {
-        MOMENT: function(p),
-        MOMENT.error(): function.error_estimate(p),
-        DERIVATIVE: function.derivative(p),
-        SECOND_DERIVATIVE: function.second_derivative(p),
-    }
-    solver, method = function.solver, "finite elements and interpolation"
-    return dataset(MOMENT.words, method, numbers, {P: p}, solver.problem.values, rtol=solver.rtol)
-
-
 def _nodes_needed(count: int, last: float, error: float, allowed: float) -> float:
     """How many nodes convergence may take, if the error falls exponentially, as from half as many to `count`."""
     if not math.isfinite(last):
@@ -218,42 +222,14 @@ def _nodes_needed(count: int, last: float, error: float, allowed: float) -> floa
 
 def _nodes(count: int, interval: tuple[float, float], among: FloatArray | None) -> tuple[FloatArray, FloatArray]:
     """So many Chebyshev points of an interval, or of some p those nearest to them, as x in [-1, 1] and as p."""
-    x = -np.cos(np.pi * np.arange(count) / (count - 1))
-    nodes = _scaled(x, *interval)
+    x, half = -np.cos(np.pi * np.arange(count) / (count - 1)), 0.5 * (interval[1] - interval[0])
+    nodes = 0.5 * (interval[0] + interval[1]) + half * x
+    nodes[[0, -1]] = interval  # and 0 exactly
+    nodes[np.abs(nodes) < 1e-12 * half] = 0.0
     if among is None:
         return x, nodes
     nodes = np.unique(among[np.argmin(np.abs(among - nodes[:, None]), axis=1)])
     return np.interp(nodes, interval, (-1.0, 1.0)), nodes
-
-
-def _scaled(x: FloatArray, low: float, high: float) -> FloatArray:
-    """Points of [-1, 1] in another interval; its ends and 0 exactly."""
-    half = 0.5 * (high - low)
-    points = 0.5 * (low + high) + half * x
-    points[[0, -1]] = low, high
-    points[np.abs(points) < 1e-12 * half] = 0.0
-    return points
-
-
-def _hermite_interpolant(
-    x: FloatArray, values: FloatArray, slopes: FloatArray, interval: tuple[float, float]
-) -> Chebyshev:
-    """The polynomial with these values and slopes at points that stand for x in [-1, 1]."""
-    count, half = x.size, 0.5 * (interval[1] - interval[0])
-    basis = np.eye(2 * count)
-    conditions = np.concatenate([chebval(x, basis).T, chebval(x, chebder(basis, axis=0)).T / count])
-    coefficients = np.linalg.solve(conditions, np.concatenate([values, slopes * half / count]))
-    return Chebyshev(coefficients, domain=interval)
-
-
-def _checked_interval(interval: tuple[float, float], problem: Problem) -> tuple[float, float]:
-    """The ends, where Λ(p) is finite and smooth between them. Raises `ValueError`, `NoSuchExponent`, `NotConverged`."""
-    low, high = (float(end) for end in checked_moments(list(interval), problem))
-    if not low < high:
-        raise ValueError(f"the interval of p is {interval}; its ends must increase")
-    if grows_far_out(problem):
-        raise NotConverged(Message(Code.KINKED))
-    return low, high
 
 
 def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> Message | None:
@@ -270,12 +246,6 @@ def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> Mess
     return Message(Code.NOT_CONVEX, p=p[i], other=np.append(p, 0.0)[j])
 
 
-def _no_root(problem: Problem, interval: tuple[float, float]) -> Absent:
-    """That Λ(p) has no root p ≠ 0 in an interval."""
-    low, high = np.clip(interval, *problem.noise.moments)
-    return Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=problem.noise.is_bounded))
-
-
 def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
 ) -> Estimate | Absent:
@@ -288,7 +258,8 @@ def nonzero_root(
     """
     if grows_far_out(solver.problem):
         return Absent(Message(Code.NO_INDEX))
-    low, high = (float(end) for end in np.clip(interval, *solver.problem.noise.moments))
+    noise = solver.problem.noise
+    low, high = (float(end) for end in np.clip(interval, *noise.moments))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)
         guess = -ratio / slope
@@ -305,8 +276,102 @@ def nonzero_root(
             found = Estimate(p, error / slope + abs(new - p), scale=1.0, quantity=STABILITY_INDEX)
             return checked(found, solver.near.remedy)
         if low == high:
-            return _no_root(solver.problem, interval)
+            low, high = np.clip(interval, *noise.moments)
+            return Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=noise.is_bounded))
         if not low < new < high:
             new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
         p = new
     raise NotConverged(Message(Code.INDEX_UNSETTLED, p=p), remedy=solver.near.refinement)
+
+
+@of_problem
+def moment_lyapunov(
+    problem: Problem,
+    p: ArrayLike,
+    *,
+    rtol: float = 1e-8,
+    mesh: CylinderMesh | None = None,
+    budget: Budget | None = None,
+) -> MomentLyapunov:
+    """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
+
+    Args:
+        problem: a motion and its noise, in one argument or two.
+        p: one moment, or an array of shape (n,).
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
+        mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
+        budget: what the choice of a mesh may cost; None for the default one.
+
+    Many p are interpolated, see `MomentLyapunovFunction`, where that saves solves; the result then has no `pairs`.
+
+    Raises:
+        ValueError: p is not finite, or empty, or rtol is not positive.
+        NoSuchExponent: Λ(p) is infinite.
+        NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
+    """
+    solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+    result = solve_moments(solver, checked_moments(p, problem))
+    if result.failures:
+        raise NotConverged(Message(Code.SEVERAL, reasons=[failure.reason for failure in result.failures]), result)
+    return result
+
+
+def solve_moments(
+    solver: ExponentSolver, p: ArrayLike, *, progress: Callable[[], None] = lambda: None
+) -> MomentLyapunov:
+    """Λ at several p, by interpolation where that saves solves; what did not converge is in its `failures`.
+
+    Args:
+        solver: of the problem.
+        p: one moment, or an array of shape (n,), which here may be empty; equal ones are solved once.
+        progress: called once for each p, whatever the number of solves.
+
+    Raises:
+        NoSuchExponent: Λ(p) is infinite for one of the p.
+    """
+    asked = checked_moments(p, solver.problem, may_be_empty=True)
+    points, reports = np.array([*dict.fromkeys(asked.tolist())], dtype=float), repeat(progress, asked.size)
+
+    def report() -> None:
+        next(reports, lambda: None)()
+
+    result = _interpolated(solver, points, report) or _one_by_one(solver, points, report)
+    for each in reports:
+        each()
+    return result if points.size == asked.size else _at(result, asked)
+
+
+def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
+    """A result at p some of which are equal, without those that failed."""
+    places = {each: i for i, each in enumerate(result.p.tolist())}
+    index = [places[each] for each in p.tolist() if each in places]
+    names = ("p", "value", "derivative", "error_estimate", "residual")
+    return replace(result, **{name: getattr(result, name)[index] for name in names})
+
+
+def _interpolated(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov | None:
+    """Λ at many p; None where that takes as many solves, or does not converge."""
+    if p.size <= FEW_MOMENTS or grows_far_out(solver.problem):
+        return None
+    ends = float(p.min()), float(p.max())
+    try:
+        function = MomentLyapunovFunction(solver.problem, ends, solver=solver, among=p, progress=progress)
+        return function.moments(p) if function.is_converged else None
+    except NotConverged:
+        return None
+
+
+def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov:
+    """Λ(0) = 0 needs no solve; where its eigenpair failed, Λ′ and residual are NaN."""
+    result = solver.moments(p, progress=progress)
+    obstacle = None if result.failures else broken_convexity(result.pairs, result.error_estimate)
+    if obstacle:
+        return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.near.refinement)),))
+    failures = tuple(failure for failure in result.failures if failure.p != 0)
+    if len(failures) == len(result.failures):
+        return result
+    failed = {failure.p for failure in failures}
+    place = [float(each) for each in p if each not in failed].index(0.0)
+    row = {"p": 0.0, "value": 0.0, "derivative": np.nan, "error_estimate": 0.0, "residual": np.nan}
+    columns: dict[str, Any] = {name: np.insert(getattr(result, name), place, number) for name, number in row.items()}
+    return replace(result, failures=failures, **columns)

@@ -1,103 +1,138 @@
-"""The quantities that are one number: what solves each, and its perturbation theory."""
+"""The quantities that are one number: what solves each, and its perturbation theory.
+
+One solve tells how often there are impacts, and how much must be lost in each so that λ = 0. An impact at x = 0 takes
+(0, ẋ) to (0, −Rẋ), which is R (0, ẋ) once every other half-wave is mirrored: it multiplies the
+whole state by R. The motion between impacts is linear, and the noise does not depend on it. So under one path of the
+noise the phase takes the same course for every R, and with n(t) impacts up to t
+
+    ln ‖x(t)‖ = ln ‖x(t)‖ at R = 1 + n(t) ln R,    λ = λ₀ + N ln R,    N = lim n(t)/t,
+
+for noise of any kind and strength: λ is affine in ln R, with the mean number N of impacts per unit time as its slope.
+
+Eq. (19) says it too. R enters L(p) by (R^p − 1) |dφ/dt| δ(φ − π/2 mod π) alone, which is 0 at p = 0. There T = 1, and
+T*, the stationary density of (φ, ξ), does not depend on R, so that
+
+    λ = Λ′(0) = ⟨T*, L′(0) 1⟩ = ⟨T*, q⟩ + ln R ⟨T*, |dφ/dt| δ(φ − π/2 mod π)⟩,
+
+whose last factor, the flux of T* over the rays of the impacts, is N. As 1 is in every discrete space, this holds on
+each mesh as it stands. And λ = 0 where
+
+    ln R_c = −λ₀/N = ln R − λ/N,
+
+which for motions that are stable without loss is a gain, R_c > 1. Λ(p) for p ≠ 0 is not affine in ln R.
+"""
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.error import Absent, Estimate
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.error import Absent, Estimate, checked
 from fpsolve.exponent.function import SEARCH_INTERVAL, nonzero_root
-from fpsolve.exponent.impacts import critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import Code, Message
 from fpsolve.model import quantity
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import ParameterDerivative, Problem, of_problem
 from fpsolve.model.quantity import MOMENT as MOMENT
 from fpsolve.model.quantity import Quantity as Quantity
 from fpsolve.theory.perturbation import second_order_or_none
 
+_EPS = sys.float_info.epsilon
+LARGEST_LOG = 500.0
+"""R_c is given for |ln R_c| up to this."""
 DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
 """What a figure can show."""
 QuantityName = Literal[DrawnName, "variance_rate", "impact_rate", "critical_impact_factor", "critical_restitution"]
 
 
-@dataclass(frozen=True)
-class Index(Quantity):
-    """A quantity that is one number, and not one for each p.
+def impact_rate(solver: ExponentSolver) -> Estimate | Absent:
+    """N = ∂λ/∂ ln R, the mean number of impacts per unit time; it does not depend on R.
 
-    Attributes:
-        solve: finds it, from a solver and the `root` of its `MomentLyapunov`, or says why there is none in `interval`.
-            Raises `NotConverged`.
-        theory: what perturbation theory makes of it; it may be infinite, or NaN where that does not apply.
-        interval: where it is sought.
+    Its error is the difference from that of a finer discretisation, for algebraic tails of a wider one.
+
+    Args:
+        solver: of a problem with impacts on one ray; of others there is none.
+
+    Raises:
+        NotConverged: it is not resolved.
     """
-
-    solve: Callable[[ExponentSolver, float | None], Estimate | Absent] = field(kw_only=True)
-    theory: Callable[[Problem], float] = field(kw_only=True)
-    interval: tuple[float, float] = field(kw_only=True)
-
-
-def _theory(problem: Problem, name: str) -> float:
-    """A number of second-order perturbation theory; NaN where that does not apply."""
-    return float(getattr(second_order_or_none(problem), name, math.nan))
-
-
-def _index(
-    record: Quantity,
-    solve: Callable[[ExponentSolver, float | None], Estimate | Absent],
-    theory: Callable[[Problem], float],
-    interval: tuple[float, float] = (-math.inf, math.inf),
-) -> Index:
-    """A record with what solves it."""
-    return Index(**vars(record), solve=solve, theory=theory, interval=interval)
+    count = len(solver.problem.system.jumps)
+    if count != 1:
+        return Absent(Message(Code.NOT_ONE_RAY, count=count or None))
+    value, better = map(_flux, solver.at_zero)
+    generator = solver.at_zero[1].generator
+    usual = generator.unit_rate / math.pi
+    rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.loss * usual
+    error = abs(better - value) + (rounding if better > lost else lost)
+    return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.near.remedy)
 
 
-LYAPUNOV_EXPONENT = _index(
-    quantity.LYAPUNOV_EXPONENT,
-    solve=lambda solver, _: solver.lyapunov_exponent(),
-    theory=lambda problem: _theory(problem, "lyapunov_exponent"),
-)
-STABILITY_INDEX = _index(
-    quantity.STABILITY_INDEX,
-    solve=lambda solver, root: nonzero_root(solver, guess=root),
-    theory=lambda problem: _theory(problem, "stability_index"),
-    interval=SEARCH_INTERVAL,
-)
-VARIANCE_RATE = _index(
-    quantity.VARIANCE_RATE,
-    solve=lambda solver, _: solver.variance_rate(),
-    theory=lambda problem: _theory(problem, "variance_rate"),
-)
-IMPACT_RATE = _index(
-    quantity.IMPACT_RATE,
-    solve=lambda solver, _: impact_rate(solver),
-    theory=lambda problem: _theory(problem, "impact_rate"),
-)
-CRITICAL_IMPACT_FACTOR = _index(
-    quantity.CRITICAL_IMPACT_FACTOR,
-    solve=lambda solver, _: critical_impact_factor(solver),
-    theory=lambda problem: _theory(problem, "critical_impact_factor"),
-)
-CRITICAL_RESTITUTION = _index(
-    quantity.CRITICAL_RESTITUTION,
-    solve=lambda solver, _: critical_restitution(solver),
-    theory=lambda problem: _restitution(problem, _theory(problem, "critical_log_factor")),
-    interval=(0.0, 1.0),
-)
-_ALL = (
-    *(LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE),
-    *(IMPACT_RATE, CRITICAL_IMPACT_FACTOR, CRITICAL_RESTITUTION),
-)
-INDICES: Mapping[str, Index] = {each.name: each for each in _ALL}
-QUANTITIES: Mapping[str, Quantity] = {MOMENT.name: MOMENT, **INDICES}
+def critical_impact_factor(solver: ExponentSolver) -> Estimate | Absent:
+    """R_c = R exp(−λ/N), with which λ = 0: more loss makes almost every path decay. It is > 1 if they do without loss.
+
+    Raises:
+        NotConverged: λ or N is not resolved.
+    """
+    log = _critical_log_factor(solver)
+    if isinstance(log, Absent):
+        return log
+    if abs(log.value) > LARGEST_LOG:
+        return Absent(Message(Code.LOG_OUT_OF_RANGE, value=log.value, most=LARGEST_LOG))
+    value = math.exp(log.value)
+    error = value * math.expm1(min(log.error_estimate, LARGEST_LOG))
+    found = Estimate(value, error, value * max(1.0, log.scale), quantity=quantity.CRITICAL_IMPACT_FACTOR)
+    return checked(found, solver.near.remedy)
 
 
-def _restitution(problem: Problem, log_factor: float) -> float:
-    """The r with a given ln R, by the impact law of the oscillator; NaN for other motions."""
-    return problem.system.impact_value(log_factor) if problem.system.impact_parameter else math.nan
+def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
+    """r_c, the coefficient of restitution with which λ = 0, by the impact law of the oscillator; or why there is none.
+
+    Raises:
+        NotConverged: λ or N is not resolved.
+    """
+    system = solver.problem.system
+    if not system.impact_parameter:
+        return Absent(Message(Code.NO_RESTITUTION))
+    log = _critical_log_factor(solver)
+    if isinstance(log, Absent):
+        return log
+    if log.value > 0:
+        # λ is affine in ln R, and 0 at ln R_c
+        lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[0].log_factor)
+        return Absent(Message(Code.ALWAYS_STABLE, value=lossless))
+    value = system.impact_value(log.value)
+    if value <= 0:
+        return Absent(Message(Code.ALWAYS_UNSTABLE, value=value))
+    slope = system.impact_slope(log.value)
+    error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
+    return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.near.remedy)
+
+
+def _flux(pair: PrincipalPair) -> float:
+    """⟨T*, ∂L′(0)/∂ ln R 1⟩ of a pair at p = 0."""
+    (jump,) = pair.generator.problem.system.jumps
+    load = pair.generator.changed(ParameterDerivative(jump.log_factor, jumps=(1.0,)), 0.0, derivative=1)
+    return float(pair.left @ (load @ pair.right) / (pair.left @ pair.space.weighed(pair.right)))
+
+
+def _critical_log_factor(solver: ExponentSolver) -> Estimate | Absent:
+    """ln R_c = ln R − λ/N."""
+    rate = impact_rate(solver)
+    if isinstance(rate, Absent):
+        return rate
+    if rate.value <= rate.error_estimate:
+        return Absent(Message(Code.RARE_IMPACTS, most=rate.value + rate.error_estimate))
+    exponent, own = solver.lyapunov_exponent(), solver.problem.system.jumps[0].log_factor
+    change = exponent.value / rate.value
+    size = abs(own) + max(abs(change), exponent.scale / rate.value)
+    error = (exponent.error_estimate + abs(change) * rate.error_estimate) / (rate.value - rate.error_estimate)
+    return Estimate(own - change, error + _EPS * size, size)
 
 
 @of_problem
@@ -136,3 +171,70 @@ def stability_index(
         NotConverged: some p on the way to it is not resolved on the mesh, or within the budget.
     """
     return nonzero_root(ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()))
+
+
+@dataclass(frozen=True)
+class Index(Quantity):
+    """A quantity that is one number, and not one for each p.
+
+    Attributes:
+        solve: finds it, from a solver and the `root` of its `MomentLyapunov`, or says why there is none in `interval`.
+            Raises `NotConverged`.
+        theory: what perturbation theory makes of it; it may be infinite, or NaN where that does not apply.
+        interval: where it is sought.
+    """
+
+    solve: Callable[[ExponentSolver, float | None], Estimate | Absent] = field(kw_only=True)
+    theory: Callable[[Problem], float] = field(kw_only=True)
+    interval: tuple[float, float] = field(default=(-math.inf, math.inf), kw_only=True)
+
+
+def _theory(problem: Problem, name: str) -> float:
+    """A number of second-order perturbation theory; NaN where that does not apply."""
+    return float(getattr(second_order_or_none(problem), name, math.nan))
+
+
+LYAPUNOV_EXPONENT = Index(
+    **vars(quantity.LYAPUNOV_EXPONENT),
+    solve=lambda solver, _: solver.lyapunov_exponent(),
+    theory=lambda problem: _theory(problem, "lyapunov_exponent"),
+)
+STABILITY_INDEX = Index(
+    **vars(quantity.STABILITY_INDEX),
+    solve=lambda solver, root: nonzero_root(solver, guess=root),
+    theory=lambda problem: _theory(problem, "stability_index"),
+    interval=SEARCH_INTERVAL,
+)
+VARIANCE_RATE = Index(
+    **vars(quantity.VARIANCE_RATE),
+    solve=lambda solver, _: solver.variance_rate(),
+    theory=lambda problem: _theory(problem, "variance_rate"),
+)
+IMPACT_RATE = Index(
+    **vars(quantity.IMPACT_RATE),
+    solve=lambda solver, _: impact_rate(solver),
+    theory=lambda problem: _theory(problem, "impact_rate"),
+)
+CRITICAL_IMPACT_FACTOR = Index(
+    **vars(quantity.CRITICAL_IMPACT_FACTOR),
+    solve=lambda solver, _: critical_impact_factor(solver),
+    theory=lambda problem: _theory(problem, "critical_impact_factor"),
+)
+CRITICAL_RESTITUTION = Index(
+    **vars(quantity.CRITICAL_RESTITUTION),
+    solve=lambda solver, _: critical_restitution(solver),
+    theory=lambda problem: (
+        problem.system.impact_value(_theory(problem, "critical_log_factor"))
+        if problem.system.impact_parameter
+        else math.nan
+    ),
+    interval=(0.0, 1.0),
+)
+INDICES: Mapping[str, Index] = {
+    each.name: each
+    for each in (
+        *(LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE),
+        *(IMPACT_RATE, CRITICAL_IMPACT_FACTOR, CRITICAL_RESTITUTION),
+    )
+}
+QUANTITIES: Mapping[str, Quantity] = {MOMENT.name: MOMENT, **INDICES}

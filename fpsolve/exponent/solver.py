@@ -16,13 +16,21 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import AllPlaces, Budget, FarPlaces, NearPlace, Tolerance
+from fpsolve.exponent.adapt import (
+    WIDER,
+    AllPlaces,
+    Budget,
+    FarPlaces,
+    NearPlace,
+    Tolerance,
+    is_far_out,
+    misplaced,
+    widened,
+)
 from fpsolve.exponent.bordered import second_derivative, slope_rounding
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
-from fpsolve.exponent.places import is_far_out, misplaced
-from fpsolve.exponent.refine import WIDER, widened
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
@@ -193,7 +201,25 @@ class ExponentSolver:
             except NotConverged as failure:
                 failures.append(Failure(float(points[i]), failure.message))
             progress()
-        return self._result([solutions[i] for i in sorted(solutions)], failures)
+        pairs = tuple(solutions[i].pair for i in sorted(solutions))
+        found = np.array([pair.p for pair in pairs])
+        errors = np.array([solutions[i].error for i in sorted(solutions)])
+        value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("value", "derivative"))
+        value[found == 0], errors[found == 0] = 0.0, 0.0  # but for rounding, in every space
+        if grows_far_out(self.problem):
+            slope[found == 0] = np.minimum(slope[found == 0], 0.0)  # from the left, where Λ is finite
+        return MomentLyapunov(
+            p=found,
+            value=value,
+            derivative=slope,
+            error_estimate=errors,
+            residual=np.array([pair.residual for pair in pairs]),
+            solver=self,
+            warnings=(*missed(self, found, value, errors), *misplaced(self.mesh, pairs)),
+            failures=tuple(failures),
+            rare=np.array([pair.p for pair in pairs if is_far_out(pair)]),
+            notes=carried_far_out(self, pairs),
+        )
 
     def estimate(self, solution: Solution) -> Estimate:
         """Λ(p) on the scale of the terms of Eq. (37) before they cancel."""
@@ -237,7 +263,7 @@ class ExponentSolver:
             told = Message(Code.ZERO_NOT_FINER, reason=failure.message, remedy=self.near.remedy)
             raise NotConverged(told) from failure
         with one_thread():
-            return pair, self.near.remedied(lambda: principal_pair(generator, 0.0, start=pair))
+            return pair, self.near.pair_on(generator, 0.0, pair)
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""
@@ -259,26 +285,6 @@ class ExponentSolver:
         near = self.near.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
         return float(np.mean([pair.derivative for pair in pairs])), error
-
-    def _result(self, solutions: Sequence[Solution], failures: Sequence[Failure]) -> MomentLyapunov:
-        pairs = tuple(solution.pair for solution in solutions)
-        p, errors = np.array([pair.p for pair in pairs]), np.array([solution.error for solution in solutions])
-        value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("value", "derivative"))
-        value[p == 0], errors[p == 0] = 0.0, 0.0  # but for rounding, in every space
-        if grows_far_out(self.problem):
-            slope[p == 0] = np.minimum(slope[p == 0], 0.0)  # from the left, where Λ is finite
-        return MomentLyapunov(
-            p=p,
-            value=value,
-            derivative=slope,
-            error_estimate=errors,
-            residual=np.array([pair.residual for pair in pairs]),
-            solver=self,
-            warnings=(*missed(self, p, value, errors), *misplaced(self.mesh, pairs)),
-            failures=tuple(failures),
-            rare=np.array([pair.p for pair in pairs if is_far_out(pair)]),
-            notes=carried_far_out(self, pairs),
-        )
 
 
 def best_order(p: FloatArray) -> Any:

@@ -15,10 +15,8 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
-from fpsolve.fem.axis import Axis
 from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
-from fpsolve.fem.phase import PhaseAxis
 from fpsolve.model.noise import Noise
 
 HALVING = 2 * math.log(2)
@@ -94,10 +92,6 @@ class PhaseCells:
         """Number of unknowns."""
         return int(np.sum(self.degrees + 1))
 
-    def axis(self) -> PhaseAxis:
-        """The functions."""
-        return PhaseAxis(self.lines, self.degrees)
-
     def enriched(self) -> PhaseCells:
         """Two degrees more; where there are none left, cells are halved."""
         if np.max(self.degrees) + 2 > MAX_DEGREE:
@@ -112,14 +106,6 @@ class PhaseCells:
         if most >= MOST_DEGREE - 2:
             lines = np.interp(np.arange(parts * lines.size - parts + 1) / parts, np.arange(lines.size), lines)
         return PhaseCells(lines, np.full(lines.size - 1, min(most + 4, MOST_DEGREE)))
-
-    def raised(self) -> PhaseCells:
-        """One degree more."""
-        return replace(self, degrees=np.minimum(self.degrees + 1, MAX_DEGREE))
-
-    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool, parts: int) -> PhaseCells:
-        """Cells that all together should lack no more than a share."""
-        return PhaseCells(*_split(self.lines, effects, share, may_coarsen, parts))
 
 
 class NoisePart:
@@ -238,18 +224,15 @@ class Cells(NoisePart):
         return replace(self, lines=lines, degree=int(np.max(degrees)))
 
     def reaching(self, excess: tuple[float, float], log_density: Callable[[FloatArray], FloatArray]) -> Cells:
-        """With further cells at each end whose effect exceeds its share, by these factors."""
-        if self.is_killed:
-            return self._less_killed(excess, log_density)
-        below = [1.6 * self.lines[0]] if excess[0] > 1 else []
-        above = [1.6 * self.lines[-1]] if excess[1] > 1 else []
-        return replace(self, lines=np.concatenate([below, self.lines, above]))
+        """With further cells at each end whose effect exceeds its share, by these factors.
 
-    def _less_killed(self, excess: tuple[float, float], log_density: Callable[[FloatArray], FloatArray]) -> Cells:
-        """The same for the ends of a place far out; close to ξ = 0 paths are no longer killed, and return freely.
-
-        Inwards the effect of killing falls like 1/P_s, outwards faster.
+        Where paths are killed, in a place far out, the effect of that falls like 1/P_s inwards, outwards faster; close
+        to ξ = 0 they are no longer killed, and return freely.
         """
+        if not self.is_killed:
+            below = [1.6 * self.lines[0]] if excess[0] > 1 else []
+            above = [1.6 * self.lines[-1]] if excess[1] > 1 else []
+            return replace(self, lines=np.concatenate([below, self.lines, above]))
         side = math.copysign(1.0, self.lines[0])
         lines = np.sort(side * self.lines)
         inner, outer = excess if side > 0 else excess[::-1]
@@ -353,21 +336,17 @@ class Discretisation:
 
     def raised(self) -> Discretisation:
         """One more function each way, where what a cell lacks harms others."""
-        return Discretisation(self.phase.raised(), tuple(part.raised() for part in self.noises))
+        phase = replace(self.phase, degrees=np.minimum(self.phase.degrees + 1, MAX_DEGREE))
+        return Discretisation(phase, tuple(part.raised() for part in self.noises))
 
     def refined(self, effects: Sequence[ModeEffects | None], share: float, may_coarsen: bool) -> Discretisation:
         """One on which every cell should lack no more than its share; the effects are those of every axis."""
         of_phase, *of_noises = effects
         assert of_phase is not None
-        phase = self.phase.refined(of_phase, share, may_coarsen, self.parts_of_phase)
+        phase = PhaseCells(*_split(self.phase.lines, of_phase, share, may_coarsen, self.parts_of_phase))
         pairs = zip(self.noises, of_noises, strict=True)
-        return Discretisation(
-            phase, tuple(part if each is None else part.refined(each, share, may_coarsen) for part, each in pairs)
-        )
-
-    def axes(self, noises: Sequence[Noise], p: float) -> list[Axis]:
-        """The functions of the noises for one p. Raises `MeshError`."""
-        return [part.axis(noise, p) for part, noise in zip(self.noises, noises, strict=True)]
+        noises = tuple(part if each is None else part.refined(each, share, may_coarsen) for part, each in pairs)
+        return Discretisation(phase, noises)
 
 
 def _split(

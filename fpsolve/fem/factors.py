@@ -14,7 +14,7 @@ from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import SingularMatrix
-from fpsolve.fem.kronecker import KroneckerSum
+from fpsolve.fem.axis import KroneckerSum
 
 MAX_DENSE_UNKNOWNS = 350
 """Below it one dense matrix is the fastest."""

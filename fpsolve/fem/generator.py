@@ -11,11 +11,11 @@ import numpy as np
 import scipy.linalg
 
 from fpsolve.arrays import finite, one
-from fpsolve.fem.axis import TensorSpace
+from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import Factors, factorised
-from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rate, phase_speed
 from fpsolve.model.problem import ParameterDerivative, Problem
@@ -59,7 +59,7 @@ class Generator:
         if isinstance(chosen, CylinderMesh):
             chosen = Discretisation.on(chosen, problem.noise)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
-        self.phi = chosen.phase.axis()
+        self.phi = PhaseAxis(chosen.phase.lines, chosen.phase.degrees)
         self._spaces: dict[float, TensorSpace] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         for jump in problem.system.jumps:
@@ -80,7 +80,7 @@ class Generator:
         if key not in self._spaces:
             if len(self._spaces) >= KEPT_SPACES:
                 del self._spaces[next(iter(self._spaces))]
-            self._spaces[key] = TensorSpace([self.phi, *self.chosen.axes([self.problem.noise], p)])
+            self._spaces[key] = TensorSpace([self.phi, self.chosen.noise.axis(self.problem.noise, p)])
         return self._spaces[key]
 
     def at(self, p: float) -> Pencil:
@@ -122,10 +122,6 @@ class Generator:
         if by.noise is None:
             return None
         return KroneckerSum([(self.phi.identity, self.space(p).xi.changed(by.noise, one))])
-
-    def mass(self, p: float) -> KroneckerSum:
-        """∫ P_s w T."""
-        return self.space(p).mass
 
     @cached_property
     def _sum(self) -> TermSum:

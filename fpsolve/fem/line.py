@@ -63,11 +63,15 @@ class LineSpace:
         self.lines, self.degree, self._sizes = lines, degree, np.diff(lines)
         dofs = skfem.Dofs(skfem.MeshLine(lines), _element(degree))
         self._dofs, self.size = dofs.element_dofs.T, int(dofs.N)
-        self.cells, self.modes = _hierarchy(self._dofs, self.size)
+        self.cells, self.modes = np.full(self.size, -2), np.ones(self.size, dtype=int)
+        for j, own in enumerate(self._dofs):  # in each cell skfem numbers two vertex functions, then bubbles by degree
+            self.cells[own] = np.where(self.cells[own] == -2, j, -1)
+            self.modes[own[2:]] = np.arange(2, own.size)
         self.ends = self._dofs[[0, -1], [0, 1]]
-        rules = self._rules(end_exponents)
-        local = np.stack([rule.points for rule in rules])
-        points, weights = self._global(local), np.stack([rule.weights for rule in rules]) * self._sizes[:, None]
+        count, (left, right), last = degree + EXTRA_POINTS, end_exponents, lines.size - 2
+        rules = [_gauss_rule(count, left * (j == 0), right * (j == last)) for j in range(last + 1)]
+        points = self.lines[:-1, None] + self._sizes[:, None] * np.stack([rule.points for rule in rules])
+        weights = np.stack([rule.weights for rule in rules]) * self._sizes[:, None]
         self.points = points.ravel()
         self._measure = weights * weight(points)
         tables = [_reference(degree, rule.points.tobytes()) for rule in rules]
@@ -84,7 +88,10 @@ class LineSpace:
     @cached_property
     def values(self) -> csr_matrix:
         """The basis functions at the points, shape (n, size)."""
-        return self._scattered(self._values)
+        m, n, k = self._values.shape
+        columns = np.broadcast_to(self._dofs[:, None, :], self._values.shape).ravel()
+        starts = np.arange(0, m * n * k + 1, k)
+        return csr_matrix((self._values.ravel(), columns, starts), shape=(m * n, self.size))
 
     def constant(self) -> FloatArray:
         """Coefficients of the function 1, shape (size,): the vertex functions add up to it."""
@@ -104,23 +111,15 @@ class LineSpace:
 
     def mass(self, f: Coefficient = one) -> csr_matrix:
         """∫ w f u v."""
-        return self._mass if f == one else self._form(self._values, f, self._values)
-
-    @cached_property
-    def _mass(self) -> csr_matrix:
-        return self._form(self._values, one, self._values)
+        return self._form(self._values, f)
 
     def stiffness(self, f: Coefficient = one) -> csr_matrix:
         """∫ w f u′v′."""
-        return self._form(self._slopes, f, self._slopes)
+        return self._form(self._slopes, f)
 
     @property
     def measure(self) -> FloatArray:
         return self._measure.ravel()
-
-    def _global(self, local: FloatArray) -> FloatArray:
-        """Points of the cells at local coordinates, shape (m, n)."""
-        return self.lines[:-1, None] + self._sizes[:, None] * local
 
     def at(self, x: FloatArray) -> csr_matrix:
         """Values at any points, as rows of E with u(x) = E @ coefficients, shape (len(x), size).
@@ -133,36 +132,16 @@ class LineSpace:
         rows = np.repeat(np.arange(x.size), self.degree + 1)
         return csr_matrix((values.ravel(), (rows, self._dofs[cell].ravel())), shape=(x.size, self.size))
 
-    def _form(self, left: FloatArray, f: Coefficient, right: FloatArray) -> csr_matrix:
-        """∫ w f (right) (left), without what is zero but for rounding."""
+    def _form(self, values: FloatArray, f: Coefficient) -> csr_matrix:
+        """∫ w f of the products of functions, without what is zero but for rounding."""
         measure = self._measure * f(self.points).reshape(self._measure.shape)
-        blocks = (left * measure[..., None]).transpose(0, 2, 1) @ right
+        blocks = (values * measure[..., None]).transpose(0, 2, 1) @ values
         blocks[np.abs(blocks) < 1e-16 * np.max(np.abs(blocks))] = 0
         rows, columns = np.broadcast_arrays(self._dofs[:, :, None], self._dofs[:, None, :])
         entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
         matrix = csr_matrix(entries, shape=(self.size, self.size))
         matrix.eliminate_zeros()
         return matrix
-
-    def _scattered(self, values: FloatArray) -> csr_matrix:
-        """Values of each cell's functions, shape (m, n, k + 1), as a matrix of shape (m·n, size)."""
-        m, n, k = values.shape
-        columns = np.broadcast_to(self._dofs[:, None, :], values.shape)
-        return csr_matrix((values.ravel(), columns.ravel(), np.arange(0, m * n * k + 1, k)), shape=(m * n, self.size))
-
-    def _rules(self, end_exponents: tuple[float, float]) -> list[Rule]:
-        """The quadrature rule of each cell."""
-        count, last, (left, right) = self.degree + EXTRA_POINTS, self.lines.size - 2, end_exponents
-        return [_gauss_rule(count, left * (j == 0), right * (j == last)) for j in range(last + 1)]
-
-
-def _hierarchy(dofs_of_cells: Any, size: int) -> tuple[Any, Any]:
-    """Cell and degree of each unknown: in each cell skfem numbers two vertex functions, then bubbles by degree."""
-    cells, modes = np.full(size, -2), np.ones(size, dtype=int)
-    for j, dofs in enumerate(dofs_of_cells):
-        cells[dofs] = np.where(cells[dofs] == -2, j, -1)
-        modes[dofs[2:]] = np.arange(2, dofs.size)
-    return cells, modes
 
 
 def _orthogonalised(slopes: FloatArray, measure: FloatArray) -> tuple[FloatArray, FloatArray]:

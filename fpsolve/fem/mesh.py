@@ -1,24 +1,30 @@
 """The computational domain: a cylinder, φ around it and the noise ξ along it, cut into φ-lines × ξ-lines.
 
-Lengths along ξ are in noise units, z = ξ/std, so that one mesh serves many cases.
+Lengths along ξ are in noise units, z = ξ/std, so that one mesh serves many cases. Meshes are written to and read from
+files: .vtu for ParaView, .msh for Gmsh.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
-from fpsolve.messages import Code, Message
+from fpsolve.files import atomic
+from fpsolve.messages import Code, Message, Remedy
 
 MAX_DEGREE = 20
 MAX_CELLS = 1000
 TOLERANCE = 1e-9
 NO_ZERO = "the noise interval [{:g}, {:g}] must contain 0 inside, where the noise lives; choose xi_min < 0 < xi_max"
+MARKERS = {"domain": 0, "impact": 1, "seam": 2, "truncation": 3}
+"""Cell data `marker` of a .vtu; the physical groups of a .msh have the same names, and numbers greater by 1."""
+FORMATS = {".vtu": "vtu", ".msh": "gmsh22"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,3 +140,127 @@ def make_mesh(
     sizes = grading ** ((middle - middle.min()) / max(np.ptp(middle), 1e-300))
     z = xi_min + (xi_max - xi_min) * np.concatenate([[0], np.cumsum(sizes)]) / np.sum(sizes)
     return CylinderMesh(phi, z, phi_degree, xi_degree)
+
+
+def write_mesh(mesh: CylinderMesh, path: str | Path, impact: float = math.pi / 2) -> None:
+    """Write quadrilaterals with points (φ, z, 0) to a .vtu or, for Gmsh, a .msh file, by its ending.
+
+    Line cells mark the impacts, at φ = `impact` mod π, the seam and the truncations (a seam at an impact has both), by
+    the cell data `marker` in a .vtu, see `MARKERS`, and by named physical groups in a .msh. The point data `phi_degree`
+    and `xi_degree` hold the degrees.
+
+    Raises:
+        MeshError: an unknown ending, or a folder that cannot be written to.
+    """
+    path = Path(path)
+    _check_format(path)
+    try:
+        with atomic(path) as temporary:
+            _as_meshio(mesh, impact, path.suffix == ".msh").write(temporary, file_format=FORMATS[path.suffix])
+    except OSError as failure:
+        raise MeshError(f"{path} cannot be written: {failure.strerror}; choose another place") from failure
+
+
+def read_mesh(path: str | Path) -> CylinderMesh:
+    """Read a mesh that `write_mesh` or another program wrote; without degrees in it, those of `make_mesh`.
+
+    Raises:
+        MeshError: the file is missing, unreadable, no full tensor grid of quadrilaterals in (φ, z), or does
+            not cover the circle or half circle.
+    """
+    import meshio
+
+    path = Path(path)
+    _check_format(path)
+    if not path.is_file():
+        raise MeshError(f"{path} {'is not a file' if path.exists() else 'does not exist'}; name a mesh file")
+    try:
+        content = meshio.vtu.read(path) if path.suffix == ".vtu" else meshio.gmsh.read(path)
+    except Exception as failure:  # meshio raises whatever its parsers do
+        why = str(failure) or type(failure).__name__
+        raise MeshError(f"{path} cannot be read as a {path.suffix} mesh ({why})", Remedy.MESH_FILE) from failure
+    quads = content.cells_dict.get("quad")
+    others = {block.type for block in content.cells} - {"quad", "line", "vertex"}
+    if quads is None or others:
+        raise MeshError(
+            f"{path} holds {', '.join(sorted(others)) or 'no quadrilaterals'}; every cell must be a quadrilateral"
+        )
+    try:
+        points = content.points
+        if points.ndim != 2 or points.shape[1] < 2 or not np.all(np.isfinite(points)):
+            raise MeshError("the points must be finite (phi, xi) or (phi, xi, 0)", Remedy.MESH_FILE)
+        if not np.all((quads >= 0) & (quads < len(points))):
+            strange = quads[(quads < 0) | (quads >= len(points))][0]
+            raise MeshError(f"a cell has the corner {strange}, but points are 0 to {len(points) - 1}", Remedy.MESH_FILE)
+        phi, z = (_grid_lines(points[:, k]) for k in (0, 1))
+        _check_tensor_grid(np.stack([phi[1], z[1]]), quads, (phi[0].size - 1, z[0].size - 1))
+        degrees = {name: _degree(content, name) for name in ("phi_degree", "xi_degree")}
+        if not z[0][0] < 0 < z[0][-1]:
+            raise MeshError(NO_ZERO.format(z[0][0], z[0][-1]))
+        return CylinderMesh(phi[0], z[0], **degrees)
+    except MeshError as failure:
+        raise MeshError(Message(Code.PLACED, place=str(path), reason=failure.message)) from failure
+
+
+def _check_format(path: Path) -> None:
+    if path.suffix not in FORMATS:
+        raise MeshError(f'{path} has the ending "{path.suffix}"; it must be one of {", ".join(FORMATS)}')
+
+
+def _as_meshio(mesh: CylinderMesh, impact: float, gmsh: bool) -> Any:
+    """The mesh with its marked lines, as meshio holds it."""
+    import meshio
+
+    m, n = mesh.phi_lines.size, mesh.z_lines.size
+    node = np.arange(m * n).reshape(m, n)
+    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+    impacts = [("impact", node[i]) for i in np.flatnonzero(np.abs(np.sin(mesh.phi_lines - impact)) < TOLERANCE)]
+    edges = [*impacts, *(("seam", node[i]) for i in (0, -1)), *(("truncation", node[:, i]) for i in (0, -1))]
+    lines = np.concatenate([np.stack([nodes[:-1], nodes[1:]], axis=1) for _, nodes in edges])
+    tags = np.concatenate([np.full(nodes.size - 1, MARKERS[name]) for name, nodes in edges])
+    markers = [np.full(len(quads), MARKERS["domain"], dtype=np.int32), tags.astype(np.int32)]
+    tags_of = {name: [tag + 1 for tag in markers] for name in ("gmsh:physical", "gmsh:geometrical")}
+    degrees = {name: np.full(m * n, getattr(mesh, name), dtype=np.int32) for name in ("phi_degree", "xi_degree")}
+    phi, z = np.meshgrid(mesh.phi_lines, mesh.z_lines, indexing="ij")
+    points = np.stack([phi.ravel(), z.ravel(), np.zeros(m * n)], axis=1)
+    names = {name: np.array([tag + 1, 2 if name == "domain" else 1]) for name, tag in MARKERS.items()}
+    return meshio.Mesh(
+        points,
+        [("quad", quads), ("line", lines)],
+        point_data=degrees,
+        cell_data=tags_of if gmsh else {"marker": markers},
+        field_data=names if gmsh else None,
+    )
+
+
+def _grid_lines(coordinates: FloatArray) -> tuple[FloatArray, Any]:
+    """The distinct values among coordinates, and for each point the index of its own."""
+    order = np.argsort(coordinates)
+    steps = np.diff(coordinates[order]) > TOLERANCE * max(np.ptp(coordinates), 1e-300)
+    index = np.empty(order.size, dtype=int)
+    index[order] = np.concatenate([[0], np.cumsum(steps)])
+    return coordinates[order][np.concatenate([[True], steps])], index
+
+
+def _check_tensor_grid(index: Any, quads: Any, shape: tuple[int, int]) -> None:
+    """Every cell of the grid must be one quadrilateral, with the cell's four corners."""
+    corners = index[:, quads]
+    lower = corners.min(axis=2)
+    offsets = corners - lower[:, :, None]
+    square = np.sort(offsets[0] + 2 * offsets[1], axis=1) == np.arange(4)
+    cells = np.unique(lower[0] * max(shape[1], 1) + lower[1])
+    if not np.all(square) or not len(quads) == cells.size == shape[0] * shape[1]:
+        raise MeshError(
+            f"{len(quads)} quadrilaterals on {shape[0] + 1} phi-lines and {shape[1] + 1} xi-lines are not the full "
+            f"tensor grid of {shape[0] * shape[1]} cells; every phi-line must cross every xi-line"
+        )
+
+
+def _degree(content: Any, name: str) -> int:
+    values = content.point_data.get(name)
+    if values is None:
+        return int(getattr(make_mesh(), name))
+    degree = np.asarray(values).flat[0] if np.size(values) else 0
+    if np.ndim(values) != 1 or not (np.all(values == degree) and 1 <= degree <= MAX_DEGREE and degree % 1 == 0):
+        raise MeshError(f"the point data {name} must be one whole number from 1 to {MAX_DEGREE} throughout")
+    return int(degree)

@@ -188,19 +188,15 @@ class PolynomialAxis(LineAxis):
         return -_form(self._slopes, self._flux)
 
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
-        logs = self._log_change(change)
+        logs, a = change.log_density(self.unit * self.points), self.noise.end_exponent
+        if change.end_exponent and a < SHARP_ENDS:  # no rule of Gauss takes its ln(1 − x²) near ±1 as it stands
+            x = self.points / self._scale
+            logs = logs + change.end_exponent * (logarithm(x, a, x.size) - np.log1p(-(x**2)))
+        logs = np.asarray(logs - self.measure @ logs)
         if g is not None:
             return _form(self.values, self.measure * self.changed_weight(change, g, logs, self.points))
         own = 2 * (change.log_diffusion - change.log_scale) * self.matrix(None)
         return own - _form(self._slopes, self._flux * logs)
-
-    def _log_change(self, change: NoiseDerivative) -> FloatArray:
-        """∂ ln P_s/∂θ at the points, without its mean; no rule of Gauss takes its ln(1 − x²) near ±1 as it stands."""
-        logs, a = change.log_density(self.unit * self.points), self.noise.end_exponent
-        if change.end_exponent and a < SHARP_ENDS:
-            x = self.points / self._scale
-            logs = logs + change.end_exponent * (logarithm(x, a, x.size) - np.log1p(-(x**2)))
-        return np.asarray(logs - self.measure @ logs)
 
     def generator_of_one(self) -> FloatArray:
         return np.asarray(-self.tilt * (self._flux @ self._slopes))

@@ -22,8 +22,7 @@ import numpy as np
 from scipy.sparse import diags, issparse
 
 from fpsolve.arrays import Coefficient, FloatArray, one
-from fpsolve.fem.axis import TensorSpace
-from fpsolve.fem.kronecker import KroneckerSum
+from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Jump, System, is_driven, phase_speed, written_coefficient
 from fpsolve.model.problem import ParameterDerivative
 
@@ -152,7 +151,13 @@ class Terms:
         yield self._term(0, Power(0), self.phi.identity, None, "L_ξ, the generator of the noise")
         for term in self.system.terms:
             yield from self._driven(term)
-        yield from self._penalties()
+        # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
+        text, jump, vertices = "upwind loads between cells", self._jump, self._vertices
+        if not np.all(self._is_exact):
+            typical = np.where(self._is_exact, 0.0, self.typical_speed())
+            yield self._term(0, Power(0), -0.5 * jump.T @ _rows(typical, jump), one, text)
+        for j in self._two_way:
+            yield self._term(0, Power(0), -0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(vertices[j])), text)
         for ray in self.system.jumps:
             text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
             for load, sign in self._loads(ray):
@@ -185,7 +190,8 @@ class Terms:
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h ∂φ with the loads at the φ-vertices, and p q."""
-        size, text = self.system.epsilon**term.order, _prefix(term)
+        size = self.system.epsilon**term.order
+        text = (f"{power_of_epsilon(term.order)} " if term.order else "") + written_coefficient(term.g)
         if not term.h.vanishes:
             loads = self._trace.T @ _rows(term.h(self._vertices), self._jump)
             along = size * (self.phi.convection(term.h) + loads)
@@ -193,15 +199,6 @@ class Terms:
         if not term.q.vanishes:
             along = size * self.phi.mass(term.q)
             yield self._term(term.order, Power(1), along, term.g, f"p {text}{_written(term.q)}")
-
-    def _penalties(self) -> Iterator[Term]:
-        """−½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|."""
-        text, jump, vertices = "upwind loads between cells", self._jump, self._vertices
-        if not np.all(self._is_exact):
-            typical = np.where(self._is_exact, 0.0, self.typical_speed())
-            yield self._term(0, Power(0), -0.5 * jump.T @ _rows(typical, jump), one, text)
-        for j in self._two_way:
-            yield self._term(0, Power(0), -0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(vertices[j])), text)
 
     def typical_speed(self) -> FloatArray:
         """θ at the φ-vertices for the typical ξ, shape (m,)."""
@@ -269,11 +266,6 @@ def _rows(factors: FloatArray, matrix: Any) -> Any:
 def power_of_epsilon(order: int) -> str:
     """ε²."""
     return "ε" if order == 1 else "ε" + str(order).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
-
-
-def _prefix(term: CoefficientMatrix) -> str:
-    """ε^n g(ξ)."""
-    return (f"{power_of_epsilon(term.order)} " if term.order else "") + written_coefficient(term.g)
 
 
 def _written(harmonics: Harmonics) -> str:

@@ -17,8 +17,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.fields import xi_marginal
-from fpsolve.exponent.nodes import Nodes
+from fpsolve.exponent.fields import Nodes, xi_marginal
 from fpsolve.files import write_text
 from fpsolve.model.problem import Problem, parameter_lines, parameter_words
 from fpsolve.signals import signals_held

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.error import Absent
-from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.quantities import lyapunov_exponent
 from fpsolve.exponent.quantities import stability_index as estimated_index
 from fpsolve.model.problem import Problem, of_problem

@@ -20,7 +20,7 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
-from fpsolve.exponent.moments import solve_moments
+from fpsolve.exponent.function import solve_moments
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh

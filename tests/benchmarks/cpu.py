@@ -18,7 +18,7 @@ from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from fpsolve import NonGaussianNoise, VibroImpactOscillator
-from fpsolve.exponent.moments import solve_moments
+from fpsolve.exponent.function import solve_moments
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem
 from tests.benchmarks.certified import CertifiedFourierHermite

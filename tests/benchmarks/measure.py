@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.exponent.moments import solve_moments
+from fpsolve.exponent.function import solve_moments
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem
 from tests.benchmarks import ngsolve_code

@@ -19,8 +19,7 @@ from hypothesis import strategies as st
 
 from fpsolve.case.case import load_case
 from fpsolve.errors import CaseError, Fault
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.fem.mesh_file import write_mesh
+from fpsolve.fem.mesh import make_mesh, write_mesh
 from fpsolve.simulation.setup import default_step, obstacles, transient
 from tests.snapshots import BIG, good
 

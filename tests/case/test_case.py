@@ -17,8 +17,7 @@ from fpsolve.case.case import Case, Curve, load_case
 from fpsolve.case.sections import Moments, Sweep
 from fpsolve.case.toml import read_document
 from fpsolve.case.vary import Vary
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.fem.mesh_file import write_mesh
+from fpsolve.fem.mesh import make_mesh, write_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator

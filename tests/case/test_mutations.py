@@ -7,8 +7,7 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.errors import CaseError, MeshError
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.fem.mesh_file import read_mesh, write_mesh
+from fpsolve.fem.mesh import make_mesh, read_mesh, write_mesh
 
 COUNT = 48
 """Mutations of each kind; two thousand take a minute."""

@@ -10,7 +10,7 @@ from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import truncation
-from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator

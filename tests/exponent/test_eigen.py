@@ -64,7 +64,7 @@ def test_spectrum_of_the_full_circle_against_fourier_hermite(p):
 
 def test_pair_solves_both_eigenproblems_and_is_normalised(fig1_solver):
     pair = fig1_solver.pair(2.0)
-    operator, mass = pair.generator.matrix(2.0), pair.generator.mass(2.0)
+    operator, mass = pair.generator.matrix(2.0), pair.generator.space(2.0).mass
     assert np.linalg.norm(operator @ pair.right - pair.value * (mass @ pair.right)) < 1e-12
     assert np.linalg.norm(operator.T @ pair.left - pair.value * (mass @ pair.left)) < 1e-12
     assert pair.left @ (mass @ pair.right) * 2 == pytest.approx(1, rel=1e-13)  # twice the half circle

@@ -10,9 +10,7 @@ import pytest
 
 from fpsolve import surfaces
 from fpsolve.errors import OutputError
-from fpsolve.exponent import eigenfunction_plot
-from fpsolve.exponent.eigenfunction_plot import FIELDS, surface_of
-from fpsolve.exponent.fields import fields
+from fpsolve.exponent.fields import FIELDS, fields, surface_of
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
@@ -68,9 +66,11 @@ def test_it_finds_out_once(probe, tmp_path):
 def test_who_draws(pair, monkeypatch, answer):
     """Where nothing can be rendered the plane is drawn, and of a cylinder a warning tells how to get it."""
     drawn = []
-    monkeypatch.setattr(eigenfunction_plot, "can_render", lambda: answer)
-    monkeypatch.setattr(eigenfunction_plot, "picture_in_space", lambda *_, cylinder: drawn.append(f"space {cylinder}"))
-    monkeypatch.setattr(eigenfunction_plot, "flat_picture", lambda *_: drawn.append("plane"))
+    monkeypatch.setattr("fpsolve.exponent.fields.can_render", lambda: answer)
+    monkeypatch.setattr(
+        "fpsolve.exponent.fields.picture_in_space", lambda *_, cylinder: drawn.append(f"space {cylinder}")
+    )
+    monkeypatch.setattr("fpsolve.exponent.fields.flat_picture", lambda *_: drawn.append("plane"))
     pair.plot()
     if answer:
         pair.plot(cylinder=True)
@@ -118,7 +118,7 @@ def test_words_of_the_plane(pair, field, label):
     assert axes.get_title().splitlines() == [
         "oscillator: omega = 1 (rad/time), restitution = 0.3, c1 = 0.1 (1/time), epsilon = 0.5,",
         "c2 = 0 (1/(time length²)), c3 = 0 (time/length²), impact = delta",
-        "noise: D0 = 0.5 (1/time), tau0 = 1 (time), r0 = 0.9",
+        "noise: D0 = 0.5 (1/time), tau0 = 1 (time), r0 = 0.9, treatment = exact",
     ]
 
 
@@ -129,7 +129,7 @@ def assert_not_blank(picture, shape):
 
 
 def test_picture_of_the_plane(pair, monkeypatch, tmp_path):
-    monkeypatch.setattr(eigenfunction_plot, "can_render", lambda: False)
+    monkeypatch.setattr("fpsolve.exponent.fields.can_render", lambda: False)
     picture = pair.plot("tilted_density", cmap="magma")
     assert_not_blank(picture, (750, 1080, 3))
     assert picture.save(tmp_path / "picture.png").read_bytes() == picture.png == picture._repr_png_()

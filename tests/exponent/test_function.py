@@ -8,8 +8,7 @@ import pytest
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.bordered import second_derivative
 from fpsolve.exponent.error import Absent, Estimate
-from fpsolve.exponent.function import MomentLyapunovFunction, nonzero_root
-from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise

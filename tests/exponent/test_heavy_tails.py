@@ -21,7 +21,7 @@ from fpsolve import (
 )
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.places import is_far_out
+from fpsolve.exponent.adapt import is_far_out
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model import CoefficientMatrix

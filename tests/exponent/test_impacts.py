@@ -12,8 +12,7 @@ from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent
-from fpsolve.exponent.impacts import critical_impact_factor, critical_restitution, impact_rate
-from fpsolve.exponent.quantities import INDICES
+from fpsolve.exponent.quantities import INDICES, critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise

@@ -10,7 +10,7 @@ from fpsolve.analysis.density import furstenberg_khasminskii, stationary_density
 from fpsolve.arrays import identity
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import principal_pair, spectrum
-from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, kron, random
 
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, BlockFactors, DenseFactors, SparseFactors, factorised
-from fpsolve.fem.kronecker import KroneckerSum
 
 
 def banded(rng, n, band):

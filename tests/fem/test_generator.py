@@ -54,7 +54,7 @@ def test_the_terms_are_the_papers_equation(both, p):
     (generator, on), scale = both, both[0].problem.system.epsilon
     paper = on(p)
     assert_same(generator.matrix(p), paper.matrix(p))
-    assert_same(generator.matrix(p).shifted(0.3), paper.matrix(p) - 0.3 * generator.mass(p).toarray())
+    assert_same(generator.matrix(p).shifted(0.3), paper.matrix(p) - 0.3 * generator.space(p).mass.toarray())
     if generator.name not in KEEP_THEIR_DIRECTION:  # elsewhere the upwind loads of all orders are one
         return
     assert_same(generator.matrix(p, orders=slice(0, 1)), paper.L0())

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from fpsolve.errors import MeshError
-from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import CylinderMesh, make_mesh
-from fpsolve.fem.mesh_file import MARKERS, read_mesh, write_mesh
+from fpsolve.fem.mesh import MARKERS, CylinderMesh, make_mesh, read_mesh, write_mesh
 from fpsolve.model.problem import Problem
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite

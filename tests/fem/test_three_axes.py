@@ -7,10 +7,9 @@ from scipy.sparse import csr_matrix
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem
 from fpsolve.arrays import identity
 from fpsolve.exponent.eigen import rayleigh_iteration
-from fpsolve.fem.axis import TensorSpace
+from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.factors import BlockFactors, DenseFactors, SparseFactors
 from fpsolve.fem.generator import Pencil
-from fpsolve.fem.kronecker import KroneckerSum
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.terms import Terms, TermSum

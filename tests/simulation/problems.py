@@ -1,6 +1,6 @@
 """What the tests of the simulation share: problems of moderate and of strong noise, and their Λ(p)."""
 
-from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 

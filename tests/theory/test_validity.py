@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fpsolve.exponent.moments import moment_lyapunov
+from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
