@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from fpsolve.analysis.curve import Field, Point, Sample, Trace, cubic
-from fpsolve.analysis.scan import FINE, Scan
+from fpsolve.analysis.scan import FINE, Field, Sample, Scan
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
@@ -31,12 +32,91 @@ MOST_AWAY = 0.2
 MOST_POINTS = 20_000
 BESIDE = 1e-8
 """A point that is outside by less is on the frame."""
+SAME = 1e-3
+"""Distance, in sides of the square, in which a curve that runs the same way is taken for one that is known."""
+PIECES = 8
+"""Into which the cubic between two points of a branch is divided."""
 
 FRAME = "leaves the frame"
 """The label of a point where a curve leaves the frame."""
 
 
-def found(
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a curve.
+
+    Attributes:
+        sample: F there.
+        label: what is special about it; empty for an ordinary one.
+    """
+
+    sample: Sample
+    label: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One branch of a curve.
+
+    Attributes:
+        points: along it, F > 0 on its left.
+        closed: whether the last is followed by the first.
+        obstacles: why it ends inside of the square, if it does.
+    """
+
+    points: tuple[Point, ...]
+    closed: bool = False
+    obstacles: tuple[Message, ...] = ()
+
+    @property
+    def at(self) -> FloatArray:
+        """(u, v), shape (n, 2); of a closed one the first again at the end."""
+        places = [point.sample.at for point in self.points]
+        return np.array(places + places[:1] * self.closed)
+
+    @cached_property
+    def fine(self) -> FloatArray:
+        """(u, v) on the cubics through the points with their tangents, `PIECES` from one to the next."""
+        at = self.at
+        tangents = np.array([point.sample.tangent for point in self.points])
+        tangents = np.concatenate([tangents, tangents[:1]]) if self.closed else tangents
+        shares = np.arange(PIECES)[:, None] / PIECES
+        if len(at) == 1:
+            return np.concatenate([at, at])
+        pieces = [cubic(at[i], at[i + 1], tangents[i], tangents[i + 1], shares) for i in range(len(at) - 1)]
+        return np.concatenate([*pieces, at[-1:]])
+
+    def between(self, i: int, share: float) -> FloatArray:
+        """About the point at a share of the way from the point i to the next."""
+        one, other = self.points[i].sample, self.points[(i + 1) % len(self.points)].sample
+        return cubic(one.at, other.at, one.tangent, other.tangent, share)
+
+    def holds(self, sample: Sample, within: float = SAME) -> bool:
+        """Whether it runs through a point of a curve, or near to it the same way; F > 0 left of both."""
+        return bool(np.any((self._gaps(sample.at) < within) & (np.diff(self.fine, axis=0) @ sample.tangent >= 0)))
+
+    def passes(self, at: FloatArray, within: float) -> bool:
+        """Whether it passes a point, one way or the other."""
+        return bool(np.any(self._gaps(at) < within))
+
+    def _gaps(self, at: FloatArray) -> FloatArray:
+        """Distances of a point from the pieces."""
+        start, way = self.fine[:-1], np.diff(self.fine, axis=0)
+        share = np.clip(np.sum((at - start) * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-300), 0, 1)
+        return np.asarray(np.linalg.norm(start + share[:, None] * way - at, axis=1))
+
+
+def cubic(
+    start: FloatArray, end: FloatArray, out: FloatArray, into: FloatArray, share: float | FloatArray
+) -> FloatArray:
+    """The cubic from a point to another with unit tangents there; shares beyond 1 continue it."""
+    rise = end - start
+    length = float(np.linalg.norm(rise))
+    quadratic, third = 3 * rise - length * (2 * out + into), length * (out + into) - 2 * rise
+    return np.asarray(start + share * (length * out + share * (quadratic + share * third)))
+
+
+def find_branches(
     field: Field, scan: Scan, longest: float = LONGEST, stepped: Callable[[], None] = lambda: None
 ) -> Iterator[Trace]:
     """Every branch that a scan shows, one after the other; each of its points is told as it is found.
@@ -47,28 +127,28 @@ def found(
     known: list[Trace] = []
     near = 0.25 / ((scan.nodes.size - 1) * (FINE - 1))
     for seed in scan.seeds():
-        rough = begun(scan, seed)
+        rough = find_zero(scan, seed)
         if rough is not None and any(trace.holds(rough, near) for trace in known):
             continue
-        start = begun(field, seed if rough is None else rough.at)
+        start = find_zero(field, seed if rough is None else rough.at)
         if start is None or any(trace.holds(start) for trace in known):
             continue
-        known.append(traced(field, start, longest, stepped))
+        known.append(trace_branch(field, start, longest, stepped))
         yield known[-1]
 
 
-def begun(field: Field, at: FloatArray) -> Sample | None:
+def find_zero(field: Field, at: FloatArray) -> Sample | None:
     """A point F = 0 near a point: on the gradient, or where that leads out of the square, beside it or above it."""
     for along in (None, np.array([1.0, 0.0]), np.array([0.0, 1.0])):
         try:
-            if (sample := corrected(field, at, along)) is not None:
+            if (sample := correct(field, at, along)) is not None:
                 return sample
         except FpsolveError:
             continue
     return None
 
 
-def corrected(field: Field, at: FloatArray, along: FloatArray | None = None) -> Sample | None:
+def correct(field: Field, at: FloatArray, along: FloatArray | None = None) -> Sample | None:
     """The point F = 0 near a point, on the normal to `along`, or without it on the gradient; None where there is none.
 
     Raises:
@@ -89,16 +169,16 @@ def corrected(field: Field, at: FloatArray, along: FloatArray | None = None) -> 
     return None
 
 
-def on_line(field: Field, axis: int, value: float, guess: FloatArray) -> Sample | None:
+def correct_on_line(field: Field, axis: int, value: float, guess: FloatArray) -> Sample | None:
     """The point F = 0 where u, or v, has a value; None where there is none near the guess."""
     at = guess.copy()
     at[axis] = value
     along = np.zeros(2)
     along[axis] = 1.0
-    return corrected(field, at, along)
+    return correct(field, at, along)
 
 
-def traced(field: Field, start: Sample, longest: float = LONGEST, stepped: Callable[[], None] = lambda: None) -> Trace:
+def trace_branch(field: Field, start: Sample, longest: float, stepped: Callable[[], None] = lambda: None) -> Trace:
     """The whole branch through a point, within the square; `stepped` is called for each of its points."""
     stepped()
     forward, closed, obstacle = _half(field, start, 1.0, longest, stepped)
@@ -117,11 +197,18 @@ def _half(
     points, step = [Point(start)], 0.25 * longest
     last, before = start, None
     while len(points) < MOST_POINTS:
-        at, reason = _predicted(last, before, sign * step), Message(Code.NEWTON_UNSETTLED)
+        if before is None:
+            at = last.at + sign * step * last.tangent
+        else:
+            share = 1 + step / float(np.linalg.norm(last.at - before.at))
+            at = cubic(before.at, last.at, sign * before.tangent, sign * last.tangent, share)
+        reason = Message(Code.NEWTON_UNSETTLED)
         try:
-            sample = _near(field, last, at)
-            is_leaving = sample is None and bool(np.any((at < 0) | (at > 1)))
-            sample = _landed(field, last, at) if is_leaving else sample
+            sample = correct(field, at, last.tangent)
+            if sample is not None and np.linalg.norm(sample.at - at) > MOST_AWAY * np.linalg.norm(at - last.at):
+                sample = None  # perhaps of another curve
+            if is_leaving := sample is None and bool(np.any((at < 0) | (at > 1))):
+                sample = _exit(field, last, at)
         except FpsolveError as failure:
             sample, reason = None, failure.message
         turn = 0.0 if sample is None else _angle(last.tangent, sample.tangent)
@@ -146,31 +233,14 @@ def _half(
     return points, False, Message(Code.TOO_LONG, count=MOST_POINTS)
 
 
-def _predicted(last: Sample, before: Sample | None, step: float) -> FloatArray:
-    """A step further, on the cubic through the last two points with their tangents."""
-    sign = math.copysign(1.0, step)
-    if before is None:
-        return last.at + step * last.tangent
-    share = 1 + abs(step) / float(np.linalg.norm(last.at - before.at))
-    return cubic(before.at, last.at, sign * before.tangent, sign * last.tangent, share)
-
-
-def _near(field: Field, last: Sample, at: FloatArray) -> Sample | None:
-    """The point of the curve beside a predicted one; None where it is not close to that."""
-    sample = corrected(field, at, last.tangent)
-    if sample is None or np.linalg.norm(sample.at - at) > MOST_AWAY * np.linalg.norm(at - last.at):
-        return None
-    return sample
-
-
-def _landed(field: Field, last: Sample, beyond: FloatArray) -> Sample | None:
+def _exit(field: Field, last: Sample, beyond: FloatArray) -> Sample | None:
     """The point where a curve leaves the square on its way to a point beyond; None where that is not clear."""
     way = beyond - last.at
     least = 0.0 if _inside(beyond) else 0.5 * BESIDE
     sides = [(k, float(side)) for k in (0, 1) for side in (0, 1) if (beyond[k] - side) * (side - 0.5) > least]
     for share, axis, side in sorted(((side - last.at[axis]) / way[axis], axis, side) for axis, side in sides):
         guess = np.clip(last.at + share * way, 0, 1)
-        sample = on_line(field, axis, side, guess)
+        sample = correct_on_line(field, axis, side, guess)
         if sample is not None and np.linalg.norm(sample.at - guess) <= 0.5 * np.linalg.norm(way):
             return sample
     return None

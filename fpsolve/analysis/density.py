@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 UNSEEN = 1e-5
 """Where the density of ξ is below this share of its largest value, no picture shows it."""
-_NAMES = {"adjoint": "adjoint density", "product": "tilted density"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,12 +53,10 @@ class Density(Result):
     def to_xarray(self) -> xarray.Dataset:
         """The density over φ and ξ, and the weights for integrals."""
         density = Quantity("density", "ρ", "density", unit=density_unit(self.noise), dims=("phi", "xi"))
-        coordinates = {
-            PHASE: self.phi,
-            self.noise: self.xi,
-            weights_of(PHASE): self.phi_weights,
-            weights_of(self.noise): self.xi_weights,
-        }
+        coordinates = {PHASE: self.phi, self.noise: self.xi}
+        for axis, weights in ((PHASE, self.phi_weights), (self.noise, self.xi_weights)):
+            words = "weight of the rule for integrals"
+            coordinates[Quantity(f"{axis.name}_weights", "w", words, unit=axis.unit, dims=axis.dims)] = weights
         return dataset(self.name, "finite elements", {density: self.values}, coordinates, self.parameters)
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
@@ -73,9 +70,8 @@ class Density(Result):
 
     def mean(self, f: Callable[[FloatArray, FloatArray], ArrayLike]) -> float:
         """∫ f(φ, ξ) ρ dφ dξ; f gets φ as a column and ξ as a row, and may return either, or a number."""
-        return float(
-            self.phi_weights @ (np.asarray(f(self.phi[:, None], self.xi[None])) * self.values) @ self.xi_weights
-        )
+        values = np.asarray(f(self.phi[:, None], self.xi[None])) * self.values
+        return float(self.phi_weights @ values @ self.xi_weights)
 
     def phi_marginal(self) -> FloatArray:
         """∫ρ dξ at `phi`, shape (m,)."""
@@ -91,11 +87,6 @@ class Density(Result):
         return self.phi_weights @ self.values
 
 
-def weights_of(axis: Quantity) -> Quantity:
-    """The weights of the rule at the points of an axis."""
-    return Quantity(f"{axis.name}_weights", "w", "weight of the rule for integrals", unit=axis.unit, dims=axis.dims)
-
-
 def stationary_density(pair: PrincipalPair) -> Density:
     """ρ(φ, ξ), solution of the Fokker-Planck equation L*(0)ρ = 0.
 
@@ -103,12 +94,12 @@ def stationary_density(pair: PrincipalPair) -> Density:
         NotConverged: too much of it is negative; `partial` is what was found.
         ValueError: the pair is not the one at p = 0.
     """
-    return _judged(pair, _density(_of_zero(pair), "adjoint"), "stationary density")
+    return _checked(pair, _density(_of_zero(pair), "adjoint"), "stationary density")
 
 
 def adjoint_density(pair: PrincipalPair) -> Density:
     """T*(φ, ξ; p) normalised to 1. Raises `NotConverged` where too much of it is negative."""
-    return _judged(pair, _density(pair, "adjoint"), "adjoint density")
+    return _checked(pair, _density(pair, "adjoint"), "adjoint density")
 
 
 def tilted_density(pair: PrincipalPair) -> Density:
@@ -117,7 +108,7 @@ def tilted_density(pair: PrincipalPair) -> Density:
     Raises:
         NotConverged: too much of it is negative; `partial` is what was found.
     """
-    return _judged(pair, _density(pair, "product"), "tilted density")
+    return _checked(pair, _density(pair, "product"), "tilted density")
 
 
 def negative_share(pair: PrincipalPair) -> float:
@@ -148,14 +139,12 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
 
 def _of_zero(pair: PrincipalPair) -> PrincipalPair:
     """The pair, which must be that at p = 0. Raises `ValueError`."""
-    if pair.p != 0:
-        raise ValueError(
-            f"the stationary density is the adjoint eigenfunction at p = 0, but the pair has p = {pair.p:g}"
-        )
-    return pair
+    if pair.p == 0:
+        return pair
+    raise ValueError(f"the stationary density is the adjoint eigenfunction at p = 0, but the pair has p = {pair.p:g}")
 
 
-def _judged(pair: PrincipalPair, density: Density, name: str) -> Density:
+def _checked(pair: PrincipalPair, density: Density, name: str) -> Density:
     """The density, if it is one. Raises `NotConverged`."""
     share = density.negative_share()
     if share > MOST_NEGATIVE:
@@ -165,13 +154,12 @@ def _judged(pair: PrincipalPair, density: Density, name: str) -> Density:
 
 def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Density:
     """One of the `Fields`, normalised, repeated from a half circle to the full one."""
-    space, at = pair.space, pair.space.xi.samples()
-    turns = space.turns
+    space, at, turns = pair.space, pair.space.xi.samples(), pair.space.turns
     values = np.tile(getattr(fields(pair, space.phi.values, at), name), (turns, 1))
     phi = np.mod(np.concatenate([space.phi.points + k * space.phi.span for k in range(turns)]), 2 * np.pi)
     order = np.argsort(phi)
     phi, values, phi_weights = phi[order], values[order], np.tile(space.phi.weights, turns)[order]
     total, problem = phi_weights @ values @ at.measure, pair.generator.problem
-    words = _NAMES[name] if pair.p or name == "product" else "stationary density"
-    about = f"{words} at p = {pair.p:g}", problem.noise_quantity, problem.values
+    words = "tilted" if name == "product" else "adjoint" if pair.p else "stationary"
+    about = f"{words} density at p = {pair.p:g}", problem.noise_quantity, problem.values
     return Density(phi, at.xi, phi_weights, at.measure, values / total, *about)

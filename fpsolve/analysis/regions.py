@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fpsolve.analysis.scan import Scan
 from fpsolve.analysis.stability import Boundary
 from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray
@@ -54,21 +53,27 @@ class Regions:
 
 
 def regions(lines: Sequence[Boundary]) -> Regions:
-    """The regions of lines that were all sought in one scan of the frame."""
-    scans = [line.scan for line in lines if line.scan is not None]
-    values = np.stack([interpolated(scan) for scan in scans])
-    signs = np.where(values > 0, 1, -1)
-    exists = np.all(np.isfinite(values), axis=0)
+    """The regions of lines that were all sought in one scan of the frame, on a grid `FINE` times as fine as its own."""
+    from scipy.ndimage import distance_transform_edt
+
+    s = (np.arange(FINE) + 0.5) / FINE
+    values = []
+    for scan in (line.scan for line in lines if line.scan is not None):
+        cells = range(scan.nodes.size - 1)
+        values.append(np.block([[scan.between(i, j, s[:, None], s[None]) for j in cells] for i in cells]))
+    signs, exists = np.where(np.stack(values) > 0, 1, -1), np.all(np.isfinite(values), axis=0)
     kinds = np.unique(signs[:, exists].T, axis=0)
-    shares = [np.mean(exists & _equal(signs, kind)) for kind in kinds]
-    order = np.argsort(shares)[::-1]
+    insides = [exists & np.all(signs == kind[:, None, None], axis=0) for kind in kinds]
+    shares = [np.mean(inside) for inside in insides]
     index, each = np.full(exists.shape, -1), []
-    for number, k in enumerate(order):
-        inside = exists & _equal(signs, kinds[k])
-        index[inside] = number
+    for number, k in enumerate(np.argsort(shares)[::-1]):
+        index[insides[k]] = number
+        depth = distance_transform_edt(np.pad(insides[k], 1))[1:-1, 1:-1]
+        deepest = np.array(np.unravel_index(int(np.argmax(depth)), depth.shape))
+        u, v = ((deepest + 0.5) / exists.shape).tolist()
         name = name_of([line.zero for line in lines], kinds[k].tolist())
         by_name = {line.zero.name: int(sign) for line, sign in zip(lines, kinds[k], strict=True)}
-        each.append(Region(name, by_name, float(shares[k]), _deepest(inside)))
+        each.append(Region(name, by_name, float(shares[k]), (u, v)))
     return Regions(tuple(each), index)
 
 
@@ -93,23 +98,3 @@ def name_of(zeros: Sequence[Zero], signs: Sequence[int]) -> str:
     if (low or high) and below != 0:
         parts.append(f"{low}δ_p{high}" if high else f"δ_p > {below:g}")
     return ", ".join(parts)
-
-
-def interpolated(scan: Scan) -> FloatArray:
-    """F on a grid `FINE` times as fine as that of the scan, by bicubic interpolation."""
-    cells, s = scan.nodes.size - 1, (np.arange(FINE) + 0.5) / FINE
-    rows = [[scan.between(i, j, s[:, None], s[None]) for j in range(cells)] for i in range(cells)]
-    return np.block(rows)
-
-
-def _equal(signs: FloatArray, kind: FloatArray) -> FloatArray:
-    return np.asarray(np.all(signs == kind[:, None, None], axis=0))
-
-
-def _deepest(inside: FloatArray) -> tuple[float, float]:
-    """The point of a region that is farthest from its edges."""
-    from scipy.ndimage import distance_transform_edt
-
-    depth = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
-    i, j = np.unravel_index(int(np.argmax(depth)), depth.shape)
-    return (float(i) + 0.5) / inside.shape[0], (float(j) + 0.5) / inside.shape[1]

@@ -1,19 +1,58 @@
-"""F on a grid of the unit square, row by row, each a task of its own, and where its interpolation changes its sign."""
+"""F at points of the unit square, and on a grid: row by row, each a task of its own, and where F changes its sign."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from fpsolve.analysis.curve import Field, Sample
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Message
 
+TOLERANCE = 1e-10
+"""|F| over its scale on a curve; a tenth of what the solves of F leave."""
 FINE = 13
 """Points along a cell of a scan where its interpolation is looked at."""
+
+
+class Sample(NamedTuple):
+    """F at a point.
+
+    Attributes:
+        at: (u, v).
+        value: F.
+        gradient: ∂F/∂(u, v), shape (2,).
+        error: estimate of |error of F|.
+        scale: the size of the terms of F before they cancel.
+    """
+
+    at: FloatArray
+    value: float
+    gradient: FloatArray
+    error: float
+    scale: float
+
+    @property
+    def is_zero(self) -> bool:
+        return abs(self.value) <= max(TOLERANCE * self.scale, 0.1 * self.error)
+
+    @property
+    def tangent(self) -> FloatArray:
+        """Along the curve, F > 0 on its left, of length 1."""
+        along = np.array([self.gradient[1], -self.gradient[0]])
+        return np.asarray(along / np.linalg.norm(along))
+
+    @property
+    def width(self) -> float:
+        """|error of F|/|∇F|: how far the curve may be off."""
+        return (self.error + abs(self.value)) / float(np.linalg.norm(self.gradient))
+
+
+Field = Callable[[FloatArray], Sample]
+"""F; raises `FpsolveError` where there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,16 +99,18 @@ class Scan:
     def seeds(self) -> Iterator[FloatArray]:
         """Points near which F changes its sign: inside the cells, or beside missing nodes on their edges."""
         fine = np.linspace(0, 1, FINE)
-        s, t, half = fine[:, None], fine[None, :], 0.5 * fine[1]
+        s, t = fine[:, None], fine[None, :]
         for i in range(self.nodes.size - 1):
             for j in range(self.nodes.size - 1):
                 corner, size = self.nodes[[i, j]], self.nodes[[i + 1, j + 1]] - self.nodes[[i, j]]
-                inside = self.between(i, j, s, t)
+                inside, shares, middle = self.between(i, j, s, t), fine, 0.5 * fine[1]
                 if np.isnan(inside).any():
-                    inside, middle = self.values[i : i + 2, j : j + 2], (np.array([0.0, 1.0]), 0.5)
-                else:
-                    middle = fine, half
-                yield from (corner + size * place for place in _changes(inside, *middle))
+                    inside, shares, middle = self.values[i : i + 2, j : j + 2], fine[[0, -1]], 0.5
+                signs = np.sign(inside)  # where one is 0, too
+                for k, m in np.argwhere(abs(signs[1:] - signs[:-1]) > 0):
+                    yield corner + size * np.array([shares[k] + middle, shares[m]])
+                for k, m in np.argwhere(abs(signs[:, 1:] - signs[:, :-1]) > 0):
+                    yield corner + size * np.array([shares[k], shares[m] + middle])
 
 
 @dataclass(frozen=True)
@@ -88,13 +129,6 @@ class Row:
     number: int
     axis: int = 1
 
-    @property
-    def nodes(self) -> FloatArray:
-        """(u, v) of its nodes in order, shape (count, 2)."""
-        along = np.linspace(0, 1, self.count)
-        across = np.full(self.count, along[self.number])
-        return np.stack([along, across] if self.axis == 0 else [across, along], axis=1)
-
 
 @dataclass(frozen=True, eq=False)
 class ScannedRow:
@@ -111,18 +145,14 @@ class ScannedRow:
     reasons: tuple[Message, ...] = ()
 
 
-def rows_of(begin: Callable[[], Field], count: int, axis: int = 1) -> list[Row]:
-    """All rows of a grid of count × count nodes."""
-    return [Row(begin, count, number, axis) for number in range(count)]
-
-
 def scan_row(row: Row) -> ScannedRow:
     """F on a row from one end to the other, so that each node is close to the one before."""
     field, reasons = row.begin(), dict[Message, None]()
     values, gradients = np.full(row.count, np.nan), np.full((row.count, 2), np.nan)
-    for k, at in enumerate(row.nodes):
+    shares = np.linspace(0, 1, row.count)
+    for k in range(row.count):
         try:
-            sample = field(at)
+            sample = field(shares[[k, row.number] if row.axis == 0 else [row.number, k]])
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
             reasons.setdefault(failure.message)
@@ -141,15 +171,6 @@ def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable
         for _ in range(count):
             progress()
     return Scan(np.linspace(0, 1, count), values, gradients, tuple(reasons))
-
-
-def _changes(values: FloatArray, shares: FloatArray, half: float) -> Iterator[FloatArray]:
-    """Half-way between neighbours in a table of F over shares of a cell that differ in sign, or of which one is 0."""
-    signs = np.sign(values)
-    for k, m in np.argwhere(abs(signs[1:] - signs[:-1]) > 0):
-        yield np.array([shares[k] + half, shares[m]])
-    for k, m in np.argwhere(abs(signs[:, 1:] - signs[:, :-1]) > 0):
-        yield np.array([shares[k], shares[m] + half])
 
 
 def _hermite(x: FloatArray, end: int) -> tuple[FloatArray, FloatArray]:

@@ -17,18 +17,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.analysis.slopes import DIFFERENTIATED as DIFFERENTIATED
-from fpsolve.analysis.slopes import RECORDS
-from fpsolve.analysis.slopes import Sensitivities as Sensitivities
-from fpsolve.analysis.slopes import Slopes as Slopes
 from fpsolve.arrays import FloatArray
+from fpsolve.data import Result, dataset
+from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.bordered import Bordered
@@ -42,47 +40,133 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import ParameterDerivative, Problem, checked_moments, of_problem, with_original
-from fpsolve.model.quantity import Quantity, moment_at
+from fpsolve.model.quantity import (
+    LYAPUNOV_EXPONENT,
+    MOMENT,
+    STABILITY_INDEX,
+    THETA,
+    VARIANCE_RATE,
+    P,
+    Quantity,
+    moment_at,
+)
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
 
 SMALL_P = 1e-4
 """For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
-Operator = Callable[[FloatArray], FloatArray]
+RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
+DIFFERENTIATED = tuple(RECORDS)
+"""The quantities that are no function of p."""
+MOST_BARS = 4
+"""Of so many p sensitivities are drawn."""
+Slopes = Mapping[str, Estimate]
+"""∂/∂θ by the key of θ."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensitivities(Result):
+    """∂/∂θ for every parameter θ of a problem; all are `Estimate`s by the key of θ, such as "oscillator.omega".
+
+    Attributes:
+        theta: the values of the parameters.
+        quantities: what the parameters are.
+        p: the moments, shape (n,).
+        moments: ∂Λ(p)/∂θ, one mapping for each p; empty where Λ(p) did not converge.
+        indices: ∂/∂θ of "lyapunov_exponent", "stability_index" and "variance_rate"; without those that do not exist.
+        notes: what is one-sided, and what is missing, and why.
+    """
+
+    theta: Mapping[str, float]
+    quantities: Mapping[str, Quantity]
+    p: FloatArray
+    moments: tuple[Slopes, ...]
+    indices: Mapping[str, Slopes]
+    notes: tuple[Message, ...] = ()
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The derivatives over p and θ, and their errors; NaN where there is none."""
+        numbers: dict[Quantity, FloatArray] = {}
+        single = [(RECORDS[name], (self.indices[name],)) for name in RECORDS if name in self.indices]
+        for record, rows in [(MOMENT, self.moments), *single]:
+            slope = record.by(THETA)
+            shape = (len(rows), len(self.theta))[2 - len(slope.dims) :]  # without p there is one row
+            for quantity, of in ((slope, "value"), (slope.error(), "error_estimate")):
+                flat = [getattr(row[key], of) if key in row else np.nan for row in rows for key in self.theta]
+                numbers[quantity] = np.array(flat, dtype=float).reshape(shape)
+        key = replace(THETA, name="parameter", words="key of a parameter", latex="", unit="1")
+        unit = replace(THETA, name="theta_unit", words="unit of theta", latex="", unit="1")
+        coordinates = {
+            P: self.p,
+            key: np.array([each.name for each in self.quantities.values()], dtype=str),
+            THETA: np.array([*self.theta.values()], dtype=float),
+            unit: np.array([each.unit for each in self.quantities.values()], dtype=str),
+        }
+        return dataset("sensitivities", "finite elements", numbers, coordinates, self.theta, notes=self.notes)
+
+    def shown(self) -> Mapping[str, tuple[float, Slopes]]:
+        """What pictures show: by their symbols λ, as p = 0, and Λ of some p, each with its derivatives."""
+        rows = [(float(p), slopes) for p, slopes in zip(self.p, self.moments, strict=True) if p and slopes]
+        chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_BARS)).round().astype(int))
+        exponent = self.indices.get(LYAPUNOV_EXPONENT.name)
+        first = {LYAPUNOV_EXPONENT.latex: (0.0, exponent)} if exponent else {}
+        return first | {moment_at(rows[i][0]).latex: rows[i] for i in chosen}
+
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+        bars = {
+            label: np.array([self.theta[key] * each.value for key, each in slopes.items()])
+            for label, (_, slopes) in self.shown().items()
+        }
+        draw_bars(axes, bars, [each.latex or key for key, each in self.quantities.items()], **kwargs)
+        axes.set_xlabel(r"effect of a relative change, $\theta\,\partial/\partial\theta$ (1/time)")
+        if bars:
+            add_legend(axes)
+
+    def _said(self) -> str:
+        what = [*self.indices, *[f"Λ({p:g})" for p in self.p[:1]], *["..."] * (self.p.size > 1)]
+        return f"of {', '.join(what) or 'nothing'} by {len(self.theta)} parameters"
 
 
 def changed_value(pair: PrincipalPair, by: ParameterDerivative) -> Estimate:
     """∂Λ/∂θ on one discretisation, with the error of rounding; the scale is that of the terms of L."""
-    generator, x, y = pair.generator, pair.right, pair.left
-    terms = list(generator.changed(by, pair.p).terms)
-    mass = generator.changed_mass(by, pair.p)
-    terms += [] if mass is None else [(-pair.value * phase, noise) for phase, noise in mass.terms]
-    return _summed([KroneckerSum([term]) for term in terms], x, y, pair.space.turns)
+    x, y, turns = pair.right, pair.left, pair.space.turns
+    factors = list(pair.generator.changed(by, pair.p).terms)
+    if (mass := pair.generator.changed_mass(by, pair.p)) is not None:
+        factors += [(-pair.value * phase, noise) for phase, noise in mass.terms]
+    terms = [KroneckerSum([each]) for each in factors]
+    parts = turns * np.array([y @ (term @ x) for term in terms])
+    sizes = turns * np.array([abs(y) @ (abs(term) @ abs(x)) for term in terms])
+    return Estimate(float(np.sum(parts)), sys.float_info.epsilon * float(np.sum(sizes)), float(np.sum(np.abs(parts))))
 
 
 def changed_slope(around: Bordered, by: ParameterDerivative) -> Estimate:
     """∂Λ′/∂θ on one discretisation."""
     pair = around.pair
-    zeroth, first = _less(pair, by, 0, changed_value(pair, by).value), _less(pair, by, 1, 0.0)
     x, y = pair.right, pair.left
-    parts = y @ first(x), y @ zeroth(around.by_p), around.adjoint_by_p @ zeroth(x)
-    return _rounded(parts, around.norm)
+    zeroth, first = _operator(pair, by, 0, changed_value(pair, by).value), _operator(pair, by, 1, 0.0)
+    return _summed((y @ first(x), y @ zeroth(around.by_p), around.adjoint_by_p @ zeroth(x)), around.norm)
 
 
 def changed_curvature(around: Bordered, by: ParameterDerivative) -> Estimate:
     """∂Λ″/∂θ at p = 0 on one discretisation."""
     pair, x, y = around.pair, around.pair.right, around.pair.left
-    zeroth = _less(pair, by, 0, changed_value(pair, by).value)
-    first = _less(pair, by, 1, changed_slope(around, by).value)
+    zeroth = _operator(pair, by, 0, changed_value(pair, by).value)
+    first = _operator(pair, by, 1, changed_slope(around, by).value)
     parts = (
-        y @ _less(pair, by, 2, 0.0, around.second_derivative)(x),
+        y @ _operator(pair, by, 2, 0.0, around.second_derivative)(x),
         2 * (y @ first(around.by_p)),
         2 * (around.adjoint_by_p @ first(x)),
         2 * (around.adjoint_by_p @ zeroth(around.by_p)),
         y @ zeroth(around.second_by_p),
     )
-    return _rounded(parts, around.norm)
+    return _summed(parts, around.norm)
 
 
-def _less(pair: PrincipalPair, by: ParameterDerivative, k: int, change: float, own: float | None = None) -> Operator:
+def _operator(
+    pair: PrincipalPair, by: ParameterDerivative, k: int, change: float, own: float | None = None
+) -> Callable[[FloatArray], FloatArray]:
     """∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M − ∂Λ⁽ᵏ⁾/∂θ M."""
     value = own if own is not None else (pair.value, pair.derivative)[k]
     operator, mass = pair.generator.changed(by, pair.p, derivative=k), pair.generator.changed_mass(by, pair.p)
@@ -159,13 +243,16 @@ def solve_sensitivities(
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
     solves = dict(zip(RECORDS, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
+    noise, values = solver.problem.noise, solver.problem.values
+    keys = [key for name in noise.one_sided if (key := f"{noise.section}.{name}") in along]
+    one_sided = [Message(Code.ONE_SIDED, key=key, value=values[key]) for key in keys]
     return Sensitivities(
         theta={key: by.theta for key, by in along.items()},
         quantities={key: parameters[key].quantity for key in along},
         p=p,
         moments=moments,
         indices={name: each for name, each in slopes.items() if each},
-        notes=(*notes, *_one_sided(solver.problem, along)),
+        notes=(*notes, *one_sided),
     )
 
 
@@ -187,38 +274,32 @@ class Gradient:
         pair = self._solver.pair(p)
         with one_thread():
             finer = principal_pair(pair.generator.enriched(), p, start=pair)
-        return self._each(lambda by: _between(changed_value(pair, by), changed_value(finer, by)))
+        return {key: _between(changed_value(pair, by), changed_value(finer, by)) for key, by in self._along.items()}
 
-    def lyapunov_exponent(self) -> Slopes:
+    def lyapunov_exponent(self) -> dict[str, Estimate]:
         """∂λ/∂θ. Raises `NotConverged`."""
-        return self._each(lambda by: self._at_zero(partial(changed_slope, by=by)))
+        return self._at_zero(changed_slope)
 
     def variance_rate(self) -> Slopes:
         """∂Λ″(0)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         self._solver.variance_rate()
-        return self._each(lambda by: self._at_zero(partial(changed_curvature, by=by)))
-
-    def ratio(self, p: float) -> Slopes:
-        """∂/∂θ of Λ(p)/p, which at p = 0 is λ; for small p from its derivatives there."""
-        if abs(p) >= SMALL_P:
-            return {key: _times(1 / p, each) for key, each in self.moment(p).items()}
-        found = self.lyapunov_exponent()
-        if p == 0:
-            return found
-        more = self.variance_rate()
-        return {key: _sum(found[key], _times(0.5 * p, more[key])) for key in found}
+        return self._at_zero(changed_curvature)
 
     def root(self, p: float) -> Slopes:
-        """∂δ_p/∂θ, p being δ_p."""
-        increase = self._solver.ratio(p)[1]
-        return {key: _times(-1 / increase, each) for key, each in self.ratio(p).items()}
+        """∂δ_p/∂θ, p being δ_p: that of Λ(p)/p, for small p from its derivatives at p = 0, over that by p."""
+        factor = -1 / self._solver.ratio(p)[1]
+        if abs(p) >= SMALL_P:
+            return {key: _times(factor, _times(1 / p, each)) for key, each in self.moment(p).items()}
+        slopes = self.lyapunov_exponent()
+        for key, each in (self.variance_rate() if p else {}).items():
+            slope, more = slopes[key], _times(0.5 * p, each)
+            errors = slope.error_estimate + more.error_estimate
+            slopes[key] = Estimate(slope.value + more.value, errors, max(slope.scale, more.scale))
+        return {key: _times(factor, each) for key, each in slopes.items()}
 
-    def _each(self, of_direction: Callable[[ParameterDerivative], Estimate]) -> Slopes:
-        return {key: of_direction(by) for key, by in self._along.items()}
-
-    def _at_zero(self, of_pair: Callable[[Bordered], Estimate]) -> Estimate:
+    def _at_zero(self, changed: Callable[[Bordered, ParameterDerivative], Estimate]) -> dict[str, Estimate]:
         coarse, fine = self._pairs_at_zero
-        return _between(of_pair(coarse), of_pair(fine))
+        return {key: _between(changed(coarse, by), changed(fine, by)) for key, by in self._along.items()}
 
     @cached_property
     def _pairs_at_zero(self) -> tuple[Bordered, Bordered]:
@@ -226,37 +307,16 @@ class Gradient:
         return Bordered(coarse), Bordered(fine)
 
 
-def _one_sided(problem: Problem, along: Mapping[str, ParameterDerivative]) -> tuple[Message, ...]:
-    """Which derivatives are taken from below."""
-    noise, values = problem.noise, problem.values
-    return tuple(
-        Message(Code.ONE_SIDED, key=key, value=values[key])
-        for key in (f"{noise.section}.{name}" for name in noise.one_sided)
-        if key in along
-    )
-
-
-def _summed(terms: Sequence[KroneckerSum], x: FloatArray, y: FloatArray, turns: int) -> Estimate:
-    """⟨T*, (sum of some operators) T⟩/⟨T*, T⟩."""
-    parts = turns * np.array([y @ (term @ x) for term in terms])
-    sizes = turns * np.array([abs(y) @ (abs(term) @ abs(x)) for term in terms])
-    return Estimate(float(np.sum(parts)), sys.float_info.epsilon * float(np.sum(sizes)), float(np.sum(np.abs(parts))))
-
-
 def _between(coarse: Estimate, fine: Estimate) -> Estimate:
     """The finer one, its error including how far both are apart."""
     return Estimate(fine.value, abs(fine.value - coarse.value) + fine.error_estimate, fine.scale)
 
 
-def _rounded(parts: Sequence[Any], norm: float) -> Estimate:
-    """The sum of some parts, with about what rounding may change in it."""
+def _summed(parts: Sequence[Any], norm: float) -> Estimate:
+    """The sum of some parts over a norm, with about what rounding may change in it."""
     size = float(np.sum(np.abs(parts))) / norm
     return Estimate(float(np.sum(parts)) / norm, 1e3 * sys.float_info.epsilon * size, size)
 
 
 def _times(factor: float, estimate: Estimate) -> Estimate:
     return Estimate(factor * estimate.value, abs(factor) * estimate.error_estimate, abs(factor) * estimate.scale)
-
-
-def _sum(one: Estimate, other: Estimate) -> Estimate:
-    return Estimate(one.value + other.value, one.error_estimate + other.error_estimate, max(one.scale, other.scale))

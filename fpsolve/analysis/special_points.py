@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
 
-from fpsolve.analysis.continuation import corrected, on_line
-from fpsolve.analysis.curve import PIECES, Field, Point, Sample, Trace
+from fpsolve.analysis.continuation import PIECES, Point, Trace, correct, correct_on_line
+from fpsolve.analysis.scan import Field, Sample
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError, NotConverged
 
@@ -34,7 +33,7 @@ def with_folds(field: Field, trace: Trace, names: tuple[str, str]) -> Trace:
         along = np.array([point.sample.tangent[axis] for point in trace.points])
         along[np.abs(along) < FLAT] = 0
         for span in _changes(along, trace.closed):
-            fold = _tried(partial(_sought, field, trace, span, partial(_component, axis)))
+            fold = _tried(_sought, field, trace, span, lambda sample, axis=axis: float(sample.tangent[axis]))
             if fold is not None:
                 new.append((fold[0], Point(fold[1], f"fold in {names[axis]}")))
     return with_points(trace, new)
@@ -49,7 +48,7 @@ def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[fl
         new += [(float(i), Point(trace.points[i].sample, label)) for i in np.flatnonzero(beyond == 0)]
         for i, j in _changes(beyond, trace.closed):
             share = beyond[i] / (beyond[i] - beyond[j % beyond.size])
-            found = _tried(partial(_valued, field, trace, i, share, axis, value)) if j == i + 1 else None
+            found = _tried(_valued, field, trace, i, share, axis, value) if j == i + 1 else None
             if found is not None:
                 new.append((found[0], Point(found[1], label)))
     return with_points(trace, new)
@@ -62,7 +61,7 @@ def crossings(one: Trace, other: Trace, fields: tuple[Field, Field]) -> Iterator
     for i in range(len(a) - 1):
         for j, shares in _meetings(a[i], a[i + 1] - a[i], b):
             guess, way = a[i] + shares[0] * (a[i + 1] - a[i]), PIECES * float(np.linalg.norm(a[i + 1] - a[i]))
-            samples = _tried(partial(_common, fields, guess))
+            samples = _tried(_common, fields, guess)
             if samples is None or np.linalg.norm(samples[0].at - guess) > 0.5 * way:
                 continue
             if all(np.linalg.norm(samples[0].at - at) > 10 * EQUAL for at in known):
@@ -93,17 +92,14 @@ def _sought(
     def at(place: float) -> Sample:
         i = min(int(place), span[1] - 1)
         k = i % len(trace.points)
-        sample = corrected(field, trace.between(k, place - i), trace.points[k].sample.tangent)
+        sample = correct(field, trace.between(k, place - i), trace.points[k].sample.tangent)
         if sample is None:
             raise NotConverged("Newton's method does not settle")
         return sample
 
-    def value(place: float) -> float:
-        return component(at(place))
-
-    if value(span[0]) * value(span[1]) >= 0:
+    if component(at(span[0])) * component(at(span[1])) >= 0:
         return None
-    place = float(brentq(value, *span, xtol=CLOSE))
+    place = float(brentq(lambda place: component(at(place)), *span, xtol=CLOSE))
     return place % len(trace.points), at(place)
 
 
@@ -111,19 +107,16 @@ def _valued(field: Field, trace: Trace, i: int, share: float, axis: int, value: 
     """The point where u, or v, has a value, about at a share of the way from the point i to the next."""
     guess = trace.between(i, share)
     size = float(np.linalg.norm(trace.between(i, 1.0) - trace.between(i, 0.0)))
-    direct = _tried(partial(on_line, field, axis, value, guess))
+    direct = _tried(correct_on_line, field, axis, value, guess)
     if direct is not None and np.linalg.norm(direct.at - guess) < 0.1 * size:
         return i + share, direct
     found = _sought(field, trace, (i, i + 1), lambda sample: float(sample.at[axis]) - value)
     if found is None:
         return None
-    exact = _tried(partial(on_line, field, axis, value, found[1].at))
-    is_same = exact is not None and np.linalg.norm(exact.at - found[1].at) < 0.1 * size
-    return found[0], exact if exact is not None and is_same else found[1]
-
-
-def _component(axis: int, sample: Sample) -> float:
-    return float(sample.tangent[axis])
+    exact = _tried(correct_on_line, field, axis, value, found[1].at)
+    if exact is not None and np.linalg.norm(exact.at - found[1].at) < 0.1 * size:
+        return found[0], exact
+    return found
 
 
 def _common(fields: tuple[Field, Field], at: FloatArray) -> tuple[Sample, Sample] | None:
@@ -137,10 +130,10 @@ def _common(fields: tuple[Field, Field], at: FloatArray) -> tuple[Sample, Sample
     return None
 
 
-def _tried(solve: Callable[[], Found | None]) -> Found | None:
+def _tried(search: Callable[..., Found | None], *arguments: Any) -> Found | None:
     """What a search finds; None where F does not exist on its way."""
     try:
-        return solve()
+        return search(*arguments)
     except (FpsolveError, np.linalg.LinAlgError):
         return None
 

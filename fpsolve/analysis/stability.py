@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.analysis.continuation import LONGEST, SHORTEST, begun, found, traced
-from fpsolve.analysis.curve import Trace
-from fpsolve.analysis.scan import Row, Scan, ScannedRow, rows_of, scan_row, scanned
+from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, find_zero, trace_branch
+from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.zero import Axis, Quantity, Zero, check_axes, zero_of
+from fpsolve.analysis.zero import Axis, Zero, ZeroField, check_axes, zero_of
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
@@ -96,12 +95,22 @@ class Boundary(Result):
     @property
     def branches(self) -> tuple[Branch, ...]:
         """The branches in the parameters themselves."""
-        return tuple(_branch(self, trace) for trace in self.traces)
+        return tuple(
+            Branch(
+                x=np.asarray(self.x.value(np.array([point.sample.at[0] for point in trace.points]))),
+                y=np.asarray(self.y.value(np.array([point.sample.at[1] for point in trace.points]))),
+                width=np.array([point.sample.width for point in trace.points]),
+                labels=tuple(point.label for point in trace.points),
+                closed=trace.closed,
+                obstacles=trace.obstacles,
+            )
+            for trace in self.traces
+        )
 
     @property
-    def quantity(self) -> Quantity:
+    def zero_field(self) -> ZeroField:
         """F over the unit square."""
-        return Quantity(self.zero, self.problem, (self.x, self.y), self.budget)
+        return ZeroField(self.zero, self.problem, (self.x, self.y), self.budget)
 
     def remark(self) -> str:
         """That there is no line, as a `Message`, or an empty text."""
@@ -143,9 +152,8 @@ class Boundary(Result):
         Raises:
             ValueError: an axis is no parameter of the problem, or the point is not in the frame.
         """
-        here = self.branches[branch]
-        values = {self.x.key: float(here.x[point]), self.y.key: float(here.y[point])}
-        problem = self.problem.at(values)
+        chosen = self.branches[branch]
+        problem = self.problem.at({self.x.key: float(chosen.x[point]), self.y.key: float(chosen.y[point])})
         check_axes(problem, x, y)
         theta = {axis.key: float(problem.values[axis.key]) for axis in (x, y)}
         start = np.array([axis.share(theta[axis.key]) for axis in (x, y)])
@@ -156,116 +164,88 @@ class Boundary(Result):
 
     def rows(self) -> list[Row]:
         """The rows of its scan, tasks for `scan_row`, each of which begins anew; they pickle small."""
-        rough = partial(Quantity, self.zero, self.problem, (self.x, self.y), self.budget, SCAN_RTOL)
-        return rows_of(rough, NODES if self.scan is None else self.scan.nodes.size, rough().easy_axis)
+        rough = partial(ZeroField, self.zero, self.problem, (self.x, self.y), self.budget, SCAN_RTOL)
+        count, axis = NODES if self.scan is None else self.scan.nodes.size, rough().easy_axis
+        return [Row(rough, count, number, axis) for number in range(count)]
 
-    def grown(
+    def solve(
         self,
+        rows: Iterator[ScannedRow] | None = None,
         progress: Callable[[], None] = lambda: None,
         stepped: Callable[[], None] = lambda: None,
-        map: Map = map,
     ) -> Iterator[Boundary]:
         """The scan, then one branch after the other: what there is so far, each time.
 
         Args:
+            rows: what `scan_row` gives for its `rows`, in order, of which no more are taken; None to scan them here.
             progress: called once for each node of the scan, a row at a time.
             stepped: called once for each point of a branch.
-            map: computes the rows, as the builtin does or in other processes; they come back in order.
         """
-        return self.grown_from(iter(map(scan_row, self.rows())), progress, stepped)
-
-    def grown_from(
-        self, rows: Iterator[ScannedRow], progress: Callable[[], None], stepped: Callable[[], None]
-    ) -> Iterator[Boundary]:
-        """The same from rows that others scan, of which it takes its own."""
-        scan = scanned(self.rows(), rows, progress)
+        tasks = self.rows()
+        scan = scanned(tasks, map(scan_row, tasks) if rows is None else rows, progress)
         now = replace(self, scan=scan, traces=())
         yield now
-        for trace in found(self.quantity, scan, self.step, stepped):
+        for trace in find_branches(self.zero_field, scan, self.step, stepped):
             now = replace(now, traces=(*now.traces, self._special(trace)))
             yield now
 
     def _from(self, seeds: Iterable[FloatArray]) -> Boundary:
         """With the branches through some points of the lines."""
-        quantity, traces = self.quantity, list[Trace]()
+        zero_field, traces = self.zero_field, list[Trace]()
         for seed in seeds:
             if np.any((seed < 0) | (seed > 1)) or any(trace.passes(seed, ON_IT) for trace in traces):
                 continue
-            start = begun(quantity, seed)
+            start = find_zero(zero_field, seed)
             if start is not None and not any(trace.holds(start) for trace in traces):
-                traces.append(self._special(traced(quantity, start, self.step)))
+                traces.append(self._special(trace_branch(zero_field, start, self.step)))
         return replace(self, traces=tuple(traces))
 
     def _special(self, trace: Trace) -> Trace:
         """A branch with its folds, and the points that the axes ask for."""
-        quantity = self.quantity
-        trace = with_folds(quantity, trace, ("x", "y"))
+        zero_field = self.zero_field
+        trace = with_folds(zero_field, trace, ("x", "y"))
         for number, axis in enumerate((self.x, self.y)):
             wanted = [(axis.share(value), f"at {axis.key} = {value:.12g}") for value in axis.at]
-            trace = with_values(quantity, trace, number, wanted)
+            trace = with_values(zero_field, trace, number, wanted)
         return trace
 
     def to_xarray(self) -> xarray.Dataset:
         """The points of all branches, one after the other, with the line, the branch and the label of each."""
-        return _dataset(self)
+        branches = self.branches
+        numbers = np.repeat(np.arange(1, len(branches) + 1), [branch.x.size for branch in branches])
+        sides = [self.problem.parameters[axis.key].quantity for axis in (self.x, self.y)]
+        x, y = (replace(side, name=name, dims=("point",)) for side, name in zip(sides, "xy", strict=True))
+        variables = {
+            quantity: np.concatenate([np.zeros(0), *(getattr(branch, of) for branch in branches)])
+            for quantity, of in ((x, "x"), (y, "y"), (POINTS["width"], "width"))
+        }
+        coordinates = {
+            POINTS["line"]: np.full(numbers.size, self.zero.name),
+            POINTS["branch"]: numbers,
+            POINTS["label"]: np.array([label for branch in branches for label in branch.labels], dtype=str),
+        }
+        held = {key: value for key, value in self.problem.values.items() if key not in (self.x.key, self.y.key)}
+        closed = ", ".join(str(number) for number, branch in enumerate(branches, start=1) if branch.closed)
+        more = {"line": self.zero.equation, "closed_branches": closed, "remark": self.remark()}
+        found = dataset("line of stability", "finite elements", variables, coordinates, held, **more)
+        found.x.attrs["key"], found.y.attrs["key"] = self.x.key, self.y.key
+        return found
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-        _draw_lines(self, found, axes, **kwargs)
+        style = {"linewidth": 2, "label": self.zero.latex, **coloured(axes, kwargs)}
+        for branch in self.branches:
+            axes.plot(*(np.append(each, each[: branch.closed]) for each in (branch.x, branch.y)), **style)
+            style.pop("label", None)
+        if "label" in style:
+            axes.plot([], [], **style)
+        label_axes(axes, found.x.attrs, found.y.attrs)
+        for side, axis in ((axes.xaxis, self.x), (axes.yaxis, self.y)):
+            scale_axis(side, axis.scale, (axis.start, axis.stop))
+        add_legend(axes)
 
     def _said(self) -> str:
-        count = len(self.traces)
-        branches = f"{count} branch{'es' * (count != 1)}"
+        branches = f"{len(self.traces)} branch{'es' * (len(self.traces) != 1)}"
         return f"{self.zero.equation}: {branches} over {self.x.key} and {self.y.key}"
-
-
-def _branch(line: Boundary, trace: Trace) -> Branch:
-    """A branch of a line in the parameters themselves."""
-    at = np.array([point.sample.at for point in trace.points])
-    return Branch(
-        x=np.asarray(line.x.value(at[:, 0])),
-        y=np.asarray(line.y.value(at[:, 1])),
-        width=np.array([point.sample.width for point in trace.points]),
-        labels=tuple(point.label for point in trace.points),
-        closed=trace.closed,
-        obstacles=trace.obstacles,
-    )
-
-
-def _dataset(line: Boundary) -> xarray.Dataset:
-    """The points of a line."""
-    branches = line.branches
-    numbers = np.repeat(np.arange(1, len(branches) + 1), [branch.x.size for branch in branches])
-    columns = [np.concatenate([np.zeros(0), *(getattr(each, of) for each in branches)]) for of in ("x", "y", "width")]
-    labels = np.array([label for branch in branches for label in branch.labels], dtype=str)
-    sides = [line.problem.parameters[axis.key].quantity for axis in (line.x, line.y)]
-    x, y = (replace(side, name=name, dims=("point",)) for side, name in zip(sides, "xy", strict=True))
-    variables = {x: columns[0], y: columns[1], POINTS["width"]: columns[2]}
-    coordinates = {
-        POINTS["line"]: np.full(numbers.size, line.zero.name),
-        POINTS["branch"]: numbers,
-        POINTS["label"]: labels,
-    }
-    held = {key: value for key, value in line.problem.values.items() if key not in (line.x.key, line.y.key)}
-    closed = [str(number) for number, branch in enumerate(branches, start=1) if branch.closed]
-    more = {"line": line.zero.equation, "closed_branches": ", ".join(closed), "remark": line.remark()}
-    found = dataset("line of stability", "finite elements", variables, coordinates, held, **more)
-    found.x.attrs["key"], found.y.attrs["key"] = line.x.key, line.y.key
-    return found
-
-
-def _draw_lines(line: Boundary, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-    """The branches of a line in their frame."""
-    style = {"linewidth": 2, "label": line.zero.latex, **coloured(axes, kwargs)}
-    for branch in line.branches:
-        x, y = (np.append(each, each[: branch.closed]) for each in (branch.x, branch.y))
-        axes.plot(x, y, **style)
-        style.pop("label", None)
-    if "label" in style:
-        axes.plot([], [], **style)
-    label_axes(axes, found.x.attrs, found.y.attrs)
-    for side, axis in ((axes.xaxis, line.x), (axes.yaxis, line.y)):
-        scale_axis(side, axis.scale, (axis.start, axis.stop))
-    add_legend(axes)
 
 
 @of_problem
@@ -301,7 +281,7 @@ def boundary(
         raise ValueError(f"got nodes = {nodes!r}; must be a whole number from 2")
     empty = Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
     line = Boundary(zero_of(zero), x, y, problem, scan=empty, step=_checked_step(step), budget=budget or Budget())
-    *_, whole = line.grown()
+    *_, whole = line.solve()
     return whole
 
 
@@ -315,12 +295,12 @@ def _checked_step(step: float) -> float:
 def crossed(lines: Sequence[Boundary]) -> list[Boundary]:
     """Lines in one frame, each with the points that it has in common with the others."""
     new = defaultdict[tuple[int, int], list[Placed]](list)
-    for (i, one), (j, other) in combinations(enumerate(lines), 2):
-        fields = one.quantity, other.quantity
-        for (a, trace), (b, crossing) in product(enumerate(one.traces), enumerate(other.traces)):
-            for (place, point), (other_place, other_point) in crossings(trace, crossing, fields):
-                new[i, a].append((place, replace(point, label=f"crossing with {other.zero.name}")))
-                new[j, b].append((other_place, replace(other_point, label=f"crossing with {one.zero.name}")))
+    for (i, first), (j, second) in combinations(enumerate(lines), 2):
+        fields = first.zero_field, second.zero_field
+        for (a, trace), (b, crossing) in product(enumerate(first.traces), enumerate(second.traces)):
+            for on_first, on_second in crossings(trace, crossing, fields):
+                for key, (place, point), other in (((i, a), on_first, second), ((j, b), on_second, first)):
+                    new[key].append((place, replace(point, label=f"crossing with {other.zero.name}")))
     return [
         replace(line, traces=tuple(with_points(trace, new[i, a]) for a, trace in enumerate(line.traces)))
         for i, line in enumerate(lines)

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.dataclasses import dataclass as checked_dataclass
 
-from fpsolve.analysis.curve import Sample
+from fpsolve.analysis.scan import Sample
 from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.errors import FpsolveError, NoSuchExponent
@@ -22,7 +22,7 @@ from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.parameters import STRICT
-from fpsolve.model.problem import ParameterDerivative, Problem, refuse_infinite
+from fpsolve.model.problem import Problem, refuse_infinite
 
 RTOL = 1e-10
 """Of F, relative to its scale."""
@@ -148,14 +148,11 @@ def said(failure: ValueError) -> str:
     """What is wrong with the parameters of a problem, in one line."""
     if not isinstance(failure, ValidationError):
         return str(failure)
-    faults = (
-        (
-            ".".join(map(str, fault["loc"])),
-            str(fault["ctx"]["error"]) if "error" in fault.get("ctx", {}) else fault["msg"],
-        )
-        for fault in failure.errors()
-    )
-    return "; ".join(f"{key}: {text}" if key else text for key, text in faults)
+    texts = []
+    for fault in failure.errors():
+        text = str(fault.get("ctx", {}).get("error", fault["msg"]))
+        texts.append(": ".join(filter(None, (".".join(map(str, fault["loc"])), text))))
+    return "; ".join(texts)
 
 
 def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
@@ -178,7 +175,7 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
         raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
 
 
-class Quantity:
+class ZeroField:
     """F over the unit square: λ or Λ(p)/p, with its gradient.
 
     λ and its slopes are affine in ln R where nothing else changes: a bounce multiplies the whole state and leaves the
@@ -195,8 +192,7 @@ class Quantity:
     def __init__(
         self, zero: Zero, problem: Problem, axes: tuple[Axis, Axis], budget: Budget, rtol: float = RTOL
     ) -> None:
-        self._zero, self._problem, self._axes = zero, problem, axes
-        self._rtol, self._budget = rtol, budget
+        self._zero, self._problem, self._axes, self._rtol, self._budget = zero, problem, axes, rtol, budget
         self._starts: Mapping[float, Solution] = {}
         keys, system = [axis.key for axis in axes], problem.system
         loss = f"{system.section}.{system.impact_parameter}"
@@ -227,17 +223,33 @@ class Quantity:
         return known[log_factor] if log_factor in known else self._between(at, problem, log_factor, known, self._bounce)
 
     def _sample(self, at: FloatArray, problem: Problem) -> Sample:
-        """F from a solve."""
-        refuse_infinite(problem, self._zero.p)
+        """F from a solve.
+
+        Raises:
+            NoSuchExponent: Λ(p) < 0 is not the largest eigenvalue, as rare paths far out in algebraic tails grow.
+        """
+        p = self._zero.p
+        refuse_infinite(problem, p)
         solver = ExponentSolver(problem, rtol=self._rtol, budget=self._budget, starts=self._starts)
-        value, error = solver.ratio_alone(self._zero.p)
-        if value > 0 > self._zero.p:
-            self._refuse_rare(solver)
-        slopes = self._slopes(solver, [problem.derivative(axis.key) for axis in self._axes])
+        value, error = solver.ratio_alone(p)
+        if value > 0 > p and problem.noise.has_algebraic_tails:
+            near = solver.near.solution(p).pair
+            if (
+                solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair
+                is not near
+            ):
+                raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
+        along = [problem.derivative(axis.key) for axis in self._axes]
+        if abs(p) >= SMALL_P:
+            pair = solver.near.solution(p).pair
+            slopes = np.array([changed_value(pair, by).value / p for by in along])
+        else:
+            around = Bordered(solver.near.solution(0.0).pair)
+            more = [0.5 * p * changed_curvature(around, by).value if p else 0.0 for by in along]
+            slopes = np.array([changed_slope(around, by).value for by in along]) + more
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
         self._starts = solver.near.known
-        scale = solver.scale(self._zero.p) / abs(self._zero.p) if self._zero.p else solver.scales.linear
-        return Sample(at, value, gradient, error, scale)
+        return Sample(at, value, gradient, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
 
     def _between(
         self, at: FloatArray, problem: Problem, log_factor: float, known: Mapping[float, Sample], bounce: int
@@ -252,22 +264,3 @@ class Quantity:
         value = one.value + share * (other.value - one.value)
         error = (abs(share) + abs(1 - share)) * max(one.error, other.error)
         return Sample(at, value, gradient, error, max(one.scale, other.scale))
-
-    def _refuse_rare(self, solver: ExponentSolver) -> None:
-        """Refuse a Λ(p) < 0 that is not the largest, as rare paths far out in algebraic tails grow. Raises so."""
-        p = self._zero.p
-        if not solver.problem.noise.has_algebraic_tails:
-            return
-        near = solver.near.solution(p).pair
-        if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
-            raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
-
-    def _slopes(self, solver: ExponentSolver, along: Sequence[ParameterDerivative]) -> FloatArray:
-        """∂F/∂θ."""
-        p = self._zero.p
-        if abs(p) >= SMALL_P:
-            pair = solver.near.solution(p).pair
-            return np.array([changed_value(pair, by).value / p for by in along])
-        around = Bordered(solver.near.solution(0.0).pair)
-        more = [0.5 * p * changed_curvature(around, by).value if p else 0.0 for by in along]
-        return np.array([changed_slope(around, by).value for by in along]) + more

@@ -105,7 +105,7 @@ def solve_chart(
     rows = iter(map(scan_row, [row for line in begun for row in line.rows()]))
     for each in begun:
         done = chart.lines
-        for line in each.grown_from(rows, progress, stepped):
+        for line in each.solve(rows, progress, stepped):
             chart = replace(chart, lines=(*done, line))
             yield chart
     yield Chart(tuple(crossed(chart.lines)), chart.closed_forms, regions(chart.lines), complete=True)

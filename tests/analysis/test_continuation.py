@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fpsolve.analysis.continuation import FRAME, LONGEST, SHORTEST, found
-from fpsolve.analysis.curve import TOLERANCE, Sample
-from fpsolve.analysis.scan import FINE, rows_of, scan_row, scanned
+from fpsolve.analysis.continuation import FRAME, LONGEST, SHORTEST, find_branches
+from fpsolve.analysis.scan import FINE, TOLERANCE, Row, Sample, scan_row, scanned
 from fpsolve.analysis.special_points import crossings, with_folds, with_points, with_values
 from fpsolve.errors import NotConverged
 from tests.conftest import sampled
@@ -41,13 +40,13 @@ def line(a, b, c):
 
 
 def scan_of(of, nodes=NODES, axis=1):
-    rows = rows_of(lambda: of, nodes, axis)
+    rows = [Row(lambda: of, nodes, number, axis) for number in range(nodes)]
     return scanned(rows, map(scan_row, rows))
 
 
 def lines(of, nodes=NODES, longest=LONGEST):
     """All branches, each checked for what must always hold."""
-    branches = list(found(of, scan_of(of, nodes), longest))
+    branches = list(find_branches(of, scan_of(of, nodes), longest))
     for branch in branches:
         check(branch, of, longest)
     for i, one in enumerate(branches):
@@ -442,7 +441,7 @@ def test_rows_go_along_an_axis_and_each_begins_anew(axis):
         of = field(lambda u, v: (u - v**2, 1, -2 * v), hole=(0, 1, 0.5))
         return lambda at: (begun[-1].append(tuple(at)), of(at))[1]
 
-    rows, told = rows_of(begin, 4, axis), []
+    rows, told = [Row(begin, 4, number, axis) for number in range(4)], []
     scan = scanned(rows, map(scan_row, rows), lambda: told.append(len(begun)))
     u, v = np.meshgrid(scan.nodes, scan.nodes, indexing="ij")
     exists = np.hypot(u, v - 1) >= 0.5
@@ -465,7 +464,7 @@ def test_what_is_no_failure_of_a_solve_ends_a_scan():
 @pytest.mark.parametrize("of", [circle(0.5, 0.5, 0.3), line(1, 1, 0.8)])
 def test_each_point_is_told_as_it_is_found(of):
     told = []
-    [branch] = found(of, scan_of(of), stepped=lambda: told.append(1))
+    [branch] = find_branches(of, scan_of(of), stepped=lambda: told.append(1))
     assert len(told) == len(branch.points)
 
 
@@ -530,7 +529,7 @@ def test_random_cubics(coefficients):
     parts = a, 2 * polynomial.polyder(a, axis=0), 2 * polynomial.polyder(a, axis=1)
     of = field(lambda u, v: [polynomial.polyval2d(2 * u - 1, 2 * v - 1, each) for each in parts])
     values, by_u, by_v = (polynomial.polygrid2d(2 * fine - 1, 2 * fine - 1, each) for each in parts)
-    branches = list(found(of, scan_of(of, NODES)))
+    branches = list(find_branches(of, scan_of(of, NODES)))
     slope = np.hypot(by_u, by_v)
     is_regular = np.all(np.maximum(abs(values), 0.05 * slope) > 3e-3)
     for branch in branches:

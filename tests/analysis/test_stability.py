@@ -15,7 +15,7 @@ from fpsolve.analysis.continuation import FRAME
 from fpsolve.analysis.scan import Scan, scan_row
 from fpsolve.analysis.sensitivity import sensitivities
 from fpsolve.analysis.stability import Boundary, boundary, crossed
-from fpsolve.analysis.zero import Axis, Quantity, zero_of
+from fpsolve.analysis.zero import Axis, ZeroField, zero_of
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.solver import ExponentSolver
@@ -131,7 +131,7 @@ def test_the_gradient_is_that_of_central_differences(zero, x, y, at, exact):
     at = np.array(at) if not (exact and y.key == "noise.r0") else np.array([at[0], 0.5])
     noise = NOISE if not exact else replace(NOISE, r0=0.5)
     problem = Problem(oscillator(0.6), noise if exact else noise.ou_reduction())
-    of = Quantity(zero_of(zero), problem, (x, y), Budget(), rtol=1e-11)
+    of = ZeroField(zero_of(zero), problem, (x, y), Budget(), rtol=1e-11)
     sample, h = of(at), 1e-3
     for k, step in enumerate(h * np.eye(2)):
         values = [of(at + m * step).value for m in (-2, -1, 1, 2)]
@@ -199,7 +199,7 @@ def test_a_fold():
         found = line({"moment": -6.0}, Axis("oscillator.omega", 0.3, 4.0), y, restitution=0.95, epsilon=epsilon)
         [(x_there, y_there)] = wanted(found, "fold in y")
         at = np.array([found.x.share(x_there), found.y.share(y_there)])
-        sample = Quantity(found.zero, found.problem, (found.x, found.y), Budget(), 1e-11)(at)
+        sample = ZeroField(found.zero, found.problem, (found.x, found.y), Budget(), 1e-11)(at)
         assert abs(sample.value) < 1e-9 * sample.scale
         assert abs(sample.gradient[0]) < 1e-8 * abs(sample.gradient[1])
         [branch] = found.branches
@@ -217,7 +217,7 @@ def test_a_fold_of_strong_noise():
     zero, values = {"stability_index": -4.0}, {"noise": noise, "omega": 0.3, "restitution": 0.9}
     found = line(zero, x, y, epsilon=1.0, **values)
     [(tau0, c1)] = wanted(found, "fold in y")
-    sample = Quantity(found.zero, found.problem, (x, y), Budget(), 1e-11)(np.array([x.share(tau0), y.share(c1)]))
+    sample = ZeroField(found.zero, found.problem, (x, y), Budget(), 1e-11)(np.array([x.share(tau0), y.share(c1)]))
     assert abs(sample.value) < 1e-9 * sample.scale
     assert abs(sample.gradient[0]) < 1e-8 * abs(sample.gradient[1])
     for beside in (0.9 * tau0, 1.1 * tau0):  # where the line is lower, so that Λ(−4) has fallen below 0
@@ -268,7 +268,7 @@ def test_a_line_pickles(weak):
     assert np.array_equal(again.branches[0].x, weak.branches[0].x)
     assert again.branches[0].labels == weak.branches[0].labels
     at = np.array([0.3, 0.4])
-    assert again.quantity(at).value == pytest.approx(weak.quantity(at).value, rel=1e-9)
+    assert again.zero_field(at).value == pytest.approx(weak.zero_field(at).value, rel=1e-9)
     assert len(pickle.dumps(weak)) < 50_000
 
 
@@ -485,7 +485,7 @@ def test_a_remark_only_speaks_of_where_f_exists():
 def test_a_line_ends_where_there_is_no_problem():
     """The restitution law needs ε²(1 − r) < 1; the sentence is one line."""
     law = VibroImpactOscillator(omega=1.0, restitution=0.5, c1=0.3, epsilon=0.5, impact="restitution")
-    of = Quantity(
+    of = ZeroField(
         zero_of(LAMBDA),
         Problem(law, NOISE.ou_reduction()),
         (Axis("oscillator.epsilon", 0.5, 3.0), Axis("oscillator.restitution", 0.1, 0.9)),
@@ -505,7 +505,7 @@ def test_rare_paths_leave_no_line():
     assert (
         ExponentSolver(problem).solution(-0.5).pair.value > 0 > ExponentSolver(problem).near.solution(-0.5).pair.value
     )
-    of = Quantity(zero_of({"stability_index": -0.5}), problem, (OMEGA, C1), Budget())
+    of = ZeroField(zero_of({"stability_index": -0.5}), problem, (OMEGA, C1), Budget())
     with pytest.raises(NoSuchExponent, match="rare paths"):
         of(np.array([OMEGA.share(1.0), C1.share(0.3)]))
     assert of(np.array([OMEGA.share(1.0), C1.share(0.0)])).value < 0
@@ -533,9 +533,9 @@ def test_rows_are_the_same_in_other_processes():
     nowhere = Scan(np.linspace(0, 1, 4), np.zeros((0, 0)), np.zeros((0, 0, 2)))
     c1 = Axis("oscillator.c1", -1.2, 0.8)
     of = Boundary(zero_of(SECOND), Axis("noise.r0", 0.5, 1.2), c1, problem, scan=nowhere)
-    here = next(of.grown()).scan
+    here = next(of.solve()).scan
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        there = next(of.grown(map=pool.map)).scan
+        there = next(of.solve(pool.map(scan_row, of.rows()))).scan
     assert np.array_equal(there.values, here.values)
     assert np.array_equal(there.gradients, here.gradients)
     assert all(len(pickle.dumps(row)) < 4000 for row in of.rows())
@@ -554,8 +554,8 @@ def test_a_row_does_not_depend_on_others():
 @pytest.mark.parametrize("is_first", [True, False])
 def test_the_scan_of_lambda_over_r_solves_two_nodes_of_a_row(is_first, monkeypatch):
     """λ is affine in ln R: rows run along r, whichever axis it is on."""
-    solved, sample = [], Quantity._sample
-    monkeypatch.setattr(Quantity, "_sample", lambda self, *given: (solved.append(1), sample(self, *given))[1])
+    solved, sample = [], ZeroField._sample
+    monkeypatch.setattr(ZeroField, "_sample", lambda self, *given: (solved.append(1), sample(self, *given))[1])
     r = Axis("oscillator.restitution", 0.5, 1.0)
     of = Boundary(zero_of(LAMBDA), *((r, C1) if is_first else (C1, r)), Problem(oscillator(), NOISE))
     scan_row(of.rows()[3])
@@ -574,7 +574,7 @@ def test_f_is_solved_in_one_thread(monkeypatch):
     monkeypatch.setattr(generator, "factorised", factorised)
     problem = Problem(oscillator(0.5), NOISE.ou_reduction())
     with threadpool_limits(2):
-        Quantity(zero_of(LAMBDA), problem, (OMEGA, C1), Budget())(np.array([0.2, 0.6]))
+        ZeroField(zero_of(LAMBDA), problem, (OMEGA, C1), Budget())(np.array([0.2, 0.6]))
         sensitivities(problem, 2.0)
     assert threads
     assert set(threads) == {1}
