@@ -1,5 +1,5 @@
+from .estimators import MomentEstimate as MomentEstimate
+from .estimators import MonteCarlo as MonteCarlo
 from .estimators import simulate as simulate
-from .monte_carlo import MomentEstimate as MomentEstimate
-from .monte_carlo import MonteCarlo as MonteCarlo
 from .response import Response as Response
 from .response import stationary_response as stationary_response

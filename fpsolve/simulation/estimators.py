@@ -16,19 +16,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import logsumexp
 
 from fpsolve.arrays import FloatArray, real_number
+from fpsolve.data import Result, dataset
+from fpsolve.drawing import draw_dots, finish, label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE, P
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.simulation.kernels import TALLIES
-from fpsolve.simulation.monte_carlo import MomentEstimate as MomentEstimate
-from fpsolve.simulation.monte_carlo import MonteCarlo as MonteCarlo
 from fpsolve.simulation.setup import (
     BATCHES,
     PATHS,
@@ -41,6 +43,10 @@ from fpsolve.simulation.setup import (
     transient,
 )
 
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
 FEW: Mapping[Estimator, int] = {"direct": 5000, "population": 1000}
 """With fewer effective paths there is no estimate. Direct runs that miss the rare large ‖x‖^p have both more effective
 paths and a smaller mean, so that estimates near a lower bound would be too small."""
@@ -51,6 +57,87 @@ _KEPT = 0.3
 _LEVELS = 12
 _SETTLING = 9
 """Slices in which a population finds its law."""
+
+
+@dataclass(frozen=True)
+class MomentEstimate:
+    """Λ(p) by simulation.
+
+    Attributes:
+        p: order of the moment.
+        value, standard_error: Λ(p) and the standard deviation of this estimate; None where too few paths carry it.
+        estimator: "direct" or "population".
+        effective_paths: how many paths carry the mean. Direct: (Σw)²/Σw² over all windows with the weights w = ‖x‖^p
+            at their ends. Population: the same for the paths of a transient ago with the weights of their descendants.
+    """
+
+    p: float
+    value: float | None
+    standard_error: float | None
+    estimator: Estimator
+    effective_paths: float
+
+
+@dataclass(frozen=True, repr=False)
+class MonteCarlo(Result):
+    """What a simulation of one parameter set found.
+
+    Attributes:
+        estimates: Λ(p), in the order of p.
+        lyapunov_exponent, lyapunov_exponent_error: λ and its standard error.
+        variance_rate, variance_rate_error: Λ″(0), from the variance of ln‖x‖ over the paths, and its standard error.
+        paths, time, step, seed: how many paths, their length after the transient, the time step, the seed.
+        impacts: how many bounces the paths without weights had.
+        warnings: what limits these numbers, each with its criterion.
+        interrupted: whether the simulation was stopped early.
+        parameters: of the problem, by keys such as "noise.D0".
+    """
+
+    estimates: tuple[MomentEstimate, ...]
+    lyapunov_exponent: float
+    lyapunov_exponent_error: float
+    variance_rate: float
+    variance_rate_error: float
+    paths: int
+    time: float
+    step: float
+    seed: int
+    impacts: int
+    warnings: tuple[Message, ...]
+    interrupted: bool = False
+    parameters: Mapping[str, float | str] = field(default_factory=dict, compare=False)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Λ(p) over p, λ and Λ″(0), with their standard errors; NaN where too few paths carry a moment."""
+        p, value, error, effective = (
+            np.array([getattr(each, name) for each in self.estimates], dtype=float)
+            for name in ("p", "value", "standard_error", "effective_paths")
+        )
+        kind = "standard error"
+        numbers = {
+            MOMENT: value,
+            MOMENT.error(kind): error,
+            EFFECTIVE_PATHS: effective,
+            LYAPUNOV_EXPONENT: self.lyapunov_exponent,
+            LYAPUNOV_EXPONENT.error(kind): self.lyapunov_exponent_error,
+            VARIANCE_RATE: self.variance_rate,
+            VARIANCE_RATE.error(kind): self.variance_rate_error,
+            IMPACTS: self.impacts,
+        }
+        settings = {name: getattr(self, name) for name in ("paths", "time", "step", "seed")}
+        estimator = self.estimates[0].estimator if self.estimates else ""
+        more = {**settings, "estimator": estimator, "interrupted": int(self.interrupted), "warnings": self.warnings}
+        return dataset(MOMENT.words, "Monte Carlo", numbers, {P: p}, self.parameters, **more)
+
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+        style = {"label": f"{found.attrs['method']} ± 2 standard errors", **kwargs}
+        draw_dots(axes, found.p.values, found.moment.values, found.moment_error.values, **style)
+        label_axes(axes, found.p.attrs, found.moment.attrs)
+        finish(axes, **style)
+
+    def _said(self) -> str:
+        rate = f"λ = {self.lyapunov_exponent:.6g} ± {self.lyapunov_exponent_error:.0e}"
+        return f"{rate}, Λ(p) at {len(self.estimates)} p, {self.paths} paths"
 
 
 @of_problem
@@ -85,33 +172,18 @@ def simulate(
         FpsolveError: the motion is no `VibroImpactOscillator`, or the noise not that of the paper.
         ValueError: an argument is out of its range, or the step is too large; the text names the largest good one.
         NoSuchExponent: some Λ(p) is infinite.
+        NotConverged: the numbers overflowed.
+        KeyboardInterrupt: before two transients were done.
     """
     oscillator, noise = simulated_parts(problem)
     time, step = (None if each is None else real_number(each, name) for name, each in (("time", time), ("step", step)))
     check_settings(noise, p, estimator, paths, seed)
     for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
         raise ValueError(f"{name}: {sentence}")
-    plan = _plan(problem, p, estimator, paths, time, step)
-    plain, populations = _start(plan, seed)
-    advances = [batch.advance for batch in (*plain, *populations)]
-    interrupted = advance_all(advances, plan.settling + plan.wanted, plan.slice_seconds, progress)
-    found = _result(plan, plain, populations, seed, interrupted)
-    return replace(found, parameters=problem.values)
-
-
-def _plan(
-    problem: Problem,
-    p: float | Sequence[float],
-    estimator: Estimator,
-    paths: int,
-    time: float | None,
-    step: float | None,
-) -> Plan:
-    oscillator, noise = simulated_parts(problem)
     h = default_step(oscillator, noise) if step is None else step
     settling = transient(oscillator, noise)
     wanted = TRANSIENTS if time is None else max(2, round(time / settling))
-    return Plan(
+    plan = Plan(
         noise=noise,
         motion=oscillator.at(dict.fromkeys(oscillator.inert, 0.0)).motion(),
         noise_step=noise.step(h),
@@ -124,31 +196,18 @@ def _plan(
         wanted=wanted,
         levels=min(_LEVELS, wanted.bit_length()) if estimator == "direct" else 0,
     )
-
-
-def _start(plan: Plan, seed: int) -> tuple[list[PlainBatch], list[Population]]:
-    """The batches, each with a stream of random numbers of its own."""
+    # each batch has a stream of random numbers of its own
     seeds = [each.spawn(1 + plan.p.size) for each in np.random.SeedSequence(seed).spawn(BATCHES)]
-    orders = plan.p if plan.estimator == "population" else ()
     plain = [PlainBatch(plan, each[0]) for each in seeds]
-    weighted = [
-        Population(plan, each[1 + k], float(p), is_far=bool(i % 2))
+    populations = [
+        Population(plan, each[1 + k], float(order), is_far=bool(i % 2))
         for i, each in enumerate(seeds)
-        for k, p in enumerate(orders)
+        for k, order in enumerate(plan.p if estimator == "population" else ())
     ]
-    return plain, weighted
-
-
-def _result(
-    plan: Plan, plain: Sequence[PlainBatch], populations: Sequence[Population], seed: int, interrupted: bool
-) -> MonteCarlo:
-    """What the batches have found.
-
-    Raises:
-        KeyboardInterrupt: that is nothing yet.
-        NotConverged: the numbers overflowed.
-    """
-    slices = np.array([batch.slices for batch in (*plain, *populations)])
+    batches = [*plain, *populations]
+    advances = [batch.advance for batch in batches]
+    interrupted = advance_all(advances, plan.settling + plan.wanted, plan.slice_seconds, progress)
+    slices = np.array([batch.slices for batch in batches])
     if slices.min() < 2:
         raise KeyboardInterrupt
     times = plan.length * np.array([batch.slices for batch in plain])
@@ -156,13 +215,11 @@ def _result(
     variance_rates = np.array([batch.variance for batch in plain]) / times
     if not np.all(np.isfinite(exponents)):
         raise NotConverged(Message(Code.SIMULATION_OVERFLOWED))
-    if plan.estimator == "direct":
+    if estimator == "direct":
         estimates, drifts = direct_estimates(plan, plain)
     else:
         estimates, drifts = population_estimates(plan, populations)
-    warnings = [*_missing(plan, estimates), *drifts]
-    if interrupted:
-        warnings.append(Message(Code.STOPPED, share=slices.mean() / plan.wanted))
+    stopped = [Message(Code.STOPPED, share=slices.mean() / plan.wanted)] if interrupted else []
     return MonteCarlo(
         estimates=tuple(estimates),
         lyapunov_exponent=float(exponents.mean()),
@@ -171,11 +228,12 @@ def _result(
         variance_rate_error=standard_error(variance_rates),
         paths=plan.paths * BATCHES,
         time=float(slices.mean()) * plan.length,
-        step=plan.step,
+        step=h,
         seed=seed,
         impacts=sum(batch.impacts for batch in plain),
-        warnings=tuple(warnings),
+        warnings=(*_missing(plan, estimates), *drifts, *stopped),
         interrupted=interrupted,
+        parameters=problem.values,
     )
 
 
@@ -191,8 +249,7 @@ def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[Mo
     times = plan.length * 2.0 ** np.arange(levels - 1)[:, None]
     slopes = np.diff(total - np.log(windows.sum(axis=0)), axis=0) / times
     rests = np.diff(log_rest - np.log(windows.sum(axis=0) - windows), axis=1) / times
-    estimates: list[MomentEstimate] = []
-    warnings: list[Message] = []
+    estimates, warnings = list[MomentEstimate](), list[Message]()
     for k, p in enumerate(plan.p):
         usable = np.flatnonzero((share[1:, k] >= _KEPT) & (effective[1:, k] >= FEW["direct"]))
         j = int(usable[-1]) if usable.size else 0
@@ -220,8 +277,7 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
     rate = np.maximum(variance + 2 * covariance, 0) / plan.length
     growth = (expected + mean) / plan.length
     trends = (tallies["numbered"] - (count - 1) / 2 * excess) / count
-    estimates: list[MomentEstimate] = []
-    warnings: list[Message] = []
+    estimates, warnings = list[MomentEstimate](), list[Message]()
     for k, p in enumerate(plan.p):
         used = slice(None)
         near, far = growth[::2, k], growth[1::2, k]
@@ -248,8 +304,7 @@ def _estimate(plan: Plan, p: float, found: tuple[float, float], effective: float
 
 def _has_variance(plan: Plan, p: float) -> bool:
     """Whether E‖x‖^2p is finite."""
-    low, high = plan.noise.moments
-    return low <= 2 * p <= high
+    return plan.noise.moments[0] <= 2 * p <= plan.noise.moments[1]
 
 
 def _missing(plan: Plan, estimates: Sequence[MomentEstimate]) -> list[Message]:

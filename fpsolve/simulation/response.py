@@ -15,7 +15,6 @@ from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import IMPACT_RATE
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.kernels import advance_and_count
 from fpsolve.simulation.setup import BATCHES, simulated_parts, starting_state
@@ -26,6 +25,13 @@ if TYPE_CHECKING:
 
 BINS = 100
 MEANS = ("x", "x_squared", "v_squared", "amplitude", "energy")
+_UNITS = dict(zip(MEANS, ("length", "length²", "length²/time²", "length", "length²/time²"), strict=True))
+X = Quantity("x", "x", "displacement", "$x$", "length", ("x",))
+V = Quantity("v", "v", "velocity", r"$\dot{x}$", "length/time", ("v",))
+AMPLITUDE = Quantity("amplitude", "A", "amplitude", r"$A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", "length", ("amplitude",))
+DENSITY = Quantity("density", "ρ", "density", r"of $(x, \dot{x})$", "time/length²", ("x", "v"))
+AMPLITUDE_DENSITY = Quantity("amplitude_density", "ρ(A)", "density of the amplitude", "$A$", "1/length", ("amplitude",))
+OUTSIDE = Quantity("outside", "outside", "share of the counts outside of the cells")
 _MARGIN = 1.5
 """Range of the histograms over the largest amplitude after the transient; what lies outside is counted apart."""
 _LOOKS = 8
@@ -69,7 +75,23 @@ class Response(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The densities over the middles of their cells, and the means."""
-        return _dataset(self)
+        kind = "standard error"
+        numbers: dict[Quantity, Any] = {
+            DENSITY: self.density,
+            AMPLITUDE_DENSITY: self.amplitude_density,
+            AMPLITUDE_DENSITY.error(kind): self.amplitude_error,
+        }
+        for name, (value, deviation) in self.means.items():
+            mean = Quantity(f"mean_{name}", f"⟨{name}⟩", f"stationary mean of {name}", unit=_UNITS[name])
+            numbers |= {mean: value, mean.error(kind): deviation}
+        numbers |= {replace(IMPACT_RATE, latex="", equation=""): self.impact_rate, OUTSIDE: self.outside}
+        coordinates: dict[Quantity, FloatArray] = {}
+        for side, edges in ((X, self.x_edges), (V, self.v_edges), (AMPLITUDE, self.amplitude_edges)):
+            name, words = f"{side.name}_edges", f"edges of the cells of {side.name}"
+            ends = Quantity(name, name, words, unit=side.unit, dims=(name,))
+            coordinates |= {side: (edges[1:] + edges[:-1]) / 2, ends: edges}
+        more = {"time": self.time, "interrupted": int(self.interrupted)}
+        return dataset("stationary response", "Monte Carlo", numbers, coordinates, self.parameters, **more)
 
     def _table(self) -> xarray.Dataset:
         """The density of the amplitude: beside that of (x, v) it would be repeated for every cell."""
@@ -99,38 +121,6 @@ class Response(Result):
     def _said(self) -> str:
         mean, error = self.means["amplitude"]
         return f"mean amplitude {mean:.6g} ± {error:.0e}, {self.density.size} cells"
-
-
-_UNITS = dict(zip(MEANS, ("length", "length²", "length²/time²", "length", "length²/time²"), strict=True))
-X, V = (
-    Quantity("x", "x", "displacement", "$x$", "length", ("x",)),
-    Quantity("v", "v", "velocity", r"$\dot{x}$", "length/time", ("v",)),
-)
-AMPLITUDE = Quantity("amplitude", "A", "amplitude", r"$A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", "length", ("amplitude",))
-DENSITY = Quantity("density", "ρ", "density", r"of $(x, \dot{x})$", "time/length²", ("x", "v"))
-AMPLITUDE_DENSITY = Quantity("amplitude_density", "ρ(A)", "density of the amplitude", "$A$", "1/length", ("amplitude",))
-OUTSIDE = Quantity("outside", "outside", "share of the counts outside of the cells")
-
-
-def _dataset(found: Response) -> xarray.Dataset:
-    """The densities and the means of a response."""
-    kind = "standard error"
-    numbers: dict[Quantity, Any] = {
-        DENSITY: found.density,
-        AMPLITUDE_DENSITY: found.amplitude_density,
-        AMPLITUDE_DENSITY.error(kind): found.amplitude_error,
-    }
-    for name, (value, deviation) in found.means.items():
-        mean = Quantity(f"mean_{name}", f"⟨{name}⟩", f"stationary mean of {name}", unit=_UNITS[name])
-        numbers |= {mean: value, mean.error(kind): deviation}
-    numbers |= {replace(IMPACT_RATE, latex="", equation=""): found.impact_rate, OUTSIDE: found.outside}
-    coordinates: dict[Quantity, FloatArray] = {}
-    for side, edges in ((X, found.x_edges), (V, found.v_edges), (AMPLITUDE, found.amplitude_edges)):
-        name, words = f"{side.name}_edges", f"edges of the cells of {side.name}"
-        ends = Quantity(name, name, words, unit=side.unit, dims=(name,))
-        coordinates |= {side: (edges[1:] + edges[:-1]) / 2, ends: edges}
-    more = {"time": found.time, "interrupted": int(found.interrupted)}
-    return dataset("stationary response", "Monte Carlo", numbers, coordinates, found.parameters, **more)
 
 
 class _Batch:
@@ -199,36 +189,27 @@ def stationary_response(
     for batch in batches:
         batch.impacts, batch.reach = 0, reach
     interrupted = advance_all(advances, looks, seconds, progress)
-    found = _collect(oscillator, batches, between, reach, interrupted)
-    return replace(found, parameters=problem.values)
-
-
-def _collect(
-    oscillator: VibroImpactOscillator, batches: list[_Batch], between: float, reach: float, interrupted: bool
-) -> Response:
     count = np.array([batch.sums[-1] for batch in batches])
     if count.min() == 0:
         raise KeyboardInterrupt
-    time = float(count.mean() / batches[0].x.size * between)
-    paths = sum(batch.x.size for batch in batches)
-    sums = np.array([batch.sums[:-1] for batch in batches]) / count[:, None]
-    x, xx, uu, amplitude = sums.T
+    duration = float(count.mean() / size * between)
+    x, xx, uu, mean_amplitude = (np.array([batch.sums[:-1] for batch in batches]) / count[:, None]).T
     square = oscillator.omega**2
-    values = dict(zip(MEANS, (x, xx, square * uu, amplitude, square * (xx + uu) / 2), strict=True))
+    values = dict(zip(MEANS, (x, xx, square * uu, mean_amplitude, square * (xx + uu) / 2), strict=True))
     edges = np.linspace(0, reach, BINS + 1)
     radial = np.array([batch.radial for batch in batches]) / count[:, None] / (reach / BINS)
-    plane = sum(batch.plane for batch in batches)
     cell = (reach / BINS) ** 2 * oscillator.omega
     return Response(
         means={name: (float(each.mean()), standard_error(each)) for name, each in values.items()},
         x_edges=edges,
         v_edges=oscillator.omega * np.linspace(-reach, reach, 2 * BINS + 1),
-        density=plane / count.sum() / cell,
+        density=sum(batch.plane for batch in batches) / count.sum() / cell,
         amplitude_edges=edges,
         amplitude_density=radial.mean(axis=0),
         amplitude_error=np.std(radial, axis=0, ddof=1) / math.sqrt(len(batches)),
         outside=1 - float(sum(batch.radial.sum() for batch in batches) / count.sum()),
-        impact_rate=sum(batch.impacts for batch in batches) / (time * paths),
-        time=time,
+        impact_rate=sum(batch.impacts for batch in batches) / (size * len(batches) * duration),
+        time=duration,
         interrupted=interrupted,
+        parameters=problem.values,
     )

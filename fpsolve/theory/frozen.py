@@ -60,9 +60,8 @@ class FrozenNoise:
             raise TypeError("noise with states is held in each of them; there is no z to look for")
         unit = noise.standard_deviation
         furthest = 5 * LARGEST_P * unit * noise_strength(problem.system) * noise.correlation_time
-        end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
         self._is_heavy = noise.has_algebraic_tails
-        end = FURTHEST if self._is_heavy else end
+        end = FURTHEST if self._is_heavy else min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
         spread = max(np.log(end / 1e-2), 1.0)
         side = end * np.sinh(spread * np.linspace(0, 1, SAMPLES)) / np.sinh(spread)
         self.z = np.concatenate([-side[:0:-1], side])
@@ -101,7 +100,7 @@ class FrozenNoise:
 
 
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
-    """That of a problem; None for a chain, which holds its states."""
+    """The `FrozenNoise` of a problem; None for a chain, which holds its states."""
     if problem.noise.has_states:
         return None
     try:
@@ -110,6 +109,4 @@ def frozen_noise(problem: Problem) -> FrozenNoise | None:
         return FrozenNoise(problem)
 
 
-@lru_cache(maxsize=8)
-def _kept(problem: Problem) -> FrozenNoise:
-    return FrozenNoise(problem)
+_kept = lru_cache(maxsize=8)(FrozenNoise)

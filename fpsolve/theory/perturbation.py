@@ -178,13 +178,12 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
 
 
 def scale_of(problem: Problem) -> Scale:
-    """The scale of Λ(p): of perturbation theory, or where that does not apply of norms of the terms."""
-    theory = second_order_or_none(problem)
-    return _rough_scale(problem) if theory is None else theory.scale
+    """The scale of Λ(p): of perturbation theory, or where that does not apply of norms of the terms.
 
-
-def _rough_scale(problem: Problem) -> Scale:
-    """Constant terms by the largest |q|, noise of strength c by c min(1, c τ), jumps once in a half-turn."""
+    Then constant terms count by the largest |q|, noise of strength c by c min(1, c τ), jumps once in a half-turn.
+    """
+    if theory := second_order_or_none(problem):
+        return theory.scale
     system, noise = problem.system, problem.noise
     steady, driven = 0.0, 0.0
     for term in system.terms:
