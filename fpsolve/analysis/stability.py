@@ -6,6 +6,7 @@ starts from that at the point before; the rows of a scan begin anew, so that oth
 
 from __future__ import annotations
 
+import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -112,6 +113,12 @@ class Boundary(Result):
         """F over the unit square."""
         return ZeroField(self.zero, self.problem, (self.x, self.y), self.budget)
 
+    @property
+    def quantity(self) -> ZeroField:
+        """Deprecated: `zero_field`."""
+        warnings.warn("quantity is called zero_field now", DeprecationWarning, stacklevel=2)
+        return self.zero_field
+
     def remark(self) -> str:
         """That there is no line, as a `Message`, or an empty text."""
         if self.traces or self.scan is None:
@@ -188,6 +195,13 @@ class Boundary(Result):
         for trace in find_branches(self.zero_field, scan, self.step, stepped):
             now = replace(now, traces=(*now.traces, self._special(trace)))
             yield now
+
+    def grown(
+        self, progress: Callable[[], None] = lambda: None, stepped: Callable[[], None] = lambda: None, map: Map = map
+    ) -> Iterator[Boundary]:
+        """Deprecated: `solve`."""
+        warnings.warn("grown is called solve now", DeprecationWarning, stacklevel=2)
+        return self.solve(iter(map(scan_row, self.rows())), progress, stepped)
 
     def _from(self, seeds: Iterable[FloatArray]) -> Boundary:
         """With the branches through some points of the lines."""

@@ -12,7 +12,7 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.analysis.continuation import FRAME
-from fpsolve.analysis.scan import Scan, scan_row
+from fpsolve.analysis.scan import Scan, ScannedRow, scan_row
 from fpsolve.analysis.sensitivity import sensitivities
 from fpsolve.analysis.stability import Boundary, boundary, crossed
 from fpsolve.analysis.zero import Axis, ZeroField, zero_of
@@ -540,6 +540,16 @@ def test_rows_are_the_same_in_other_processes():
     assert np.array_equal(there.gradients, here.gradients)
     assert all(len(pickle.dumps(row)) < 4000 for row in of.rows())
     assert all(len(pickle.dumps(scan_row(row))) < 1000 for row in of.rows())
+
+
+def test_former_names_work_and_are_deprecated():
+    of = Boundary(zero_of(LAMBDA), OMEGA, C1, Problem(oscillator(), NOISE.ou_reduction()))
+    at = np.array([0.3, 0.4])
+    with pytest.warns(DeprecationWarning, match="quantity is called zero_field now"):
+        assert of.quantity(at).value == of.zero_field(at).value
+    with pytest.warns(DeprecationWarning, match="grown is called solve now"):
+        former = of.grown(map=lambda scan, rows: [ScannedRow(np.ones(13), np.ones((13, 2)))] * len(rows))
+    assert np.all(next(former).scan.values == 1)
 
 
 def test_a_row_does_not_depend_on_others():
