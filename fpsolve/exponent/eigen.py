@@ -216,7 +216,7 @@ def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> Iterate:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
     space, operator = pencil.space, pencil.matrix
     best = Iterate(float(y @ (operator @ x) / (y @ space.weighed(x))), math.inf, x, y)
-    size, stalls = operator.norm(), 0
+    size, stalls = operator.norm, 0
     for _ in range(MAX_ITERATIONS):
         shift, last = best.value, best.residual
         factor = pencil.factorised(shift)
@@ -282,7 +282,7 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
         right=x,
         left=y,
         derivative=float(y @ (generator.matrix(p, derivative=1) @ x) / norm),
-        residual=float(max(errors) / operator.norm()),
+        residual=float(max(errors) / operator.norm),
         rounding=float(rounding),
         sign_defects=_sign_defects(space, x, y),
         generator=generator,

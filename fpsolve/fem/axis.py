@@ -64,15 +64,14 @@ class Axis:
 
 def along(factors: Sequence[Any], table: FloatArray) -> FloatArray:
     """A table with a matrix applied along each of its axes, from the last; None leaves an axis as it is."""
+    if table.ndim == 2:
+        first, last = factors
+        table = table if last is None else table @ last.T
+        return table if first is None else first @ table
     for axis in range(len(factors) - 1, -1, -1):
-        factor = factors[axis]
-        if factor is None:
-            continue
-        if table.ndim == 2:
-            table = table @ factor.T if axis else factor @ table
-        else:
+        if factors[axis] is not None:
             moved = np.moveaxis(table, axis, 0)
-            image = factor @ moved.reshape(len(moved), -1)
+            image = factors[axis] @ moved.reshape(len(moved), -1)
             table = np.moveaxis(image.reshape(-1, *moved.shape[1:]), 0, axis)
     return table
 
@@ -87,7 +86,7 @@ class KroneckerSum:
 
     terms: Sequence[tuple[Any, ...]]
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """The number of functions along each axis."""
         return tuple(factor.shape[0] for factor in self.terms[0])
@@ -99,6 +98,8 @@ class KroneckerSum:
 
     def __matmul__(self, vector: FloatArray) -> FloatArray:
         table = vector.reshape(self.shape)
+        if len(self.shape) == 2:  # by far the most products of a solve
+            return np.ravel(sum(first @ (table @ last.T) for first, last in self.terms))
         return np.ravel(sum(along(term, table) for term in self.terms))
 
     @property
@@ -110,6 +111,7 @@ class KroneckerSum:
         """A bound on the absolute values."""
         return KroneckerSum([tuple(abs(factor) for factor in term) for term in self.terms])
 
+    @cached_property
     def norm(self) -> float:
         """A bound on the largest sum of the absolute values of a column."""
         return float(sum(np.prod([abs(factor).sum(axis=0).max() for factor in term]) for term in self.terms))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -310,12 +311,12 @@ class Discretisation:
         """Number of unknowns."""
         return self.phase.size * math.prod(part.size for part in self.noises)
 
-    @property
+    @cached_property
     def is_tilted(self) -> bool:
         """Whether the functions move with p."""
         return any(part.slope for part in self.noises)
 
-    @property
+    @cached_property
     def is_killed(self) -> bool:
         """Whether paths that leave an interval of a noise are killed."""
         return any(part.is_killed for part in self.noises)

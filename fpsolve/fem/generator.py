@@ -138,7 +138,7 @@ class Generator:
         free = self.matrix(0.0, orders=slice(0, 1)).terms[0][0]
         return 30 * float(abs(free).sum(axis=0).max()) / self.unit_rate
 
-    @property
+    @cached_property
     def keeps_constants(self) -> bool:
         """Whether ⟨P_s, L₀T⟩ = 0 for every T: no path is killed, and the order 0 only rotates uniformly."""
         if self.chosen.is_killed:

@@ -92,21 +92,25 @@ class TermSum:
     """A sum of terms, in which those with the same functions of the noises, order and coefficient are added up once."""
 
     def __init__(self, terms: Iterable[Term]) -> None:
-        sums: dict[tuple[Any, int, OfMoment], Any] = {}
+        sums: dict[Any, dict[tuple[int, OfMoment], Any]] = {}
         for term in terms:
-            key = term.noises, term.order, term.of_p
-            sums[key] = sums[key] + term.phase if key in sums else term.phase
-        self._parts = sums
+            parts, key = sums.setdefault(term.noises, {}), (term.order, term.of_p)
+            parts[key] = parts[key] + term.phase if key in parts else term.phase
+        (noises, first), *_ = sums.items()
+        self._nothing = {(one,) * len(noises): 0.0 * next(iter(first.values()))}
+        self._parts = [(noises, [(*key, phase) for key, phase in parts.items()]) for noises, parts in sums.items()]
+        self._orders = range(1 + max(order for parts in sums.values() for order, _ in parts))
 
     def phases(self, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> dict[Any, Any]:
         """For each function of the noises the matrix of φ; the first is that of 1."""
-        (first, *_), count = self._parts.values(), len(next(iter(self._parts))[0])
-        phases: dict[Any, Any] = {(one,) * count: 0.0 * first}
-        wanted = range(1 + max(order for _, order, _ in self._parts))[orders]
-        for (noises, order, of_p), phase in self._parts.items():
-            size = of_p(p, derivative) if order in wanted else 0.0
-            if size:
-                phases[noises] = phases[noises] + size * phase if noises in phases else size * phase
+        phases, wanted = self._nothing.copy(), self._orders[orders]
+        for noises, parts in self._parts:
+            total = phases.get(noises)
+            for order, of_p, phase in parts:
+                if order in wanted and (size := of_p(p, derivative)):
+                    total = size * phase if total is None else total + size * phase
+            if total is not None:
+                phases[noises] = total
         return phases
 
     def matrix(self, space: TensorSpace, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:

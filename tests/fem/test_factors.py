@@ -34,7 +34,7 @@ def test_products_transposes_and_bounds(operator, rng):
     np.testing.assert_allclose(operator.T @ v, matrix.T @ v, atol=1e-12 * np.abs(matrix).max() * operator.size)
     np.testing.assert_allclose(operator.tocsc().toarray(), matrix, atol=1e-12)
     assert np.all(abs(operator) @ abs(v) >= np.abs(matrix) @ abs(v) - 1e-9)
-    assert operator.norm() >= np.abs(matrix).sum(axis=0).max() - 1e-9
+    assert operator.norm >= np.abs(matrix).sum(axis=0).max() - 1e-9
     first = np.kron(np.eye(operator.shape[0]), operator.terms[0][1])
     np.testing.assert_allclose(operator.shifted(0.3).toarray(), matrix - 0.3 * first, atol=1e-12)
 

@@ -71,7 +71,7 @@ def test_sums_of_three_factors(operator, rng):
     np.testing.assert_allclose(operator @ v, matrix @ v, atol=1e-10)
     np.testing.assert_allclose(operator.T @ v, matrix.T @ v, atol=1e-10)
     assert np.all(abs(operator) @ abs(v) >= np.abs(matrix) @ abs(v) - 1e-9)
-    assert operator.norm() >= np.abs(matrix).sum(axis=0).max() - 1e-9
+    assert operator.norm >= np.abs(matrix).sum(axis=0).max() - 1e-9
     rest = np.kron(*operator.terms[0][1:])
     np.testing.assert_allclose(operator.shifted(0.3).toarray(), matrix - 0.3 * np.kron(np.eye(4), rest), atol=1e-12)
     for factors in (DenseFactors(operator.toarray()), BlockFactors(operator), SparseFactors(operator)):
