@@ -153,16 +153,16 @@ def write_figure(
         if any(np.any(item.rare) for item in series):
             axes.plot([], [], "o", label="carried by rare paths", markersize=points(7 if is_few else 4), **_GREY)
         if simulated := [item.simulated for item in series if item.simulated is not None]:
-            sizes = (
-                {"markersize": 5, "elinewidth": 1.1, "capsize": 4} if is_few else {"markersize": 3, "elinewidth": 0.8}
-            )
+            size, line, cap = (5, 1.1, 4) if is_few else (3, 0.8, 0)
+            sizes = {"markersize": points(size), "elinewidth": points(line), "capsize": points(cap)}
             style: dict[str, Any] = {
-                name: points(size) for name, size in {"capsize": 0, "markeredgewidth": 1, **sizes}.items()
+                "marker": ".",
+                "color": "black",
+                "markeredgewidth": points(1),
+                "zorder": 5,
+                **sizes,
             }
-            every = np.concatenate(simulated, axis=1)
-            draw_dots(
-                axes, *every, label="Monte Carlo ± 2 standard errors", marker=".", color="black", zorder=5, **style
-            )
+            draw_dots(axes, *np.concatenate(simulated, axis=1), label="Monte Carlo ± 2 standard errors", **style)
         axes.margins(x=0.03)
         scale_axis(axes.xaxis, scale_of(np.concatenate([item.x for item in series])), setting.xlim)
         scale_axis(axes.yaxis, "linear", setting.ylim)

@@ -114,12 +114,23 @@ def codec(kind: Any) -> Codec:
     origin, parts = get_origin(kind), get_args(kind)
     if kind in _SIMPLE:
         return _SIMPLE[kind]
-    if kind is Quantity:
-        return _codec_of_quantities()
     if is_dataclass(kind):
-        return _codec_of_rows(kind)
+        attributes = _recorded(kind)
+        row = Codec(
+            [kind.__name__, *([name, one.form] for name, one in attributes.items())],
+            lambda value: [one.plain(getattr(value, name)) for name, one in attributes.items()],
+            lambda data: kind(
+                *[one.made(part) for one, part in zip(attributes.values(), _checked(data, list), strict=True)]
+            ),
+        )
+        if kind is not Quantity:
+            return row
+        # a text for each, as there are few of them and many numbers
+        plain = lru_cache(lambda value: json.dumps(row.plain(value)))
+        made = lru_cache(lambda text: row.made(json.loads(text)))
+        return Codec(row.form, plain, lambda data: made(_checked(data, str)))
     if origin is np.ndarray:
-        return Codec("array", _packed, _array)
+        return Codec("array", _packed, _unpacked)
     if origin is Literal:
         return Codec(parts, str, lambda data: parts[parts.index(data)])
     if origin is UnionType and NoneType in parts:
@@ -155,40 +166,14 @@ def codec(kind: Any) -> Codec:
 
 @cache
 def _recorded(kind: Any) -> Mapping[str, Codec]:
-    """Of each attribute of a result but its curve."""
-    hints = _annotations(kind)
+    """For each attribute of a dataclass but a curve; what needs numba is imported for simulations only."""
+    names = {}
+    if kind is SimulatedCurve:
+        from fpsolve.simulation import MonteCarlo, Response
+
+        names = {"MonteCarlo": MonteCarlo, "Response": Response}
+    hints = get_type_hints(kind, localns=names)
     return {each.name: codec(hints[each.name]) for each in fields(kind) if each.name != "curve"}
-
-
-def _annotations(kind: Any) -> Mapping[str, Any]:
-    """The types of the attributes of a dataclass; what needs numba is imported for simulations only."""
-    if kind is not SimulatedCurve:
-        return get_type_hints(kind)
-    from fpsolve.simulation import MonteCarlo, Response
-
-    return get_type_hints(kind, localns={"MonteCarlo": MonteCarlo, "Response": Response})
-
-
-def _codec_of_rows(kind: Any) -> Codec:
-    """Of a dataclass: a list of its attributes."""
-    hints = _annotations(kind)
-    names = [each.name for each in fields(kind)]
-    each = [codec(hints[name]) for name in names]
-    return Codec(
-        [kind.__name__, *([name, one.form] for name, one in zip(names, each, strict=True))],
-        lambda value: [one.plain(getattr(value, name)) for name, one in zip(names, each, strict=True)],
-        lambda data: kind(*[one.made(part) for one, part in zip(each, _checked(data, list), strict=True)]),
-    )
-
-
-def _codec_of_quantities() -> Codec:
-    """Of what numbers are called: a text for each, as there are few of them and many numbers."""
-    rows = _codec_of_rows(Quantity)
-    plain, made = (
-        lru_cache(lambda value: json.dumps(rows.plain(value))),
-        lru_cache(lambda text: rows.made(json.loads(text))),
-    )
-    return Codec(rows.form, plain, lambda data: made(_checked(data, str)))
 
 
 def _checked(data: Any, kind: Any) -> Any:
@@ -203,7 +188,7 @@ def _packed(value: FloatArray) -> Record:
     return {"shape": list(value.shape), "data": b64encode(zlib.compress(data)).decode("ascii")}
 
 
-def _array(packed: Mapping[str, Any]) -> FloatArray:
+def _unpacked(packed: Mapping[str, Any]) -> FloatArray:
     data = zlib.decompress(b64decode(packed["data"], validate=True))
     return np.frombuffer(data, dtype="<f8").reshape(tuple(packed["shape"])).astype(float)
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import MonteCarloSection
@@ -14,10 +12,6 @@ from fpsolve.pool import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.theory.validity import simulated_tail_note
-
-if TYPE_CHECKING:  # numba takes half a second to import
-    from fpsolve.simulation.estimators import MonteCarlo
-    from fpsolve.simulation.response import Response
 
 SIGNIFICANT = 3.0
 """Standard errors by which λ must exceed 0 before a stationary response is sought."""
@@ -51,24 +45,9 @@ def refuse_obstacles(case: Case) -> None:
             raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
 
 
-@dataclass(frozen=True)
-class SimulateCurve:
-    """The task: simulates a curve with as many processors as there are.
-
-    Attributes:
-        orders: p of the moments.
-        setting: [monte_carlo] of the case, whose p are not used.
-    """
-
-    orders: tuple[float, ...]
-    setting: MonteCarloSection
-
-    @classmethod
-    def of(cls, case: Case) -> SimulateCurve:
-        return cls(tuple(float(p) for p in case.simulated), case.monte_carlo)
-
-    def __call__(self, curve: Curve, progress: Callable[[], None] = lambda: None) -> SimulatedCurve:
-        return simulate_curve(curve, self.orders, self.setting, progress)
+def simulated_orders(case: Case) -> tuple[float, ...]:
+    """The p at which a case is simulated."""
+    return tuple(map(float, case.simulated))
 
 
 def simulate_curves(
@@ -86,13 +65,13 @@ def simulate_curves(
     Raises:
         KeyboardInterrupt: nothing was done yet.
     """
-    task = SimulateCurve.of(case)
+    orders = simulated_orders(case)
     for curve in case.curves():
         if found := known(curve):
             yield found
             continue
         try:
-            simulated = task(curve, progress)
+            simulated = simulate_curve(curve, orders, case.monte_carlo, progress)
         except KeyboardInterrupt:
             if curve.number == 1:
                 raise
@@ -127,28 +106,24 @@ def simulate_curve(
     noted = result.warnings if note is None else (*result.warnings, note)
     if not _is_nonlinear(curve) or result.interrupted:
         return SimulatedCurve(curve, result, None, noted, result.interrupted)
+    value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
     try:
-        response, warnings = _respond(curve, result, progress)
+        if value <= SIGNIFICANT * error:
+            for _ in range(2 * PROGRESS_STEPS):
+                progress()
+            at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
+            return SimulatedCurve(curve, result, None, (*noted, at_rest))
+        from fpsolve.simulation.response import stationary_response
+
+        response = stationary_response(
+            curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
+            time=result.time, step=result.step, seed=result.seed, progress=progress,
+        )  # fmt: skip
     except KeyboardInterrupt:
         return SimulatedCurve(curve, result, None, (*noted, Message(Code.RESPONSE_NOT_REACHED)), interrupted=True)
-    interrupted = response is not None and response.interrupted
-    return SimulatedCurve(curve, result, response, (*noted, *warnings), interrupted)
-
-
-def _respond(curve: Curve, result: MonteCarlo, progress: Callable[[], None]) -> tuple[Response | None, list[Message]]:
-    """The stationary response, or why there is none. Raises KeyboardInterrupt before it is stationary."""
-    from fpsolve.simulation.response import stationary_response
-
-    value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
-    if value <= SIGNIFICANT * error:
-        for _ in range(2 * PROGRESS_STEPS):
-            progress()
-        return None, [Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)]
-    response = stationary_response(
-        curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
-        time=result.time, step=result.step, seed=result.seed, progress=progress,
-    )  # fmt: skip
-    return response, [Message(Code.RESPONSE_STOPPED, time=response.time)] if response.interrupted else []
+    if response.interrupted:
+        noted = (*noted, Message(Code.RESPONSE_STOPPED, time=response.time))
+    return SimulatedCurve(curve, result, response, noted, response.interrupted)
 
 
 def _is_nonlinear(curve: Curve) -> bool:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.output.records import Records, append
 from fpsolve.pool import Pool
 from fpsolve.study.records import record_of, simulated_of, simulation_key
 from fpsolve.study.results import SimulatedCurve
-from fpsolve.study.simulate import SimulateCurve, simulate_curves, simulation_steps
+from fpsolve.study.simulate import simulate_curve, simulate_curves, simulated_orders, simulation_steps
 from fpsolve.workflow.progress import Advance
 
 SIMULATED_RECORDS = "records/simulated"
@@ -26,7 +28,8 @@ class Simulations:
     """
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
-        self.case, self.folder, self.task = case, folder, SimulateCurve.of(case)
+        self.case, self.folder = case, folder
+        self.asked: dict[str, Any] = {"orders": simulated_orders(case), "setting": case.monte_carlo}
         self.records = Records(folder / SIMULATED_RECORDS)
         if is_fresh:
             self.records.remove()
@@ -61,7 +64,7 @@ class Simulations:
         done = 0
         with pool:
             unknown = (curve for curve in self.case.curves() if curve.number not in self._known)
-            simulated = pool.map(self.task, unknown)
+            simulated = pool.map(partial(simulate_curve, **self.asked), unknown)
             try:
                 for curve in self.case.curves():
                     found = self._found(curve)
@@ -83,4 +86,4 @@ class Simulations:
             return None
 
     def _key(self, curve: Curve) -> str:
-        return simulation_key(curve, self.task.orders, self.task.setting)
+        return simulation_key(curve, **self.asked)
