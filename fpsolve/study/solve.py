@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from fpsolve.analysis.density import negative_share, stationary_density
-from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, solve_sensitivities
+from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.output import EIGENFUNCTIONS, SENSITIVITIES
-from fpsolve.case.sections import Expectation
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
@@ -94,12 +93,20 @@ def expected(case: Case, curve: Curve) -> Wanted:
 
 def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
     """Every expectation of a case against every curve that it selects."""
-    return [
-        _comparison(expectation, result)
-        for expectation in case.expect
-        for result in results
-        if expectation.selects(result.curve.varied)
-    ]
+    found = []
+    for wanted, result in ((each, result) for each in case.expect for result in results):
+        if not wanted.selects(result.curve.varied):
+            continue
+        if wanted.p is not None:
+            at = np.flatnonzero(np.isclose(result.moments.p, wanted.p, rtol=0, atol=1e-12))
+            value = float(result.moments.value[at[0]]) if at.size else None
+        else:
+            estimate = result.estimates[wanted.quantity]
+            value = None if estimate is None else estimate.value
+        tolerance = max(wanted.atol or 0.0, (wanted.rtol or 0.0) * abs(wanted.value))
+        met = value is not None and abs(value - wanted.value) <= tolerance
+        found.append(Comparison(wanted, dict(result.curve.varied), value, tolerance, met))
+    return found
 
 
 def solve_curve(
@@ -118,9 +125,18 @@ def solve_curve(
     found = solve_moments(solver, wanted.p, progress=progress)
     estimates, missing = _solve_indices(solver, wanted.indices, found)
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
+    theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
     pairs, stationary = _functions(solver, without_failed(wanted, found.failures))
     lost = _lost(stationary, solver.near.refinement)
-    slopes = _sensitivities(solver, curve, wanted, found, estimates)
+    slopes = None
+    if wanted.differentiated is not None:
+        slopes = solve_sensitivities(
+            solver,
+            np.array([p for p in wanted.differentiated if np.any(found.p == p)]),
+            curve.problem.directions(),
+            indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
+            root=None if (index := estimates[STABILITY_INDEX.name]) is None else index.value,
+        )
     exponent = estimates[LYAPUNOV_EXPONENT.name]
     notes = (
         validity.heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
@@ -130,10 +146,22 @@ def solve_curve(
         *of[Severity.NOTE],
         *(slopes.notes if slopes else ()),
     )
-    limits = (*of[Severity.WARNING], *_imprecise(estimates, numerics), *(lost or _unresolved(pairs)))
+    unresolved = [
+        Message(Code.UNREADABLE, name=name, p=pair.p, size=defect)
+        for pair in (() if lost else pairs)
+        for name, defect, most in (
+            ("T", pair.sign_defects[0], UNRESOLVED),
+            ("T_adjoint", pair.sign_defects[1], UNRESOLVED),
+            ("tilted_density", negative_share(pair), MOST_NEGATIVE),
+        )
+        if defect > most
+    ]
+    limits = (*of[Severity.WARNING], *_imprecise(estimates, numerics), *lost, *unresolved)
     result = CurveResult(
         curve=curve,
-        moments=_moments(found),
+        moments=MomentColumns(
+            found.p, found.value, found.derivative, found.error_estimate, found.residual, theory, found.rare
+        ),
         estimates=estimates,
         discretisation=_discretisation(solver),
         warnings=(*found.warnings, *limits),
@@ -162,17 +190,14 @@ def without_failed(wanted: Wanted, failures: Sequence[Failure]) -> Wanted:
 
 def _functions(solver: ExponentSolver, wanted: Wanted) -> tuple[tuple[PrincipalPair, ...], PrincipalPair | None]:
     """The eigenpairs to be drawn that converge, and that at p = 0."""
-    attempts = (_pair(solver, p) for p in wanted.shown)
-    pairs = tuple(pair for pair in attempts if pair is not None)
-    return pairs, _pair(solver, 0.0) if wanted.density else None
 
+    def pair(p: float) -> PrincipalPair | None:
+        try:
+            return solver.pair(p)
+        except NotConverged:
+            return None
 
-def _moments(found: MomentLyapunov) -> MomentColumns:
-    """The numbers, with Eq. (37) beside them."""
-    theory = perturbed_moments(found.solver.problem, found.p)
-    return MomentColumns(
-        found.p, found.value, found.derivative, found.error_estimate, found.residual, theory, found.rare
-    )
+    return tuple(filter(None, map(pair, wanted.shown))), pair(0.0) if wanted.density else None
 
 
 def _solve_indices(
@@ -206,40 +231,6 @@ def _solve_indices(
     return estimates, [Message(code, symbols=symbols, reason=reason) for (code, reason), symbols in missing.items()]
 
 
-def _sensitivities(
-    solver: ExponentSolver,
-    curve: Curve,
-    wanted: Wanted,
-    moments: MomentLyapunov,
-    estimates: Mapping[str, Estimate | None],
-) -> Sensitivities | None:
-    """The derivatives of what was found by all parameters of the case, if they are wanted."""
-    if wanted.differentiated is None:
-        return None
-    index = estimates[STABILITY_INDEX.name]
-    return solve_sensitivities(
-        solver,
-        np.array([p for p in wanted.differentiated if np.any(moments.p == p)]),
-        curve.problem.derivatives(),
-        indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
-        root=None if index is None else index.value,
-    )
-
-
-def _unresolved(pairs: Sequence[PrincipalPair]) -> list[Message]:
-    """Which eigenfunctions or T T* are not positive, as layers of slow or strong noise are thinner than the cells."""
-    return [
-        Message(Code.UNREADABLE, name=name, p=pair.p, size=defect)
-        for pair in pairs
-        for name, defect, most in (
-            ("T", pair.sign_defects[0], UNRESOLVED),
-            ("T_adjoint", pair.sign_defects[1], UNRESOLVED),
-            ("tilted_density", negative_share(pair), MOST_NEGATIVE),
-        )
-        if defect > most
-    ]
-
-
 def _lost(stationary: PrincipalPair | None, remedy: Remedy) -> list[Message]:
     """Why the stationary density of a pair at p = 0 is not written, and what to do, or nothing."""
     try:
@@ -265,25 +256,6 @@ def _imprecise(estimates: Mapping[str, Estimate | None], numerics: Numerics) -> 
         for name, estimate in estimates.items()
         if estimate and estimate.relative_error > numerics.rtol
     ]
-
-
-def _pair(solver: ExponentSolver, p: float) -> PrincipalPair | None:
-    try:
-        return solver.pair(p)
-    except NotConverged:
-        return None
-
-
-def _comparison(expectation: Expectation, result: CurveResult) -> Comparison:
-    if expectation.p is not None:
-        found = np.isclose(result.moments.p, expectation.p, rtol=0, atol=1e-12)
-        value = float(result.moments.value[found][0]) if np.any(found) else None
-    else:
-        estimate = result.estimates[expectation.quantity]
-        value = None if estimate is None else estimate.value
-    tolerance = max(expectation.atol or 0.0, (expectation.rtol or 0.0) * abs(expectation.value))
-    met = value is not None and abs(value - expectation.value) <= tolerance
-    return Comparison(expectation, dict(result.curve.varied), value, tolerance, met)
 
 
 def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:

@@ -89,18 +89,14 @@ def batches(case: Case, order: Callable[[Curve], Order | None], numerics: Numeri
 
 def solved(order: Order, numerics: Numerics, progress: Callable[[], None] = lambda: None) -> Solved:
     """What is wanted of a set; where that cannot be found, a result that says why, unless its numbers are known."""
-    if not order.is_known:
-        return _anew(order.curve, order.wanted, numerics, progress)
-    try:
-        return Solved(None, *solve_functions(order.curve, order.wanted, numerics))
-    except OSError:
-        raise
-    except Exception:  # its numbers stay as they are
-        return Solved(None, (), None)
-
-
-def _anew(curve: Curve, wanted: Wanted, numerics: Numerics, progress: Callable[[], None]) -> Solved:
-    """A set of which nothing is known yet."""
+    curve, wanted = order.curve, order.wanted
+    if order.is_known:
+        try:
+            return Solved(None, *solve_functions(curve, wanted, numerics))
+        except OSError:
+            raise
+        except Exception:  # its numbers stay as they are
+            return Solved(None, (), None)
     try:
         return solve_curve(curve, wanted, numerics, progress)
     except FpsolveError as failure:
