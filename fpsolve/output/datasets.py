@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,8 +41,10 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
     """
     import xarray as xr
 
-    over, planned = _dimensions(case), case.planned
-    shape = tuple(len(case.vary.values(key)) for key in over) if over != (SET,) else (planned,)
+    vary, planned = case.vary, case.planned
+    is_list = bool(vary) and vary.mode != "product"
+    over: tuple[str, ...] = (SET,) if is_list else vary.keys
+    shape = (planned,) if is_list else tuple(len(vary.values(key)) for key in over)
     places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.output.quantities else {}
     moments = {name: np.full((planned, len(places)), math.nan) for name in STORED_MOMENTS if places}
     indices = {index: np.full((3, planned), math.nan) for index in asked(case)}
@@ -63,40 +65,22 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
         each.name: ((*over, *each.dims), values.reshape(shape + values.shape[1:]), each.attributes)
         for each, values in columns
     }
-    dataset = xr.Dataset(variables, _coordinates(case), _attributes(case, facts))
+    coordinates: dict[str, Any] = {}
+    for key in vary.keys:
+        about = {} if vary.is_text(key) else case.parameters[key].quantity.attributes
+        coordinates[key] = (SET, list(vary.columns[key]), about) if is_list else (key, list(vary.values(key)), about)
+    if MOMENT.name in case.output.quantities:
+        coordinates["p"] = ("p", case.p, P.attributes)
+    [first] = case.curves(0, 1)
+    held = {key: value for key, value in first.parameters.items() if key not in vary.keys}
+    origin = {name: each if isinstance(each, str | float | int) else json.dumps(each) for name, each in facts.items()}
+    head = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol}
+    dataset = xr.Dataset(variables, coordinates, {**head, **held, **origin})
     dataset[STATUS.name].attrs |= {
         "flag_values": np.array([int(each) for each in Status], dtype=np.int8),
         "flag_meanings": " ".join(each.name.lower() for each in Status),
     }
     return dataset.assign_attrs(complete=int(not np.any(status == Status.MISSING)))
-
-
-def _dimensions(case: Case) -> tuple[str, ...]:
-    if not case.vary:
-        return ()
-    return case.vary.keys if case.vary.mode == "product" else (SET,)
-
-
-def _coordinates(case: Case) -> dict[str, Any]:
-    over = _dimensions(case)
-    found: dict[str, Any] = {}
-    for key in case.vary.keys:
-        values = case.vary.values(key) if over != (SET,) else case.vary.columns[key]
-        about = {} if case.vary.is_text(key) else case.parameters[key].quantity.attributes
-        found[key] = ((key,) if over != (SET,) else over, list(values), about)
-    if MOMENT.name in case.output.quantities:
-        found["p"] = (("p",), case.p, P.attributes)
-    return found
-
-
-def _attributes(case: Case, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """The title, the parameters that are held, and where it all comes from; tables as JSON."""
-    [first] = case.curves(0, 1)
-    held = {key: value for key, value in first.parameters.items() if key not in case.vary.keys}
-    origin = {
-        name: value if isinstance(value, str | float | int) else json.dumps(value) for name, value in facts.items()
-    }
-    return {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **held, **origin}
 
 
 def open_results(*places: str | Path) -> xr.Dataset:
@@ -113,20 +97,19 @@ def open_results(*places: str | Path) -> xr.Dataset:
     """
     import xarray as xr
 
-    paths = [path for place in places for path in _found(str(place))]
+    there = [
+        path
+        for place in map(str, places)
+        for path in ([Path(place)] if Path(place).exists() else sorted(map(Path, glob(place))))  # noqa: PTH207  (absolute)
+    ]
+    files = [path / RESULTS if path.is_dir() else path for path in there]
+    paths = [path for path in files if path.is_file() and path.suffix == ".nc"]
     if not paths:
         raise FpsolveError(f"no results.nc in {', '.join(map(str, places)) or 'nothing'}; run a case first")
     runs = [_long(path) for path in paths]
     if any("p" in run.dims for run in runs):  # those of which no moments were wanted have none of the p
         runs = [run if "p" in run.dims else run.assign_coords(p=("p", np.zeros(0))) for run in runs]
     return xr.concat(runs, SET, data_vars="all", join="outer", combine_attrs="drop_conflicts")
-
-
-def _found(place: str) -> Sequence[Path]:
-    """The files that a folder, a file or a pattern means."""
-    paths = [Path(place)] if Path(place).exists() else sorted(map(Path, glob(place)))  # noqa: PTH207  (it may be absolute)
-    files = [path / RESULTS if path.is_dir() else path for path in paths]
-    return [path for path in files if path.is_file() and path.suffix == ".nc"]
 
 
 def _long(path: Path) -> xr.Dataset:
@@ -140,15 +123,10 @@ def _long(path: Path) -> xr.Dataset:
     over = [name for name in found.dims if name not in ("p", SET)]
     if SET not in found.dims:
         found = found.stack({SET: over}).reset_index(SET) if over else found.expand_dims(SET)
-    held = {
-        key: value
-        for key, value in found.attrs.items()
-        if str(key).partition(".")[0] in ("oscillator", "system", "noise")
-    }
-    size = found.sizes[SET]
+    kinds = ("oscillator", "system", "noise")
+    held = {key: value for key, value in found.attrs.items() if str(key).partition(".")[0] in kinds}
     labels = {"run": path.parent.name, **held}
-    coordinates = {key: (SET, np.full(size, value)) for key, value in labels.items()}
     rest = {key: value for key, value in found.attrs.items() if key not in held}
-    found = found.assign_coords(coordinates)
+    found = found.assign_coords({key: (SET, np.full(found.sizes[SET], value)) for key, value in labels.items()})
     found.attrs = rest
     return found

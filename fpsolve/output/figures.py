@@ -12,7 +12,7 @@ from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.figure import MOST_NAMED, map_key
-from fpsolve.case.sections import Value, Varied, same
+from fpsolve.case.sections import Value, same
 from fpsolve.drawing import Format, draw_bars, figure_for
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
@@ -125,35 +125,31 @@ def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | Non
 
 
 def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
-    """One series for each set of the other parameters that vary."""
+    """A number over the parameter: one series for each set of the other parameters that vary."""
+    key, p = case.figure.x, case.figure.moment
     groups: dict[tuple[tuple[str, Value], ...], list[Pair]] = {}
     for pair in pairs:
-        others = tuple((key, value) for key, value in pair[0].curve.key if key != case.figure.x)
+        others = tuple((name, value) for name, value in pair[0].curve.key if name != key)
         groups.setdefault(others, []).append(pair)
-    shown = _some(len(groups))
-    return [
-        _parameter_series(case, dict(others), group, with_theory=i in shown)
-        for i, (others, group) in enumerate(groups.items())
-    ]
-
-
-def _parameter_series(case: Case, others: Varied, group: Sequence[Pair], *, with_theory: bool) -> Series:
-    """A number over the parameter; its perturbation theory, which has poles, where it is sought."""
-    key, p = case.figure.x, case.figure.moment
-    x = np.array([float(result.curve.varied[key]) for result, _ in group])
-    line = np.linspace(x.min(), x.max(), 200) if with_theory else _NOTHING
-    if with_theory and x.min() > 0:
-        line = np.unique(np.concatenate([line, np.geomspace(x.min(), x.max(), 200)]))
-    dots = [(at, _simulated(case, sample)) for at, (_, sample) in zip(x, group, strict=True) if sample]
-    return Series(
-        others,
-        x,
-        np.array([_number(case, result) for result, _ in group]),
-        line,
-        np.array([_theory(case, case.curve({**others, key: float(value)}).problem) for value in line]),
-        _columns([(at, *dot) for at, dot in dots if dot]),
-        np.array([p in result.moments.rare for result, _ in group]),
-    )
+    shown, found = _some(len(groups)), []
+    for i, (others, group) in enumerate(groups.items()):
+        x = np.array([float(result.curve.varied[key]) for result, _ in group])
+        line = np.linspace(x.min(), x.max(), 200) if i in shown else _NOTHING
+        if line.size and x.min() > 0:
+            line = np.unique(np.concatenate([line, np.geomspace(x.min(), x.max(), 200)]))
+        dots = [(at, _simulated(case, sample)) for at, (_, sample) in zip(x, group, strict=True) if sample]
+        found.append(
+            Series(
+                dict(others),
+                x,
+                np.array([_number(case, result) for result, _ in group]),
+                line,
+                np.array([_theory(case, case.curve({**dict(others), key: float(each)}).problem) for each in line]),
+                _columns([(at, *dot) for at, dot in dots if dot]),
+                np.array([p in result.moments.rare for result, _ in group]),
+            )
+        )
+    return found
 
 
 def _value(estimate: Estimate | None) -> float | None:

@@ -55,18 +55,43 @@ def write_map(
     setting: FigureSection,
     about: Callable[[str], Quantity],
 ) -> None:
-    """Draw a map, and write it to files whose endings tell the format."""
+    """Draw a map, hatched where it is not known, grey where there is none, and write it to files.
+
+    Args:
+        paths: .png, .pdf or what else matplotlib writes.
+        parameters: what holds for all of it, for below the title.
+        setting: how the figure is set.
+    """
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Rectangle
+
     with figure_for(paths, title, parameters, FORMATS[setting.width]) as figure:
         axes, edges = figure.add_subplot(), (_edges(plane.x), _edges(plane.y))
         label_axes(axes, *(about(key).attributes for key in plane.keys))
         _draw_values(axes, plane, edges, quantity.timed(setting.time_unit).attributes)
-        for axis, values, ends, limits in (
-            (axes.xaxis, plane.x, edges[0], setting.xlim),
-            (axes.yaxis, plane.y, edges[1], setting.ylim),
+        for axis, each, ends, limits in zip(
+            (axes.xaxis, axes.yaxis), (plane.x, plane.y), edges, (setting.xlim, setting.ylim), strict=True
         ):
-            scale_axis(axis, scale_of(values), limits or (float(ends[0]), float(ends[-1])))
-        _draw_gaps(axes, plane, edges)
-        _draw_zeros(axes, plane)
+            scale_axis(axis, scale_of(each), limits or (float(ends[0]), float(ends[-1])))
+        gaps = np.isnan(plane.values) & ~plane.failed
+        for where, label, colours in (
+            (plane.failed, "failed or not solved", {"facecolor": "white", "edgecolor": "0.45", "hatch": "/////"}),
+            (gaps, plane.absent, {"facecolor": "0.8", "edgecolor": "none"}),
+        ):
+            (x, y), style = edges, {"label": label, "linewidth": 0, **colours}
+            cells = [Rectangle((x[j], y[i]), x[j + 1] - x[j], y[i + 1] - y[i]) for i, j in np.argwhere(where)]
+            if cells:
+                axes.add_collection(PatchCollection(cells, **style))
+        known = plane.values[np.isfinite(plane.values)]
+        if known.size and known.min() < 0 < known.max():
+            inside, wide = np.ma.masked_invalid(plane.values), points(1.5)
+            look: dict[str, Any] = {"colors": _BETWEEN, "linestyles": "--", "linewidths": wide, "zorder": 3}
+            axes.contour(plane.x, plane.y, inside, levels=[0.0], **look)
+            axes.plot([], [], "--", color=_BETWEEN, linewidth=wide, label="zero, interpolated between the values")
+        words = f"{plane.equation}, traced by a chart{', not finished' if plane.is_partial else ''}"
+        for i, branch in enumerate(plane.zero):
+            label = "" if i else words
+            axes.plot(*branch, color="black", linewidth=points(2.6), label=label, scalex=False, scaley=False)
 
 
 def _draw_values(axes: Any, plane: Plane, edges: tuple[FloatArray, FloatArray], about: Mapping[str, Any]) -> None:
@@ -105,33 +130,3 @@ def _edges(values: FloatArray) -> FloatArray:
     middles = 0.5 * (places[1:] + places[:-1])
     edges = np.concatenate([[2 * places[0] - middles[0]], middles, [2 * places[-1] - middles[-1]]])
     return np.exp(edges) if is_log else edges
-
-
-def _draw_gaps(axes: Any, plane: Plane, edges: tuple[FloatArray, FloatArray]) -> None:
-    """Hatched where it is not known, grey where there is none."""
-    from matplotlib.collections import PatchCollection
-    from matplotlib.patches import Rectangle
-
-    x, y = edges
-    for gaps, label, colours in (
-        (plane.failed, "failed or not solved", {"facecolor": "white", "edgecolor": "0.45", "hatch": "/////"}),
-        (np.isnan(plane.values) & ~plane.failed, plane.absent, {"facecolor": "0.8", "edgecolor": "none"}),
-    ):
-        style: dict[str, Any] = {"label": label, "linewidth": 0, **colours}
-        cells = [Rectangle((x[j], y[i]), x[j + 1] - x[j], y[i + 1] - y[i]) for i, j in np.argwhere(gaps)]
-        if cells:
-            axes.add_collection(PatchCollection(cells, **style))
-
-
-def _draw_zeros(axes: Any, plane: Plane) -> None:
-    """The line of zeros between the values, and that of a chart."""
-    known = plane.values[np.isfinite(plane.values)]
-    if known.size and known.min() < 0 < known.max():
-        values, wide = np.ma.masked_invalid(plane.values), points(1.5)
-        style: dict[str, Any] = {"colors": _BETWEEN, "linestyles": "--", "linewidths": wide, "zorder": 3}
-        axes.contour(plane.x, plane.y, values, levels=[0.0], **style)
-        axes.plot([], [], "--", color=_BETWEEN, linewidth=wide, label="zero, interpolated between the values")
-    words = f"{plane.equation}, traced by a chart{', not finished' if plane.is_partial else ''}"
-    for i, branch in enumerate(plane.zero):
-        label = "" if i else words
-        axes.plot(*branch, color="black", linewidth=points(2.6), label=label, scalex=False, scaley=False)

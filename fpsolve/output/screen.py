@@ -145,8 +145,7 @@ class Screen:
             """The least width of a column."""
             is_text = columns[i].is_text
             heading = columns[i].heading.split() if is_folded or is_text else [columns[i].heading]
-            cells = [row[i].plain for row in rows]
-            parts = [part for cell in cells for part in (cell.split() if is_text else cell.split("\n"))]
+            parts = [part for row in rows for part in row[i].plain.split(None if is_text else "\n")]
             return max(map(cell_len, [*heading, *parts]), default=0)
 
         kept = list(range(len(columns)))

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fpsolve import __version__
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
@@ -29,9 +29,6 @@ from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.quantity import MOMENT, MOMENTS
 from fpsolve.study.results import CurveResult, SimulatedCurve
-
-if TYPE_CHECKING:
-    pass
 
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
@@ -73,6 +70,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
     state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
     start = json.dumps({**head(case), **state, **facts}, indent=1, ensure_ascii=False).removesuffix("\n}")
     indent = 1 if case.planned <= MOST_INDENTED else None
+    has_moments = MOMENT.name in case.output.quantities
     indices = [column.name for each in asked(case) for column in (each, each.error())]
     with ExitStack() as stack:
         summary, moments, curves = (
@@ -83,12 +81,18 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
         by_curve.writerow([*case.vary.keys, *indices, "p_solved", "p_failed", "status", "seconds"])
         summary.write(f'{start},\n "curves": [')
         for number, result in enumerate(results):
-            varied, rows = result.curve.varied.values(), _rows(result)
+            varied, done = result.curve.varied.values(), result.moments
+            columns = [getattr(done, name).tolist() for name in MOMENTS]
+            finite = [[None if math.isnan(each) else each for each in row] for row in zip(*columns, strict=True)]
+            rows = [dict(zip(MOMENTS, row, strict=True)) for row in finite]
             content = _summary(case, result, rows)
             text = json.dumps(content, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
             summary.write((",\n  " if number else "\n  ") + text)
-            by_moment.writerows([*varied, *row.values()] for row in rows)
-            by_curve.writerow([*varied, *_row(case, result)])
+            by_moment.writerows([*varied, *row] for row in finite)
+            found = [result.estimates[each.name] for each in asked(case)]
+            numbers = [number for each in found for number in ((each.value, each.error_estimate) if each else ("", ""))]
+            counts = [done.p.size, (case.p.size if has_moments else 0) - done.p.size]
+            by_curve.writerow([*varied, *numbers, *counts, result.status.name.lower(), round(result.seconds, 6)])
         summary.write("\n ]\n}\n")
 
 
@@ -142,7 +146,7 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
     found: dict[str, Any] = {"moments": rows} if MOMENT.name in case.output.quantities else {}
     for index in asked(case):
         numbers = result.index(index)
-        found[index.name] = numbers and {key: _finite(value) for key, value in numbers.items()}
+        found[index.name] = numbers and {key: value if math.isfinite(value) else None for key, value in numbers.items()}
     if SENSITIVITIES in case.output.quantities:
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
     return {
@@ -154,25 +158,6 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
         "notes": in_case_words(result.notes),
         "seconds": round(result.seconds, 6),
     }
-
-
-def _row(case: Case, result: CurveResult) -> list[Any]:
-    """Each index and its error, empty where there is none, and what became of the curve."""
-    estimates = [result.estimates[each.name] for each in asked(case)]
-    numbers = [number for each in estimates for number in ((each.value, each.error_estimate) if each else ("", ""))]
-    solved, wanted = result.moments.p.size, case.p.size if MOMENT.name in case.output.quantities else 0
-    return [*numbers, solved, wanted - solved, result.status.name.lower(), round(result.seconds, 6)]
-
-
-def _rows(result: CurveResult) -> list[dict[str, float | None]]:
-    """One row for each p; what is not known is None."""
-    columns = [getattr(result.moments, name).tolist() for name in MOMENTS]
-    known = ([None if math.isnan(each) else each for each in row] for row in zip(*columns, strict=True))
-    return [dict(zip(MOMENTS, row, strict=True)) for row in known]
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _sensitivities(found: Sensitivities) -> dict[str, Any]:

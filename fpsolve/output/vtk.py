@@ -119,13 +119,10 @@ def write_curves(case: Case, folder: Path) -> Path | None:
     if case.planned == 1 or not there:
         return None
     keys = [key for key in case.vary.keys if len(case.vary.values(key)) > 1]
-    key = keys[0] if len(keys) == 1 and not case.vary.is_text(keys[0]) else ""
-    entries = (
-        (float(curve.varied[key]), name, f"{curve.label}, p = {p:g}")
-        if key
-        else (float(curve.number), name, f"curve {curve.number}: {curve.label}, p = {p:g}")
-        for curve, name in there
-    )
+    if len(keys) == 1 and not case.vary.is_text(keys[0]):
+        entries = [(float(curve.varied[keys[0]]), name, f"{curve.label}, p = {p:g}") for curve, name in there]
+    else:
+        entries = [(float(each.number), name, f"curve {each.number}: {each.label}, p = {p:g}") for each, name in there]
     write_text(folder / CURVES, _collection(sorted(entries)))
     return folder / CURVES
 
@@ -143,13 +140,9 @@ def write_response(simulated: SimulatedCurve, folder: Path) -> None:
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
     grid = _pyvista().ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
     grid.cell_data["density"] = response.density.ravel(order="F")
-    known = {
-        "lyapunov_exponent": found.lyapunov_exponent,
-        "lyapunov_exponent_error": found.lyapunov_exponent_error,
-    }
-    _write(
-        path, grid, {**known, **_facts({**curve.parameters, "curve": float(curve.number)}, curve.varied, curve.problem)}
-    )
+    known = {name: getattr(found, name) for name in ("lyapunov_exponent", "lyapunov_exponent_error")}
+    parameters = {**curve.parameters, "curve": float(curve.number)}
+    _write(path, grid, {**known, **_facts(parameters, curve.varied, curve.problem)})
 
 
 def copy_show_script(directory: Path) -> Path:
@@ -196,10 +189,7 @@ def _pyvista() -> Any:
 def _facts(parameters: Facts, varied: Collection[str], problem: Problem) -> Facts:
     """The parameters, and the words about those of a problem that a picture shows, if there are any, in ASCII."""
     known = {key: each._replace(value=parameters[key]) for key, each in problem.parameters.items() if key in parameters}
-    words = {
-        "varied": parameter_words(known, varied),
-        "held": "\n".join(parameter_lines(known, varied)),
-    }
+    words = {"varied": parameter_words(known, varied), "held": "\n".join(parameter_lines(known, varied))}
     return {**parameters, **{name: text.replace("²", "^2") for name, text in words.items() if text}}
 
 
