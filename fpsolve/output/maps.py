@@ -78,7 +78,7 @@ def write_map(
             (plane.failed, "failed or not solved", {"facecolor": "white", "edgecolor": "0.45", "hatch": "/////"}),
             (gaps, plane.absent, {"facecolor": "0.8", "edgecolor": "none"}),
         ):
-            (x, y), style = edges, {"label": label, "linewidth": 0, **colours}
+            (x, y), style = edges, dict[str, Any](label=label, linewidth=0, **colours)
             cells = [Rectangle((x[j], y[i]), x[j + 1] - x[j], y[i + 1] - y[i]) for i, j in np.argwhere(where)]
             if cells:
                 axes.add_collection(PatchCollection(cells, **style))

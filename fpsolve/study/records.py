@@ -111,10 +111,10 @@ class Codec(NamedTuple):
 @cache
 def codec(kind: Any) -> Codec:
     """For the values of an attribute with an annotation."""
-    origin, parts = get_origin(kind), get_args(kind)
+    origin, parts, is_row = get_origin(kind), get_args(kind), is_dataclass(kind)
     if kind in _SIMPLE:
         return _SIMPLE[kind]
-    if is_dataclass(kind):
+    if is_row:
         attributes = _recorded(kind)
         row = Codec(
             [kind.__name__, *([name, one.form] for name, one in attributes.items())],
