@@ -76,41 +76,36 @@ class Quantity:
         unit = "" if self.unit in ("1", "unknown") else f" {self.unit}"
         return f"{name} = {value:g}{unit.removeprefix(' 1')}"
 
+    @property
+    def _plain(self) -> Quantity:
+        """The same without what a subclass adds."""
+        return Quantity(**{each.name: getattr(self, each.name) for each in fields(Quantity)})
+
     def error(self, kind: str = "estimated error") -> Quantity:
         """Its error, of a kind such as "standard error"; where it is estimated, the comment says from what."""
         comment = f"from {self.error_source}" if kind == "estimated error" and self.error_source else ""
-        return replace(_plain(self), name=f"{self.name}_error", words=f"{kind} of the {self.words}", comment=comment)
+        return replace(self._plain, name=f"{self.name}_error", words=f"{kind} of the {self.words}", comment=comment)
 
     @property
     def perturbation(self) -> Quantity:
         """What perturbation theory makes of it."""
         name, words = f"{self.name}_perturbation", f"{self.words} by perturbation theory"
-        return replace(_plain(self), name=name, words=words, equation=self.closed_form)
+        return replace(self._plain, name=name, words=words, equation=self.closed_form)
 
     def by(self, other: Quantity) -> Quantity:
         """Its partial derivative by another one."""
+        divisor = other.unit if other.unit.isidentifier() else f"({other.unit})"
+        unit = self.unit if other.unit == "1" else "1" if self.unit == other.unit else f"{self.unit}/{divisor}"
+        if "unknown" in (self.unit, other.unit):
+            unit = "unknown"
         return Quantity(
             name=f"{self.name}_by_{other.name}",
             symbol=f"∂{self.symbol}/∂{other.symbol}",
             words=f"derivative of the {self.words} by {other.name}",
             latex=rf"$\partial {self.latex.strip('$')}/\partial {other.latex.strip('$')}$" if other.latex else "",
-            unit=_over(self.unit, other.unit),
+            unit=unit,
             dims=(*self.dims, *other.dims),
         )
-
-
-def _plain(quantity: Quantity) -> Quantity:
-    """The same without what a subclass adds."""
-    return Quantity(**{each.name: getattr(quantity, each.name) for each in fields(Quantity)})
-
-
-def _over(unit: str, other: str) -> str:
-    """The unit of a ratio."""
-    if "unknown" in (unit, other):
-        return "unknown"
-    if other == "1" or unit == other:
-        return unit if other == "1" else "1"
-    return f"{unit}/{other if other.isidentifier() else f'({other})'}"
 
 
 def brief(thing: object, text: str) -> str:

@@ -101,9 +101,16 @@ def figure_for(
         layout = ConstrainedLayoutEngine(h_pad=0.07 * form.scale)
         figure = Figure(figsize=(form.width, 1.3 * form.height), dpi=form.dpi, layout=layout)
         FigureCanvasAgg(figure)
-        body = figure.subfigures()
+        body: Any = figure.subfigures()
         yield body
-        _add_heading(figure, body, title, parameters)
+        room = 0.96 * figure.get_figwidth()
+        large, small = (_font_size(f"{which}.titlesize") for which in ("figure", "axes"))
+        words = [[part for word in line.split(" ") for part in wrap(word, 40)] for line in title.splitlines()]
+        if title:
+            lines = "\n".join(in_lines(figure, line, " ", large, room, has_math=False) for line in words)
+            figure.suptitle(lines, parse_math=False)
+        if parameters:
+            body.suptitle(in_lines(figure, parameters, ", ", small, room), fontsize=small, color="0.3")
         _add_legend(figure)
         figure.set_figheight(4 * form.height)  # has room for everything, so that the layout tells what is left
         layout.execute(figure)
@@ -113,18 +120,6 @@ def figure_for(
         for path in paths:
             with atomic(path) as temporary:
                 figure.savefig(temporary, metadata={"CreationDate": None} if path.suffix == ".pdf" else None)
-
-
-def _add_heading(figure: Any, body: Any, title: str, parameters: Sequence[str]) -> None:
-    """The title, each of its lines in as many as fit, and the parameters."""
-    room = 0.96 * figure.get_figwidth()
-    large, small = (_font_size(f"{which}.titlesize") for which in ("figure", "axes"))
-    words = [[part for word in line.split(" ") for part in wrap(word, 40)] for line in title.splitlines()]
-    if title:
-        lines = "\n".join(in_lines(figure, line, " ", large, room, has_math=False) for line in words)
-        figure.suptitle(lines, parse_math=False)
-    if parameters:
-        body.suptitle(in_lines(figure, parameters, ", ", small, room), fontsize=small, color="0.3")
 
 
 def _add_legend(figure: Any) -> None:

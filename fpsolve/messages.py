@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from enum import Enum, StrEnum, unique
+from functools import partial
 from string import Formatter
 from types import MappingProxyType
 from typing import Any
@@ -271,7 +272,7 @@ class Message(str):
         raise AttributeError(f"a message is not changed: {name}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _remade, (self.code, dict(self.data))
+        return partial(Message, self.code, **self.data), ()
 
     @property
     def severity(self) -> Severity:
@@ -315,10 +316,6 @@ class Message(str):
 def message_of(text: str) -> Message:
     """A text as a message; a message as it is."""
     return text if isinstance(text, Message) else Message(Code.TEXT, text=text)
-
-
-def _remade(code: Code, data: Mapping[str, Any]) -> Message:
-    return Message(code, **data)
 
 
 def _words(code: Code, data: Mapping[str, Any], audience: Audience) -> str:

@@ -164,7 +164,21 @@ def picture_in_space(surface: Surface, cmap: str, *, cylinder: bool) -> Picture:
     try:
         plotter.set_background("white")
         plotter.enable_anti_aliasing("ssaa")
-        _add_surface(plotter, surface, cmap, cylinder=cylinder)
+        phi, rows = surface.phi.ravel(), np.arange(surface.phi.size).reshape(surface.phi.shape)
+        points = surface.placed(phi[:, None], surface.xi, surface.values, cylinder=cylinder)
+        corners = rows[:, :-1].reshape(-1, 1) * surface.xi.size + np.arange(surface.xi.size - 1)
+        sides = [corners, corners + surface.xi.size, corners + surface.xi.size + 1, corners + 1]
+        mesh = pyvista.PolyData(points.reshape(-1, 3), np.stack([np.full_like(corners, 4), *sides], axis=-1).ravel())
+        mesh.point_data["values"] = surface.values.ravel()
+        bar: dict[str, Any] = {"title": f"{surface.label('values')}\n", "vertical": True, "color": "black"}
+        bar |= {"position_x": 0.88, "position_y": 0.25, "height": 0.5, "width": 0.06, "n_labels": 5, "fmt": "%.3g"}
+        bar |= {"title_font_size": 20, "label_font_size": 20}
+        plotter.add_mesh(mesh, cmap=cmap, clim=surface.limits, smooth_shading=True, ambient=0.45, scalar_bar_args=bar)
+        for row in (row for impact in surface.impacts for row in np.flatnonzero(np.abs(phi - impact) < 1e-9)):
+            edge = pyvista.lines_from_points(points[row])
+            plotter.add_mesh(edge, color=RED, line_width=4, render_lines_as_tubes=True, lighting=False)
+        for edges in () if cylinder else LINES:
+            plotter.add_lines(np.multiply(edges, BOX), color="black", width=1, connected=True)
         plain: dict[str, Any] = {"shape": None, "show_points": False, "always_visible": True, "bold": False}
         for words, place, side in (_labels_of_cylinder if cylinder else _labels_of_box)(surface):
             style = {"text_color": RED if "impact" in words else "black", "justification_horizontal": side}
@@ -181,27 +195,6 @@ def picture_in_space(surface: Surface, cmap: str, *, cylinder: bool) -> Picture:
         plotter.close()
         vtkLogger.SetStderrVerbosity(before)
     return Picture(content.getvalue())
-
-
-def _add_surface(plotter: Any, surface: Surface, cmap: str, *, cylinder: bool) -> None:
-    """The surface in colours, and both its edges at each impact."""
-    import pyvista
-
-    phi, rows = surface.phi.ravel(), np.arange(surface.phi.size).reshape(surface.phi.shape)
-    points = surface.placed(phi[:, None], surface.xi, surface.values, cylinder=cylinder)
-    corners = rows[:, :-1].reshape(-1, 1) * surface.xi.size + np.arange(surface.xi.size - 1)
-    sides = [corners, corners + surface.xi.size, corners + surface.xi.size + 1, corners + 1]
-    mesh = pyvista.PolyData(points.reshape(-1, 3), np.stack([np.full_like(corners, 4), *sides], axis=-1).ravel())
-    mesh.point_data["values"] = surface.values.ravel()
-    bar: dict[str, Any] = {"title": f"{surface.label('values')}\n", "vertical": True, "color": "black", "fmt": "%.3g"}
-    bar |= {"position_x": 0.88, "position_y": 0.25, "height": 0.5, "width": 0.06, "n_labels": 5}
-    bar |= {"title_font_size": 20, "label_font_size": 20}
-    plotter.add_mesh(mesh, cmap=cmap, clim=surface.limits, smooth_shading=True, ambient=0.45, scalar_bar_args=bar)
-    for row in (row for impact in surface.impacts for row in np.flatnonzero(np.abs(phi - impact) < 1e-9)):
-        edge = pyvista.lines_from_points(points[row])
-        plotter.add_mesh(edge, color=RED, line_width=4, render_lines_as_tubes=True, lighting=False)
-    for edges in () if cylinder else LINES:
-        plotter.add_lines(np.multiply(edges, BOX), color="black", width=1, connected=True)
 
 
 def _labels_of_box(surface: Surface) -> Iterator[Label]:

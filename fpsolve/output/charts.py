@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fpsolve.analysis.regions import P_BIFURCATIONS, Regions
-from fpsolve.analysis.stability import SCAN_RTOL, Boundary
+from fpsolve.analysis.stability import SCAN_RTOL
 from fpsolve.analysis.zero import RTOL, Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
@@ -41,7 +41,44 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
         for *point, label in zip(branch.x, branch.y, branch.width, branch.labels, strict=True)
     )
     write_csv(folder / "chart.csv", ["line", "branch", "x", "y", "width", "label"], rows)
-    write_json(folder / "chart.json", {**head(case), **_summary(case, chart)})
+    zeros, frame = charted(case).zero, {"x": charted(case).x.axis, "y": charted(case).y.axis}
+    keys = [axis.key for axis in frame.values()]
+    summary = {
+        **head(case),
+        "complete": chart.complete,
+        "planned": len(zeros),
+        "done": len(chart.lines) if chart.complete else max(len(chart.lines) - 1, 0),
+        "parameters": {key: value for key, value in case.curve({}).parameters.items() if key not in keys},
+        **{
+            side: {"key": axis.key, "start": axis.start, "stop": axis.stop, "scale": axis.scale, "at": list(axis.at)}
+            for side, axis in frame.items()
+        },
+        "rtol": RTOL,
+        "lines": [
+            {
+                "line": line.zero.name,
+                "equation": line.zero.equation,
+                "appears": _appears(line.zero),
+                "scan": None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": SCAN_RTOL},
+                "branches": [
+                    {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
+                    for branch in line.branches
+                ],
+            }
+            for line in chart.lines
+        ],
+        "closed_forms": [
+            {"line": zero.name, "equation": "(38)-(39)", "branches": [branch.tolist() for branch in branches]}
+            for zero, branches in zip(zeros, chart.closed_forms, strict=True)
+        ],
+        "regions": [
+            {"name": each.name, "signs": each.signs, "share": each.share}
+            | {side: float(axis.value(at)) for (side, axis), at in zip(frame.items(), each.at, strict=True)}
+            for each in (chart.regions.each if chart.regions else ())
+        ],
+        "warnings": in_case_words(chart.remarks),
+    }
+    write_json(folder / "chart.json", summary)
 
 
 def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
@@ -57,9 +94,18 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
             scale_axis(axis, side.scale, (side.start, side.stop))
         small = {} if chart.regions is None else _shade(axes, chart.regions, frame)
         for i, line in enumerate(chart.lines):
-            _draw_line(axes, line, COLOURS[i % len(COLOURS)])
-            for branch in chart.closed_forms[i]:
-                axes.plot(branch[:, 0], branch[:, 1], **_CLOSED_FORM)
+            colour, appears = COLOURS[i % len(COLOURS)], _appears(line.zero)
+            for branch in line.branches:
+                path = (np.append(each, each[:1]) if branch.closed else each for each in (branch.x, branch.y))
+                axes.plot(*path, color=colour, linewidth=2)
+                for start, (_, marker) in _SPECIAL.items():
+                    chosen = np.array([start in label for label in branch.labels])
+                    hollow = {"color": colour, "markersize": 7, "markerfacecolor": "white"}
+                    axes.plot(branch.x[chosen], branch.y[chosen], marker, **hollow)
+            name = f"{line.zero.latex}: {appears}" if appears else line.zero.latex
+            axes.plot([], [], color=colour, linewidth=2, label=name)
+            for points in chart.closed_forms[i]:
+                axes.plot(points[:, 0], points[:, 1], **_CLOSED_FORM)
         axes.plot([], [], label="closed form, Eqs. (38)-(39)", **_CLOSED_FORM)
         labels = [label for line in chart.lines for branch in line.branches for label in branch.labels]
         for start, (name, marker) in _SPECIAL.items():
@@ -109,46 +155,6 @@ def held_in_words(curve: Curve, varied: Iterable[str], time_unit: str) -> list[s
     return [known[key].quantity.timed(time_unit).stated(value) for key, value in held.items()]
 
 
-def _summary(case: Case, chart: Chart) -> dict[str, Any]:
-    """What chart.json says."""
-    zeros, frame = charted(case).zero, {"x": charted(case).x.axis, "y": charted(case).y.axis}
-    keys = [axis.key for axis in frame.values()]
-    return {
-        "complete": chart.complete,
-        "planned": len(zeros),
-        "done": len(chart.lines) if chart.complete else max(len(chart.lines) - 1, 0),
-        "parameters": {key: value for key, value in case.curve({}).parameters.items() if key not in keys},
-        **{
-            side: {"key": axis.key, "start": axis.start, "stop": axis.stop, "scale": axis.scale, "at": list(axis.at)}
-            for side, axis in frame.items()
-        },
-        "rtol": RTOL,
-        "lines": [
-            {
-                "line": line.zero.name,
-                "equation": line.zero.equation,
-                "appears": _appears(line.zero),
-                "scan": None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": SCAN_RTOL},
-                "branches": [
-                    {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
-                    for branch in line.branches
-                ],
-            }
-            for line in chart.lines
-        ],
-        "closed_forms": [
-            {"line": zero.name, "equation": "(38)-(39)", "branches": [branch.tolist() for branch in branches]}
-            for zero, branches in zip(zeros, chart.closed_forms, strict=True)
-        ],
-        "regions": [
-            {"name": each.name, "signs": each.signs, "share": each.share}
-            | {side: float(axis.value(at)) for (side, axis), at in zip(frame.items(), each.at, strict=True)}
-            for each in (chart.regions.each if chart.regions else ())
-        ],
-        "warnings": in_case_words(chart.remarks),
-    }
-
-
 def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, str]:
     """Draw a tint for each region, and its name, or where that has no room a letter; the letters by the names."""
     from matplotlib.colors import ListedColormap
@@ -170,19 +176,6 @@ def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, s
             small[name] = next(letters, "z")
             axes.text(*place, small[name], fontsize=12, weight="bold", **middle)
     return small
-
-
-def _draw_line(axes: Any, line: Boundary, colour: str) -> None:
-    """A line with its special points; its name is λ = 0, or what appears at a value of δ_p."""
-    for branch in line.branches:
-        path = (np.append(each, each[:1]) if branch.closed else each for each in (branch.x, branch.y))
-        axes.plot(*path, color=colour, linewidth=2)
-        for start, (_, marker) in _SPECIAL.items():
-            chosen = np.array([start in label for label in branch.labels])
-            axes.plot(branch.x[chosen], branch.y[chosen], marker, color=colour, markersize=7, markerfacecolor="white")
-    appears = _appears(line.zero)
-    name = f"{line.zero.latex}: {appears}" if appears else line.zero.latex
-    axes.plot([], [], color=colour, linewidth=2, label=name)
 
 
 def _appears(zero: Zero) -> str | None:

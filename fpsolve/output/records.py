@@ -50,9 +50,14 @@ class Records:
     def look(self) -> Records:
         """Find what has been written by now, since the last look."""
         for path in self._files():
-            for key, address in _lines(path, self._seen.get(path.name, 0)):
-                self._addresses[key] = address
-                self._seen[path.name] = address.start + address.size
+            start = self._seen.get(path.name, 0)
+            with path.open("rb") as file:
+                file.seek(start)
+                for line in file:
+                    if found := _parsed(line):
+                        self._addresses[found[0]] = Address(path.name, start, len(line))
+                        self._seen[path.name] = start + len(line)
+                    start += len(line)
         return self
 
     @property
@@ -167,7 +172,10 @@ def append(folder: Path, key: str, record: dict[str, Any]) -> Address:
     """
     content = json.dumps(record, ensure_ascii=False).encode()
     line = b'{"key": "%s", "crc32": %d, "record": %s}\n' % (key.encode(), zlib.crc32(content), content)
-    path = folder / _own_name()
+    number = os.getpid()
+    if number not in _NAMES:  # no other process has this name, nor had it
+        _NAMES[number] = f"{socket.gethostname()}-{number}-{token_hex(4)}.jsonl"
+    path = folder / _NAMES[number]
     path.parent.mkdir(parents=True, exist_ok=True)
     handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
     try:
@@ -186,25 +194,6 @@ def append(folder: Path, key: str, record: dict[str, Any]) -> Address:
     finally:
         os.close(handle)
     return Address(path.name, start, len(line))
-
-
-def _own_name() -> str:
-    """A name that no other process has, nor had."""
-    number = os.getpid()
-    if number not in _NAMES:
-        _NAMES[number] = f"{socket.gethostname()}-{number}-{token_hex(4)}.jsonl"
-    return _NAMES[number]
-
-
-def _lines(path: Path, start: int) -> Iterator[tuple[str, Address]]:
-    """The keys and places of the whole records of a file, from a byte on."""
-    with path.open("rb") as file:
-        file.seek(start)
-        for line in file:
-            found = _parsed(line)
-            if found is not None:
-                yield found[0], Address(path.name, start, len(line))
-            start += len(line)
 
 
 def _parsed(line: bytes) -> tuple[str, dict[str, Any]] | None:

@@ -133,7 +133,7 @@ def solve_curve(
         slopes = solve_sensitivities(
             solver,
             np.array([p for p in wanted.differentiated if np.any(found.p == p)]),
-            curve.problem.directions(),
+            curve.problem.derivatives(),
             indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
             root=None if (index := estimates[STABILITY_INDEX.name]) is None else index.value,
         )
