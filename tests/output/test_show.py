@@ -247,15 +247,15 @@ def words(paraview, folder, *arguments, times=(0,)):
 def named_results(tmp_path_factory):
     """One p only, with parameters."""
     folder, solver = tmp_path_factory.mktemp("named"), ExponentSolver(Problem(HARD, UNIT_NOISE), COARSE)
-    parameters = {"oscillator.omega": 1.0, "oscillator.impact": "delta", "noise.D0": 0.5}
-    written(folder, solver, [1.0], parameters=parameters, varied=["noise.D0"])
+    parameters = {"oscillator.omega": 1.0, "oscillator.impact": "delta", "noise.alpha": 1.0}
+    written(folder, solver, [1.0], parameters=parameters, varied=["noise.alpha"])
     copy_show_script(folder)
     return folder
 
 
 def test_words_of_the_picture(paraview, named_results):
     [((title, parameters), captions, grid, lowest)] = words(paraview, named_results)
-    assert title.startswith("noise.D0 = 0.5 (1/time)\np = 1 ")
+    assert title.startswith("noise.alpha = 1 (1/time)\np = 1 ")
     assert title.endswith(" (1/time)")
     assert 0 < lowest < 1
     assert parameters.splitlines() == ["oscillator: omega = 1 (rad/time), impact = delta"]
@@ -270,7 +270,7 @@ def test_words_of_the_picture(paraview, named_results):
 @pytest.mark.slow
 def test_the_stationary_density_is_that_at_p_0(paraview, named_results):
     [((title, _), *_, lowest)] = words(paraview, named_results, "--field", "stationary_density")
-    assert title.splitlines() == ["noise.D0 = 0.5 (1/time)", "stationary density (p = 0)"]
+    assert title.splitlines() == ["noise.alpha = 1 (1/time)", "stationary density (p = 0)"]
     assert lowest == 0
 
 
