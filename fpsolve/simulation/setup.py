@@ -35,7 +35,7 @@ def simulated_parts(problem: Problem) -> tuple[Any, Noise]:
     if noise.is_simulated and system.motion() is not None:
         return system, noise
     raise FpsolveError(
-        "simulation is for a VibroImpactOscillator under OrnsteinUhlenbeck or NonGaussianNoise, but this is a "
+        "simulation is for a VibroImpactOscillator under noise that states a step of its paths, but this is a "
         f"{type(system).__name__} under {type(noise).__name__}; use the finite elements"
     )
 

@@ -67,7 +67,7 @@ def test_response_of_a_problem_is_that_of_its_halves():
 )
 def test_other_problems_are_refused(problem, name):
     sentence = (
-        "simulation is for a VibroImpactOscillator under OrnsteinUhlenbeck or NonGaussianNoise, but this is a "
+        "simulation is for a VibroImpactOscillator under noise that states a step of its paths, but this is a "
         f"{name}; use the finite elements"
     )
     for call in (lambda: moments(problem, [1.0]), lambda: response(problem)):

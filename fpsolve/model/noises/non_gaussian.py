@@ -90,9 +90,30 @@ class ImplicitStep(NamedTuple):
             xi_mean[i] = 0.5 * (xi[i] + xi_end[i])
 
 
+class TreatedNoise(Noise):
+    """The noise of Eq. (7), taken as it stands or replaced by its reduction: a word, the treatment, tells which."""
+
+    D0: float
+    tau0: float
+    r0: float
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> TreatedNoise:
+        words = {name: value for name, value in table.items() if name in TREATMENT}
+        return cls(**{name: value for name, value in table.items() if name not in words}).at(words)
+
+    def at(self, values: Mapping[str, float | str]) -> TreatedNoise:
+        """The noise with other values of D₀, τ₀, r₀ or of its treatment, "exact" or "ou-reduction"."""
+        numbers: dict[str, Any] = {"D0": self.D0, "tau0": self.tau0, "r0": self.r0, **values}
+        treatment = numbers.pop("treatment", self.words["treatment"])
+        if treatment not in ("exact", "ou-reduction"):
+            raise ValueError(f'got {treatment!r} as a treatment of the noise; must be one of "exact", "ou-reduction"')
+        return (NonGaussianNoise if treatment == "exact" else ReducedNoise)(**numbers)
+
+
 @told_in_words
 @dataclass(frozen=True, config=STRICT)
-class NonGaussianNoise(Noise):
+class NonGaussianNoise(TreatedNoise):
     """Non-Gaussian coloured noise dξ = −V′(ξ)/τ₀ dt + (√(2D₀)/τ₀) dW, Eqs. (7)-(8).
 
     r₀ = 1 is the Ornstein-Uhlenbeck process; r₀ < 1 has bounded support, r₀ > 1 algebraic tails.
@@ -275,18 +296,10 @@ class NonGaussianNoise(Noise):
             return ReducedNoise.exact_law(decimals)
         return ExactLaw((1 - r0) / tau0, 1 / (1 - r0), 2 * D0 / (tau0 * (1 - r0)), is_bounded=True)
 
-    @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> NonGaussianNoise | ReducedNoise:
-        words = {name: value for name, value in table.items() if name in TREATMENT}
-        return cls(**{name: value for name, value in table.items() if name not in words}).at(words)
-
-    def at(self, values: Mapping[str, float | str]) -> NonGaussianNoise | ReducedNoise:  # type: ignore[override]
-        return _treated(self, values)
-
 
 @told_in_words
 @dataclass(frozen=True, config=STRICT)
-class ReducedNoise(GaussianNoise):
+class ReducedNoise(TreatedNoise, GaussianNoise):
     """The Ornstein-Uhlenbeck process by which Eqs. (12)-(14) replace the noise of Eq. (7): α₀ = 1/τ₁, σ₀ = √(2D₀)/τ₀.
 
     Args:
@@ -344,26 +357,6 @@ class ReducedNoise(GaussianNoise):
             case "tau0":
                 return self.by_logarithms(-1 / self.tau0, -1 / self.tau0)
         return self.by_logarithms(0.0, 1 / (2 - self.r0) - 3 / (5 - 3 * self.r0))
-
-    @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> NonGaussianNoise | ReducedNoise:
-        words = {name: value for name, value in table.items() if name in TREATMENT}
-        return cls(**{name: value for name, value in table.items() if name not in words}).at(words)
-
-    def at(self, values: Mapping[str, float | str]) -> NonGaussianNoise | ReducedNoise:  # type: ignore[override]
-        return _treated(self, values)
-
-
-def _treated(
-    noise: NonGaussianNoise | ReducedNoise, values: Mapping[str, float | str]
-) -> NonGaussianNoise | ReducedNoise:
-    """The noise with other values of D₀, τ₀, r₀ or of its treatment, "exact" or "ou-reduction"."""
-    numbers = {"D0": noise.D0, "tau0": noise.tau0, "r0": noise.r0, **values}
-    treatment = numbers.pop("treatment", noise.words["treatment"])
-    if treatment not in ("exact", "ou-reduction"):
-        raise ValueError(f'got {treatment!r} as a treatment of the noise; must be one of "exact", "ou-reduction"')
-    made: type[NonGaussianNoise | ReducedNoise] = NonGaussianNoise if treatment == "exact" else ReducedNoise
-    return made(**numbers)  # type: ignore[arg-type]
 
 
 def _curvature_of_log(q: FloatArray) -> FloatArray:
