@@ -79,9 +79,7 @@ class SineWiener(Noise):
         """2/σ²."""
         return 2 / self.sigma**2
 
-    @property
-    def relaxation_time(self) -> float:
-        return self.correlation_time
+    relaxation_time = correlation_time
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) = ½A² σ²/(¼σ⁴ + ω²)."""
