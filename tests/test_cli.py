@@ -19,6 +19,7 @@ from fpsolve import cli
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.model.kinds import parameter_of
+from fpsolve.output import figures
 from fpsolve.output.terminal import digits
 from fpsolve.study import sweep
 from tests.conftest import heed_signals, sampled
@@ -85,8 +86,8 @@ def test_out_and_set(case, tmp_path, capsys):
 
 
 def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
-    drawn = []
-    monkeypatch.setattr("fpsolve.output.figures.write_figure", lambda *arguments, **_: drawn.append(arguments[3]))
+    drawn, make = [], figures.figure_for
+    monkeypatch.setattr(figures, "figure_for", lambda _, title, *more: drawn.append(title) or make([], title, *more))
     sets = ["oscillator.omega = 2.0", "moments.p=[1.0]", "budget.seconds=9.0", "output.eigenfunctions=[]"]
     assert main(["run", case, *(f"--set={text}" for text in sets)]) == 0
     assert drawn == ["A test\nwith oscillator.omega = 2.0, moments.p = [1.0]"]

@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 from string import ascii_lowercase
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -115,15 +115,10 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
             axes.plot([], [], marker=f"${letter}$", label=name, markersize=8, **_LETTER)
 
 
-class Traced(NamedTuple):
-    """A line of a chart that was written: its branches, each of shape (2, n), and whether the chart was finished."""
+def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varied) -> tuple[list[FloatArray], bool]:
+    """The branches of a line of the chart in a folder over two keys, each of shape (2, n), and whether it is finished.
 
-    branches: tuple[FloatArray, ...] = ()
-    is_whole: bool = True
-
-
-def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varied) -> Traced:
-    """A line of the chart in a folder over two keys, if it has such a line and is of these parameters.
+    There are none where the chart has no such line, or is not of these parameters.
 
     Args:
         keys: of the abscissa and of the ordinate, in whichever order the chart has them.
@@ -133,7 +128,7 @@ def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varie
         summary = json.loads((folder / "chart.json").read_text(encoding="utf-8"))
         found = summary["x"]["key"], summary["y"]["key"]
         if set(found) != set(keys) or not summary["parameters"].items() <= parameters.items():
-            return Traced()
+            return [], True
         with (folder / "chart.csv").open(encoding="utf-8", newline="") as file:
             rows = [row for row in csv.DictReader(file) if row["line"] == zero.name]
         branches = []
@@ -142,9 +137,9 @@ def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varie
             points = [[float(row[key]) for key in "xy"] for row in rows if row["branch"] == str(number)]
             path = np.array(points + points[:1] if branch["closed"] else points).T
             branches.append(path if found == keys else path[::-1])
-        return Traced(tuple(branches), bool(summary["complete"]))
+        return branches, bool(summary["complete"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):  # there is none, or it is no chart of ours
-        return Traced()
+        return [], True
 
 
 def held_in_words(curve: Curve, varied: Iterable[str], time_unit: str) -> list[str]:

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from fpsolve.drawing import label_of
-from fpsolve.output.curves import Encoding
 from fpsolve.output.datasets import dataset_of
-from fpsolve.output.figures import draw
-from fpsolve.output.maps import Plane
+from fpsolve.output.figures import Encoding, draw
 from fpsolve.theory.perturbation import second_order
 from tests.conftest import sampled
 from tests.output.drawing import case_of, drawn_case, results_of, texts, tick_labels, words
@@ -284,13 +282,11 @@ def test_a_chart_that_is_none_is_left(drawn, tmp_path, text):
 
 
 @pytest.mark.parametrize(("count", "more", "is_map"), [(8, "", False), (9, "", True), (8, "figure.map=true", True)])
-def test_when_it_is_a_map(drawn, tmp_path, monkeypatch, count, more, is_map):
-    planes = []
-    monkeypatch.setattr("fpsolve.output.figures.write_map", lambda plane, *_, **__: planes.append(plane))
+def test_when_it_is_a_map(drawn, tmp_path, count, more, is_map):
     sets = [intensities(count), "vary.oscillator.omega=[1.0, 2.0, 4.0]", over("oscillator.omega"), more]
     drawn_case(tmp_path, list(filter(None, sets)))
-    assert len(planes) == is_map
-    assert all(isinstance(plane, Plane) and plane.values.shape == (count, 3) for plane in planes)
+    maps = [each for each in drawn[0].axes[0].collections if type(each).__name__ == "QuadMesh"]
+    assert [each.get_array().shape for each in maps] == [(count, 3)] * is_map
 
 
 def test_ten_thousand_curves_take_seconds(tmp_path):

@@ -1,6 +1,7 @@
 """What the figures show, read from the drawn figures themselves."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,19 +9,23 @@ from matplotlib.collections import PathCollection
 from matplotlib.colors import to_hex
 
 from fpsolve.case.case import load_case
-from fpsolve.exponent.quantities import MOMENT
-from fpsolve.output.curves import Series, write_figure
-from fpsolve.output.figures import draw, write_response_figure
+from fpsolve.drawing import figure_for
+from fpsolve.output.figures import Series, draw, draw_response, draw_series
 from fpsolve.simulation.response import MEANS, Response
 from tests.solving import solve_case
 
-ROOT = Path(__file__).parents[2]
+CASE = load_case(Path(__file__).parents[2] / "cases/minimal.toml")
 
 
 def series(count=9, scale=1.0, **more):
     """A parabola through 0 and 1, from -2 to 2."""
     p = np.linspace(-2, 2, count)
     return Series({}, p, scale * p * (p - 1), p, scale * p * (p - 1), **more)
+
+
+def picture(folder, *curves, title="Title"):
+    with figure_for([folder / "figure.png"], title) as figure:
+        draw_series(figure.add_subplot(), CASE, curves, "(37)")
 
 
 def legend(figure):
@@ -32,7 +37,7 @@ def legend(figure):
 )
 @pytest.mark.parametrize("scale", [1e-2, 1e-4, 1e-7])
 def test_title_is_clear_of_the_power_of_ten(drawn, tmp_path, title, scale):
-    write_figure([series(scale=scale / 10)], "p", MOMENT, title, [tmp_path / "figure.png"])
+    picture(tmp_path, series(scale=scale / 10), title=title)
     (axes,) = drawn[0].axes
     power, words = axes.yaxis.get_offset_text(), drawn[0].texts[0].get_window_extent()
     assert power.get_text()
@@ -45,7 +50,7 @@ def test_title_is_clear_of_the_power_of_ten(drawn, tmp_path, title, scale):
 def test_all_that_is_simulated_is_drawn(drawn, tmp_path, count):
     p = np.linspace(-2, 2, count)
     simulated = np.array([p, p * (p - 1), np.full(count, 0.01)])
-    write_figure([series(simulated=simulated)], "p", MOMENT, "Title", [tmp_path / "figure.png"])
+    picture(tmp_path, series(simulated=simulated))
     dots = drawn[0].axes[0].containers[0].lines[0]
     np.testing.assert_array_equal(dots.get_xydata(), simulated[:2].T)
     assert "Monte Carlo ± 2 standard errors" in legend(drawn[0])
@@ -53,7 +58,7 @@ def test_all_that_is_simulated_is_drawn(drawn, tmp_path, count):
 
 @pytest.mark.parametrize(("count", "words"), [(33, "finite elements"), (100, "finite elements (not all marked)")])
 def test_legend_tells_that_markers_are_left_out(drawn, tmp_path, count, words):
-    write_figure([series(count)], "p", MOMENT, "Title", [tmp_path / "figure.png"])
+    picture(tmp_path, series(count))
     assert legend(drawn[0])[0] == words
 
 
@@ -69,7 +74,7 @@ def marks(figure):
 
 def test_stability_index_is_marked_on_the_zero_line(drawn, tmp_path):
     others = [series(root=1.0), series(), series(root=-0.5)]
-    write_figure(others, "p", MOMENT, "Title", [tmp_path / "figure.png"])
+    picture(tmp_path, *others)
     lines = [line for line in drawn[0].axes[0].lines if np.size(line.get_xdata())]
     curves = [line.get_color() for line in lines if line.get_marker() in ("o", "s", "D")]
     assert marks(drawn[0]) == [(1.0, 0.0, curves[0]), (-0.5, 0.0, curves[2])]
@@ -77,7 +82,7 @@ def test_stability_index_is_marked_on_the_zero_line(drawn, tmp_path):
 
 
 def test_no_entry_without_a_stability_index(drawn, tmp_path):
-    write_figure([series()], "p", MOMENT, "Title", [tmp_path / "figure.png"])
+    picture(tmp_path, series())
     assert not any("stability" in text for text in legend(drawn[0]))
 
 
@@ -88,7 +93,7 @@ def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
         density=np.ones((30, 20)), amplitude_edges=edges, amplitude_density=density, amplitude_error=0.01 * density,
         outside=0.0, impact_rate=1.0, time=1.0,
     )  # fmt: skip
-    write_response_figure(response, "Title", [tmp_path / "response.png"])
+    draw_response(CASE, SimpleNamespace(response=response, curve=CASE.curve({})), tmp_path)
     plane, radial, bar = drawn[0].axes
     labels = [plane.xaxis.label, plane.yaxis.label, bar.yaxis.label, radial.xaxis.label, radial.yaxis.label]
     units = ["(length)", "(length/time)", "(time/length²)", "(length)", "(1/length)"]
@@ -99,7 +104,7 @@ def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
 
 @pytest.mark.parametrize(("p", "count"), [("[-1.0, 2.0]", 1), ("[1.0, 2.0]", 0)])
 def test_stability_index_of_a_case_is_marked_where_p_reaches_it(drawn, tmp_path, p, count):
-    case = load_case(ROOT / "cases/minimal.toml", [f"moments.p={p}"])
+    case = load_case(CASE.path, [f"moments.p={p}"])
     results = solve_case(case)
     draw(case, results, [], tmp_path)
     found = [x for x, _, _ in marks(drawn[0])]
@@ -110,7 +115,7 @@ def test_theory_that_is_not_drawn_is_not_computed(drawn, tmp_path, monkeypatch):
     """Of many curves over a parameter: 200 points for each of 10,000 sets would take minutes."""
     over = 'vary={ mode = "zip", "noise.D0" = {start=0.1,stop=0.2,num=30}, "noise.tau0" = {start=0.5,stop=0.6,num=30} }'
     sets = [over, "expect=[]", 'figure={x="noise.D0",y="lyapunov_exponent"}', 'output.quantities=["lyapunov_exponent"]']
-    case = load_case(ROOT / "cases/minimal.toml", sets)
+    case = load_case(CASE.path, sets)
     results = solve_case(case)
     make, made = type(case).curve, []
     monkeypatch.setattr(type(case), "curve", lambda *arguments: made.append(1) or make(*arguments))

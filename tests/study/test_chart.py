@@ -209,9 +209,7 @@ def test_a_map_and_its_chart_share_a_folder(path, tmp_path):
     }
     held = json.loads((tmp_path / "plane" / "chart.json").read_text(encoding="utf-8"))["parameters"]
     assert not {"oscillator.omega", "noise.D0"} & held.keys()
-    traced = read_line(
-        tmp_path / "plane", ("noise.D0", "oscillator.omega"), Zero("moment", 2.0), case.curve({}).parameters
-    )
-    assert traced.is_whole
-    [branch] = traced.branches
+    keys, held = ("noise.D0", "oscillator.omega"), case.curve({}).parameters
+    [branch], is_whole = read_line(tmp_path / "plane", keys, Zero("moment", 2.0), held)
+    assert is_whole
     assert np.all((branch[0] >= 0.01) & (branch[0] <= 1.0) & (branch[1] >= 0.5) & (branch[1] <= 3.0))

@@ -179,7 +179,7 @@ def test_no_response_where_the_rest_is_stable(case, out, capsys):
 
 def test_run_adds_markers(case, out, capsys, monkeypatch):
     drawn = []
-    monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
+    monkeypatch.setattr(figures, "draw_series", lambda axes, case, series, *_: drawn.append(series))
     assert main(["run", str(case), "--out", str(out), "--monte-carlo"]) == 0
     assert (out / "quick/summary.json").exists()
     found = read(out / "quick/monte_carlo.json")["estimates"]
@@ -201,7 +201,7 @@ def test_run_adds_markers_over_a_parameter(case, out):
 def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, out, capsys, monkeypatch):
     drawn = []
     monkeypatch.setattr(simulated, "simulate_curve", raising(KeyboardInterrupt))
-    monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
+    monkeypatch.setattr(figures, "draw_series", lambda axes, case, series, *_: drawn.append(series))
     assert main(["run", str(case), "--out", str(out), "--monte-carlo"]) == 130
     ((series,),) = drawn
     assert series.simulated is None
@@ -221,7 +221,7 @@ def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, m
         return original(curve, *others)
 
     monkeypatch.setattr(simulated, "simulate_curve", failing_later)
-    monkeypatch.setattr(figures, "write_figure", lambda series, *_, **__: drawn.append(series))
+    monkeypatch.setattr(figures, "draw_series", lambda axes, case, series, *_: drawn.append(series))
     sets = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", "monte_carlo.time=100.0"]
     assert main(["run", str(case), "--out", str(out), "--monte-carlo", *sets]) == 3
     (series,) = drawn
