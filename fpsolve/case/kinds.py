@@ -15,10 +15,10 @@ from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
 from fpsolve.case.messages import nearest, refuse, shown, shown_with_kind
+from fpsolve.model.faults import fields_of
 from fpsolve.model.kinds import kind_names, noise_kind, system_kind
 from fpsolve.model.parameters import STRICT, Parametrised, parameter
 from fpsolve.model.problem import Problem
-from fpsolve.model.words import fields_of
 
 Half = Literal["system", "noise"]
 USUAL: Mapping[Half, str] = {"system": "vibro-impact", "noise": "ou-reduction"}

@@ -13,8 +13,8 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
+from fpsolve.model.faults import accepted, choices, fields_of
 from fpsolve.model.parameters import example_of, meaning_of
-from fpsolve.model.words import accepted, choices, fields_of
 
 _OWN, _RANGE = "own sentence", "range"
 LIST, TABLE = "<list>", "<table>"

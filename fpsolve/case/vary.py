@@ -29,9 +29,9 @@ from fpsolve.case.messages import (
 )
 from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.case.sections import MAX_MOMENTS, Sweep, Value, Values, flat, same
+from fpsolve.model.faults import accepted, choices
 from fpsolve.model.parameters import STRICT, meaning_of
 from fpsolve.model.quantity import Quantity
-from fpsolve.model.words import accepted, choices
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
 _WORDS = Words(

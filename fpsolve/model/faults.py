@@ -1,18 +1,24 @@
-"""What is wrong with the parameters of a dataclass, in a sentence for each fault instead of pydantic's text."""
+"""What a field accepts, and what is wrong with parameters: sentences read off types and ranges, not pydantic's."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
 from functools import wraps
-from typing import Any, TypeVar
+from itertools import chain
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import ValidationError
-from pydantic_core import InitErrorDetails
+from pydantic.fields import FieldInfo
 
 from fpsolve.model.parameters import meaning_of
-from fpsolve.model.words import accepted
 
 Kind = TypeVar("Kind")
+_BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+_NOUNS: dict[Any, str] = {float: "finite number", int: "whole number", str: "string"}
 
 
 class ParameterError(ValidationError):
@@ -49,13 +55,8 @@ def told_in_words(kind: type[Kind]) -> type[Kind]:
 
 def _in_words(error: ValidationError, kind: Any) -> ParameterError:
     """The same faults, with our text."""
-    details = error.errors(include_url=False)
-    faults = [
-        InitErrorDetails(type=each["type"], loc=each["loc"], input=each["input"], ctx=each.get("ctx", {}))
-        for each in details
-    ]
-    told = ParameterError.from_exception_data(error.title, faults)
-    assert isinstance(told, ParameterError)
+    details: list[Any] = error.errors(include_url=False)
+    told: Any = ParameterError.from_exception_data(error.title, details)
     told.text = "\n".join(f"{kind.__name__}: {_sentence(each, kind.__pydantic_fields__)}" for each in details)
     return told
 
@@ -70,9 +71,8 @@ def _sentence(detail: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
         return f"{what}: unknown; the parameters are {', '.join(fields)}"
     meaning = meaning_of(fields[name])
     must = f"must be {accepted(fields[name])}" + (f" ({meaning})" if meaning else "")
-    return (
-        f"{name}: missing; {must}" if detail["type"] == "missing" else f"{name}: got {_shown(detail['input'])}; {must}"
-    )
+    found = "missing" if detail["type"] == "missing" else f"got {_shown(detail['input'])}"
+    return f"{name}: {found}; {must}"
 
 
 def _shown(value: Any) -> str:
@@ -82,3 +82,57 @@ def _shown(value: Any) -> str:
     except ValueError:  # of a whole number with thousands of digits
         return "a number too long to show"
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def accepted(field: FieldInfo) -> str:
+    """The range of a key, read off its field: "a finite number > 0 and <= 1"."""
+    texts = choices(field.annotation)
+    if texts:
+        return "one of " + ", ".join(f'"{text}"' for text in texts)
+    bounds = (
+        f"{sign} {_number(getattr(constraint, name))}"
+        for constraint in field.metadata
+        for name, sign in _BOUNDS.items()
+        if hasattr(constraint, name)
+    )
+    return f"a {_not_empty(field.metadata)}{_noun(field.annotation)} {' and '.join(bounds)}".rstrip()
+
+
+def _not_empty(metadata: Iterable[Any]) -> str:
+    return "non-empty " if any(hasattr(constraint, "min_length") for constraint in metadata) else ""
+
+
+def _number(bound: float) -> str:
+    """5/3, and the float below it, as 5/3, not as 1.6666666666666667; 1e15 as it stands here."""
+    fraction = Fraction(bound).limit_denominator(99)
+    is_simple = fraction.denominator > 1 and math.isclose(fraction, bound, rel_tol=1e-15)
+    return str(fraction) if is_simple or isinstance(bound, int) else re.sub(r"e\+?(-?)0*", r"e\1", f"{bound:g}")
+
+
+def choices(annotation: Any) -> list[str]:
+    """The texts that an annotation takes, if these are all."""
+    if get_origin(annotation) is Literal:
+        return list(get_args(annotation))
+    return [member.value for member in getattr(annotation, "__members__", {}).values()]
+
+
+def fields_of(annotation: Any) -> Mapping[str, FieldInfo]:
+    """The fields of a model, or of a kind of system or noise, as in a table of a case file; of others nothing."""
+    return {**getattr(annotation, "__pydantic_fields__", {}), **getattr(annotation, "stated", {})}
+
+
+def _noun(annotation: Any, plural: str = "") -> str:
+    """An annotation in words: tuple[float, ...] as "list of finite numbers"."""
+    if fields := fields_of(annotation):
+        return f"table{plural} with the keys {', '.join(fields)}"
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        inner = chain.from_iterable(getattr(extra, "metadata", ()) for extra in arguments[1:])
+        return _not_empty(inner) + _noun(arguments[0], plural)
+    if origin in (Union, UnionType):
+        return " or a ".join(_noun(argument, plural) for argument in arguments if argument is not NoneType)
+    if origin is tuple:
+        return f"list{plural} of {_noun(arguments[0], 's')}"
+    if origin is dict:
+        return f"table{plural} of {_noun(arguments[1], 's')}"
+    return _NOUNS.get(annotation, "value") + plural

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from functools import cache
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self, cast
 
 from pydantic import ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -46,18 +46,17 @@ def parameter(
 
 def example_of(field: FieldInfo) -> str:
     """The line of TOML that states a `parameter`, or nothing."""
-    [example] = field.examples or [""]
-    return str(example)
+    return str((field.examples or [""])[0])
 
 
 def symbol_of(field: FieldInfo) -> str:
     """The symbol of a `parameter` in LaTeX, or nothing."""
-    return _extra(field, "symbol")
+    return _extra(field).get("symbol", "")
 
 
 def unit_of(field: FieldInfo) -> str:
     """The unit of a `parameter`, or nothing."""
-    return _extra(field, "unit")
+    return _extra(field).get("unit", "")
 
 
 def meaning_of(field: FieldInfo) -> str:
@@ -66,9 +65,8 @@ def meaning_of(field: FieldInfo) -> str:
     return f"{meaning}, in {unit}" if unit else meaning
 
 
-def _extra(field: FieldInfo, name: str) -> str:
-    extra = field.json_schema_extra
-    return str(extra[name]) if isinstance(extra, dict) else ""
+def _extra(field: FieldInfo) -> Mapping[str, str]:
+    return cast("Mapping[str, str]", field.json_schema_extra or {})
 
 
 def stated_field(annotation: Any, default: Any = ...) -> FieldInfo:

@@ -276,12 +276,12 @@ def matrix_at(system: System, xi: ArrayLike, orders: slice = slice(None)) -> Flo
 
 def phase_speed(system: System, xi: ArrayLike) -> Harmonics:
     """dφ/dt at ξ as a function of φ: in Eq. (17) ω + ε h₁ξ + ε² h₂."""
-    return _total(system, [term.h for term in system.terms], xi)
+    return turning(matrix_at(system, xi))
 
 
 def growth_rate(system: System, xi: ArrayLike) -> Harmonics:
     """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
-    return _total(system, [term.q for term in system.terms], xi)
+    return stretching(matrix_at(system, xi))
 
 
 def crosses_both_ways(system: System, jump: Jump, xi: ArrayLike) -> bool:
@@ -299,26 +299,14 @@ def is_steady(system: System, jump: Jump) -> bool:
 
 def turning_noise(system: System, jump: Jump, ends: FloatArray) -> FloatArray:
     """The ξ between two ends for which the phase turns at the ray of a jump, from forward to backward or back."""
+
+    def speed(xi: ArrayLike) -> FloatArray:
+        return phase_speed(system, xi)(jump.phase)
+
     xi = np.linspace(ends[0], ends[1], SAMPLES)
-    backward = phase_speed(system, xi)(jump.phase) < 0
+    backward = speed(xi) < 0
     at = np.flatnonzero(backward[1:] != backward[:-1])
-
-    def speed(xi: float) -> float:
-        return float(phase_speed(system, xi)(jump.phase))
-
     return np.array([brentq(speed, xi[i], xi[i + 1], xtol=1e-14, rtol=1e-14) for i in at])
-
-
-def _total(system: System, parts: Sequence[Harmonics], xi: ArrayLike) -> Harmonics:
-    """Σ ε^n g(ξ) of the harmonics of all terms."""
-    xi = np.asarray(xi, dtype=float)
-    sizes = [system.epsilon**term.order * term.g(xi) for term in system.terms]
-    return Harmonics(
-        *(
-            sum((size * getattr(part, name) for size, part in zip(sizes, parts, strict=True)), start=np.zeros_like(xi))
-            for name in ("mean", "cosine", "sine")
-        )
-    )
 
 
 def squared_frequency(a: FloatArray) -> FloatArray:

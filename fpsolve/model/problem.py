@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from textwrap import wrap
@@ -108,16 +108,22 @@ class Problem:
         """∂/∂θ by one of the `differentiable` parameters. Raises `ValueError` for others."""
         if key not in self.differentiable:
             raise ValueError(f"got {key}; the parameters to differentiate by are {', '.join(self.differentiable)}")
-        section, _, name = key.partition(".")
-        theta = float(self.values[key])
-        if section == self.noise.section:
-            return ParameterDerivative(theta, noise=self.noise.derivative(name))
-        terms, jumps = self.system.derivative(name)
-        return ParameterDerivative(theta, terms, jumps)
+        return self._derivatives([key])[key]
 
     def derivatives(self) -> Mapping[str, ParameterDerivative]:
         """∂/∂θ by all of the `differentiable` parameters, by their keys."""
-        return {key: self.derivative(key) for key in self.differentiable}
+        return self._derivatives(self.differentiable)
+
+    def _derivatives(self, keys: Sequence[str]) -> Mapping[str, ParameterDerivative]:
+        values, found = self.values, {}
+        for key in keys:
+            section, _, name = key.partition(".")
+            theta = float(values[key])
+            if section == self.noise.section:
+                found[key] = ParameterDerivative(theta, noise=self.noise.derivative(name))
+            else:
+                found[key] = ParameterDerivative(theta, *self.system.derivative(name))
+        return found
 
     @property
     def noise_quantity(self) -> Quantity:
@@ -143,10 +149,8 @@ def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str
 
 def _valued(parameter: Parameter) -> str:
     """The value of a parameter with its unit."""
-    value, unit = parameter.value, parameter.quantity.unit
-    if isinstance(value, str) or unit in ("1", "unknown"):
-        return value if isinstance(value, str) else f"{value:g}"
-    return f"{value:g} ({unit})"
+    text = parameter.value if isinstance(parameter.value, str) else f"{parameter.value:g}"
+    return text if parameter.quantity.unit in ("1", "unknown") else f"{text} ({parameter.quantity.unit})"
 
 
 def with_original(problem: Problem, original: Any) -> Problem:
@@ -231,11 +235,7 @@ def of_problem(function: Callable[Concatenate[Problem, P], R_co]) -> OfProblem[P
 def of_problem_too(method: Callable[..., None]) -> Callable[..., None]:
     """The same for a method, such as `__init__`."""
 
-    @wraps(method)
-    def with_pair(self: Any, *args: Any, **kwargs: Any) -> None:
-        method(self, *problem_first(args, kwargs), **kwargs)
-
-    return with_pair
+    return wraps(method)(lambda self, *args, **kwargs: method(self, *problem_first(args, kwargs), **kwargs))
 
 
 def problem_first(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[Any, ...]:

@@ -15,7 +15,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.kinds import kinds_of, parameters_of, sections_of
 from fpsolve.case.vary import values_of
 from fpsolve.exponent.adapt import Budget
-from fpsolve.model import words
+from fpsolve.model import faults
 from fpsolve.model.kinds import parameter_of
 from fpsolve.model.parameters import STRICT, example_of, symbol_of
 from fpsolve.model.quantity import P
@@ -24,7 +24,7 @@ from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 def fields_of(annotation: Any) -> Mapping[str, FieldInfo]:
     """Those of the model in an annotation, if there is one."""
-    return words.fields_of(annotation) or next(filter(None, map(fields_of, get_args(annotation))), {})
+    return faults.fields_of(annotation) or next(filter(None, map(fields_of, get_args(annotation))), {})
 
 
 def records(fields: Mapping[str, FieldInfo], section: str = "") -> Iterator[tuple[str, FieldInfo]]:

@@ -22,23 +22,12 @@ from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, LinearStep, linear_step
 from fpsolve.model.parameters import SIZE, STRICT, parameter, stated_field
 
-Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
-CorrelationTime = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
 Departure = Annotated[
     float,
     parameter(
         "departure from Gaussian noise; from 5/3 on the variance (10) is infinite", "r0 = 0.95", "$r_0$", ge=-1e6
     ),
 ]
-TREATMENT = {
-    "treatment": stated_field(
-        Annotated[
-            Literal["ou-reduction", "exact"],
-            parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"'),
-        ],
-        "ou-reduction",
-    )
-}
 NEAR_GAUSSIAN = 0.1
 """|r₀ − 1| up to which the reduction is made."""
 _SMALL = 0.05
@@ -90,16 +79,27 @@ class ImplicitStep(NamedTuple):
             xi_mean[i] = 0.5 * (xi[i] + xi_end[i])
 
 
+@dataclass(frozen=True, config=STRICT)
 class TreatedNoise(Noise):
     """The noise of Eq. (7), taken as it stands or replaced by its reduction: a word, the treatment, tells which."""
 
-    D0: float
-    tau0: float
-    r0: float
+    D0: Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
+    tau0: Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
+    r0: Departure
+
+    stated: ClassVar[Mapping[str, FieldInfo]] = {
+        "treatment": stated_field(
+            Annotated[
+                Literal["ou-reduction", "exact"],
+                parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"'),
+            ],
+            "ou-reduction",
+        )
+    }
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> TreatedNoise:
-        words = {name: value for name, value in table.items() if name in TREATMENT}
+        words = {name: value for name, value in table.items() if name in cls.stated}
         return cls(**{name: value for name, value in table.items() if name not in words}).at(words)
 
     def at(self, values: Mapping[str, float | str]) -> TreatedNoise:
@@ -127,13 +127,10 @@ class NonGaussianNoise(TreatedNoise):
         ParameterError: a parameter is not a finite number in its range.
     """
 
-    D0: Intensity
-    tau0: CorrelationTime
     r0: Annotated[Departure, Field(lt=3)]
 
     kind: ClassVar[str] = "non-gaussian"
     words: ClassVar[Mapping[str, str]] = {"treatment": "exact"}
-    stated: ClassVar[Mapping[str, FieldInfo]] = TREATMENT
     approximates_spectrum: ClassVar[bool] = True
     tails_beyond: ClassVar[tuple[str, float, str] | None] = "r0", 1.0, 'use treatment = "ou-reduction"'
 
@@ -198,10 +195,6 @@ class NonGaussianNoise(TreatedNoise):
         with np.errstate(invalid="ignore", divide="ignore"):
             power = xlog1py(-1 / (self.r0 - 1), bracket)
         return np.where(bracket > -1, power, -math.inf) - self._log_normalisation
-
-    def density(self, xi: ArrayLike) -> FloatArray:
-        """P_s(ξ) of Eq. (9); 0 outside the support."""
-        return np.exp(self.log_density(xi))
 
     @property
     def _log_normalisation(self) -> float:
@@ -311,13 +304,10 @@ class ReducedNoise(TreatedNoise, GaussianNoise):
         ParameterError: a parameter is not a finite number in its range.
     """
 
-    D0: Intensity
-    tau0: CorrelationTime
     r0: Annotated[Departure, Field(lt=math.nextafter(5 / 3, 0))]  # at which 5 - 3 r0 is 0 already
 
     kind: ClassVar[str] = "ou-reduction"
     words: ClassVar[Mapping[str, str]] = {"treatment": "ou-reduction"}
-    stated: ClassVar[Mapping[str, FieldInfo]] = TREATMENT
 
     @property
     def alpha(self) -> float:  # type: ignore[override]

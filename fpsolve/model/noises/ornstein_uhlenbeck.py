@@ -101,10 +101,6 @@ class GaussianNoise(Noise):
         z = np.asarray(xi, dtype=float) / self.standard_deviation
         return -0.5 * z**2 - math.log(math.sqrt(2 * math.pi) * self.standard_deviation)
 
-    def density(self, xi: ArrayLike) -> FloatArray:
-        """Gaussian density with variance σ₀²/(2α₀)."""
-        return np.exp(self.log_density(xi))
-
     def spectral_density(self, omega: float) -> float:
         """S(ω) = σ₀²/(α₀² + ω²), Eq. (16)."""
         return self.sigma**2 / (self.alpha**2 + omega**2)

@@ -10,10 +10,11 @@ from functools import wraps
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import FloatArray, identity
+from fpsolve.arrays import FloatArray, identity, one
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
 from fpsolve.model.quantity import Quantity
@@ -202,15 +203,9 @@ class PlaneSystem(System):
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> PlaneSystem:
         named = {name: value for name, value in table.items() if name not in cls.stated}
-        stated: Sequence[StatedTerm] = table["terms"]
         terms = [
-            (
-                each.factor,
-                CoefficientMatrix(each.order, each.matrix, identity)
-                if each.noise
-                else CoefficientMatrix(each.order, each.matrix),
-            )
-            for each in stated
+            (each.factor, CoefficientMatrix(each.order, each.matrix, identity if each.noise else one))
+            for each in table["terms"]
         ]
         jumps = [Jump(each.phase, each.log_factor) for each in table.get("jumps", ())]
         return cls.of_terms(terms, jumps, **named)
@@ -251,7 +246,8 @@ class PlaneSystem(System):
             raise ValueError(
                 f"the terms, their g or the rays of the jumps change with {name}; only matrices and ln R may"
             )
-        weights = _slope_weights(x) / half
+        polynomials = np.linalg.inv(chebyshev.chebvander(x, NODES - 1))  # by their values at x
+        weights = np.asarray(chebyshev.chebval(0.0, chebyshev.chebder(polynomials))) / half
         matrices = _weighed(weights, [[term.matrix for term in terms] for terms, _ in around])
         slopes = _weighed(weights, [[jump.log_factor for jump in jumps] for _, jumps in around])
         changed = [replace(term, matrix=a.tolist()) for term, a in zip(self.terms, matrices, strict=True) if a.any()]
@@ -262,12 +258,8 @@ def _parts(
     build: Callable[..., Parts], named: Mapping[str, float]
 ) -> tuple[Sequence[CoefficientMatrix], Sequence[Jump]]:
     """The terms and the jumps that a function makes."""
-    made: Any = build(**named)
-    return (
-        made
-        if isinstance(made, tuple) and len(made) == 2 and not isinstance(made[0], CoefficientMatrix)
-        else (made, ())
-    )
+    made: Any = tuple(build(**named))
+    return (made, ()) if not made or isinstance(made[-1], CoefficientMatrix) else made
 
 
 def _form(parts: tuple[Sequence[CoefficientMatrix], Sequence[Jump]]) -> tuple[Any, ...]:
@@ -281,14 +273,3 @@ def _weighed(weights: FloatArray, values: Any) -> FloatArray:
     values = np.array(values)
     total, sizes = (np.tensordot(w, v, 1) for w, v in ((weights, values), (np.abs(weights), np.abs(values))))
     return np.where(np.abs(total) > 1e-14 * sizes, total, 0.0)
-
-
-def _slope_weights(x: FloatArray) -> FloatArray:
-    """The weights of the values at some points of [-1, 1] in the slope at 0 of the polynomial through them."""
-    return np.asarray(np.linalg.solve(np.polynomial.chebyshev.chebvander(x, x.size - 1).T, _chebyshev_slopes(x.size)))
-
-
-def _chebyshev_slopes(count: int) -> FloatArray:
-    """T_k′(0) for k < count: k sin(kπ/2)."""
-    k = np.arange(count)
-    return np.asarray(k * np.sin(k * np.pi / 2), dtype=float)
