@@ -20,17 +20,18 @@ from pydantic import (
 )
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.chart import ChartSection
-from fpsolve.case.figure import FigureSection
 from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of, varying, with_system
 from fpsolve.case.messages import explain, refuse, shortened
-from fpsolve.case.output import EIGENFUNCTIONS, OutputSection
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
+    EIGENFUNCTIONS,
+    ChartSection,
     Expectation,
+    FigureSection,
     MeshSection,
     Moments,
     MonteCarloSection,
+    OutputSection,
     Section,
     Text,
     Value,

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from copy import copy
 from functools import lru_cache
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import ValidationError, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
-from fpsolve.case.messages import nearest, refuse, shown, shown_with_kind
+from fpsolve.case.messages import nearest, refuse, shown_with_kind
 from fpsolve.model.faults import fields_of
 from fpsolve.model.kinds import kind_names, noise_kind, system_kind
 from fpsolve.model.parameters import STRICT, Parametrised, parameter
@@ -23,8 +23,6 @@ from fpsolve.model.problem import Problem
 Half = Literal["system", "noise"]
 USUAL: Mapping[Half, str] = {"system": "vibro-impact", "noise": "ou-reduction"}
 """The kinds of sections that name none."""
-_ROOMS: Mapping[Half, Literal["systems", "noises"]] = {"system": "systems", "noise": "noises"}
-_CLASSES: Mapping[Half, Callable[[str], type[Parametrised]]] = {"system": system_kind, "noise": noise_kind}
 
 
 def with_system(data: Any) -> Any:
@@ -43,60 +41,51 @@ def half_of(half: Half, table: Any) -> Any:
     Raises:
         ValidationError: with all that is wrong with it.
     """
-    if isinstance(table, Parametrised):
-        return table
     if not isinstance(table, dict):
-        fault = InitErrorDetails(type="dataclass_type", loc=(), input=table, ctx={"class_name": half})
-        raise ValidationError.from_exception_data(half, [fault])
-    name = table.get("kind")
-    kind, known = _kind(half, name), {key: value for key, value in table.items() if key != "kind"}
-    kind_fields, faults = fields_of(kind), list[InitErrorDetails]()
-    for key in [] if kind.takes_any else [key for key in known if key not in kind_fields]:
-        faults.append(InitErrorDetails(type="unexpected_keyword_argument", loc=(key,), input=known.pop(key)))
-    for word, field in kind.stated.items():
-        if word in known and word in kind.words and name is not None:
-            faults.append(InitErrorDetails(type="unexpected_keyword_argument", loc=(word,), input=known.pop(word)))
-        elif word in known:
-            try:
-                accepted: Any = Annotated[field.annotation, Field(), *field.metadata]
-                known[word] = TypeAdapter[Any](accepted, config=STRICT).validate_python(known[word])
-            except ValidationError as error:
-                faults += _details(error, (word,))
-                del known[word]
-        elif field.is_required():
-            faults.append(InitErrorDetails(type="missing", loc=(word,), input=table))
-    if faults and any(field.is_required() for field in kind.stated.values()):
-        raise ValidationError.from_exception_data(half, faults)
+        return table
+    name, known = table.get("kind"), {key: value for key, value in table.items() if key != "kind"}
+    kind = _kind(half, name)
+    foreign = set(known) - (set(known) if kind.takes_any else set(fields_of(kind)))
+    foreign |= set(kind.words) & set(kind.stated) & set(known) if name is not None else set()
+    faults = [
+        InitErrorDetails(type="unexpected_keyword_argument", loc=(key,), input=known.pop(key))
+        for key in table
+        if key in foreign
+    ]
+    given = {word: known.pop(word) for word in kind.stated if word in known}
+    fields: Any = {word: (field.annotation, field) for word, field in kind.stated.items()}
     try:
-        made = kind.from_table(known)
+        said = create_model(half, __config__=STRICT, **fields).model_validate(given)
+        known |= {word: getattr(said, word) for word in given}
     except ValidationError as error:
-        raise ValidationError.from_exception_data(half, [*faults, *_details(error)]) from None
-    except (ValueError, TypeError) as error:
-        if not faults:
-            refuse([((), table, str(error))])
-    if faults:
-        raise ValidationError.from_exception_data(half, faults)
+        faults += _details(error)
+    if not (faults and any(field.is_required() for field in kind.stated.values())):
+        try:
+            made = kind.from_table(known)
+        except ValidationError as error:
+            faults += _details(error)
+        except (ValueError, TypeError) as error:
+            if not faults:
+                raise ValueError(str(error)) from None
+    refuse([], faults)
     return made
 
 
-def _details(error: ValidationError, place: tuple[str, ...] = ()) -> list[InitErrorDetails]:
-    """The faults of an error as those at a place."""
+def _details(error: ValidationError) -> list[InitErrorDetails]:
     return [
-        InitErrorDetails(type=each["type"], loc=(*place, *each["loc"]), input=each["input"], ctx=each.get("ctx", {}))
+        InitErrorDetails(type=each["type"], loc=each["loc"], input=each["input"], ctx=each.get("ctx", {}))
         for each in error.errors(include_url=False)
     ]
 
 
 def _kind(half: Half, name: Any) -> type[Parametrised]:
     """The class of a kind; without a name the usual one."""
-    names = kind_names(_ROOMS[half]) if name is not None else ()
+    names = kind_names("systems" if half == "system" else "noises") if name is not None else ()
     if name is not None and name not in names:
-        guess = nearest(name, names) if isinstance(name, str) else ""
-        got = shown(name) if isinstance(name, str) else shown_with_kind(name)
-        text = f"got {got}; must be one of {', '.join(names)};{guess} write, for example, kind = "
-        refuse([(("kind",), name, f'{text}"{names[0]}"')])
+        text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
+        refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
     try:
-        return _CLASSES[half](name or USUAL[half])
+        return (system_kind if half == "system" else noise_kind)(name or USUAL[half])
     except ValueError as error:
         refuse([(("kind",), name, f"{error}; mend its package, or write another kind")])
         raise
@@ -117,18 +106,15 @@ def kinds_of(data: Mapping[str, Any]) -> dict[Half, type[Parametrised]]:
 def sections_of(fields: Mapping[str, FieldInfo], data: Mapping[str, Any]) -> dict[str, FieldInfo]:
     """The fields of a case with the kinds that its tables name, and [system] by its name in the file."""
     found = dict[str, FieldInfo]()
-    kinds = kinds_of(data)
+    kinds: Mapping[str, type[Parametrised]] = kinds_of(data)  # type: ignore[assignment]
     for name, field in fields.items():
-        if name not in kinds:
-            found[name] = field
-            continue
-        half: Half = "system" if name == "system" else "noise"
-        section = "oscillator" if half == "system" and "system" not in data else name
-        is_named = isinstance(data.get(section), dict) and "kind" in data[section]
-        found[section] = described = copy(field)
-        described.annotation = kinds[half]
-        if section == "system" or is_named:
-            described.description, described.examples = f"{half} of a kind", [f"[{section}]"]
+        section = "oscillator" if name == "system" in kinds and "system" not in data else name
+        found[section] = field
+        if name in kinds:
+            found[section] = described = copy(field)
+            described.annotation = kinds[name]
+            if section == "system" or (isinstance(data.get(section), dict) and "kind" in data[section]):
+                described.description, described.examples = f"{name} of a kind", [f"[{section}]"]
     return found
 
 
@@ -140,28 +126,21 @@ def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[
         context: with the kinds that the tables name.
     """
     found = dict[str, FieldInfo]()
+    unbounded = parameter("a parameter", "")
+    unbounded.annotation = float
     for half in USUAL:
         made = valid.get(half)
         kind = context.get("kinds", {}).get(half) or (None if made is None else type(made))
         if kind is None or (made is None and not kind.fields()):
             return None
-        fields = fields_of(kind)
         names = made.values if made is not None else {**kind.fields(), **kind.words}
-        found |= {f"{kind.section}.{name}": fields.get(name) or _unbounded() for name in names}
+        found |= {f"{kind.section}.{name}": fields_of(kind).get(name, unbounded) for name in names}
     return found
-
-
-def _unbounded() -> FieldInfo:
-    """A parameter of which no range is stated."""
-    field = parameter("a parameter", "")
-    field.annotation = float
-    return field
 
 
 def problem_of(valid: Mapping[str, Any]) -> Problem | None:
     """The problem of the sections that are valid, if both halves are."""
-    halves = valid.get("system"), valid.get("noise")
-    return None if None in halves else Problem(*halves)  # type: ignore[arg-type]
+    return Problem(valid["system"], valid["noise"]) if {"system", "noise"} <= valid.keys() else None
 
 
 def varying(problem: Problem) -> Callable[[Mapping[str, float | str]], Problem]:
@@ -173,12 +152,10 @@ def varying(problem: Problem) -> Callable[[Mapping[str, float | str]], Problem]:
         return changed.system if section == problem.system.section else changed.noise
 
     def at(varied: Mapping[str, float | str]) -> Problem:
-        sections = (each.section for each in problem.halves)
-        return Problem(
-            *(
-                half(section, tuple(item for item in varied.items() if item[0].partition(".")[0] == section))
-                for section in sections
-            )
+        system, noise = (
+            half(each.section, tuple(item for item in varied.items() if item[0].partition(".")[0] == each.section))
+            for each in problem.halves
         )
+        return Problem(system, noise)
 
     return at

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Any, get_args
@@ -17,7 +17,8 @@ from fpsolve.model.faults import accepted, choices, fields_of
 from fpsolve.model.parameters import example_of, meaning_of
 
 _OWN, _RANGE = "own sentence", "range"
-LIST, TABLE = "<list>", "<table>"
+LIST = "<list>"
+TABLE = "<table>"
 """Tags of a discriminated union: parts of pydantic's error locations that are no keys."""
 DEPENDENT = "cannot be judged, as the kinds of the system and the noise are not known; mend these"
 """Of a section; which kinds are wrong is another fault."""
@@ -29,35 +30,29 @@ Refusal = tuple[Path, Any, str]
 """Where, which value, and why; an empty sentence stands for "not what this key accepts"."""
 
 
-def refuse(refusals: Iterable[Refusal]) -> None:
-    """Raise all refusals of a validator at once; without any, do nothing."""
+def refuse(refusals: Iterable[Refusal], others: Iterable[InitErrorDetails] = ()) -> None:
+    """Raise all refusals of a validator, and other errors, at once; without any, do nothing."""
     details = [
         InitErrorDetails(type=PydanticCustomError(_OWN if text else _RANGE, text), loc=path, input=value)
         for path, value, text in refusals
     ]
-    if details:
+    if details := [*others, *details]:
         raise ValidationError.from_exception_data("case", details)
 
 
-def repeated_or_unknown(
-    names: Sequence[Any], known: Sequence[str], unknown: Callable[[str, str], str]
-) -> Iterator[Refusal]:
-    """Each name of a list that is not known, or stands there already.
-
-    Args:
-        unknown: makes the sentence on an unknown name, from how that is shown and from the guess what was meant.
-    """
-    for i, name in enumerate(names):
-        if name not in known:
-            guess = nearest(name, known) if isinstance(name, str) else ""
-            yield (i,), name, unknown(shown_with_kind(name), guess)
-        elif name in names[:i]:
-            yield (i,), name, f"got {shown(name)} twice; names must be distinct; remove one"
+def is_list(value: Any) -> bool:
+    """Whether a value is a list of TOML, or a tuple of Python."""
+    return isinstance(value, list | tuple)
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def quoted(names: Iterable[str]) -> str:
+    """Names as TOML lists them."""
+    return ", ".join(f'"{name}"' for name in names)
+
+
+def nearest(name: Any, known: Iterable[str]) -> str:
     """' did you mean "omega"?' or nothing."""
-    guess = _guess(name, known)
+    guess = _guess(name, known) if type(name) is str else None
     return f' did you mean "{guess}"?' if guess else ""
 
 
@@ -72,15 +67,14 @@ def _guess(name: str, known: Iterable[str]) -> str | None:
 def shown(value: Any) -> str:
     """A value as TOML writes it, cut to a readable length."""
     try:
-        text = _toml(value)
+        return shortened(_toml(value))
     except (ValueError, RecursionError):
-        text = "a value too long to show"
-    return shortened(text)
+        return "a value too long to show"
 
 
-def shown_with_kind(value: Any) -> str:
-    """The same with what it is: "3 (a number)"."""
-    return f"{shown(value)} ({_KINDS.get(type(value), 'a date or time')})"
+def shown_with_kind(value: Any, *, but: type | None = None) -> str:
+    """The same with what it is, but for one kind: "3 (a number)"."""
+    return shown(value) if type(value) is but else f"{shown(value)} ({_KINDS.get(type(value), 'a date or time')})"
 
 
 def shortened(text: str) -> str:
@@ -89,20 +83,16 @@ def shortened(text: str) -> str:
 
 
 def _toml(value: Any) -> str:
-    if isinstance(value, bool | str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, list | tuple):
+    if is_list(value):
         return f"[{', '.join(map(_toml, value))}]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
-    return str(value)
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, bool | str) else str(value)
 
 
-def own_faults(error: ValidationError) -> Iterator[ErrorDetails]:
+def faults_in(error: ValidationError) -> Iterator[ErrorDetails]:
     """What pydantic found, without calling a list too short only because its entries are wrong."""
-    for detail in error.errors(include_url=False):
-        if detail["type"] != "too_short" or not detail["input"]:
-            yield detail
+    return (each for each in error.errors(include_url=False) if each["type"] != "too_short" or not each["input"])
 
 
 def too_long(detail: Mapping[str, Any]) -> str:
@@ -124,19 +114,16 @@ def explain(
         fields: of that model.
         varied: the ranges of the values of [vary].
     """
-    faults = [(tuple(part for part in each["loc"] if part not in (LIST, TABLE)), each) for each in own_faults(error)]
+    faults = [(tuple(part for part in each["loc"] if part not in (LIST, TABLE)), each) for each in faults_in(error)]
     if "system" not in fields:  # the file calls it otherwise
         faults = [(("oscillator", *path[1:]) if path[:1] == ("system",) else path, each) for path, each in faults]
-    misspelt = {_meant(path, fields) for path, detail in faults if detail["type"] in _UNKNOWN}
+    misspelt = set[Path]()
+    for path, detail in faults:
+        if detail["type"] in _UNKNOWN and (guess := _guess(str(path[-1]), _known_keys(path, fields))):
+            misspelt.add((*path[:-1], *guess.split(".")))
     for path, detail in faults:
         if (detail["type"] != "missing" or path not in misspelt) and detail["msg"] != DEPENDENT:
             yield path, _key(path), _sentence(path, dict(detail), fields, varied)
-
-
-def _meant(path: Path, fields: Mapping[str, FieldInfo]) -> Path | None:
-    """The path of the known key that an unknown one is most like."""
-    guess = _guess(str(path[-1]), _known_keys(path, fields))
-    return (*path[:-1], *guess.split(".")) if guess else None
 
 
 def _known_keys(path: Path, fields: Mapping[str, FieldInfo]) -> list[str]:
@@ -150,20 +137,19 @@ def _key(path: Path) -> str:
     text = ""
     for part in path:
         quoted = str(part) if re.fullmatch(r"[\w-]+", str(part)) else json.dumps(part, ensure_ascii=False)
-        text += f"[{part}]" if isinstance(part, int) else f".{quoted}" if text else quoted
+        text += f"[{part}]" if type(part) is int else f".{quoted}" if text else quoted
     return text
 
 
 def _sentence(
     path: Path, detail: Mapping[str, Any], fields: Mapping[str, FieldInfo], varied: Mapping[str, FieldInfo]
 ) -> str:
-    if detail["type"] == _OWN:
-        return str(detail["msg"])
-    if detail["type"] == "value_error":
-        return str(detail["ctx"]["error"])
-    if detail["type"] == "too_long":
+    kind, value = detail["type"], detail["input"]
+    if kind in (_OWN, "value_error"):
+        return str(detail["msg"] if kind == _OWN else detail["ctx"]["error"])
+    if kind == "too_long":
         return too_long(detail)
-    if detail["type"] in _UNKNOWN:
+    if kind in _UNKNOWN:
         known = _known_keys(path, fields)
         beside = ", ".join(key for key in known if "." not in key)
         return f"unknown key;{nearest(str(path[-1]), known)} known keys: {beside}; rename or remove it"
@@ -173,18 +159,12 @@ def _sentence(
     if is_varied:
         example = example_of(fields["vary"])
         must = must.replace("be", "be a non-empty list, each entry", 1) if len(path) == 2 else must
-    if detail["type"] == "missing":
+    if kind == "missing":
         return f"missing; {must}; add it, for example {example}"
-    value = detail["input"]
-    guess = nearest(value, choices(field.annotation)) if isinstance(value, str) else ""
-    return f"got {shown(value)}{_kind(value, detail['type'])}; {must};{guess} write, for example, {example}"
-
-
-def _kind(value: Any, error_type: str) -> str:
-    is_range = error_type == _RANGE and type(value) in (int, float)
-    if is_range or not error_type.endswith((_RANGE, "_type", "_not_found")):
-        return ""
-    return f" ({_KINDS.get(type(value), 'a date or time')})"
+    is_number = kind == _RANGE and type(value) in (int, float)  # of the right type, and out of range
+    has_kind = kind.endswith((_RANGE, "_type", "_not_found", "_instance_of")) and not is_number
+    got = shown_with_kind(value) if has_kind else shown(value)
+    return f"got {got}; {must};{nearest(value, choices(field.annotation))} write, for example, {example}"
 
 
 def _beside(path: Path, fields: Mapping[str, FieldInfo]) -> tuple[Mapping[str, FieldInfo], FieldInfo]:

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import stat
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 _MARK = b"\xef\xbb\xbf"
 
 
 class Unreadable(Exception):
-    """A file that is no text.
-
-    Attributes:
-        sentence: why, and what to do.
-        line: where; None where that is not in the file.
-    """
+    """A file that is no text: a sentence on why, and what to do; the line, where that is in the file."""
 
     def __init__(self, sentence: str, line: int | None = None) -> None:
         super().__init__(sentence)
         self.sentence, self.line = sentence, line
 
 
-@dataclass(frozen=True)
-class Words:
+class Words(NamedTuple):
     """What messages on a file speak of.
 
     Attributes:

@@ -9,30 +9,33 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from itertools import product
+from itertools import islice, product
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
 
-from fpsolve.analysis.zero import said
-from fpsolve.arrays import FloatArray
-from fpsolve.case.chart import ChartAxis, ChartSection
-from fpsolve.case.figure import FigureSection, figure_refusals
+from fpsolve.analysis.zero import axis_faults, said
+from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of, varying
-from fpsolve.case.messages import Refusal, nearest, shown
-from fpsolve.case.output import OutputSection
+from fpsolve.case.messages import Refusal, faults_in, nearest, shown
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
+    ChartAxis,
+    ChartSection,
     Expectation,
+    FigureSection,
     MeshSection,
     Moments,
     MonteCarloSection,
+    OutputSection,
     Varied,
     same,
 )
-from fpsolve.case.vary import FileVary, Vary, assignments
+from fpsolve.case.vary import Vary, assignments, map_key, values_of
 from fpsolve.errors import FpsolveError, MeshError, NoSuchExponent
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.mesh import CylinderMesh
@@ -47,26 +50,20 @@ _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones n
 
 def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
     is_varied = context.get("varies", False)  # then the curves decide which moments exist
-    return _of_curves({**valid, "moments": moments}, Vary(), with_existence=not is_varied)
+    found = _unsolvable({**valid, "moments": moments}, Vary(), with_existence=not is_varied)
+    return (((), None, text) for _, text in islice(found, 1))
 
 
 def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
-    """Too many curves, or one that cannot be solved; of a file every one."""
+    """Too many curves, or the first one that cannot be solved; of a file every one."""
     if len(vary) > MAX_CURVES:
         yield (), None, f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
-    elif isinstance(vary, FileVary):
+    elif vary.file:
         reasons = ((vary.lines[place], text) for place, text in (_unsolvable(valid, vary) if vary.lines else ()))
         for line, text in sorted([*vary.faults, *reasons], key=itemgetter(0)):
             yield ("file",), None, f"{vary.file}:{line}: {text}"
     else:
-        yield from _of_curves(valid, vary)
-
-
-def _of_curves(valid: Known, vary: Vary, *, with_existence: bool = True) -> Iterator[Refusal]:
-    """The first of these."""
-    for _, text in _unsolvable(valid, vary, with_existence=with_existence):
-        yield (), None, text
-        return
+        yield from (((), None, text) for _, text in islice(_unsolvable(valid, vary), 1))
 
 
 def _unsolvable(valid: Known, vary: Vary, *, with_existence: bool = True) -> Iterator[tuple[int, str]]:
@@ -159,7 +156,7 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     vary: Vary = valid["vary"]
     is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
     for place, varied in enumerate(vary.sets()):
-        row = f"{vary.file}:{vary.lines[place]}: " if isinstance(vary, FileVary) else ""
+        row = f"{vary.file}:{vary.lines[place]}: " if vary.file else ""
         reason, faults = "" if is_known else _obstacle(base.at, varied, p), {}
         with suppress(ValueError):  # that is the reason
             try:
@@ -178,20 +175,40 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
 
 def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """What the other sections do not allow."""
-    return figure_refusals(figure, valid)
+    if figure.moment is not None:
+        yield from _of_orders(valid, [(("y", "moment"), figure.moment)], "or choose one of them")
+    vary: Vary | None = valid.get("vary")
+    if vary is None:
+        return
+    known = ["p", *(key for key in vary.keys if not vary.is_text(key))]
+    if figure.x not in known:
+        text = f";{nearest(figure.x, known)} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
+        if figure.x in vary.keys:
+            text = f", whose values are texts; must be one of {', '.join(known)}; choose one of them"
+        yield ("x",), figure.x, f"got {shown(figure.x)}{text}"
+        return
+    if figure.map and vary.crossing(figure.x) is None:
+        text = (
+            "got true; a map needs a [vary] of all combinations of two keys of numbers and no others, each with two "
+            "values or more; vary these, or remove it"
+        )
+        yield ("map",), figure.map, text
+    for name, key, limits in (("xlim", figure.x, figure.xlim), ("ylim", map_key(figure, vary), figure.ylim)):
+        if key in vary.keys and limits and limits[0] <= 0 and is_log_spaced(vary.values(key)):
+            text = f"got {shown(limits)}; must be > 0, as the values of {key} are spread by factors, on a "
+            yield (name,), limits, f"{text}logarithmic axis; raise the smaller one"
 
 
 def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """Eigenfunctions at p that are not among the moments, and a figure of what is not computed."""
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
-    yield from _of_orders(valid, wanted, "output.eigenfunctions")
-    figure: FigureSection | None = valid.get("figure")
-    if figure is None:
-        return
-    if figure.model_fields_set & {"x", "y"} and figure.needed not in output.quantities:
+    yield from _of_orders(valid, wanted, f"choose one of them, {_without('output.eigenfunctions')}")
+    figure: FigureSection = valid.get("figure", FigureSection())
+    drawn = figure.model_fields_set
+    if drawn & {"x", "y"} and figure.needed not in output.quantities:
         text = f"has no {shown(figure.needed)}, which figure.y draws; add it, or let figure.y be one of the names here"
         yield ("quantities",), output.quantities, text
-    for name in figure.mark if "mark" in figure.model_fields_set else ():
+    for name in figure.mark if "mark" in drawn else ():
         if name not in output.quantities:
             text = f"has no {shown(name)}, which figure.mark marks; add it, or remove it from figure.mark"
             yield ("quantities",), output.quantities, text
@@ -199,18 +216,18 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
     """Each p that is not among the moments, and each key of a `where` that is not varied, or not with that value."""
-    yield from _of_orders(valid, (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None), "expect")
+    orders = (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None)
+    yield from _of_orders(valid, orders, f"choose one of them, {_without('expect')}")
     vary: Vary | None = valid.get("vary")
     if vary is None:
         return
-    stated = ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items())
-    for i, key, value in stated:
+    for i, key, value in ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items()):
         if key not in vary.keys:
             guess, known = nearest(key, vary.keys), ", ".join(vary.keys) or "none"
             text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {_without('expect')}"
             yield (i, "where", key), value, text
         elif not any(same(value, other) for other in vary.columns[key]):
-            is_possible = isinstance(value, str) == vary.is_text(key)
+            is_possible = (type(value) is str) == vary.is_text(key)
             remedy = f"add it to [vary], {_without('expect')}" if is_possible else "write one of these"
             text = f"got {shown(value)}; must be one of {shown(vary.values(key))}; {remedy}"
             yield (i, "where", key), value, text
@@ -221,40 +238,53 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
     problem, parameters = problem_of(valid), parameters_of(valid, context)
     if chart is None or problem is None or parameters is None:
         return
-    axes = {"x": chart.x, "y": chart.y}
-    found = [
-        ((name, *path), value, text)
-        for name, axis in axes.items()
-        for path, value, text in axis.refusals(problem, parameters)
-    ]
-    yield from found
-    corners = [dict(zip((chart.x.key, chart.y.key), ends, strict=True)) for ends in product(*map(_ends, axes.values()))]
-    if found:
+    axes = chart.x, chart.y
+    of_x, of_y = (list(_of_axis(axis, problem, parameters)) for axis in axes)
+    yield from (((name, *path), *rest) for name, found in (("x", of_x), ("y", of_y)) for path, *rest in found)
+    if of_x or of_y:
         return
+    ends = product((chart.x.start, chart.x.stop), (chart.y.start, chart.y.stop))
+    corners = [{chart.x.key: x, chart.y.key: y} for x, y in ends]
     for corner in corners:
         with suppress(ValueError):
             noise = problem.at(corner).noise
             if noise.has_algebraic_tails and noise.tails_beyond is not None:
                 limit, most, remedy = noise.tails_beyond
                 key = f"{noise.section}.{limit}"
-                axis = next((name for name, each in axes.items() if each.key == key), None)
-                highest = max([float(problem.values[key]), *(each.stop for each in axes.values() if each.key == key)])
+                stops = {name: axis.stop for name, axis in zip("xy", axes, strict=True) if axis.key == key}
+                highest = max(float(problem.values[key]), *stops.values())
                 text = (
                     f"{key} reaches {highest:g} in the frame; for {limit} > {most:g} Λ(p) is infinite or carried by "
                     f"rare paths, and no line of stability; let it end at {most:g}, or {remedy}"
                 )
-                yield (axis, "stop") if axis else (), highest, text
+                yield (next(iter(stops)), "stop") if stops else (), highest, text
                 return
     p = np.array([zero.p for zero in chart.zero])
-    reason = next(
-        filter(None, (_with(each) + text for each in corners if (text := _obstacle(problem.at, each, p)))), ""
-    )
-    if reason:
-        yield (), None, f"{reason}; choose another frame"
+    for corner in corners:
+        if reason := _obstacle(problem.at, corner, p):
+            yield (), None, f"{_with(corner)}{reason}; choose another frame"
+            return
 
 
-def _ends(axis: ChartAxis) -> tuple[float, float]:
-    return axis.start, axis.stop
+def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo]) -> Iterator[Refusal]:
+    """A key that is none to differentiate by, or ends that are out of its range, or not in order."""
+    known = problem.differentiable
+    if axis.key not in known:
+        inert = [name for half in problem.halves for name in half.inert]
+        is_inert = any(axis.key == f"{half.section}.{name}" for half in problem.halves for name in half.inert)
+        told = f"; {' and '.join(inert)} are not in the linear theory" if is_inert else ""
+        text = f'got "{axis.key}";{nearest(axis.key, known)} must be one of {", ".join(known)}{told}'
+        yield ("key",), axis.key, f"{text}; choose one of them"
+        return
+    for name, value in (("start", axis.start), ("stop", axis.stop)):
+        try:
+            values_of(ranges[axis.key]).validate_python([value])
+        except ValidationError as error:
+            for detail in faults_in(error):
+                must = detail["msg"].replace("Input should be", "must be")
+                yield (name,), value, f"got {value}; {axis.key} {must}; choose another value"
+            return
+    yield from axis_faults(axis.start, axis.stop, axis.scale, axis.at)
 
 
 def _without(key: str) -> str:
@@ -262,14 +292,14 @@ def _without(key: str) -> str:
     return f"or go without by --set '{key}=[]'"
 
 
-def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float]], key: str) -> Iterator[Refusal]:
-    """Each wanted p of a key, with its path, that is not among the moments."""
+def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float]], remedy: str) -> Iterator[Refusal]:
+    """Each wanted p, with its path, that is not among the moments."""
     moments: Moments | None = valid.get("moments")
     for path, p in wanted:
         if moments is not None and not moments.has(p):
             first, last = moments.values[[0, -1]]
             known = f"moments.p ({moments.values.size} values, {first:g} to {last:g})"
-            yield path, p, f"got {p}; must be among {known}; add it there, choose one of them, {_without(key)}"
+            yield path, p, f"got {p}; must be among {known}; add it there, {remedy}"
 
 
 REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {

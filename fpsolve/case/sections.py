@@ -6,28 +6,40 @@ What keys of the system, the noise and the budget mean stands where these do; th
 from __future__ import annotations
 
 import math
+import re
 import sys
 from bisect import bisect_left
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
+from fpsolve.analysis.zero import Axis, Zero, zero_of
 from fpsolve.arrays import FloatArray
-from fpsolve.case.messages import LIST, TABLE, Refusal, refuse
+from fpsolve.case.messages import LIST, TABLE, Refusal, is_list, nearest, quoted, refuse, shown, shown_with_kind
 from fpsolve.errors import MeshError
-from fpsolve.exponent.quantities import QuantityName
+from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh, vertices_at
 from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.model.quantity import Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
 _DIGITS = 12
 _SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
+SENSITIVITIES, EIGENFUNCTIONS = "sensitivities", "eigenfunctions"
+QUANTITY_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS)
+"""What may be asked for; eigenfunctions with the stationary density."""
+_LARGEST = 1e30
+_APART = 1e-9
+"""How far the ends of an axis are from each other at least, relative to their size."""
+MOST_NAMED = 8
+"""Curves that a legend can tell apart; of more, and of a map, colours tell the value of a key."""
+_ZERO = 'zero = ["lyapunov_exponent", { moment = 2.0 }]'
 
 Values = tuple[float, ...]
 Value = float | str
@@ -37,19 +49,31 @@ NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MO
 Text = Annotated[str, Field(min_length=1)]
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
+Scale = Literal["linear", "log"]
+MarkedName = Literal["stability_index", "lyapunov_exponent"]
 
 
-def flat(value: Any, whole: Container[str] = ()) -> Any:
+def is_number(value: Any) -> bool:
+    """Whether a value of TOML is a finite number."""
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
+
+
+def same(value: Value, other: Value) -> bool:
+    """Whether two values of a varied key are one."""
+    if str in (type(value), type(other)):
+        return value == other
+    return math.isclose(value, other, rel_tol=_SAME)  # type: ignore[arg-type]
+
+
+def flat(table: Mapping[str, Any], whole: Container[str] = ()) -> dict[str, Any]:
     """Nested tables as one: noise.D0 = 1.0 means the same as "noise.D0" = 1.0.
 
     Args:
-        value: a table; anything else is left.
+        table: with the values of keys, or tables of them; a range is a value.
         whole: the keys whose tables are values, not sections.
     """
-    if not isinstance(value, dict):
-        return value
     result: dict[str, Any] = {}
-    for key, item in _entries(value, "", whole):
+    for key, item in _entries(table, "", whole):
         if key in result:
             raise ValueError(f"{key} stands twice, once with quotes and once without; remove one of them")
         result[key] = item
@@ -57,7 +81,6 @@ def flat(value: Any, whole: Container[str] = ()) -> Any:
 
 
 def _entries(table: Mapping[str, Any], section: str, whole: Container[str]) -> Iterator[tuple[str, Any]]:
-    """The dotted keys of a table and of those in it; a range is a value."""
     for name, item in table.items():
         key = section + name
         is_section = isinstance(item, dict) and item and key not in whole and not item.keys() & RANGE
@@ -76,7 +99,7 @@ class Sweep(Section):
     start: Annotated[float, parameter("the first value", "start = 1.0")]
     stop: Annotated[float, parameter("the last value", "stop = 6.0")]
     num: Annotated[int, parameter("how many values", "num = 33", ge=2, le=MAX_MOMENTS)]
-    scale: Annotated[Literal["linear", "log"], parameter("how they are spread", 'scale = "log"')] = "linear"
+    scale: Annotated[Scale, parameter("how they are spread", 'scale = "log"')] = "linear"
 
     @model_validator(mode="after")
     def _increases(self) -> Self:
@@ -104,10 +127,7 @@ class Sweep(Section):
 
 RANGE = frozenset(Sweep.__pydantic_fields__)
 """The keys that tell a range from a section."""
-
-
-def _list_or_table(value: Any) -> str | None:
-    return LIST if isinstance(value, list | tuple) else TABLE if isinstance(value, dict | Sweep) else None
+_TAGS: Mapping[type, str] = {list: LIST, tuple: LIST, dict: TABLE, Sweep: TABLE}
 
 
 class Moments(Section):
@@ -115,7 +135,7 @@ class Moments(Section):
 
     p: Annotated[
         Annotated[NonEmpty, Tag(LIST)] | Annotated[Sweep, Tag(TABLE)],
-        Discriminator(_list_or_table),
+        Discriminator(lambda value: _TAGS.get(type(value))),
         parameter(
             "orders of the moments",
             "p = [1.0, 2.0] or p = { start = -2.0, stop = 6.0, num = 33 }",
@@ -128,9 +148,7 @@ class Moments(Section):
     @property
     def values(self) -> FloatArray:
         """All p, in the file's order."""
-        if isinstance(self.p, Sweep):
-            return self.p.values
-        return np.array(self.p)
+        return self.p.values if isinstance(self.p, Sweep) else np.array(self.p)
 
     @cached_property
     def increasing(self) -> tuple[float, ...]:
@@ -206,17 +224,228 @@ class MonteCarloSection(Section):
     p: Annotated[NonEmpty | None, parameter("orders of the moments that are simulated", "p = [1.0, 2.0]")] = None
 
 
-def _where(value: Any) -> Any:
+def _names(known: Sequence[str], must: str, unknown: str, *, may_be_empty: bool = False) -> BeforeValidator:
+    """Takes a list of some names, each at most once; both texts follow what was got."""
+
+    def checked(names: Any) -> tuple[str, ...]:
+        if not is_list(names) or not (names or may_be_empty):
+            raise ValueError(f"got {shown_with_kind(names)}; {must}")
+        wrong = list[Refusal]()
+        for i, name in enumerate(names):
+            if name not in known:
+                text = f"got {shown_with_kind(name)};{unknown.format(guess=nearest(name, known))} rename or remove it"
+                wrong.append(((i,), name, text))
+            elif name in names[:i]:
+                wrong.append(((i,), name, f"got {shown(name)} twice; names must be distinct; remove one"))
+        refuse(wrong)
+        return tuple(names)
+
+    return BeforeValidator(checked)
+
+
+class MomentAt(Section):
+    """{ moment = p }: Λ at one p."""
+
+    moment: Annotated[float, parameter("order of the moment", "moment = 2.0")]
+
+
+def _ordinate(value: Any) -> Any:
+    """The name of a quantity, or Λ at one p."""
+    names = get_args(DrawnName)
+    if isinstance(value, MomentAt) or value in names:
+        return value
+    if isinstance(value, dict) and value.keys() == {"moment"} and is_number(value["moment"]):
+        return MomentAt(moment=float(value["moment"]))
+    raise ValueError(
+        f"got {shown_with_kind(value, but=str)}; must be one of {quoted(names)}, or {{ moment = p }} with a finite "
+        f"p;{nearest(value, names)} write, for example, y = {{ moment = 2.0 }}"
+    )
+
+
+def _limits(value: Any) -> tuple[float, float]:
+    """The two ends of an axis."""
+    if is_list(value) and len(value) == 2 and all(map(is_number, value)):
+        start, stop = value
+        if max(abs(start), abs(stop)) <= _LARGEST and stop - start > _APART * max(abs(start), abs(stop)):
+            return float(start), float(stop)
+    raise ValueError(
+        f"got {shown_with_kind(value)}; must be a list of two numbers, the smaller one first, from -1e30 to 1e30 and "
+        "not equal to 9 digits; write, for example, [0.0, 4.0]"
+    )
+
+
+def _time_unit(value: Any) -> Any:
+    """Letters that stand for a unit of time."""
+    if type(value) is str and re.fullmatch(r"[^\W\d_]{1,12}", value):
+        return value
+    text = f'got {shown_with_kind(value)}; must be a unit of 1 to 12 letters; write, for example, time_unit = "s"'
+    raise ValueError(text)
+
+
+Limits = Annotated[tuple[float, float], BeforeValidator(_limits)]
+_MARKS = quoted(get_args(MarkedName))
+
+
+class FigureSection(Section):
+    """[figure]: the axes, what is marked, and how it is set; x is "p" or a varied key."""
+
+    x: Annotated[Text, parameter("the abscissa", 'x = "p"')] = "p"
+    y: Annotated[DrawnName | MomentAt, BeforeValidator(_ordinate), parameter("the ordinate", 'y = "moment"')] = "moment"
+    map: Annotated[bool | None, parameter("whether colours show it over two keys", "map = true")] = None
+    title: Annotated[Text | None, parameter("the heading instead of that of the case", 'title = "Stability"')] = None
+    width: Annotated[
+        Literal["single column", "double column"], parameter("how wide it is printed", 'width = "single column"')
+    ] = "double column"
+    xlim: Annotated[Limits | None, parameter("ends of the abscissa", "xlim = [0.0, 4.0]")] = None
+    ylim: Annotated[Limits | None, parameter("ends of the ordinate", "ylim = [-0.1, 0.1]")] = None
+    mark: Annotated[
+        tuple[MarkedName, ...],
+        _names(
+            get_args(MarkedName),
+            f"must be a list of some of {_MARKS}; write, for example, [{_MARKS}]",
+            f" must be one of {_MARKS};{{guess}}",
+            may_be_empty=True,
+        ),
+        parameter("what is marked", 'mark = ["stability_index"]'),
+    ] = ("stability_index",)
+    time_unit: Annotated[
+        str, BeforeValidator(_time_unit), parameter("what the unit of time is called", 'time_unit = "s"')
+    ] = "time"
+
+    @property
+    def moment(self) -> float | None:
+        """The p whose Λ(p) is drawn over a parameter; None where another quantity is drawn."""
+        return self.y.moment if isinstance(self.y, MomentAt) else None
+
+    @property
+    def needed(self) -> str:
+        """The name of the quantity that must be computed for it."""
+        return MOMENT.name if isinstance(self.y, MomentAt) else self.y
+
+    @property
+    def quantity(self) -> Quantity:
+        """What is drawn."""
+        return QUANTITIES[self.needed] if self.moment is None else moment_at(self.moment)
+
+    @model_validator(mode="after")
+    def _fits_x(self) -> Self:
+        written = self.y if self.moment is None else {"moment": self.moment}
+        names = '{ moment = 2.0 }, "lyapunov_exponent" or "stability_index"'
+        if self.x == "p" and self.y != "moment":
+            remedy = 'must be "moment" where x = "p"; write y = "moment", or set x to a key of [vary]'
+            refuse([(("y",), written, f"got {shown(written)}; {remedy}")])
+        if self.x != "p" and self.y == "moment":
+            text = f'got {shown(written)}; must be {names} where x is not "p"; write one of these'
+            refuse([(("y",), self.y, text)])
+        if self.x == "p" and self.map:
+            text = "got true; a map is drawn over two keys of [vary]; set x to one of them, or remove it"
+            refuse([(("map",), self.map, text)])
+        if self.x != "p" and self.mark and "mark" in self.model_fields_set:
+            text = f'got {shown(self.mark)}; only Λ(p) over p has marks; write x = "p", or remove it'
+            refuse([(("mark",), self.mark, text)])
+        return self
+
+
+class OutputSection(Section):
+    """[output]: what is computed, the p whose eigenfunctions are written, and whether sensitivities are drawn."""
+
+    quantities: Annotated[
+        tuple[str, ...],
+        _names(
+            QUANTITY_NAMES,
+            f"must be a non-empty list of some of {quoted(QUANTITY_NAMES)}; name one",
+            f"{{guess}} known names: {quoted(QUANTITY_NAMES)};",
+        ),
+        parameter("what is computed", 'quantities = ["lyapunov_exponent", "stability_index"]'),
+    ] = QUANTITY_NAMES
+    eigenfunctions: Annotated[
+        Values | None,
+        parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False, max_length=MAX_MOMENTS),
+    ] = None
+    sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
+
+    @property
+    def asks_for_eigenfunctions(self) -> bool:
+        """Whether the file itself says that they are written, and not the defaults alone."""
+        return EIGENFUNCTIONS in self.quantities and (
+            self.eigenfunctions is not None or "quantities" in self.model_fields_set
+        )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        wanted, wrong = self.eigenfunctions or (), list[Refusal]()
+        first = {p: i for i, p in reversed(list(enumerate(wanted)))}
+        for i, p in enumerate(wanted):
+            if first[p] != i:
+                text = f"got {p} twice; values must be distinct; remove one"
+                wrong.append((("eigenfunctions", i), p, text))
+        for name, value, instead in (
+            ("sensitivities", self.sensitivities, "false"),
+            ("eigenfunctions", self.eigenfunctions, "eigenfunctions = []"),
+        ):
+            if value and name not in self.quantities:
+                text = f'got {shown(value)}, but output.quantities has no "{name}"; add it there, or write {instead}'
+                wrong.append(((name,), value, text))
+        refuse(wrong)
+        return self
+
+
+class ChartAxis(Section):
+    """{ key, start, stop, scale, at }: one side of the frame."""
+
+    key: Annotated[Text, parameter("the parameter", 'key = "oscillator.omega"')]
+    start: Annotated[float, parameter("its smallest value", "start = 0.3")]
+    stop: Annotated[float, parameter("its largest value", "stop = 5.0")]
+    scale: Annotated[Scale, parameter("how it is spread", 'scale = "log"')] = "linear"
+    at: Annotated[Values, parameter("values wanted exactly", "at = [1.0, 2.0]", strict=False, max_length=1000)] = ()
+
+    @property
+    def axis(self) -> Axis:
+        """The same for the solver."""
+        return Axis(self.key, self.start, self.stop, self.scale, self.at)
+
+
+def _zeros(value: Any) -> Any:
+    """The entries of `zero` as `Zero`s; those already made are left."""
+    if not is_list(value) or not value:
+        raise ValueError(f"got {shown(value)}; must be a list with one entry at least; write, for example, {_ZERO}")
+    made, refusals = list[Zero](), list[Refusal]()
+    for i, entry in enumerate(value):
+        try:
+            zero = entry if isinstance(entry, Zero) else zero_of(entry)
+        except (ValueError, TypeError):
+            known = '"lyapunov_exponent", { moment = 2.0 } or { stability_index = -1.0 }, the number finite and not 0'
+            refusals.append(((i,), entry, f"got {shown(entry)}; must be {known}; write one of these"))
+            continue
+        if zero in made:
+            refusals.append(((i,), entry, f"got {shown(entry)} twice; lines must differ; remove one of them"))
+        made.append(zero)
+    refuse(refusals)
+    return tuple(made)
+
+
+class ChartSection(Section):
+    """[chart]: a frame of two parameters, and the lines in it."""
+
+    x: Annotated[ChartAxis, parameter("the abscissa", 'x = { key = "oscillator.omega", start = 0.3, stop = 5.0 }')]
+    y: Annotated[ChartAxis, parameter("the ordinate", 'y = { key = "noise.D0", start = 0.01, stop = 2.0 }')]
+    zero: Annotated[tuple[Zero, ...], BeforeValidator(_zeros), parameter("what is zero on a line", _ZERO)]
+
+    @model_validator(mode="after")
+    def _two_parameters(self) -> Self:
+        if self.x.key == self.y.key:
+            text = f'got "{self.y.key}" for both axes; must be two parameters; choose another for one of them'
+            refuse([(("y", "key"), self.y.key, text)])
+        return self
+
+
+def _where(table: Any) -> Any:
     """The flat table of a `where`, every entry a finite number or a text."""
-    table = flat(value)
-    if isinstance(table, dict):
-        refuse(((key,), item, "") for key, item in table.items() if not is_number(item) and not isinstance(item, str))
+    if not isinstance(table, dict):
+        return table
+    table = flat(table)
+    refuse(((key,), item, "") for key, item in table.items() if not is_number(item) and type(item) is not str)
     return table
-
-
-def is_number(value: Any) -> bool:
-    """Whether a value of TOML is a finite number."""
-    return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
 class Expectation(Section):
@@ -250,10 +479,3 @@ class Expectation(Section):
             refusals.append((("rtol",), None, "missing, and so is atol; add, for example, rtol = 1e-3"))
         refuse(refusals)
         return self
-
-
-def same(value: Value, other: Value) -> bool:
-    """Whether two values of a varied key are one."""
-    if isinstance(value, str) or isinstance(other, str):
-        return value == other
-    return math.isclose(value, other, rel_tol=_SAME)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 
@@ -19,8 +20,10 @@ from fpsolve.case.messages import (
     DEPENDENT,
     Refusal,
     explain,
+    faults_in,
+    is_list,
     nearest,
-    own_faults,
+    quoted,
     refuse,
     shortened,
     shown,
@@ -28,17 +31,14 @@ from fpsolve.case.messages import (
     too_long,
 )
 from fpsolve.case.reading import Unreadable, Words, read_text
-from fpsolve.case.sections import MAX_MOMENTS, Sweep, Value, Values, flat, same
+from fpsolve.case.sections import MAX_MOMENTS, MOST_NAMED, FigureSection, Sweep, Value, Values, flat, same
 from fpsolve.model.faults import accepted, choices
 from fpsolve.model.parameters import STRICT, meaning_of
 from fpsolve.model.quantity import Quantity
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
-_WORDS = Words(
-    *("the sets", "a file of sets", "sets.csv", "comma-separated"),
-    start="its first row must name keys, as in noise.D0,noise.tau0",
-    may_have_mark=True,
-)
+_START = "its first row must name keys, as in noise.D0,noise.tau0"
+_WORDS = Words("the sets", "a file of sets", "sets.csv", "comma-separated", _START, may_have_mark=True)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 Columns = dict[str, tuple[Value, ...]]
 Known = Mapping[str, FieldInfo]
@@ -47,11 +47,8 @@ Known = Mapping[str, FieldInfo]
 
 def values_of(known: FieldInfo, most: int | None = None) -> TypeAdapter[Values]:
     """What a list of values of a parameter must be, with at most so many entries."""
-    kind = Annotated[
-        tuple[Annotated[float, Field(), *known.metadata], ...],
-        Field(strict=False, min_length=1, max_length=most),
-    ]
-    return TypeAdapter(kind, config=STRICT)
+    number = Annotated[float, Field(), *known.metadata]
+    return TypeAdapter(Annotated[tuple[number, ...], Field(strict=False, min_length=1, max_length=most)], config=STRICT)
 
 
 @dataclass(frozen=True)
@@ -61,10 +58,16 @@ class Vary:
     Attributes:
         columns: the values of each varied key; of a product its distinct values, else one for each set.
         mode: "product" for all combinations, the last key varying fastest, or "zip" for values side by side.
+        file: where they were read, for messages; empty for those of the case itself.
+        lines: where each set stands in this file.
+        faults: what is wrong in other rows, with their lines.
     """
 
     columns: Mapping[str, tuple[Value, ...]] = field(default_factory=dict)
     mode: Literal["product", "zip"] = "product"
+    file: str = ""
+    lines: tuple[int, ...] = ()
+    faults: tuple[tuple[int, str], ...] = ()
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -86,42 +89,33 @@ class Vary:
 
     def is_text(self, key: str) -> bool:
         """Whether the values of a varied key are texts."""
-        return isinstance(next(iter(self.columns[key]), 0.0), str)
+        return type(next(iter(self.columns[key]), 0.0)) is str
 
     def sets(self, start: int = 0, stop: int | None = None) -> Iterator[dict[str, Value]]:
         """The varied values of each set from one place to another, any place reached at once."""
-        return map(self._set, range(len(self))[start:stop])
+        columns, sizes = self.columns, [len(values) for values in self.columns.values()]
+        for place in range(len(self))[start:stop]:
+            at: Sequence[Any] = [place] * len(sizes) if self.mode == "zip" else np.unravel_index(place, sizes)
+            yield {key: values[i] for (key, values), i in zip(columns.items(), at, strict=True)}
 
     def among(self, keys: Iterable[str]) -> Iterator[dict[str, Value]]:
         """The distinct sets of some of the keys."""
         wanted = set(keys)
         chosen = {key: values for key, values in self.columns.items() if key in wanted}
-        seen = dict.fromkeys(tuple(each.items()) for each in Vary(chosen, self.mode).sets())
-        return map(dict, seen)
+        return map(dict, dict.fromkeys(tuple(each.items()) for each in Vary(chosen, self.mode).sets()))
 
-    def _set(self, place: int) -> dict[str, Value]:
-        if self.mode == "zip":
-            return {key: values[place] for key, values in self.columns.items()}
-        chosen = []
-        for values in reversed(list(self.columns.values())):
-            place, at = divmod(place, len(values))
-            chosen.append(values[at])
-        return dict(zip(self.columns, reversed(chosen), strict=True))
+    def crossing(self, key: str) -> str | None:
+        """The second key of a map over a key: of a product over two keys of numbers the other one."""
+        several = [each for each in self.keys if len(self.values(each)) > 1]
+        is_plane = self.mode == "product" and len(several) == 2 and key in several
+        return None if not is_plane or any(map(self.is_text, several)) else next(k for k in several if k != key)
 
 
-@dataclass(frozen=True)
-class FileVary(Vary):
-    """The sets of a file.
-
-    Attributes:
-        file: its name, for messages.
-        lines: where each set stands.
-        faults: what is wrong in other rows, with their lines.
-    """
-
-    file: str = ""
-    lines: tuple[int, ...] = ()
-    faults: tuple[tuple[int, str], ...] = ()
+def map_key(figure: FigureSection, vary: Vary) -> str | None:
+    """The second key of the map that is drawn; None where curves are."""
+    key = vary.crossing(figure.x)
+    is_map = key is not None and (len(vary.values(key)) > MOST_NAMED if figure.map is None else figure.map)
+    return key if is_map else None
 
 
 def written(value: Value, style: str = "g") -> str:
@@ -141,12 +135,8 @@ def legend(varied: Mapping[str, Value], about: Callable[[str], Quantity]) -> str
 
 def groups(values: Sequence[Value]) -> list[int]:
     """For each value the place of the first one that is the same."""
-    if isinstance(values[0], str):
-        seen: dict[Value, int] = {}
-        return [seen.setdefault(value, i) for i, value in enumerate(values)]
-    order = sorted(range(len(values)), key=values.__getitem__)
     runs: list[list[int]] = []
-    for place in order:
+    for place in sorted(range(len(values)), key=values.__getitem__):
         if runs and same(values[runs[-1][-1]], values[place]):
             runs[-1].append(place)
         else:
@@ -166,7 +156,7 @@ def repeats(columns: Mapping[str, tuple[Value, ...]]) -> Iterator[tuple[int, int
 def vary_of(value: Any, info: ValidationInfo) -> Vary:
     """What [vary] means; a `Vary` is left. Raises ValidationError with all that is wrong with it.
 
-    Of a file the rows that are wrong by themselves are not raised, but among the faults of its `FileVary`.
+    Of a file the rows that are wrong by themselves are not raised, but among its `faults`.
     """
     context = info.context or {}
     parameters = parameters_of(info.data, context)
@@ -174,7 +164,7 @@ def vary_of(value: Any, info: ValidationInfo) -> Vary:
         return value
     if not isinstance(value, dict):
         text = f"got {shown_with_kind(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
-        refuse([((), value, text)])
+        raise ValueError(text)
     if parameters is None:
         refuse([((), value, DEPENDENT)])
         return Vary()
@@ -184,9 +174,8 @@ def vary_of(value: Any, info: ValidationInfo) -> Vary:
     mode = table.pop("mode", "product")
     columns, refusals = Columns(), list[Refusal]()
     if mode not in ("product", "zip"):
-        guess = nearest(mode, ("product", "zip")) if isinstance(mode, str) else ""
-        text = f'got {shown_with_kind(mode)}; must be one of "product", "zip";{guess} write mode = "zip", or remove it'
-        refusals.append((("mode",), mode, text))
+        text = f'got {shown_with_kind(mode)}; must be one of "product", "zip";{nearest(mode, ("product", "zip"))}'
+        refusals.append((("mode",), mode, f'{text} write mode = "zip", or remove it'))
     for key, item in table.items():
         if key in parameters:
             refusals += _column(key, item, parameters[key], columns)
@@ -199,11 +188,11 @@ def vary_of(value: Any, info: ValidationInfo) -> Vary:
     return Vary(columns, mode)
 
 
-def _of_file(table: Mapping[str, Any], parameters: Known, folder: Path) -> FileVary:
+def _of_file(table: Mapping[str, Any], parameters: Known, folder: Path) -> Vary:
     """The sets of a file, beside which nothing else may stand."""
     file, mode = table["file"], table.get("mode", "zip")
     others = [key for key in table if key not in ("file", "mode")]
-    if not isinstance(file, str) or not file:
+    if type(file) is not str or not file:
         text = f'got {shown_with_kind(file)}; must be the path of a file of sets; write, for example, file = "sets.csv"'
         refuse([(("file",), file, text)])
     if others:
@@ -222,29 +211,24 @@ def _of_file(table: Mapping[str, Any], parameters: Known, folder: Path) -> FileV
 
 def _column(key: str, values: Any, field: FieldInfo, columns: Columns) -> Iterator[Refusal]:
     """What is wrong with the values of a key; without faults these join the columns."""
-    if texts := choices(field.annotation):
-        yield from _texts(key, values, texts)
-        columns[key] = tuple(values) if isinstance(values, list | tuple) else ()
+    texts = choices(field.annotation)
+    if texts and not (is_list(values) and values):
+        known = quoted(texts)
+        text = f"got {shown_with_kind(values)}; must be a non-empty list of {known}; write, for example, "
+        yield (key,), values, f"{text}{key} = [{known}]"
+    elif texts:
+        for i, value in enumerate(values):
+            if value not in texts:
+                text = f"got {shown_with_kind(value)}; must be one of {quoted(texts)};{nearest(value, texts)}"
+                yield (key, i), value, f"{text} write one of them"
+        columns[key] = tuple(values)
     elif isinstance(values, dict) and values:
         yield from _range(key, values, field, columns)
     else:
         try:
             columns[key] = values_of(field, MAX_MOMENTS).validate_python(values)
         except ValidationError as error:
-            yield from (((key, *detail["loc"]), detail["input"], too_long(detail)) for detail in own_faults(error))
-
-
-def _texts(key: str, values: Any, texts: Sequence[str]) -> Iterator[Refusal]:
-    known = ", ".join(f'"{text}"' for text in texts)
-    if not isinstance(values, list | tuple) or not values:
-        text = f"got {shown_with_kind(values)}; must be a non-empty list of {known}; write, for example, "
-        yield (key,), values, f"{text}{key} = [{known}]"
-        return
-    for i, value in enumerate(values):
-        if value not in texts:
-            guess = nearest(value, texts) if isinstance(value, str) else ""
-            text = f"got {shown_with_kind(value)}; must be one of {known};{guess} write one of them"
-            yield (key, i), value, text
+            yield from (((key, *detail["loc"]), detail["input"], too_long(detail)) for detail in faults_in(error))
 
 
 def _range(key: str, table: Mapping[str, Any], field: FieldInfo, columns: Columns) -> Iterator[Refusal]:
@@ -255,8 +239,9 @@ def _range(key: str, table: Mapping[str, Any], field: FieldInfo, columns: Column
         faults = explain(error, Sweep.__pydantic_fields__)
         yield from (((key, *path), table, sentence) for path, _, sentence in faults)
         return
-    wrong = [end for end in ("start", "stop") if any(_invalid(field, [getattr(sweep, end)]))]
-    yield from (((key, end), getattr(sweep, end), "") for end in wrong)
+    ends = ("start", sweep.start), ("stop", sweep.stop)
+    wrong = [ends[i] for i in _out_of_range(field, [end for _, end in ends])]
+    yield from (((key, name), end, "") for name, end in wrong)
     values = tuple(sweep.values.tolist())
     if len(set(groups(values))) < len(values):
         text = f"got num = {sweep.num}, which makes values equal to 12 digits; use a smaller num, or ends further apart"
@@ -265,24 +250,21 @@ def _range(key: str, table: Mapping[str, Any], field: FieldInfo, columns: Column
         columns[key] = values
 
 
-def _invalid(field: FieldInfo, values: Sequence[float]) -> list[bool]:
-    """Which values are out of the range of a parameter."""
-    wrong = [False] * len(values)
+def _out_of_range(field: FieldInfo, values: Sequence[float]) -> list[int]:
+    """The places of values that a parameter cannot have."""
     try:
         values_of(field).validate_python(values)
     except ValidationError as error:
-        for detail in own_faults(error):
-            wrong[int(detail["loc"][0])] = True
-    return wrong
+        return [int(detail["loc"][0]) for detail in faults_in(error)]
+    return []
 
 
 def _repeated(columns: Columns) -> Iterator[Refusal]:
     """The values of a product that a key has already."""
     for key, values in columns.items():
-        first = groups(values)
-        for i, value in enumerate(values):
-            if first[i] != i:
-                yield (key, i), value, f"got {value} twice; values must be distinct; remove one of them"
+        for i, first in enumerate(groups(values)):
+            if first != i:
+                yield (key, i), values[i], f"got {values[i]} twice; values must be distinct; remove one of them"
 
 
 def _uneven(columns: Columns) -> Iterator[Refusal]:
@@ -293,121 +275,97 @@ def _uneven(columns: Columns) -> Iterator[Refusal]:
         text = f'{told}; with mode = "zip" all must have one length; complete the shorter ones, or use mode = "product"'
         yield (), None, text
         return
-    vary = Vary(columns, "zip")
     for place, first in repeats(columns):
-        [varied] = vary.sets(place, place + 1)
+        varied = {key: values[place] for key, values in columns.items()}
         text = f"sets {first + 1} and {place + 1} are both {assignments(varied)}; must be distinct; remove one of them"
         yield (next(iter(columns)), place), varied, text
 
 
-@dataclass
-class _Table:
-    """The header of a file and its rows that are as long as it, with their lines; what is wrong with others."""
-
-    first: int = 0
-    header: list[str] = field(default_factory=list)
-    rows: list[list[str]] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
-    faults: list[tuple[int, str]] = field(default_factory=list)
-
-
-def read_sets(file: str, folder: Path, parameters: Known) -> FileVary:
+def read_sets(file: str, folder: Path, parameters: Known) -> Vary:
     """The sets of a file, with the faults of its rows.
 
     Raises:
-        Unreadable: there is no table in it.
+        Unreadable: there are no rows in it, no commas, or wrong quotes.
     """
-    table = _table(read_text(folder / file, _WORDS))
-    unknown = _header_faults(table.header, parameters)
-    faults, columns = [(table.first, reason) for reason in unknown] + table.faults, {}
-    wrong: set[int] = set()
-    for key, cells in zip(table.header, zip(*table.rows, strict=True), strict=False):
-        if key not in parameters:
-            continue
-        values, reasons = _cells(cells, parameters[key])
-        faults += [(table.lines[i], f"{key}: {reason}") for i, reason in reasons.items()]
-        columns[key] = values
-        wrong |= reasons.keys()
-    good = [i for i in range(len(table.lines)) if i not in wrong and not unknown]
-    lines = tuple(table.lines[i] for i in good)
-    kept = {key: tuple(values[i] for i in good) for key, values in columns.items()}
-    for place, first in repeats(kept) if good else ():
-        faults.append((lines[place], f"is the same set as line {lines[first]}; must be distinct; remove one of them"))
-    return FileVary(kept, "zip", file, lines, tuple(faults))
-
-
-def _table(text: str) -> _Table:
-    """The cells of a file. Raises Unreadable where there are no rows, no commas, or wrong quotes."""
-    reader, table = csv.reader(io.StringIO(text, newline=""), strict=True), _Table()
-    line = 1
+    reader = csv.reader(io.StringIO(read_text(folder / file, _WORDS), newline=""), strict=True)
+    line, header = 1, list[str]()
+    unknown, faults = list[tuple[int, str]](), list[tuple[int, str]]()
+    rows = dict[int, list[str]]()  # by their lines
     try:
         for row in reader:
             cells = [cell.strip() for cell in row]
-            if any(cells) and not table.header:
+            if any(cells) and not header:
                 if len(cells) == 1 and re.search(r"[;\t]", cells[0]):
                     mark = "semicolons" if ";" in cells[0] else "tabs"
                     raise Unreadable(f"is separated by {mark}; write commas, and decimal points in the numbers", line)
-                table.header, table.first = cells, line
-            elif any(cells) and len(cells) != len(table.header):
-                table.faults.append((line, _wrong_length(cells, table.header)))
+                header = cells
+                unknown = [(line, reason) for reason in _header_faults(header, parameters)]
+            elif any(cells) and len(cells) != len(header):
+                faults.append((line, _wrong_length(cells, header)))
             elif any(cells):
-                table.rows.append(cells)
-                table.lines.append(line)
+                rows[line] = cells
             line = reader.line_num + 1
     except csv.Error as error:
         raise Unreadable(f"cannot be read as comma-separated values ({error}); mend its quotes", line) from None
-    if not table.header or not (table.rows or table.faults):
+    if not (rows or faults):
         raise Unreadable("has a header but no sets; write a row of values for each set")
-    return table
+    columns, lines, wrong = Columns(), list(rows), set[int]()
+    for key, column in zip(header, zip(*rows.values(), strict=True), strict=False):
+        if key in parameters:
+            columns[key], reasons = _cells(column, parameters[key])
+            faults += [(lines[i], f"{key}: {reason}") for i, reason in reasons.items()]
+            wrong |= reasons.keys()
+    good = [] if unknown else [i for i in range(len(lines)) if i not in wrong]
+    kept = {key: tuple(values[i] for i in good) for key, values in columns.items()}
+    lines = [lines[i] for i in good]
+    for place, first in repeats(kept) if good else ():
+        faults.append((lines[place], f"is the same set as line {lines[first]}; must be distinct; remove one of them"))
+    return Vary(kept, "zip", file, tuple(lines), (*unknown, *faults))
 
 
-def _header_faults(header: Sequence[str], parameters: Known) -> list[str]:
+def _header_faults(header: Sequence[str], parameters: Known) -> Iterator[str]:
     """What of a header is no key, or there already."""
-    reasons, known = list[str](), f"known keys: {', '.join(parameters)}; rename or remove it"
+    known = f"known keys: {', '.join(parameters)}; rename or remove it"
     for i, key in enumerate(header):
         if not key:
-            reasons.append(f"column {i + 1}: has no key in the header; {known}")
+            yield f"column {i + 1}: has no key in the header; {known}"
         elif key not in parameters:
-            reasons.append(f"{shortened(key)}: cannot be varied;{nearest(key, parameters)} {known}")
+            yield f"{shortened(key)}: cannot be varied;{nearest(key, parameters)} {known}"
         elif key in header[:i]:
-            reasons.append(f"{key}: stands twice in the header; remove one of them")
-    return reasons
+            yield f"{key}: stands twice in the header; remove one of them"
 
 
 def _wrong_length(cells: Sequence[str], header: Sequence[str]) -> str:
-    text = f"has {len(cells)} cell{'s' if len(cells) > 1 else ''}; must have {len(header)}, one for each key"
-    if len(cells) == 1 and ";" in cells[0]:
-        return f"{text}; write commas between them, and decimal points in the numbers"
+    remedy = "remove the others, and write decimal points, not commas, in the numbers"
     if len(cells) < len(header):
-        return f"{text}; add those that are missing"
-    return f"{text}; remove the others, and write decimal points, not commas, in the numbers"
+        remedy = "add those that are missing"
+    if len(cells) == 1 and ";" in cells[0]:
+        remedy = "write commas between them, and decimal points in the numbers"
+    return f"has {len(cells)} cell{'s' * (len(cells) > 1)}; must have {len(header)}, one for each key; {remedy}"
 
 
-def _cells(cells: Sequence[str], field: FieldInfo) -> tuple[Sequence[Value], dict[int, str]]:
+def _cells(cells: Sequence[str], field: FieldInfo) -> tuple[tuple[Value, ...], dict[int, str]]:
     """The values in cells, 0 without a sign, and what is wrong with some, by their places."""
+    wrong = dict[int, str]()
     if texts := choices(field.annotation):
-        told = ", ".join(texts)
-        return cells, {
-            i: f"{_got(cell)}; must be one of {told};{nearest(cell, texts)} write one of them"
-            for i, cell in enumerate(cells)
-            if cell not in texts
-        }
-    values, wrong = list[float](), dict[int, str]()
-    must = f"must be {accepted(field)} ({meaning_of(field)})"
-    for i, cell in enumerate(cells):
-        try:
-            values.append(float(cell) + 0.0)
-        except ValueError:
-            values.append(math.nan)
-            remedy = "write commas between cells, and decimal points in numbers" if ";" in cell else "write a number"
-            if _DECIMAL_COMMA.fullmatch(cell):
-                remedy = f"write the decimal point as {cell.replace(',', '.')}"
-            wrong[i] = f"{_got(cell)}; {must}; {remedy}"
-    for i, is_wrong in enumerate(_invalid(field, values)):
-        if is_wrong and i not in wrong:
-            wrong[i] = f"{_got(cells[i])}; {must}; change it, or remove the row"
-    return values, wrong
-
-
-def _got(cell: str) -> str:
-    return f"got {shortened(cell)}" if cell else "is empty"
+        for i, cell in enumerate(cells):
+            if cell not in texts:
+                wrong[i] = f"must be one of {', '.join(texts)};{nearest(cell, texts)} write one of them"
+        values: tuple[Value, ...] = tuple(cells)
+    else:
+        must, numbers = f"must be {accepted(field)} ({meaning_of(field)})", list[float]()
+        for i, cell in enumerate(cells):
+            try:
+                numbers.append(float(cell) + 0.0)
+            except ValueError:
+                numbers.append(math.nan)
+                is_split = ";" in cell
+                remedy = "write commas between cells, and decimal points in numbers" if is_split else "write a number"
+                if _DECIMAL_COMMA.fullmatch(cell):
+                    remedy = f"write the decimal point as {cell.replace(',', '.')}"
+                wrong[i] = f"{must}; {remedy}"
+        for i in _out_of_range(field, numbers):
+            wrong.setdefault(i, f"{must}; change it, or remove the row")
+        values = tuple(numbers)
+    got = (f"got {shortened(cell)}" if cell else "is empty" for cell in cells)
+    return values, {i: f"{each}; {wrong[i]}" for i, each in enumerate(got) if i in wrong}

@@ -17,9 +17,8 @@ import numpy as np
 from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.case.figure import MOST_NAMED, map_key
-from fpsolve.case.sections import Value, Varied, same
-from fpsolve.case.vary import legend
+from fpsolve.case.sections import MOST_NAMED, Value, Varied, same
+from fpsolve.case.vary import legend, map_key
 from fpsolve.drawing import (
     COLOURS,
     FORMATS,

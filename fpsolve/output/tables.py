@@ -21,8 +21,8 @@ from typing import Any
 from fpsolve import __version__
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.output import SENSITIVITIES
 from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.case.sections import SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json

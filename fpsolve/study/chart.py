@@ -13,7 +13,7 @@ from fpsolve.analysis.stability import NODES, Boundary, Map, crossed
 from fpsolve.analysis.zero import Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.case.chart import ChartSection
+from fpsolve.case.sections import ChartSection
 from fpsolve.errors import FpsolveError, NoPerturbationTheory
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem

@@ -13,7 +13,7 @@ from fpsolve.analysis.density import negative_share, stationary_density
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.output import EIGENFUNCTIONS, SENSITIVITIES
+from fpsolve.case.sections import EIGENFUNCTIONS, SENSITIVITIES
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
