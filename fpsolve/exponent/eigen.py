@@ -203,19 +203,22 @@ def _dominant(apply: Any, start: FloatArray, p: float) -> tuple[FloatArray, floa
 
 
 class Iterate(NamedTuple):
-    """A two-sided Rayleigh quotient, the larger of the two backward errors, and both vectors, of length 1."""
+    """A two-sided Rayleigh quotient, the larger of the two backward errors, both vectors, of length 1, and M of them."""
 
     value: float
     residual: float
     x: FloatArray
     y: FloatArray
+    mx: FloatArray
+    my: FloatArray
 
 
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # a start may be useless, as its residual tells then
 def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> Iterate:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
     space, operator = pencil.space, pencil.matrix
-    best = Iterate(float(y @ (operator @ x) / (y @ space.weighed(x))), math.inf, x, y)
+    mx = space.weighed(x)
+    best = Iterate(float(y @ (operator @ x) / (y @ mx)), math.inf, x, y, mx, space.weighed(y))
     size, stalls = operator.norm, 0
     for _ in range(MAX_ITERATIONS):
         shift, last = best.value, best.residual
@@ -240,26 +243,21 @@ def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> Iterate:
 
 def _improved(factor: Factors, space: TensorSpace, shift: float, size: float, old: Iterate) -> Iterate:
     """One step of inverse iteration; of (L − σM) x₁ = M x₀ the images L x₁ need no product with L."""
-    images, vectors = [], []
-    for vector, solve in ((old.x, factor.solve), (old.y, factor.solve_transposed)):
-        source = space.weighed(vector)
-        new = solve(source)
-        length = np.linalg.norm(new)
-        vectors.append(new / length)
-        images.append(source / length)
-    weighed = [space.weighed(vector) for vector in vectors]
-    distance = float(vectors[1] @ images[0] / (vectors[1] @ weighed[0]))
-    errors = [np.linalg.norm(image - distance * each) for image, each in zip(images, weighed, strict=True)]
-    return Iterate(shift + distance, float(max(errors) / size), *vectors)
+    x, y = factor.solve(old.mx), factor.solve_transposed(old.my)
+    lengths = length(x), length(y)
+    x, y = x / lengths[0], y / lengths[1]
+    images, mx, my = (old.mx / lengths[0], old.my / lengths[1]), space.weighed(x), space.weighed(y)
+    distance = float(y @ images[0] / (y @ mx))
+    error = max(length(images[0] - distance * mx), length(images[1] - distance * my))
+    return Iterate(shift + distance, error / size, x, y, mx, my)
 
 
 def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair:
     """Normalise both vectors, judge their signs, and take Λ from the formula that rounding harms less."""
     p, space, operator = pencil.p, pencil.space, pencil.matrix
     images = operator @ found.x, operator.T @ found.y
-    weighed = space.weighed(found.x), space.weighed(found.y)
-    value = float(found.y @ images[0] / (found.y @ weighed[0]))  # without what elimination rounds off
-    errors = [np.linalg.norm(image - value * each) for image, each in zip(images, weighed, strict=True)]
+    value = float(found.y @ images[0] / (found.y @ found.mx))  # without what elimination rounds off
+    error = max(length(images[0] - value * found.mx), length(images[1] - value * found.my))
     constant = space.constant
     weight, norm = space.weighed(constant), 1 / space.turns
     x = found.x * ((constant @ weight) / (weight @ found.x))
@@ -282,11 +280,16 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
         right=x,
         left=y,
         derivative=float(y @ (generator.matrix(p, derivative=1) @ x) / norm),
-        residual=float(max(errors) / operator.norm),
+        residual=error / operator.norm,
         rounding=float(rounding),
         sign_defects=_sign_defects(space, x, y),
         generator=generator,
     )
+
+
+def length(vector: FloatArray) -> float:
+    """Its Euclidean norm."""
+    return math.sqrt(vector @ vector)
 
 
 def _sign_defects(space: TensorSpace, x: FloatArray, y: FloatArray) -> tuple[float, float]:

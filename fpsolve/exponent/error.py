@@ -181,7 +181,7 @@ class Solution:
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     """The effects along every axis; None along one that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
-    operator = pair.generator.matrix(pair.p).shifted(pair.value)
+    operator = pair.generator.at(pair.p).matrix.shifted(pair.value)
     tables, found = (space.table(pair.right), space.table(pair.left)), list[ModeEffects | None]()
     for at, axis in enumerate(space.axes):
         inner, count = axis.cells >= 0, int(axis.cells.max()) + 1

@@ -18,7 +18,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget, misplaced
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Absent, Estimate, Failure, checked
+from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, checked
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, missed
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, message_of
@@ -130,10 +130,11 @@ class MomentLyapunovFunction(Result):
         """Λ(p) at several p; the residual is the largest of the nodes."""
         points = checked_moments(p, self.solver.problem)
         value, error = self(points), self.error_estimate(points)
-        for point, each, bound in zip(points.tolist(), value.tolist(), error.tolist(), strict=True):
-            if point != 0:
-                estimate = Estimate(each, bound, self.solver.scale(point), quantity=moment_at(point))
-                checked(estimate, self.solver.near.remedy, point)
+        scale = self.solver.scales.moment(points)
+        is_meaningless = ~(error <= MEANINGLESS * np.maximum(np.abs(value), scale)) & (points != 0)
+        for i in np.flatnonzero(is_meaningless):
+            estimate = Estimate(float(value[i]), float(error[i]), float(scale[i]), quantity=moment_at(points[i]))
+            checked(estimate, self.solver.near.remedy, float(points[i]))
         return MomentLyapunov(
             p=points,
             value=value,
@@ -310,7 +311,7 @@ def moment_lyapunov(
         NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
     """
     solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
-    result = solve_moments(solver, checked_moments(p, problem))
+    result = solve_moments(solver, real_numbers(p, "p"))
     if result.failures:
         raise NotConverged(Message(Code.SEVERAL, reasons=[failure.reason for failure in result.failures]), result)
     return result

@@ -294,7 +294,7 @@ def best_order(p: FloatArray) -> Any:
 
 def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
     """A warning about the p at which the estimated error exceeds rtol, or nothing."""
-    size = np.where(p == 0, math.inf, np.maximum(np.abs(value), [solver.scale(float(each)) for each in p]))
+    size = np.where(p == 0, math.inf, np.maximum(np.abs(value), solver.scales.moment(p)))
     shares = error / size
     count = np.count_nonzero(shares > solver.rtol)
     if not count:

@@ -228,7 +228,12 @@ class TensorSpace:
 
     def weighed(self, coefficients: FloatArray) -> FloatArray:
         """∫ P_s w T for every test function w, T a function of the space."""
-        return np.ravel(along([None, *self.mass.terms[0][1:]], self.table(coefficients)))
+        return along(self._of_noises, self.table(coefficients)).ravel()
+
+    @cached_property
+    def _of_noises(self) -> tuple[Any, ...]:
+        """The factors of `mass`; None for that of φ, which is the identity."""
+        return None, *self.mass.terms[0][1:]
 
     def table(self, coefficients: FloatArray) -> FloatArray:
         """Coefficients of a function by axes, shape `shape`."""

@@ -62,6 +62,7 @@ class Generator:
         self.phi = PhaseAxis(chosen.phase.lines, chosen.phase.degrees)
         self._spaces: dict[float, TensorSpace] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
+        self._last: Pencil | None = None
         for jump in problem.system.jumps:
             self.phi.vertices_at(jump.phase)
         self.space(0.0)  # refuses a mesh that cannot be used
@@ -84,8 +85,10 @@ class Generator:
         return self._spaces[key]
 
     def at(self, p: float) -> Pencil:
-        """What is solved at p."""
-        return Pencil(p, self.space(p), self.matrix(p))
+        """What is solved at p; the last one is kept."""
+        if self._last is None or self._last.p != p:
+            self._last = Pencil(p, self.space(p), self.matrix(p))
+        return self._last
 
     def enriched(self) -> Generator:
         """That of the next finer discretisation."""

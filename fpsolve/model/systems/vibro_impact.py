@@ -148,7 +148,7 @@ class VibroImpactOscillator(System):
             CoefficientMatrix(2, ((0.0, 0.0), (0.0, self.c1))),
         )
 
-    @property
+    @cached_property
     def jumps(self) -> tuple[Jump, ...]:  # type: ignore[override]
         """The impacts, where cos φ = 0; to the order ε² both laws lose 1 − r."""
         return (Jump(math.pi / 2, self.log_impact_factor, -self._loss),)
