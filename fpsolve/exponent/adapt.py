@@ -123,10 +123,10 @@ class NearPlace:
         if tolerance is None and p in self._failed:
             raise self._failed[p]
         allowed = tolerance or self.tolerance
-        if p not in self.known or (self.mesh is None and not self._meets(self.known[p], allowed)):
+        if p not in self.known or (self.mesh is None and not self.meets(self.known[p], allowed)):
             try:
                 with one_thread():
-                    self.known[p] = self._found(p, allowed)
+                    self.known[p] = _Search(self, p, allowed).found()
             except NotConverged as failure:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure
@@ -174,79 +174,31 @@ class NearPlace:
         best = max((place.rate for place in places), default=0.0)
         return self.solution(p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)))
 
-    def _found(self, p: float, tolerance: Tolerance) -> Solution:
-        """A solution that meets a tolerance, or the one on the given mesh."""
-        if self.mesh is not None:
-            coarse, fine = self._given
-            pair = self._tried(coarse, p).pair
-            return Solution(pair, self.pair_on(fine, p, pair))
-        if abs(p) < self.small_p:
-            return self._tried(self.near_zero(p, tolerance).pair.generator, p)
-        start = None
-        for attempt in (self._from_start, self._from_nearest):
-            start = attempt(p, tolerance) or start
-            if start is not None and self._meets(start, tolerance) and other_center(start.pair) is None:
-                return start
-        return self._searched(p, tolerance, start)
-
-    def _searched(self, p: float, tolerance: Tolerance, start: Solution | None) -> Solution:
+    def searched(self, search: _Search, start: Solution | None) -> Solution:
         """A solution within a tolerance from a first discretisation, or from a solution that does not suffice.
 
         Where slow noise may carry the moment in two places, the larger eigenvalue.
         """
-        search = _Search(self.problem, p, tolerance, self.budget)
-        found = search.run(start or first(self.problem, p, self.rtol))
+        found = search.run(start or first(self.problem, search.p, self.rtol))
         elsewhere = other_center(found.pair)
         if elsewhere is None:
             return found
-        other = search.run(first(self.problem, p, self.rtol, elsewhere))
+        other = search.run(first(self.problem, search.p, self.rtol, elsewhere))
         return max(found, other, key=lambda each: each.pair.value)
 
     @cached_property
-    def _given(self) -> tuple[Generator, Generator]:
+    def given(self) -> tuple[Generator, Generator]:
         """That of the given mesh, and one of four degrees more, whose error hardly counts beside it."""
         assert self.mesh is not None
         generator = Generator(self.problem, self.mesh)
         return generator, generator.enriched().enriched()
 
-    def _from_nearest(self, p: float, tolerance: Tolerance) -> Solution | None:
-        """The solution at p with what was chosen for the nearest p, where that is likely to do."""
-        nearest = min(self.known, key=lambda q: abs(q - p), default=None)
-        if nearest is None:
-            return None
-        generator = self.known[nearest].pair.generator
-        if (chosen := self._trimmed(self.known[nearest], tolerance)) is not generator.chosen:
-            generator = Generator(self.problem, chosen)
-        try:
-            solution = self._tried(generator, p) if self.fits(generator, nearest, p) else None
-        except NotConverged:
-            return None
-        if solution is None or (nearest != p and not self.is_far and is_far_out(solution.pair)):
-            return None  # its interval may reach a place far out, which at this p is not the nearest to ξ = 0
-        return solution
-
-    def _from_start(self, p: float, tolerance: Tolerance) -> Solution | None:
-        """The solution at p with what was chosen for it in the problem close by, or None."""
-        if p not in self.starts or corners(self.problem, p):  # which lie elsewhere there
-            return None
-        chosen = self._trimmed(self.starts[p], tolerance)
-        try:
-            return Solution(principal_pair(Generator(self.problem, chosen), p, start=self.starts[p].pair))
-        except (NotConverged, MeshError):
-            return None
-
-    def _tried(self, generator: Generator, p: float) -> Solution:
-        """The solution at p with a generator, from those around p, or from the nearest one."""
-        known = (solution.pair for solution in self.known.values())
-        near = sorted(known, key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
-        return Solution(self.pair_on(generator, p, near))
-
-    def _meets(self, solution: Solution, tolerance: Tolerance) -> bool:
+    def meets(self, solution: Solution, tolerance: Tolerance) -> bool:
         """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
         pair = solution.pair
         return abs(pair.p) < self.small_p or solution.error <= tolerance(pair.p, pair.value)
 
-    def _trimmed(self, solution: Solution, tolerance: Tolerance) -> Discretisation:
+    def trimmed(self, solution: Solution, tolerance: Tolerance) -> Discretisation:
         """The discretisation of a solution, or a much smaller one that would do."""
         pair, generator = solution.pair, solution.pair.generator
         if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
@@ -281,8 +233,8 @@ class FarPlaces(NearPlace):
         except NotConverged as failure:
             raise NotConverged(Message(Code.FAR_OUT, reason=failure.message), failure.partial) from failure
 
-    def _searched(self, p: float, tolerance: Tolerance, start: Solution | None) -> Solution:
-        search, places = _Search(self.problem, p, tolerance, self.budget), far_places(self.problem, p)
+    def searched(self, search: _Search, start: Solution | None) -> Solution:
+        places = far_places(self.problem, search.p)
         enough = comparable(max(place.rate for place in places))
         wanted = [place for place in places if place.rate > enough]
         if start is not None and len(wanted) == 1:
@@ -323,12 +275,11 @@ class AllPlaces:
 
 @dataclass
 class _Search:
-    """For a discretisation that meets a tolerance at p; what it has cost, and the best it has found."""
+    """For the solution at one p within a tolerance; what it has cost, and the best it has found."""
 
-    problem: Problem
+    place: NearPlace
     p: float
     tolerance: Tolerance
-    budget: Budget
     started: float = field(default_factory=time.thread_time)
     stages: int = 0
     best: Solution | None = None
@@ -336,6 +287,54 @@ class _Search:
     share: float = math.inf
     failure: Exception | None = None
     last: tuple[float, int] = (0.0, 0)
+
+    def found(self) -> Solution:
+        """A solution within the tolerance, or the one on the given mesh."""
+        if self.place.mesh is not None:
+            coarse, fine = self.place.given
+            pair = self.tried(coarse).pair
+            return Solution(pair, self.place.pair_on(fine, self.p, pair))
+        if abs(self.p) < self.place.small_p:
+            return self.tried(self.place.near_zero(self.p, self.tolerance).pair.generator)
+        start = None
+        for attempt in (self.from_start, self.from_nearest):
+            start = attempt() or start
+            if start is not None and self.place.meets(start, self.tolerance) and other_center(start.pair) is None:
+                return start
+        return self.place.searched(self, start)
+
+    def from_start(self) -> Solution | None:
+        """The solution with what was chosen for this p in the problem close by, or None."""
+        start, problem = self.place.starts.get(self.p), self.place.problem
+        if start is None or corners(problem, self.p):  # which lie elsewhere there
+            return None
+        try:
+            generator = Generator(problem, self.place.trimmed(start, self.tolerance))
+            return Solution(principal_pair(generator, self.p, start=start.pair))
+        except (NotConverged, MeshError):
+            return None
+
+    def from_nearest(self) -> Solution | None:
+        """The solution with what was chosen for the nearest p, where that is likely to do."""
+        nearest = min(self.place.known, key=lambda q: abs(q - self.p), default=None)
+        if nearest is None:
+            return None
+        generator = self.place.known[nearest].pair.generator
+        if (chosen := self.place.trimmed(self.place.known[nearest], self.tolerance)) is not generator.chosen:
+            generator = Generator(self.place.problem, chosen)
+        try:
+            solution = self.tried(generator) if self.place.fits(generator, nearest, self.p) else None
+        except NotConverged:
+            return None
+        if solution is None or (nearest != self.p and not self.place.is_far and is_far_out(solution.pair)):
+            return None  # its interval may reach a place far out, which at this p is not the nearest to ξ = 0
+        return solution
+
+    def tried(self, generator: Generator) -> Solution:
+        """The solution with a generator, from those around p, or from the nearest one."""
+        known = (solution.pair for solution in self.place.known.values())
+        near = sorted(known, key=lambda pair: abs(pair.p - self.p))[:NEIGHBOURS]
+        return Solution(self.place.pair_on(generator, self.p, near))
 
     def run(self, start: Solution | Discretisation) -> Solution:
         """A solution within the tolerance, the tilted density sought where a first discretisation, or a solution, is.
@@ -351,7 +350,7 @@ class _Search:
         while True:
             self.check(chosen)
             try:
-                pair = principal_pair(Generator(self.problem, chosen), self.p, start=pair)
+                pair = principal_pair(Generator(self.place.problem, chosen), self.p, start=pair)
             except (MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError) as failure:
                 self.failure, pair = failure, None
                 chosen = chosen.doubled()
@@ -369,10 +368,10 @@ class _Search:
         size, elapsed = chosen.size, time.thread_time() - self.started
         cost = max(SECONDS_PER_UNKNOWN, (elapsed - self.last[0]) / max(self.last[1], 1) ** 1.5 if self.last[1] else 0.0)
         seconds = elapsed + cost * size**1.5
-        if size > self.budget.unknowns:
-            self.stop(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=self.budget.unknowns))
-        if seconds > self.budget.seconds:
-            self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.budget.seconds))
+        if size > self.place.budget.unknowns:
+            self.stop(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=self.place.budget.unknowns))
+        if seconds > self.place.budget.seconds:
+            self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.place.budget.seconds))
         if self.stages >= MAX_STAGES:
             self.stop(Message(Code.MESHES_SPENT, count=MAX_STAGES))
         self.last, self.stages = (elapsed, size), self.stages + 1

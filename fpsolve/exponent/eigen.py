@@ -203,7 +203,7 @@ def _dominant(apply: Any, start: FloatArray, p: float) -> tuple[FloatArray, floa
 
 
 class Iterate(NamedTuple):
-    """A two-sided Rayleigh quotient, the larger of the two backward errors, both vectors, of length 1, and M of them."""
+    """A two-sided Rayleigh quotient, the larger of both backward errors, both unit vectors, and M times them."""
 
     value: float
     residual: float
