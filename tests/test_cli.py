@@ -23,11 +23,12 @@ from fpsolve.output import figures
 from fpsolve.output.terminal import digits
 from fpsolve.study import sweep
 from tests.conftest import heed_signals, sampled
-from tests.test_workflow import HOPELESS, LEAN, TABLES, TEXT, files
+from tests.test_workflow import DRAWN, HOPELESS, LEAN, TABLES, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
 BARE = ["--set", "output.eigenfunctions=[]"]
-COMMANDS = [["check", "test.toml"], ["run", "test.toml", *BARE], ["mesh", "a.vtu"], ["--help"], ["--version"]]
+WITH_FIGURE = ["--set", "output={ figure = true, eigenfunctions = [] }"]
+COMMANDS = [["check", "test.toml"], ["run", "test.toml", *WITH_FIGURE], ["mesh", "a.vtu"], ["--help"], ["--version"]]
 
 
 @pytest.fixture
@@ -42,7 +43,7 @@ def case(tmp_path, monkeypatch):
 def shown(tmp_path_factory):
     """What a run prints and writes that is made once."""
     folder, out, err = tmp_path_factory.mktemp("shown"), io.StringIO(), io.StringIO()
-    (folder / "test.toml").write_text(TEXT, encoding="utf-8")
+    (folder / "test.toml").write_text(DRAWN, encoding="utf-8")
     with chdir(folder), redirect_stdout(out), redirect_stderr(err):
         assert main(["run", "test.toml"]) == 0
     return SimpleNamespace(out=out.getvalue(), err=err.getvalue(), folder=folder / "results/test")
@@ -88,12 +89,12 @@ def test_out_and_set(case, tmp_path, capsys):
 def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
     drawn, make = [], figures.figure_for
     monkeypatch.setattr(figures, "figure_for", lambda _, title, *more: drawn.append(title) or make([], title, *more))
-    sets = ["oscillator.omega = 2.0", "moments.p=[1.0]", "budget.seconds=9.0", "output.eigenfunctions=[]"]
-    assert main(["run", case, *(f"--set={text}" for text in sets)]) == 0
+    sets = ["oscillator.omega = 2.0", "moments.p=[1.0]", "budget.seconds=9.0"]
+    assert main(["run", case, *(f"--set={text}" for text in sets), *WITH_FIGURE]) == 0
     assert drawn == ["A test\nwith oscillator.omega = 2.0, moments.p = [1.0]"]
     told = " ".join(capsys.readouterr().out.split())
     assert told.startswith("A test: noise.D0 = 0.1 with oscillator.omega = 2.0, moments.p = [1.0] ┏")
-    assert main(["run", case, "--set", "output.eigenfunctions=[]"]) == 0
+    assert main(["run", case, *WITH_FIGURE]) == 0
     assert drawn[1:] == ["A test"]
 
 
@@ -449,7 +450,7 @@ def test_a_closed_pipe_ends_a_command_quietly(case, arguments, unbuffered):
 
 @pytest.mark.parametrize(
     ("arguments", "code"),
-    sampled((["run", "none.toml"], BAD_INPUT), (["run", "test.toml", *BARE], 0), (["nonsense"], BAD_INPUT)),
+    sampled((["run", "none.toml"], BAD_INPUT), (["run", "test.toml", *WITH_FIGURE], 0), (["nonsense"], BAD_INPUT)),
 )
 def test_full_errors_keep_the_exit_code(case, tmp_path, arguments, code):
     """A run goes on without them."""

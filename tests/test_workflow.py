@@ -46,8 +46,10 @@ p = [2.0, 0.0, -1.0]
 [vary]
 "noise.D0" = [0.1, 1.0]
 [output]
+figure = false
 eigenfunctions = [2.0]
 """
+DRAWN = TEXT.replace("figure = false", "figure = true")
 
 
 @pytest.fixture
@@ -65,12 +67,11 @@ def write(folder, text, overrides=()):
 def whole(tmp_path_factory):
     """The results and the folder of a case that is run once, by the name of its file, for tests that only look."""
     folder = tmp_path_factory.mktemp("whole")
-    write(folder, TEXT)
+    write(folder, DRAWN)
     return SimpleNamespace(results=fpsolve.run(str(folder / "test.toml"), folder), folder=folder / "test")
 
 
 LEAN = "output={ quantities = ['lyapunov_exponent'] }"
-"""What needs no figure is there at once."""
 
 
 def files(folder):
@@ -95,7 +96,7 @@ def test_summary_has_the_promised_form_and_the_computed_values(whole):
     assert (summary["case"], summary["title"]) == ("test", "A test")
     assert summary["fpsolve_version"] == version("fpsolve")
     assert (summary["complete"], summary["planned"], summary["done"]) == (True, 2, 2)
-    assert (summary["case_text"], summary["overrides"]) == (TEXT, [])
+    assert (summary["case_text"], summary["overrides"]) == (DRAWN, [])
     for curve, result, D0 in zip(summary["curves"], results, (0.1, 1.0), strict=True):
         assert curve["varied"] == {"noise.D0": D0}
         assert curve["parameters"]["noise.D0"] == D0
@@ -162,8 +163,9 @@ def without_times(folder):
     return summary, moments, [line.rpartition(",")[0] for line in curves.splitlines()]
 
 
-def test_tables_are_the_same_twice(case, whole, tmp_path):
+def test_tables_are_the_same_twice(whole, tmp_path):
     """Of a case, and of the name of its file."""
+    case = write(tmp_path, DRAWN)
     assert [each.curve for each in fpsolve.run(case, tmp_path)] == [each.curve for each in whole.results]
     assert without_times(tmp_path / "test") == without_times(whole.folder)
     first, second = (xarray.load_dataset(folder / "results.nc") for folder in (whole.folder, tmp_path / "test"))
@@ -211,7 +213,7 @@ HOPELESS = "mesh={ phi_cells = 1, phi_degree = 2, xi_cells = 2, xi_degree = 3 }"
 
 def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
     """The strong-noise curve fails at p = 2 and −1; the weak one and p = 0 are kept."""
-    text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
+    text = DRAWN.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
     case = write(tmp_path, text, [HOPELESS])
     with pytest.raises(NotConverged, match="use more cells") as caught:
         fpsolve.run(case, tmp_path / "out")
@@ -352,8 +354,9 @@ def test_tables_are_whole_where_an_interruption_comes_as_they_are_written(case, 
     assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
 
 
-def test_a_run_goes_on_where_it_was_interrupted(case, whole, tmp_path, monkeypatch):
+def test_a_run_goes_on_where_it_was_interrupted(whole, tmp_path, monkeypatch):
     """With the numbers of a run that nobody interrupts; files but records are made anew."""
+    case = write(tmp_path, DRAWN)
     interrupt_curve(monkeypatch, 2)
     with pytest.raises(KeyboardInterrupt):
         fpsolve.run(case, tmp_path / "out")
@@ -662,7 +665,7 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
 
 def test_sensitivities_are_written(tmp_path):
     """At nine p or all, and of the indices, each with its error; those of the Python function."""
-    sets = ["moments.p={start=-2.0, stop=6.0, num=17}", "vary={}", "output={eigenfunctions=[2.0], sensitivities=true}"]
+    sets = ["moments.p={start=-2.0, stop=6.0, num=17}", "vary={}", "output={eigenfunctions=[2.0], figure=false, sensitivities=true}"]
     case = write(tmp_path, TEXT, sets)
     fpsolve.run(case, tmp_path)
     [curve] = json.loads((tmp_path / "test/summary.json").read_text(encoding="utf-8"))["curves"]

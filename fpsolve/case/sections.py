@@ -347,7 +347,7 @@ class FigureSection(Section):
 
 
 class OutputSection(Section):
-    """[output]: what is computed, the p whose eigenfunctions are written, and whether sensitivities are drawn."""
+    """[output]: what is computed, the p whose eigenfunctions are written, and what is drawn."""
 
     quantities: Annotated[
         tuple[str, ...],
@@ -362,6 +362,7 @@ class OutputSection(Section):
         Values | None,
         parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False, max_length=MAX_MOMENTS),
     ] = None
+    figure: Annotated[bool, parameter("whether the figure is drawn", "figure = false")] = True
     sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
 
     @property

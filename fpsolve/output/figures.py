@@ -137,10 +137,11 @@ def _several(varied: Sequence[Varied]) -> tuple[dict[str, int], list[str]]:
 def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path) -> None:
     """Draw figure.png and figure.pdf: finite elements, perturbation theory, and what is simulated as dots.
 
-    Over two keys with many values it is a map. Without a [figure] there is none of a case that does not ask for Λ(p).
+    Over two keys with many values it is a map. There is none with `[output] figure = false`, and without a [figure]
+    none of a case that does not ask for Λ(p).
     """
     setting = case.figure
-    if setting.needed not in case.output.quantities or not results:
+    if not case.output.figure or setting.needed not in case.output.quantities or not results:
         return
     held = held_in_words(results[0].curve, case.vary.keys, setting.time_unit)
     with figure_for(_paths(folder, "figure"), case.caption, held, FORMATS[setting.width]) as figure:
