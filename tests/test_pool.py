@@ -14,7 +14,7 @@ import pytest
 from fpsolve import pool
 from fpsolve.errors import FpsolveError
 from fpsolve.pool import PROCESSORS, Pool, cluster, limit_processors, parallel, processors, serial
-from tests.conftest import heed_signals
+from tests.conftest import heed_signals, sampled
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 
@@ -65,6 +65,7 @@ def test_map_keeps_the_order(count):
         assert list(workers.map(square, [4])) == [16]  # the workers are still there
 
 
+@pytest.mark.slow
 def test_items_are_taken_when_they_are_needed():
     """They may be many, and may follow from results."""
     taken = []
@@ -101,7 +102,7 @@ def test_items_are_taken_when_they_are_needed():
     assert last.item == 0
 
 
-@pytest.mark.parametrize("workers", [parallel(2), Pool(Cluster, ahead=3)])
+@pytest.mark.parametrize("workers", sampled(Pool(Cluster, ahead=3), parallel(2)))
 def test_a_dead_worker_costs_its_task_only(workers):
     with workers:
         found = {done.item: done for done in workers.run(deadly, range(15))}
@@ -111,6 +112,7 @@ def test_a_dead_worker_costs_its_task_only(workers):
     assert all(done.result == item for item, done in found.items() if item != 7)
 
 
+@pytest.mark.slow
 def test_a_dead_worker_ends_a_map():
     with parallel(2) as workers, pytest.raises(FpsolveError, match="a worker died"):
         list(workers.map(deadly, range(15)))
@@ -151,12 +153,13 @@ def test_a_map_of_this_process_is_as_lazy_as_the_builtin():
     assert done == [0]
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", sampled(1, 2))
 def test_exceptions_are_raised_here(count):
     with parallel(count) as workers, pytest.raises(OSError, match="No space"):
         list(workers.run(faulty, range(20)))
 
 
+@pytest.mark.slow
 def test_workers_are_other_processes_with_one_processor_each():
     with parallel(2) as workers:
         found = set(workers.map(whereabouts, range(20)))
@@ -185,7 +188,7 @@ with parallel(2) as workers:
 """
 
 
-@pytest.mark.parametrize("is_file", [True, False])
+@pytest.mark.parametrize("is_file", sampled(False, True))
 def test_a_script_needs_no_guard(tmp_path, is_file):
     """Its processes do not run it again, nor look for it where it came through a pipe."""
     script = tmp_path / "script.py"
@@ -203,6 +206,7 @@ def test_a_script_needs_no_guard(tmp_path, is_file):
     assert (done.returncode, done.stdout, done.stderr) == (0, "14\n", "")
 
 
+@pytest.mark.slow
 def test_no_more_processes_than_tasks():
     with parallel(1000, 2) as workers:
         assert len(set(workers.map(whereabouts, range(20)))) == 2

@@ -42,6 +42,7 @@ p = {{ start = -2.0, stop = 4.0, num = 4 }}
 "noise.D0" = {{ start = 0.1, stop = 1.0, num = {size}, scale = "log" }}
 "oscillator.omega" = {{ start = 0.5, stop = 3.0, num = {size} }}
 [output]
+figure = false
 quantities = ["moment", "lyapunov_exponent", "stability_index", "variance_rate", "critical_impact_factor"]
 """
 SIZE = 6
@@ -203,6 +204,7 @@ def test_a_changed_parameter_solves_only_what_it_changes(place):
     assert len(lines(place, "changed")) == SIZE**2
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_what_is_solved(place):
     process = started(place, "interrupted", "--jobs", "2")
     folder = place / "interrupted/sweep" / SOLVED_RECORDS
@@ -389,6 +391,7 @@ def test_records_are_read_once(tmp_path, monkeypatch):
     assert known.look().read(known.address("key0")) == {"number": 10}
 
 
+@pytest.mark.slow
 def test_a_drawing_that_fails_costs_no_numbers(place, monkeypatch):
     case = load_case(place / "sweep.toml", ["vary={}", "output={}", "moments.p=[1.0]"])
     before = run_case(case, place / "drawn").results[0]

@@ -665,7 +665,7 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
 
 def test_sensitivities_are_written(tmp_path):
     """At nine p or all, and of the indices, each with its error; those of the Python function."""
-    sets = ["moments.p={start=-2.0, stop=6.0, num=17}", "vary={}", "output={eigenfunctions=[2.0], figure=false, sensitivities=true}"]
+    sets = ["moments.p={start=-2.0, stop=6.0, num=17}", "vary={}", "output.sensitivities=true"]
     case = write(tmp_path, TEXT, sets)
     fpsolve.run(case, tmp_path)
     [curve] = json.loads((tmp_path / "test/summary.json").read_text(encoding="utf-8"))["curves"]

@@ -59,7 +59,7 @@ def wanted(found, label):
 
 
 @pytest.mark.parametrize("epsilon", sampled(0.5, 0.1))
-@pytest.mark.parametrize("zero", [LAMBDA, SECOND, INDEX])
+@pytest.mark.parametrize("zero", sampled(LAMBDA, SECOND, INDEX))
 def test_f_is_zero_on_a_line(zero, epsilon):
     """Also if it is solved anew and more tightly, which moves the line by less than its width."""
     found = line(zero, epsilon=epsilon)
@@ -72,7 +72,7 @@ def test_f_is_zero_on_a_line(zero, epsilon):
         assert (abs(value) - error) / slope <= point.sample.width < 1e-8
 
 
-@pytest.mark.parametrize("zero", [LAMBDA, SECOND, INDEX])
+@pytest.mark.parametrize("zero", sampled(SECOND, LAMBDA, INDEX))
 @pytest.mark.parametrize("omega", sampled(3.0, 1.2))
 def test_weak_noise_has_the_lines_of_the_paper(zero, omega):
     """c₁ of Λ₂(p)/p = 0, Eq. (36), is off by O(ε²)."""
@@ -101,7 +101,7 @@ def test_weak_noise_has_the_lines_of_the_paper(zero, omega):
         (2.0, 1.0, 2.0, 0.5, 0.0),
     ],
 )
-@pytest.mark.parametrize("key", ["noise.D0", "oscillator.omega"])
+@pytest.mark.parametrize("key", sampled("noise.D0", "oscillator.omega"))
 def test_without_impacts_the_line_of_index_minus_two_is_exact(omega, epsilon, d0, tau0, r0, key):
     """At p = −2 the generator is the adjoint of that at p = 0 less the trace: Λ(−2) = ε²(S(0)/2 − c₁)."""
     noise = NonGaussianNoise(D0=d0, tau0=tau0, r0=r0)
@@ -116,7 +116,7 @@ def test_without_impacts_the_line_of_index_minus_two_is_exact(omega, epsilon, d0
     assert not any("fold" in label for label in branch.labels)  # though ∂F/∂ω = 0 all along
 
 
-@pytest.mark.parametrize("zero", [LAMBDA, SECOND, INDEX, {"moment": 1e-5}])
+@pytest.mark.parametrize("zero", sampled(LAMBDA, SECOND, INDEX, {"moment": 1e-5}, keep=2))
 @pytest.mark.parametrize(
     ("x", "y", "at"),
     [
@@ -162,6 +162,7 @@ def test_a_refined_line_is_the_same_with_shorter_steps(weak):
     assert finer.scan is weak.scan
 
 
+@pytest.mark.slow
 def test_two_branches_close_to_each_other_are_both_refined():
     """δ_p = −6 without much damping of impacts bends back, so that the frame cuts it into two arms near its top."""
     found = bent()
@@ -319,6 +320,7 @@ def test_almost_sure_stability_ends_at_the_paper_s_damping():
         assert c1 == pytest.approx(-density(omega) / 4 + 2 * omega * 0.2 / math.pi, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_almost_sure_stability_ends_at_the_paper_s_restitution():
     """Section 5: almost-sure stable if r < 1 − π(S(2ω) + 4c₁)/(8ω)."""
     y = Axis("oscillator.restitution", 0.5, 1.0)
@@ -329,6 +331,7 @@ def test_almost_sure_stability_ends_at_the_paper_s_restitution():
         assert r == pytest.approx(1 - math.pi * (density(omega) + 4 * 0.1) / (8 * omega), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_almost_sure_stability_ends_at_the_paper_s_spectral_density():
     """Section 5: almost-sure stable if S(2ω) < −4c₁ + 8ω(1 − r)/π, here reached by D₀."""
     dampings = (-0.1, 0.0, 0.1)
@@ -339,7 +342,7 @@ def test_almost_sure_stability_ends_at_the_paper_s_spectral_density():
         assert density(1.5, replace(NOISE, D0=d0)) == pytest.approx(-4 * c1 + 8 * 1.5 * 0.2 / math.pi, rel=1e-3)
 
 
-@pytest.mark.parametrize("index", [-1.0, 0.5, 2.0])
+@pytest.mark.parametrize("index", sampled(-1.0, 0.5, 2.0))
 def test_moment_stability_ends_at_the_paper_s_index(index):
     """Eq. (38): the moments 0 < p < δ_p are stable, so that δ_p = v is where that of p = v ceases to be."""
     omega = 2.0
@@ -360,7 +363,7 @@ def test_moment_stability_ends_at_the_paper_s_index(index):
         ("oscillator.restitution", (0.6, 1.0), 1),
     ],
 )
-@pytest.mark.parametrize("zero", [LAMBDA, SECOND])
+@pytest.mark.parametrize("zero", sampled(LAMBDA, SECOND))
 def test_what_the_paper_says_of_each_parameter(zero, key, values, sign):
     """Section 5: D₀, r₀, r and c₁ take stability away; ω and τ₀ add to it: the c₁ where it ends falls, or rises."""
     found = line(zero, Axis(key, *values), Axis("oscillator.c1", -5.0, 1.0))

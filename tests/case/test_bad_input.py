@@ -21,6 +21,7 @@ from fpsolve.case.case import load_case
 from fpsolve.errors import CaseError, Fault
 from fpsolve.fem.mesh import make_mesh, write_mesh
 from fpsolve.simulation.setup import default_step, obstacles, transient
+from tests.conftest import sampled
 from tests.snapshots import BIG, good
 
 GOOD = good("bad")
@@ -120,6 +121,7 @@ def test_too_long_a_list(tmp_path: Path, key: str, old: str, new: str) -> None:
     assert fault.line
 
 
+@pytest.mark.slow
 def test_the_longest_lists_take_no_longer_than_reading_them(tmp_path: Path) -> None:
     """Within seconds; comparing all pairs would take minutes."""
     longest = TOO_MANY.replace(", 0.100001", "")
@@ -185,7 +187,7 @@ def test_any_parameters_in_their_ranges_give_a_case_or_messages(
         assert all(0 < length < math.inf for length in lengths)
 
 
-@pytest.mark.parametrize("parts", [300, 600, 3000])
+@pytest.mark.parametrize("parts", sampled(300, 600, 3000))
 @pytest.mark.parametrize("start", ["vary", "a", "mesh.file"])
 def test_very_long_dotted_key(tmp_path: Path, start: str, parts: int) -> None:
     long = f"{start}{'.a' * parts} = 1"
@@ -239,7 +241,9 @@ def test_a_link_to_a_case(tmp_path: Path) -> None:
     assert load_case(tmp_path / "link.toml").title == "good"
 
 
-@pytest.mark.parametrize(("count", "last"), [(50, "unknown key"), (51, ": and 1 more"), (3000, ": and 2950 more")])
+@pytest.mark.parametrize(
+    ("count", "last"), sampled((50, "unknown key"), (51, ": and 1 more"), (3000, ": and 2950 more"), keep=2)
+)
 def test_of_many_faults_the_first_are_told(tmp_path: Path, count: int, last: str) -> None:
     path = write(tmp_path, "".join(f"wrong{i} = 1\n" for i in range(count)) + GOOD)
     with pytest.raises(CaseError) as raised:

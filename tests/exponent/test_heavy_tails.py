@@ -62,8 +62,8 @@ def by_differences(case, p, value, phases=128):
     ("case", "p", "known"),
     [
         *sampled(
-            (problem(0.5, 1.0, 1.1, 0.2, restitution=0.8, c1=0.1), -0.5, None),
             (problem(0.5, 1.0, 1.1, 0.1), -0.1, 0.004209),
+            (problem(0.5, 1.0, 1.1, 0.2, restitution=0.8, c1=0.1), -0.5, None),
             (problem(0.5, 1.0, 1.1, 0.2), -0.5, 0.02688),
             (problem(0.7, 0.8, 1.1, 0.15), -0.3, None),
             (problem(0.4, 1.5, 1.08, 0.12), -0.7, None),

@@ -17,7 +17,7 @@ from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from tests.conftest import FIG1, UNIT_NOISE
+from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.oracles.paper_generator import PaperGenerator
 
 WEAK = VibroImpactOscillator(omega=1.2, restitution=0.7, c1=-0.3, epsilon=0.4)
@@ -49,7 +49,7 @@ def assert_same(matrix, expected):
     assert np.max(np.abs(matrix.toarray() - expected)) <= 1e-14 * max(np.max(np.abs(expected)), 1e-3)
 
 
-@pytest.mark.parametrize("p", [-2.0, 0.0, 1.7])
+@pytest.mark.parametrize("p", sampled(1.7, 0.0, -2.0, keep=2))
 def test_the_terms_are_the_papers_equation(both, p):
     (generator, on), scale = both, both[0].problem.system.epsilon
     paper = on(p)
@@ -119,7 +119,7 @@ def test_coefficients_and_their_derivatives(coefficient, derivative):
     assert coefficient(0.0) == (1 if coefficient == Power(0) else 0)
 
 
-@pytest.mark.parametrize("p", [-3.0, 0.5, 4.0])
+@pytest.mark.parametrize("p", sampled(0.5, -3.0, 4.0))
 def test_the_upper_bound_lies_right_of_the_spectrum(both, p):
     generator, _ = both
     if generator.size < 1500:

@@ -19,6 +19,7 @@ TEXT = f"""title = "A test"
 p = [2.0, 0.0, -1.0]
 [output]
 eigenfunctions = []
+figure = false
 """
 PRODUCT = '[vary]\n"noise.D0" = [1.0, 0.1]\n"noise.treatment" = ["exact", "ou-reduction"]\n'
 ZIP = '[vary]\nmode = "zip"\n"oscillator.omega" = [1.0, 2.0, 2.0]\n"oscillator.c1" = [0.1, 0.1, 0.2]\n'

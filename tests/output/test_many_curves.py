@@ -289,6 +289,7 @@ def test_when_it_is_a_map(drawn, tmp_path, count, more, is_map):
     assert [each.get_array().shape for each in maps] == [(count, 3)] * is_map
 
 
+@pytest.mark.slow
 def test_ten_thousand_curves_take_seconds(tmp_path):
     case = case_of(tmp_path, ["vary.noise.D0={start=0.1, stop=3.0, num=10000}"])
     results = results_of(case)

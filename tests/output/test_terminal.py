@@ -18,6 +18,7 @@ from fpsolve.output.screen import Column, Grid, Screen
 from fpsolve.output.terminal import duration, print_comparisons, print_results, print_simulation, print_warnings
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
+from tests.conftest import sampled
 from tests.solving import solve_case
 from tests.test_workflow import TEXT
 
@@ -45,7 +46,7 @@ def terminal(monkeypatch):
     return begin
 
 
-@pytest.mark.parametrize("width", [60, 80, 200])
+@pytest.mark.parametrize("width", sampled(80, 60, 200))
 def test_quantities_are_whole(case, width, capsys, terminal):
     results, simulated = solve_case(case), tuple(simulate_curves(case))
     terminal(width)

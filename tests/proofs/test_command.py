@@ -72,6 +72,7 @@ def test_bounds_and_verdicts_are_told_and_written(case, tmp_path, capsys):
     assert main(["prove", "--check", "results/proven/proof.json"]) == 0
 
 
+@pytest.mark.slow
 def test_several_processes_write_the_same_file(case, tmp_path):
     varied = ["--set", 'vary."noise.D0"=[0.5, 1.0]', *LOOSE, "--quiet"]
     assert main(["prove", case, *varied, "--jobs", "1"]) == 0

@@ -27,16 +27,18 @@ def problem(*, reduced=False, impact="delta", **numbers):
     [
         (FIG1, 2.0, 0.013021271916, 8e-8),
         (FIG1 | {"r0": 0.7}, 2.0, 0.007799597190, 4.6e-9),
-        (MIDDLE, 2.0, 0.02512405045, 6e-10),
+        pytest.param(MIDDLE, 2.0, 0.02512405045, 6e-10, marks=pytest.mark.slow),
         pytest.param(MIDDLE, -1.0, 0.05373157261, 9.2e-9, marks=pytest.mark.slow),
         pytest.param(STRONG, 1.0, 0.23681957433, 4.2e-6, marks=pytest.mark.slow),
         pytest.param(STRONG, 4.0, 2.466736467, 1.8e-6, marks=pytest.mark.slow),
         pytest.param(STRONG, -3.0, 1.051181765, 1e-2, marks=pytest.mark.slow),
-        (STRONG | {"r0": 0.95}, 1.0, 0.475228026738, 1e-3),
+        pytest.param(STRONG | {"r0": 0.95}, 1.0, 0.475228026738, 1e-3, marks=pytest.mark.slow),
         (FIG1 | {"reduced": True}, 2.0, 0.014163143653, 1e-9),
-        (FIG1 | {"epsilon": 0.3, "reduced": True}, 2.0, 0.129043772, 1e-8),
+        pytest.param(FIG1 | {"epsilon": 0.3, "reduced": True}, 2.0, 0.129043772, 1e-8, marks=pytest.mark.slow),
         (MIDDLE | {"r0": 0.95, "reduced": True}, 2.0, 0.04887793797, 1e-8),
-        (FIG1 | {"epsilon": 1.0, "D0": 0.3, "reduced": True}, 1.0, 0.1243172991, 1e-5),
+        pytest.param(
+            FIG1 | {"epsilon": 1.0, "D0": 0.3, "reduced": True}, 1.0, 0.1243172991, 1e-5, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_bounds_are_close_and_hold_what_a_spectral_code_of_its_own_finds(numbers, p, value, half_width):
@@ -51,7 +53,7 @@ def test_bounds_are_close_and_hold_what_a_spectral_code_of_its_own_finds(numbers
 @pytest.mark.parametrize(
     ("numbers", "value"),
     [
-        (FIG1, 0.0142930811487),
+        pytest.param(FIG1, 0.0142930811487, marks=pytest.mark.slow),
         (FIG1 | {"reduced": True}, 0.0154347905379),
         (FIG1 | {"epsilon": 1.0}, 2.198165797704),
     ],
@@ -72,6 +74,7 @@ def test_the_second_negative_moment_is_known_without_loss_for_gaussian_noise(eps
     assert found.lower <= expected <= found.upper
 
 
+@pytest.mark.slow
 def test_the_lyapunov_exponent_agrees_with_the_slope_of_the_moments():
     """Λ is convex and Λ(0) = 0, so that −Λ(−h)/h ≤ λ ≤ Λ(h)/h; both laws differ by more than the bounds."""
     given = problem(**MIDDLE, impact="restitution")
@@ -92,6 +95,7 @@ def test_noise_whose_ends_are_reached():
     assert found.lower - estimate.error_estimate[0] <= estimate.value[0] <= found.upper + estimate.error_estimate[0]
 
 
+@pytest.mark.slow
 def test_the_stability_index_lies_between_two_signs():
     given = problem(**FIG1)
     found, estimate = prove_stability_index(given), fpsolve.stability_index(given)
@@ -113,6 +117,7 @@ def test_nothing_moves_at_p_zero():
     assert not objection(found.certificate)
 
 
+@pytest.mark.slow
 def test_a_width_beyond_reach_is_told():
     found = prove(problem(**FIG1 | {"epsilon": 0.05, "D0": 0.1}, reduced=True), 1.0, width=1e-30)
     assert found.is_proven

@@ -9,6 +9,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem
 from fpsolve.simulation.estimators import simulate
 from tests.agreement import cheap_step, rows
+from tests.conftest import sampled
 from tests.simulation.problems import MODERATE, REDUCED, exact
 
 
@@ -37,7 +38,7 @@ def test_a_sample_agrees_with_finite_elements():
 
 
 @pytest.mark.parametrize("count", [16, pytest.param(200, marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("estimator", "paths", "time"), [("direct", 2048, 100.0), ("population", 2048, 50.0)])
+@pytest.mark.parametrize(("estimator", "paths", "time"), sampled(("direct", 2048, 100.0), ("population", 2048, 50.0)))
 def test_standard_errors_are_honest(estimator, paths, time, count):
     """Over 200 seeds the estimates deviate by their standard error, within 20 %, and their mean is Λ(p)."""
     orders = [1.0] if estimator == "population" else [-1.0, 0.5, 1.0]

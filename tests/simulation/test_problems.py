@@ -19,6 +19,7 @@ from fpsolve.simulation.batches import PlainBatch, Plan
 from fpsolve.simulation.estimators import simulate
 from fpsolve.simulation.response import stationary_response
 from fpsolve.simulation.setup import PROGRESS_STEPS
+from tests.conftest import sampled
 
 OSCILLATOR = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5, c2=0.3, impact="restitution")
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9)
@@ -88,7 +89,7 @@ def copied(thing):
     return pickle.loads(pickle.dumps(thing))
 
 
-@pytest.mark.parametrize("estimator", ["direct", "population"])
+@pytest.mark.parametrize("estimator", sampled("direct", "population"))
 def test_estimates_pickle(estimator):
     found = moments(OSCILLATOR, NOISE, [-1.0, 0.5, 30.0], estimator=estimator)
     assert copied(found) == found
