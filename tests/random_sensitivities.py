@@ -1,0 +1,78 @@
+"""∂Λ(p)/∂θ of random parameter sets against central differences of Λ(p).
+
+`python -m tests.random_sensitivities [first last]` prints for each set how far the two are apart, in stated errors.
+"""
+
+import sys
+
+import numpy as np
+
+from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator
+from fpsolve.analysis.sensitivity import sensitivities
+from fpsolve.exponent.solver import ExponentSolver
+
+RTOL = 1e-11
+STEP = 1e-4
+"""Of differences, in shares of a parameter."""
+
+
+def problem_of(theta, law, is_exact):
+    """A problem and the noise of Eq. (7), from parameters by their keys."""
+    own = {key.partition(".")[2]: value for key, value in theta.items()}
+    noise = NonGaussianNoise(**{name: own.pop(name) for name in ("D0", "tau0", "r0")})
+    return Problem(VibroImpactOscillator(**own, impact=law), noise if is_exact else noise.ou_reduction()), noise
+
+
+def drawn(seed):
+    """A random problem and a p: weak or strong, reduced or exact noise, both laws of impact."""
+    rng = np.random.default_rng(seed)
+
+    def between(low, high):
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    epsilon, restitution = between(0.05, 1.5), rng.uniform(0.6, 0.95)
+    theta = {
+        "oscillator.omega": between(0.3, 5),
+        "oscillator.restitution": restitution,
+        "oscillator.c1": rng.uniform(-0.4, 0.4),
+        "oscillator.epsilon": epsilon,
+        "noise.D0": between(0.05, 2),
+        "noise.tau0": between(0.05, 5),
+        "noise.r0": rng.uniform(-1, 1.4),
+    }
+    is_exact = theta["noise.r0"] < 0.98 and rng.random() < 0.7
+    law = "restitution" if epsilon**2 * (1 - restitution) < 0.8 and rng.random() < 0.5 else "delta"
+    return theta, law, bool(is_exact), float(rng.choice([-1, 1]) * rng.uniform(0.3, 5))
+
+
+def central(theta, key, value_at, step=STEP):
+    """A central difference of fourth order."""
+    h = step * max(abs(theta[key]), 0.1)
+    values = [value_at(theta | {key: theta[key] + k * h}) for k in (-2, -1, 1, 2)]
+    return (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h)
+
+
+def main(first: int = 1, last: int = 100) -> None:
+    """Print of each set the greatest distance of a derivative from its difference, over what both leave open."""
+    for seed in range(first, last + 1):
+        theta, law, is_exact, p = drawn(seed)
+        problem, _ = problem_of(theta, law, is_exact)
+        [found] = sensitivities(problem, p, rtol=RTOL).moments
+        solved, off = ExponentSolver(problem, rtol=RTOL).solution(p), {}
+        for key, estimate in found.items():
+
+            def value_at(at, law=law, is_exact=is_exact, p=p):
+                return ExponentSolver(problem_of(at, law, is_exact)[0], rtol=RTOL).pair(p).value
+
+            fine, coarse = (central(theta, key, value_at, step) for step in (STEP, 2 * STEP))
+            noise = (solved.error + 1e-13 * problem.system.omega) / (STEP * max(abs(theta[key]), 0.1))
+            off[key] = abs(estimate.value - fine) / (estimate.error_estimate + abs(fine - coarse) + noise)
+        worst = max(off, key=off.__getitem__)
+        print(
+            f"{seed:4d} p = {p:6.3f} {law:11s} {'exact' if is_exact else 'reduced':7s} {off[worst]:8.3f} {worst}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
