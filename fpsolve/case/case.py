@@ -37,7 +37,7 @@ from fpsolve.case.sections import (
     Value,
     Varied,
 )
-from fpsolve.case.toml import Document, read_document
+from fpsolve.case.toml import read_document
 from fpsolve.case.vary import EXAMPLE, Vary, assignments, vary_of
 from fpsolve.errors import CaseError, Fault
 from fpsolve.exponent.adapt import Budget
@@ -190,18 +190,15 @@ class Case(Section):
     @property
     def shown(self) -> FloatArray:
         """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread, or none."""
+        wanted = self.output.eigenfunctions
         if EIGENFUNCTIONS not in self.output.quantities or self.leaves_out_eigenfunctions or self.noise.has_states:
-            return np.zeros(0)
-        if self.output.eigenfunctions is not None:
-            wanted = np.array(self.output.eigenfunctions)
-            return self.p[[int(np.argmin(np.abs(self.p - each))) for each in wanted]] if wanted.size else wanted
-        return _spread(self.p)
+            wanted = ()
+        return _spread(self.p) if wanted is None else np.array([self.p[np.argmin(np.abs(self.p - p))] for p in wanted])
 
     @property
     def usual_p(self) -> float:
         """The p at which curves are compared by their eigenfunctions: of those that are shown, or of all, next to 2."""
-        p = self.shown if self.shown.size else self.p
-        return float(p[np.argmin(np.abs(p - USUAL_P))])
+        return float(min(self.shown if self.shown.size else self.p, key=lambda p: abs(p - USUAL_P)))
 
     @property
     def leaves_out_eigenfunctions(self) -> bool:
@@ -252,9 +249,8 @@ class Case(Section):
     def is_exact(self) -> bool:
         """Whether perturbation theory has another noise than some curve."""
         texts = [key for key in self.vary.keys if self.vary.is_text(key)]
-        told = dict[tuple[Value, ...], Varied]()
-        for varied in self.vary.sets() if texts else [{}]:
-            told.setdefault(tuple(varied[key] for key in texts), varied)
+        sets = self.vary.sets() if texts else [{}]
+        told = {tuple(varied[key] for key in texts): varied for varied in sets}  # one for each of their combinations
         return any(self.curve(varied).is_exact for varied in told.values())
 
     def heading(self, curve: Curve) -> str:
@@ -262,9 +258,9 @@ class Case(Section):
         return self._with_changes(f"{self.title}: {curve.label}" if curve.varied else self.title)
 
     def _with_changes(self, title: str) -> str:
-        split = [(key.strip(), value.strip()) for key, _, value in (text.partition("=") for text in self._overrides)]
-        told = [f"{key} = {value}" for key, value in split if key.partition(".")[0] in COMPUTED]
-        return f"{title}\nwith {', '.join(shortened(text) for text in told)}" if told else title
+        split = [map(str.strip, text.split("=", 1)) for text in self._overrides]
+        told = [shortened(f"{key} = {value}") for key, value in split if key.partition(".")[0] in COMPUTED]
+        return f"{title}\nwith {', '.join(told)}" if told else title
 
     def place(self, curve: Curve) -> str:
         """The name of the case, and which of the curves."""
@@ -298,29 +294,23 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
         CaseError: with every fault of the file and of the overrides, each with its line and its remedy.
     """
     document = read_document(path, overrides, options)
-    faults = list(document.faults)
-    data = document.data
+    faults, data = document.faults, document.data
     context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds_of(data)}
     try:
         case = Case.model_validate(data, context=context)
-        faults += _hidden_overrides(case, document)
+        for key in case.vary.keys:  # which replaces what the command line says of it
+            if isinstance(document.places.get(key), str):
+                remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
+                faults.append(document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}"))
     except ValidationError as error:
-        known = explain(error, sections_of(Case.model_fields, data), parameters_of({}, context) or {})
-        faults += [document.fault(*fault) for fault in known]
+        fields, parameters = sections_of(Case.model_fields, data), parameters_of({}, context)
+        faults += (document.fault(*fault) for fault in explain(error, fields, parameters or {}))
     except RecursionError:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
     if faults:
         raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
     case._path, case._overrides, case._text = Path(path), tuple(overrides), document.text
     return case
-
-
-def _hidden_overrides(case: Case, document: Document) -> Iterator[Fault]:
-    """Values of the command line that [vary] would replace."""
-    for key in case.vary.keys:
-        if isinstance(document.places.get(key), str):
-            remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
-            yield document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}")
 
 
 def _spread(p: FloatArray) -> FloatArray:

@@ -148,14 +148,13 @@ def varying(problem: Problem) -> Callable[[Mapping[str, float | str]], Problem]:
 
     @lru_cache(maxsize=1024)
     def half(section: str, values: tuple[tuple[str, float | str], ...]) -> Any:
-        changed = problem.at(dict(values)) if values else problem
-        return changed.system if section == problem.system.section else changed.noise
+        return next(each for each in problem.at(dict(values)).halves if each.section == section)
 
     def at(varied: Mapping[str, float | str]) -> Problem:
-        system, noise = (
-            half(each.section, tuple(item for item in varied.items() if item[0].partition(".")[0] == each.section))
-            for each in problem.halves
-        )
+        of_half = {each.section: list[tuple[str, float | str]]() for each in problem.halves}
+        for key, value in varied.items():
+            of_half[key.partition(".")[0]].append((key, value))
+        system, noise = (half(section, tuple(values)) for section, values in of_half.items())
         return Problem(system, noise)
 
     return at

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import stat
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import NamedTuple
-
-_MARK = b"\xef\xbb\xbf"
 
 
 class Unreadable(Exception):
@@ -18,16 +17,7 @@ class Unreadable(Exception):
 
 
 class Words(NamedTuple):
-    """What messages on a file speak of.
-
-    Attributes:
-        content: what is in it, such as "the case".
-        kind: what it is, such as "a case file".
-        example: its name, such as "fig1.toml".
-        format: such as "TOML".
-        start: what to do where it is empty.
-        may_have_mark: whether it may start with a byte order mark.
-    """
+    """What messages on a file speak of: "the case", "a case file", "fig1.toml", "TOML", what to do if empty."""
 
     content: str
     kind: str
@@ -38,12 +28,22 @@ class Words(NamedTuple):
 
 
 def read_text(path: Path, words: Words) -> str:
-    """The text of a file in UTF-8. Raises Unreadable."""
-    content = _content(path, words)
-    if content.startswith(_MARK):
-        if not words.may_have_mark:
-            raise Unreadable('starts with a byte order mark; save it as "UTF-8", not "UTF-8 with BOM"', 1)
-        content = content.removeprefix(_MARK)
+    """The text of a file in UTF-8, without a byte order mark where it may have one. Raises Unreadable."""
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise Unreadable(f"is a directory; name {words.kind} in it, such as {words.example}")
+        if not stat.S_ISREG(mode):
+            raise Unreadable(f"is a pipe or a device, not a file; write {words.content} into a file and name that")
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise Unreadable(f"no such file; look in {path.parent.resolve()} or give the full path") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise Unreadable(f"cannot be read ({reason}); check its name and permissions") from None
+    if content.startswith(BOM_UTF8) and not words.may_have_mark:
+        raise Unreadable('starts with a byte order mark; save it as "UTF-8", not "UTF-8 with BOM"', 1)
+    content = content.removeprefix(BOM_UTF8)
     if b"\0" in content:
         raise Unreadable(f"is binary or UTF-16, not UTF-8 text; name a {words.format} file, or save it as UTF-8")
     try:
@@ -54,18 +54,3 @@ def read_text(path: Path, words: Words) -> str:
     if not text.strip():
         raise Unreadable(f"is empty; {words.start}")
     return text
-
-
-def _content(path: Path, words: Words) -> bytes:
-    try:
-        mode = path.stat().st_mode
-        if stat.S_ISDIR(mode):
-            raise Unreadable(f"is a directory; name {words.kind} in it, such as {words.example}")
-        if not stat.S_ISREG(mode):
-            raise Unreadable(f"is a pipe or a device, not a file; write {words.content} into a file and name that")
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise Unreadable(f"no such file; look in {path.parent.resolve()} or give the full path") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise Unreadable(f"cannot be read ({reason}); check its name and permissions") from None

@@ -22,6 +22,9 @@ _SCALAR = re.compile(r"[^,\]}\n#]+")
 _TOO_DEEP = "lists or tables are nested too deeply; a case needs three levels"
 
 
+Keys = tuple[str | int, ...]
+
+
 def dotted(path: Sequence[str | int]) -> str:
     """("expect", 0, "p") as expect.0.p; the same name for a quoted "noise.D0" and a dotted noise.D0."""
     return ".".join(map(str, path))
@@ -39,41 +42,41 @@ class _Scanner:
     def __init__(self, text: str) -> None:
         self.text, self.at = text, 0
         self.lines: dict[str, int] = {}
-        self.assigned: list[tuple[str | int, ...]] = []
+        self.assigned: list[Keys] = []
         self.repeated: tuple[str, int] | None = None
         self._newlines = [match.start() for match in re.finditer("\n", text)]
         self._explicit: set[str] = set()
-        self._tables: dict[tuple[str | int, ...], int] = {}
+        self._entries: dict[Keys, int] = {}  # the last one of each list of tables
 
     def scan(self) -> _Scanner:
-        base: tuple[str | int, ...] = ()
-        while self._peek():
-            if self._peek() == "[":
+        base: Keys = ()
+        while mark := self._peek():
+            if mark == "[":
                 base = self._header()
             else:
                 self.assigned.append(self._assignment(base))
         return self
 
-    def _peek(self) -> str:
-        self.at = self._match(_BLANK).end()
-        return self.text[self.at : self.at + 1]
-
-    def _match(self, pattern: re.Pattern[str]) -> re.Match[str]:
+    def _take(self, pattern: re.Pattern[str]) -> str:
         match = pattern.match(self.text, self.at)
         if match is None:
             raise ValueError(f"cannot read the text from character {self.at} on")
-        return match
+        self.at = match.end()
+        return match.group()
+
+    def _peek(self) -> str:
+        self._take(_BLANK)
+        return self.text[self.at : self.at + 1]
 
     def _skip(self, mark: str) -> bool:
         found = self._peek() == mark
         self.at += found
         return found
 
-    def _note(self, path: Sequence[str | int]) -> None:
+    def _note(self, path: Keys) -> None:
         line, key = bisect_left(self._newlines, self.at) + 1, dotted(path)
         for end in range(len(path) - 1, 0, -1):
-            table = dotted(path[:end])
-            if table in self.lines:  # and so are all around it
+            if (table := dotted(path[:end])) in self.lines:  # and so are all around it
                 break
             self.lines[table] = line
         if key not in self._explicit:
@@ -82,36 +85,30 @@ class _Scanner:
         elif self.repeated is None:
             self.repeated = key, line
 
-    def _key(self) -> tuple[str, ...]:
+    def _key(self) -> list[str]:
         parts: list[str] = []
         while not parts or self._skip("."):
             self._peek()  # past blanks
-            token = self._match(_KEY).group()
-            self.at += len(token)
+            token = self._take(_KEY)
             parts.append(tomllib.loads(f"key = {token}")["key"] if token[0] in "\"'" else token)
-        return tuple(parts)
+        return parts
 
-    def _header(self) -> tuple[str | int, ...]:
-        self._skip("[")
-        is_list = self.text.startswith("[", self.at)
-        self.at += is_list
-        path: tuple[str | int, ...] = ()
-        *parents, last = self._key()
-        for part in parents:
-            path = self._entry((*path, part))
-        path = (*path, last)
-        if is_list:
-            self._tables[path] = self._tables.get(path, -1) + 1
-        path = self._entry(path)
+    def _header(self) -> Keys:
+        is_list = self.text.startswith("[[", self.at)
+        self.at += 1 + is_list
+        path: Keys = ()
+        keys = self._key()
+        for i, part in enumerate(keys):
+            path = (*path, part)
+            if is_list and i == len(keys) - 1:
+                self._entries[path] = self._entries.get(path, -1) + 1
+            if path in self._entries:
+                path = (*path, self._entries[path])
         self._note(path)
         self.at += 1 + is_list
         return path
 
-    def _entry(self, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
-        """The last table of a list of tables, or the path itself."""
-        return (*path, self._tables[path]) if path in self._tables else path
-
-    def _assignment(self, base: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    def _assignment(self, base: Keys) -> Keys:
         path = (*base, *self._key())
         self._note(path)
         if not self._skip("="):
@@ -119,7 +116,7 @@ class _Scanner:
         self._value(path)
         return path
 
-    def _value(self, path: tuple[str | int, ...]) -> None:
+    def _value(self, path: Keys) -> None:
         if self._skip("["):
             index = 0
             while not self._skip("]"):
@@ -132,7 +129,7 @@ class _Scanner:
                 self._assignment(path)
                 self._skip(",")
         else:
-            self.at = self._match(_STRING if self._peek() in ("'", '"') else _SCALAR).end()
+            self._take(_STRING if self._peek() in ("'", '"') else _SCALAR)
 
 
 @dataclass
@@ -140,14 +137,12 @@ class Document:
     """The data of a TOML file and of the command line's changes to it.
 
     Attributes:
-        file: its name, for messages.
         data: what `tomllib` made of it.
         places: the line of each dotted key, or the `--set` or other option that gave it.
         faults: what is wrong with the changes.
         text: the file as it was read.
     """
 
-    file: str
     data: dict[str, Any]
     places: dict[str, int | str]
     faults: list[Fault] = field(default_factory=list)
@@ -155,18 +150,18 @@ class Document:
 
     def fault(self, path: Sequence[str | int], key: str, sentence: str) -> Fault:
         """A fault at the place of this path, or of the nearest table around it that has one."""
-        around = (dotted(path[:end]) for end in range(len(path), 0, -1))
-        place = next((self.places[table] for table in around if table in self.places), None)
-        if isinstance(place, str):
-            return Fault(f"{place}: {key}", None, sentence)
-        return Fault(key, place, sentence)
+        around = (self.places.get(dotted(path[:end])) for end in range(len(path), 0, -1))
+        place = next((each for each in around if each is not None), None)
+        return Fault(f"{place}: {key}", None, sentence) if isinstance(place, str) else Fault(key, place, sentence)
 
     def override(self, text: str, typed: str) -> None:
         """Apply one `key=value` of the command line, with what was typed; what is wrong with it joins the faults."""
         try:
-            text_as_toml = _quoted_if_bare(text)
-            path = _override_path(text_as_toml)
-            value: Any = _loads(text_as_toml)
+            text = _quoted_if_bare(text)
+            assigned = _Scanner(text).scan().assigned
+            if len(assigned) != 1:
+                raise ValueError(f"must be one key=value, but {len(assigned)} stand here")
+            path, value = assigned[0], _loads(text)
             for key in path:
                 value = value[key]
             _assign(self.data, dotted(path).split("."), value)
@@ -188,13 +183,6 @@ def _quoted_if_bare(text: str) -> str:
     key, _, value = map(str.strip, text.partition("="))
     is_word = re.fullmatch(r"[A-Za-z./~][\w./~ -]*", value) and value not in ("true", "false", "nan", "inf")
     return f'{key}="{value}"' if is_word else text
-
-
-def _override_path(text: str) -> tuple[str | int, ...]:
-    assigned = _Scanner(text).scan().assigned
-    if len(assigned) != 1:
-        raise ValueError(f"must be one key=value, but {len(assigned)} stand here")
-    return assigned[0]
 
 
 def _assign(table: dict[str, Any], path: Sequence[str], value: Any) -> None:
@@ -219,31 +207,23 @@ def read_document(
     Raises:
         CaseError: the file cannot be read or is not TOML.
     """
-    text = _read(path)
     try:
-        data = _loads(text)
-        document = Document(str(path), data, dict(_Scanner(text).scan().lines), text=text)
+        text = read_text(Path(path), _WORDS)
+        document = Document(_loads(text), _Scanner(text).scan().lines, text=text)
+    except Unreadable as error:
+        raise CaseError(str(path), [Fault("", error.line, error.sentence)]) from None
     except RecursionError:
         raise CaseError(str(path), [Fault("", None, _TOO_DEEP)]) from None
     except ValueError as error:
         raise CaseError(str(path), [_syntax_fault(text, str(error))]) from None
-    for override in overrides:
-        document.override(override, f"--set {override}")
-    for option, text in (options or {}).items():
-        document.override(text, option)
+    for typed, change in [*((f"--set {each}", each) for each in overrides), *(options or {}).items()]:
+        document.override(change, typed)
     return document
 
 
 def _loads(text: str) -> dict[str, Any]:
     """The data of TOML, 0 without a sign. Raises ValueError where it is none."""
     return tomllib.loads(text, parse_float=lambda number: float(number) + 0.0)
-
-
-def _read(path: str | Path) -> str:
-    try:
-        return read_text(Path(path), _WORDS)
-    except Unreadable as error:
-        raise CaseError(str(path), [Fault("", error.line, error.sentence)]) from None
 
 
 def _syntax_fault(text: str, message: str) -> Fault:
@@ -258,8 +238,7 @@ def _syntax_fault(text: str, message: str) -> Fault:
             key, second = scanner.repeated
             first, key = scanner.lines[key], re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", key)
             return Fault(key, second, f"set twice, first on line {first}; remove one of them")
-    lines = text.splitlines()
-    shown = lines[line - 1].strip() if line and line <= len(lines) else ""
+    shown = "".join(text.splitlines()[line - 1 : line]).strip() if line else ""
     return Fault("", line, f"not valid TOML: {message}; {_syntax_remedy(shown)}")
 
 
