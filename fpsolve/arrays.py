@@ -90,9 +90,9 @@ def _finite(values: Any) -> FloatArray | None:
     """Finite real numbers as an array of their shape, or None where they are something else."""
     with suppress(ValueError, OverflowError):  # of lists of unequal lengths, and of whole numbers beyond all floats
         array = np.asarray(values)
-        is_listed = not isinstance(values, np.ndarray) or array.dtype == object
+        is_listed = array is not values or array.dtype == object
         listed = np.asarray(values, dtype=object).ravel() if is_listed else ()
-        is_plain = not np.ma.is_masked(values) and not any(isinstance(each, bool | np.bool_) for each in listed)
+        is_plain = not np.ma.is_masked(values) and {bool, np.bool_}.isdisjoint(map(type, listed))
         is_real = array.dtype.kind in "iuf" or (
             array.dtype == object and all(isinstance(each, Real | Decimal) for each in listed)
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from enum import Enum, StrEnum, unique
 from functools import partial
 from string import Formatter
@@ -282,7 +282,7 @@ class Message(str):
     @property
     def kind(self) -> tuple[Any, ...]:
         """What it has in common with messages that differ in numbers only."""
-        return self.code, *((key, _without_numbers(value)) for key, value in self.data.items())
+        return self.code, *((key, _changed(value, _WITHOUT_NUMBERS)) for key, value in self.data.items())
 
     @property
     def size(self) -> float | None:
@@ -292,7 +292,7 @@ class Message(str):
 
     def reasons(self) -> Iterator[Message]:
         """The messages among its data."""
-        return (value for value in self.data.values() if isinstance(value, Message))
+        return (value for value in self.data.values() if type(value) is Message)
 
     def words(self, audience: Audience) -> str:
         """The text in the words of an audience."""
@@ -305,17 +305,17 @@ class Message(str):
 
     def to_data(self) -> dict[str, Any]:
         """What strict JSON can hold, from which `from_data` makes it again."""
-        return {"code": self.code.name, "data": {key: _plain(value) for key, value in self.data.items()}}
+        return {"code": self.code.name, "data": {key: _changed(value, _PLAIN) for key, value in self.data.items()}}
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Message:
         """The inverse of `to_data`. Raises `KeyError` or `TypeError` where it is none."""
-        return cls(Code[data["code"]], **{key: _from_plain(value) for key, value in data["data"].items()})
+        return cls(Code[data["code"]], **{key: _changed(value, _FROM_PLAIN) for key, value in data["data"].items()})
 
 
 def message_of(text: str) -> Message:
     """A text as a message; a message as it is."""
-    return text if isinstance(text, Message) else Message(Code.TEXT, text=text)
+    return text if type(text) is Message else Message(Code.TEXT, text=text)
 
 
 def _words(code: Code, data: Mapping[str, Any], audience: Audience) -> str:
@@ -338,14 +338,14 @@ class _Writer(Formatter):
         if format_spec.startswith("?"):
             present, _, absent = format_spec[1:].partition("¦")
             return absent if value is None or value is False else present
-        if value is None:
-            return ""
-        if isinstance(value, tuple):
-            separator = "\n" if any(isinstance(each, Message) for each in value) else ", "
+        kind = type(value)
+        if kind is tuple:
+            separator = "\n" if Message in map(type, value) else ", "
             return separator.join(self.format_field(each, format_spec) for each in value)
-        if isinstance(value, Message):
+        if kind is Message:
             return value.words(self._audience)
-        return self._audience.get(value, value.value) if isinstance(value, Remedy) else format(value, format_spec)
+        text = "" if value is None else format(value, format_spec)
+        return self._audience.get(value, text) if kind is Remedy else text
 
 
 def _python(value: Any) -> Any:
@@ -353,27 +353,28 @@ def _python(value: Any) -> Any:
     return tuple(map(_python, value)) if isinstance(value, list | tuple) else value
 
 
-def _without_numbers(value: Any) -> Any:
-    if isinstance(value, Message):
-        return value.kind
-    if isinstance(value, tuple):
-        return tuple(dict.fromkeys(map(_without_numbers, value)))
-    return "#" if isinstance(value, int | float) and not isinstance(value, bool) else value
+def _special(stated: Mapping[str, str]) -> Remedy | float:
+    return float(stated["number"]) if "number" in stated else Remedy[stated["remedy"]]
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, Message):
-        return value.to_data()
-    if isinstance(value, Remedy):
-        return {"remedy": value.name}
-    if isinstance(value, float) and not math.isfinite(value):
-        return {"number": str(value)}
-    return [_plain(each) for each in value] if isinstance(value, tuple) else value
+def _changed(value: Any, by_type: Mapping[type, Callable[[Any], Any]]) -> Any:
+    """What a table by types makes of a datum; others stay."""
+    return by_type[type(value)](value) if type(value) in by_type else value
 
 
-def _from_plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        if "number" in value:
-            return float(value["number"])
-        return Message.from_data(value) if "code" in value else Remedy[value["remedy"]]
-    return tuple(map(_from_plain, value)) if isinstance(value, list) else value
+_WITHOUT_NUMBERS: Mapping[type, Callable[[Any], Any]] = {
+    Message: lambda message: message.kind,
+    tuple: lambda values: tuple(dict.fromkeys(_changed(each, _WITHOUT_NUMBERS) for each in values)),
+    int: lambda _: "#",
+    float: lambda _: "#",
+}
+_PLAIN: Mapping[type, Callable[[Any], Any]] = {
+    Message: Message.to_data,
+    Remedy: lambda remedy: {"remedy": remedy.name},
+    tuple: lambda values: [_changed(each, _PLAIN) for each in values],
+    float: lambda number: number if math.isfinite(number) else {"number": str(number)},
+}
+_FROM_PLAIN: Mapping[type, Callable[[Any], Any]] = {
+    list: lambda values: tuple(_changed(each, _FROM_PLAIN) for each in values),
+    dict: lambda stated: Message.from_data(stated) if "code" in stated else _special(stated),
+}

@@ -80,8 +80,7 @@ def _details(error: ValidationError) -> list[InitErrorDetails]:
 
 def _kind(half: Half, name: Any) -> type[Parametrised]:
     """The class of a kind; without a name the usual one."""
-    names = kind_names("systems" if half == "system" else "noises") if name is not None else ()
-    if name is not None and name not in names:
+    if name is not None and name not in (names := kind_names("systems" if half == "system" else "noises")):
         text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
         refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
     try:

@@ -87,7 +87,7 @@ def _toml(value: Any) -> str:
         return f"[{', '.join(map(_toml, value))}]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, bool | str) else str(value)
+    return json.dumps(value, ensure_ascii=False) if type(value) in (bool, str) else str(value)
 
 
 def faults_in(error: ValidationError) -> Iterator[ErrorDetails]:

@@ -9,7 +9,7 @@ import math
 import re
 import sys
 from bisect import bisect_left
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
@@ -65,26 +65,23 @@ def same(value: Value, other: Value) -> bool:
     return math.isclose(value, other, rel_tol=_SAME)  # type: ignore[arg-type]
 
 
-def flat(table: Mapping[str, Any], whole: Container[str] = ()) -> dict[str, Any]:
+def flat(table: Mapping[str, Any], whole: Container[str] = (), section: str = "") -> dict[str, Any]:
     """Nested tables as one: noise.D0 = 1.0 means the same as "noise.D0" = 1.0.
 
     Args:
         table: with the values of keys, or tables of them; a range is a value.
         whole: the keys whose tables are values, not sections.
+        section: the first part of all keys, with a dot.
     """
     result: dict[str, Any] = {}
-    for key, item in _entries(table, "", whole):
-        if key in result:
-            raise ValueError(f"{key} stands twice, once with quotes and once without; remove one of them")
-        result[key] = item
-    return result
-
-
-def _entries(table: Mapping[str, Any], section: str, whole: Container[str]) -> Iterator[tuple[str, Any]]:
     for name, item in table.items():
         key = section + name
         is_section = isinstance(item, dict) and item and key not in whole and not item.keys() & RANGE
-        yield from _entries(item, f"{key}.", whole) if is_section else [(key, item)]
+        for each, value in (flat(item, whole, f"{key}.") if is_section else {key: item}).items():
+            if each in result:
+                raise ValueError(f"{each} stands twice, once with quotes and once without; remove one of them")
+            result[each] = value
+    return result
 
 
 class Section(BaseModel):
@@ -320,7 +317,7 @@ class FigureSection(Section):
     @property
     def needed(self) -> str:
         """The name of the quantity that must be computed for it."""
-        return MOMENT.name if isinstance(self.y, MomentAt) else self.y
+        return str(self.y) if self.moment is None else MOMENT.name
 
     @property
     def quantity(self) -> Quantity:
