@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fpsolve.case.case import load_case
-from fpsolve.errors import CaseError, Fault
+from fpsolve.errors import CaseError
 from fpsolve.fem.mesh import make_mesh, write_mesh
 from fpsolve.simulation.setup import default_step, obstacles, transient
 from tests.conftest import sampled
@@ -27,18 +27,17 @@ from tests.snapshots import BIG, good
 GOOD = good("bad")
 
 
-def faults_of(path: Path, overrides: Sequence[str] = ()) -> tuple[Fault, ...]:
+def refused(path: Path, overrides: Sequence[str] = ()) -> CaseError:
     with pytest.raises(CaseError) as raised:
         load_case(path, overrides)
     assert raised.value.file == str(path)
-    return raised.value.faults
+    return raised.value
 
 
 def only_message(path: Path, overrides: Sequence[str] = ()) -> str:
-    with pytest.raises(CaseError) as raised:
-        load_case(path, overrides)
-    assert len(raised.value.faults) == 1, str(raised.value)
-    return str(raised.value)
+    error = refused(path, overrides)
+    assert len(error.faults) == 1, str(error)
+    return str(error)
 
 
 def edited(old: str, new: str) -> str:
@@ -116,7 +115,7 @@ TOO_MANY = f"[{', '.join(f'0.{i:06}' for i in range(1, 100_002))}]"
     ids=["moments", "vary", "output", "monte_carlo"],
 )
 def test_too_long_a_list(tmp_path: Path, key: str, old: str, new: str) -> None:
-    fault = next(fault for fault in faults_of(write(tmp_path, edited(old, new))) if fault.key == key)
+    fault = next(fault for fault in refused(write(tmp_path, edited(old, new))).faults if fault.key == key)
     assert fault.sentence == "lists 100001 numbers; must be at most 100000; list fewer"
     assert fault.line
 
@@ -179,7 +178,7 @@ def test_any_parameters_in_their_ranges_give_a_case_or_messages(
     try:
         case = load_case(path)
     except CaseError:
-        assert {fault.key for fault in faults_of(path)} <= {"oscillator", "moments", *SIMULATED}
+        assert {fault.key for fault in refused(path).faults} <= {"oscillator", "moments", *SIMULATED}
         return
     [curve] = case.curves()
     if not obstacles(curve.oscillator, curve.noise, time=case.monte_carlo.time, step=case.monte_carlo.step):
@@ -192,8 +191,8 @@ def test_any_parameters_in_their_ranges_give_a_case_or_messages(
 def test_very_long_dotted_key(tmp_path: Path, start: str, parts: int) -> None:
     long = f"{start}{'.a' * parts} = 1"
     path = write(tmp_path, f"{long}\n{without(start.partition('.')[0]) if start != 'a' else GOOD}")
-    assert faults_of(path)
-    assert faults_of(write(tmp_path, GOOD), [long])
+    assert refused(path).faults
+    assert refused(write(tmp_path, GOOD), [long]).faults
 
 
 @pytest.mark.parametrize(
@@ -218,22 +217,23 @@ def test_file_that_is_no_text(tmp_path: Path, content: bytes, words: str) -> Non
     assert all(word in message for word in others)
 
 
-def test_missing_file(tmp_path: Path) -> None:
-    path = tmp_path / "nowhere.toml"
-    assert only_message(path) == f"{path}: no such file; look in {tmp_path} or give the full path"
+NO_FILE = "is a pipe or a device, not a file; write the case into a file and name that"
 
 
-def test_directory(tmp_path: Path) -> None:
-    assert only_message(tmp_path) == f"{tmp_path}: is a directory; name a case file in it, such as fig1.toml"
-
-
-@pytest.mark.parametrize("name", ["/dev/zero", "/dev/null", "pipe.toml"])
-def test_a_pipe_or_a_device(tmp_path: Path, name: str) -> None:
-    """Reading them might never end."""
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("nowhere.toml", "no such file; look in {} or give the full path"),
+        ("", "is a directory; name a case file in it, such as fig1.toml"),
+        *((name, NO_FILE) for name in ("/dev/zero", "/dev/null", "pipe.toml")),  # reading them might never end
+        ("bad.toml/case.toml", "cannot be read (Not a directory); check its name and permissions"),
+    ],
+)
+def test_no_file(tmp_path: Path, name: str, sentence: str) -> None:
     os.mkfifo(tmp_path / "pipe.toml")
-    path = tmp_path / name
-    sentence = "is a pipe or a device, not a file; write the case into a file and name that"
-    assert only_message(path) == f"{path}: {sentence}"
+    write(tmp_path, GOOD)
+    assert only_message(tmp_path / name) == f"{tmp_path / name}: {sentence.format(tmp_path)}"
+    assert "cannot be read (" in only_message(tmp_path / "a\0b.toml")
 
 
 def test_a_link_to_a_case(tmp_path: Path) -> None:
@@ -246,22 +246,12 @@ def test_a_link_to_a_case(tmp_path: Path) -> None:
 )
 def test_of_many_faults_the_first_are_told(tmp_path: Path, count: int, last: str) -> None:
     path = write(tmp_path, "".join(f"wrong{i} = 1\n" for i in range(count)) + GOOD)
-    with pytest.raises(CaseError) as raised:
-        load_case(path)
-    assert len(raised.value.faults) == count
-    lines = str(raised.value).splitlines()
+    error = refused(path)
+    assert len(error.faults) == count
+    lines = str(error).splitlines()
     assert len(lines) == min(count, 51)
     assert [line.split(": ")[:2] for line in lines[:50]] == [[f"{path}:{i + 1}", f"wrong{i}"] for i in range(50)]
     assert last in lines[-1]
-
-
-def test_file_below_a_file(tmp_path: Path) -> None:
-    path = write(tmp_path, GOOD) / "case.toml"
-    assert "cannot be read (Not a directory); check its name" in only_message(path)
-
-
-def test_name_with_a_null(tmp_path: Path) -> None:
-    assert "cannot be read (" in only_message(tmp_path / "a\0b.toml")
 
 
 def test_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -297,49 +287,35 @@ MESHES = {
 }
 
 
-@pytest.mark.parametrize("name", MESHES)
+UNREADABLE = {
+    "empty.vtu": (b"", "cannot be read"),
+    "garbage.vtu": (b"garbage", "cannot be read"),
+    "truncated.vtu": (b"<VTKFile>", "cannot be read"),
+    "half.vtu": (None, "cannot be read"),
+    "missing.vtu": (None, "exist"),
+    "folder.vtu": (None, "is not a file"),
+    "mesh.txt": (b"mesh", '".txt"; it must be one of '),
+}
+
+
+@pytest.mark.parametrize("name", [*MESHES, *UNREADABLE])
 def test_bad_mesh(tmp_path: Path, name: str) -> None:
-    mesh, words = MESHES[name]
-    mesh.write(tmp_path / "bad.vtu")
-    assert_mesh_is_refused(tmp_path, "bad.vtu", words)
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (b"", "cannot be read"),
-        (b"garbage", "cannot be read"),
-        (b"<VTKFile>", "cannot be read"),
-        (None, "exist"),
-    ],
-    ids=["empty", "garbage", "truncated", "missing"],
-)
-def test_unreadable_mesh(tmp_path: Path, content: bytes | None, words: str) -> None:
-    if content is not None:
-        (tmp_path / "bad.vtu").write_bytes(content)
-    assert_mesh_is_refused(tmp_path, "bad.vtu", words)
-
-
-def test_half_a_mesh_file(tmp_path: Path) -> None:
-    write_mesh(make_mesh(), tmp_path / "whole.vtu")
-    content = (tmp_path / "whole.vtu").read_bytes()
-    (tmp_path / "half.vtu").write_bytes(content[: len(content) // 2])
-    assert_mesh_is_refused(tmp_path, "half.vtu", "cannot be read")
-
-
-def test_mesh_that_is_a_directory(tmp_path: Path) -> None:
-    (tmp_path / "folder.vtu").mkdir()
-    assert_mesh_is_refused(tmp_path, "folder.vtu", "is not a file")
-
-
-def test_mesh_of_unknown_format(tmp_path: Path) -> None:
-    (tmp_path / "mesh.txt").write_text("mesh", encoding="utf-8")
-    assert_mesh_is_refused(tmp_path, "mesh.txt", '".txt"; it must be one of ')
-
-
-def assert_mesh_is_refused(folder: Path, name: str, words: str) -> None:
+    if name in MESHES:
+        mesh, words = MESHES[name]
+        name = "bad.vtu"
+        mesh.write(tmp_path / name)
+    else:
+        content, words = UNREADABLE[name]
+        if name == "half.vtu":
+            write_mesh(make_mesh(), tmp_path / "whole.vtu")
+            content = (tmp_path / "whole.vtu").read_bytes()
+            content = content[: len(content) // 2]
+        if name == "folder.vtu":
+            (tmp_path / name).mkdir()
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
     text = edited("phi_cells = 2\nxi_cells = 4", f'file = "{name}"')
-    path = write(folder, text)
+    path = write(tmp_path, text)
     message = only_message(path)
     assert message.startswith(f'{path}:{line_of(text, "mesh.file")}: mesh.file: got "{name}"; ')
     assert words in message
@@ -357,22 +333,7 @@ def test_mesh_file_too_wide_for_one_of_the_noises(tmp_path: Path) -> None:
 
 
 TRIES = [
-    *(
-        "",
-        "-1",
-        "0",
-        "1e999",
-        "nan",
-        "true",
-        '"x"',
-        "[]",
-        "{}",
-        "[[]]",
-        "[1, 2]",
-        "{ a = 1 }",
-        "1979-05-27",
-        BIG,
-    ),
+    *("", "-1", "0", "1e999", "nan", "true", '"x"', "[]", "{}", "[[]]", "[1, 2]", "{ a = 1 }", "1979-05-27", BIG),
     *('"\\u0000"', "{ start = 0, stop = 1, num = 2 }", "[{}]", "1e308", "1e-320", "'''\n'''", "[\n1,\n]"),
     *('{ start = 1, stop = 2, num = 3, scale = "log" }', '["exact"]', '["moment", "moment"]'),
     *("{ noise.D0 = [2] }", "[1e308, -1e308]", '"noise.D0"', '"lyapunov_exponent"', "07:32:00"),

@@ -89,6 +89,12 @@ def windy(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPa
     monkeypatch.syspath_prepend(str(folder))
 
 
+REDUCED = "[noise]\nD0 = 1.0\ntau0 = 0.5\nr0 = 0.95\n"
+WIND = '[noise]\nkind = "wind"\ngust = 0.5\nmemory = 2.0\n'
+UHLENBECK = '[noise]\nkind = "ornstein-uhlenbeck"\nalpha = 0.5\nsigma = 0.5\n'
+SINE = '[noise]\nkind = "sine-wiener"\namplitude = 1.0\nsigma = 1.0\n'
+
+
 def write(folder: Path, *parts: str) -> Path:
     path = folder / "kinds.toml"
     path.write_text("".join(parts), encoding="utf-8")
@@ -109,15 +115,14 @@ def solved(path: Path, out: Path) -> dict[str, float]:
 
 
 def test_the_system_has_two_names(tmp_path: Path) -> None:
-    noise = "[noise]\nD0 = 1.0\ntau0 = 0.5\nr0 = 0.95\n"
-    usual = load_case(write(tmp_path, OSCILLATOR, noise, MOMENTS))
+    usual = load_case(write(tmp_path, OSCILLATOR, REDUCED, MOMENTS))
     named = OSCILLATOR.replace("[oscillator]", '[system]\nkind = "vibro-impact"')
-    again = load_case(write(tmp_path, named, noise.replace("D0", 'kind = "ou-reduction"\nD0'), MOMENTS))
+    again = load_case(write(tmp_path, named, REDUCED.replace("D0", 'kind = "ou-reduction"\nD0'), MOMENTS))
     assert again.problem == usual.problem == Problem(usual.oscillator, ReducedNoise(D0=1.0, tau0=0.5, r0=0.95))
     assert again.curve({"oscillator.omega": 2.0}).parameters["oscillator.omega"] == 2.0
-    exact = load_case(write(tmp_path, OSCILLATOR, noise.replace("D0", 'kind = "non-gaussian"\nD0'), MOMENTS))
+    exact = load_case(write(tmp_path, OSCILLATOR, REDUCED.replace("D0", 'kind = "non-gaussian"\nD0'), MOMENTS))
     assert exact.noise == NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
-    [text] = said(tmp_path, OSCILLATOR, named.partition("\n")[2], noise, MOMENTS)
+    [text] = said(tmp_path, OSCILLATOR, named.partition("\n")[2], REDUCED, MOMENTS)
     assert text.endswith("oscillator: stands beside [system], but a case has one system; remove one of the two")
 
 
@@ -151,48 +156,39 @@ def test_one_message_for_what_is_wrong_with_a_kind(windy: None, tmp_path: Path, 
 
 def test_a_noise_of_another_package(windy: None, tmp_path: Path) -> None:
     """Its keys may be varied, drawn over, and be the axes of a chart; its numbers are those of the same law."""
-    noise = '[noise]\nkind = "wind"\ngust = 0.5\nmemory = 2.0\n'
     rest = '[vary]\n"noise.gust" = [0.5, 1.0]\n[figure]\nx = "noise.gust"\ny = { moment = 2.0 }\n'
     frame = '[chart]\nzero = ["lyapunov_exponent"]\nx = { key = "noise.gust", start = 0.1, stop = 2.0 }\n'
     frame += 'y = { key = "noise.memory", start = 0.1, stop = 9.0 }\n'
-    path = write(tmp_path, OSCILLATOR, noise, MOMENTS, ONLY, rest, frame)
-    case = load_case(path)
+    case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS, ONLY, rest, frame))
     kind = type(case.noise)
     assert (kind, version_of(kind)) == (noise_kind("wind"), "windy 1.5")  # type: ignore[arg-type]
     assert case.parameters["noise.gust"].quantity.unit == "1/time"
-    same = load_case(
-        write(tmp_path, OSCILLATOR, '[noise]\nkind = "ornstein-uhlenbeck"\nalpha = 0.5\nsigma = 0.5\n', MOMENTS)
-    )
-    assert same.noise == OrnsteinUhlenbeck(alpha=0.5, sigma=0.5)
-    values = solved(write(tmp_path, OSCILLATOR, noise, MOMENTS, ONLY, rest), tmp_path / "out")
-    [expected] = solved(
-        write(tmp_path, OSCILLATOR, '[noise]\nkind = "ornstein-uhlenbeck"\nalpha = 0.5\nsigma = 0.5\n', MOMENTS, ONLY),
-        tmp_path / "out2",
-    ).values()
+    values = solved(write(tmp_path, OSCILLATOR, WIND, MOMENTS, ONLY, rest), tmp_path / "out")
+    same = write(tmp_path, OSCILLATOR, UHLENBECK, MOMENTS, ONLY)
+    assert load_case(same).noise == OrnsteinUhlenbeck(alpha=0.5, sigma=0.5)
+    [expected] = solved(same, tmp_path / "out2").values()
     assert next(iter(values.values())) == pytest.approx(expected, rel=1e-10)
-    text = said(tmp_path, OSCILLATOR, noise, MOMENTS, rest.replace("noise.gust", "noise.D0"))[0]
+    text = said(tmp_path, OSCILLATOR, WIND, MOMENTS, rest.replace("noise.gust", "noise.D0"))[0]
     assert text.startswith('14: vary."noise.D0": cannot be varied; ')
     assert "noise.gust, noise.memory" in text
-    text = said(tmp_path, OSCILLATOR, noise, MOMENTS, frame.replace("noise.gust", "noise.D0"))[0]
+    text = said(tmp_path, OSCILLATOR, WIND, MOMENTS, frame.replace("noise.gust", "noise.D0"))[0]
     assert text.startswith('15: chart.x.key: got "noise.D0"; did you mean "noise.gust"? must be one of ')
 
 
 def test_records_depend_on_the_kind_and_its_version(
     windy: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    noise = '[noise]\nkind = "wind"\ngust = 0.5\nmemory = 2.0\n'
     keys = set()
     for version in ("windy 1.5", "windy 1.6"):
         monkeypatch.setattr("fpsolve.study.records.version_of", lambda _, version=version: version)
-        case = load_case(write(tmp_path, OSCILLATOR, noise, MOMENTS))
+        case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS))
         keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
     assert len(keys) == 2
 
 
 def test_figures_speak_of_the_parameters_of_the_case(tmp_path: Path) -> None:
     """Two kinds may have a parameter of one name."""
-    noise = '[noise]\nkind = "sine-wiener"\namplitude = 1.0\nsigma = 1.0\n'
-    case = load_case(write(tmp_path, OSCILLATOR, noise, MOMENTS, '[figure]\ntime_unit = "s"\n'))
+    case = load_case(write(tmp_path, OSCILLATOR, SINE, MOMENTS, '[figure]\ntime_unit = "s"\n'))
     quantities = {key: each.quantity for key, each in case.parameters.items()}
     assert case.about("noise.sigma").latex == quantities["noise.sigma"].latex == r"$\sigma$"
     assert "time" not in case.about("noise.amplitude").unit
@@ -207,9 +203,8 @@ def test_ours_cannot_be_replaced(windy: None) -> None:
 @pytest.mark.parametrize(("order", "has_theory"), [("order = 1", True), ("order = 0", False)])
 def test_a_plane_system_from_a_file(tmp_path: Path, order: str, has_theory: bool) -> None:
     """ẍ + 0.2ẋ + (1 + ξ)x = 0 under sine-Wiener noise, against the moment hierarchy; noise of order 0 has no theory."""
-    noise = '[noise]\nkind = "sine-wiener"\namplitude = 1.0\nsigma = 1.0\n'
     rest = '[vary]\n"system.damping" = [0.1, 0.2]\n'
-    path = write(tmp_path, PLANE.replace("ORDER", order), noise, MOMENTS, ONLY, rest)
+    path = write(tmp_path, PLANE.replace("ORDER", order), SINE, MOMENTS, ONLY, rest)
     first, second = solved(path, tmp_path / "out").values()
     assert first == pytest.approx(-0.0773243898649, abs=1e-10)
     assert second < first
@@ -230,8 +225,7 @@ def test_a_plane_system_from_a_file(tmp_path: Path, order: str, has_theory: bool
     ],
 )
 def test_what_is_wrong_with_a_plane_system(tmp_path: Path, old: str, new: str, words: str) -> None:
-    noise = "[noise]\nD0 = 1.0\ntau0 = 0.5\nr0 = 0.95\n"
-    texts = said(tmp_path, PLANE.replace("ORDER", "order = 1").replace(old, new), noise, MOMENTS)
+    texts = said(tmp_path, PLANE.replace("ORDER", "order = 1").replace(old, new), REDUCED, MOMENTS)
     assert any(words in text for text in texts)
 
 

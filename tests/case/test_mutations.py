@@ -13,25 +13,7 @@ COUNT = 48
 """Mutations of each kind; two thousand take a minute."""
 CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.toml"))
 NUMBERS = ["0", "-1", "1e308", "5e-324", "nan", "inf", "-0.0", "true", '"x"', "[]", "{}", "1e400", "9" * 400, "0x10"]
-PIECES = [
-    "=",
-    "[",
-    "]",
-    '"',
-    "'",
-    "\n",
-    "#",
-    ",",
-    ".",
-    "[[expect]]",
-    "[vary]",
-    "\x00",
-    "\ufeff",
-    "é",
-    "p",
-    "where",
-    "{",
-]
+PIECES = [*"=[]\"'\n#,.", "[[expect]]", "[vary]", *"\x00\ufeffép", "where", "{"]
 
 
 def mutated(text, rng):
