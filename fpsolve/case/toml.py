@@ -161,7 +161,8 @@ class Document:
             assigned = _Scanner(text).scan().assigned
             if len(assigned) != 1:
                 raise ValueError(f"must be one key=value, but {len(assigned)} stand here")
-            path, value = assigned[0], _loads(text)
+            path: Keys = assigned[0]
+            value: Any = _loads(text)
             for key in path:
                 value = value[key]
             _assign(self.data, dotted(path).split("."), value)
@@ -209,7 +210,7 @@ def read_document(
     """
     try:
         text = read_text(Path(path), _WORDS)
-        document = Document(_loads(text), _Scanner(text).scan().lines, text=text)
+        document = Document(_loads(text), dict(_Scanner(text).scan().lines), text=text)
     except Unreadable as error:
         raise CaseError(str(path), [Fault("", error.line, error.sentence)]) from None
     except RecursionError:
