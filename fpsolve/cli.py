@@ -7,6 +7,7 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
 from shlex import quote
@@ -247,7 +248,8 @@ def check(
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
-    from fpsolve.output.terminal import agreement, print_comparisons, print_failures, print_warnings
+    from fpsolve.output.remarks import print_remarks
+    from fpsolve.output.terminal import agreement, print_comparisons
     from fpsolve.workflow.cases import check_case
 
     code, loaded = 0, load(cases, overrides)
@@ -256,10 +258,10 @@ def check(
         outcome = check_case(case, pool=pool, watch=_watch(is_quiet=quiet))
         if quiet:
             print(f"{case.name}: {agreement(outcome.comparisons)}")
-            print_failures(case, outcome.results, file="")
+            print_remarks(case, outcome.results, "", [Severity.FAILURE])
         else:
             print_comparisons(case, outcome.comparisons)
-            print_warnings(case, outcome.results, file="")
+            print_remarks(case, outcome.results, "")
         if outcome.failures:
             code = NOT_CONVERGED
         elif not all(comparison.met for comparison in outcome.comparisons):
@@ -462,13 +464,14 @@ def pool_of(jobs: int | None, scheduler: str, cases: Sequence[Case] = ()) -> Poo
 
 def _watch(*, is_json: bool = False, is_quiet: bool = False) -> Watch:
     """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
-    from fpsolve.output.terminal import print_failures, print_results, print_simulation, print_warnings
+    from fpsolve.output.remarks import print_remarks
+    from fpsolve.output.terminal import print_results, print_simulation
     from fpsolve.workflow.progress import Bars, Watch
 
     if is_quiet:
-        return Watch(solved=print_failures)
+        return Watch(solved=partial(print_remarks, severities=[Severity.FAILURE]))
     bar = Bars().bar
-    return Watch(bar, print_warnings) if is_json else Watch(bar, print_results, print_simulation)
+    return Watch(bar, print_remarks) if is_json else Watch(bar, print_results, print_simulation)
 
 
 if __name__ == "__main__":

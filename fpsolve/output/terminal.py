@@ -21,16 +21,14 @@ from fpsolve.exponent.quantities import (
     VARIANCE_RATE,
     Index,
 )
-from fpsolve.messages import Severity
 from fpsolve.model.quantity import moment_at
-from fpsolve.output.remarks import print_remark, print_remarks
+from fpsolve.output.remarks import MONTE_CARLO, print_remark, print_remarks
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.tables import asked, in_case_words
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve, Status
 from fpsolve.theory.far import grows_far_out
 
-SUMMARY, MONTE_CARLO = "summary.json", "monte_carlo*.json"
 MOST_TABLES, MOST_ROWS = 10, 50
 """Curves that have a table each, and that have a row each."""
 MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
@@ -204,21 +202,7 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
             for group in groups:
                 screen.packed(group)
             screen.lines([""])
-    print_warnings(case, results)
-
-
-def print_warnings(case: Case, results: Sequence[CurveResult], file: str = SUMMARY) -> None:
-    """What limits the numbers of the curves, why some are missing, and which theory is not valid.
-
-    Args:
-        file: that holds all of it; empty where nothing is written.
-    """
-    print_remarks(case, results, file)
-
-
-def print_failures(case: Case, results: Sequence[CurveResult], file: str = SUMMARY) -> None:
-    """Why some numbers are missing, and nothing else."""
-    print_remarks(case, results, file, [Severity.FAILURE])
+    print_remarks(case, results)
 
 
 def print_written(folder: Path, what: str, seconds: float, known: str = "") -> None:
@@ -296,13 +280,9 @@ def _simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult 
     grid = Grid(case.heading(simulated.curve), columns)
     exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
     for estimate in simulated.result.estimates:
-        value, error = estimate.value, estimate.standard_error
-        row = ["none", ""] if value is None or error is None else [sampled(value, error), f"{error:.1e}"]
-        if result:
-            known = exact.get(estimate.p) if estimate.p else 0.0
-            row += ["" if known is None else f"{known:.6g}"]
-            row += ["" if known is None or value is None or not error else _deviation(value, error, known)]
-        grid.rows.append([f"{estimate.p:g}", *row, f"{estimate.effective_paths:.0f}"])
+        known = exact.get(estimate.p) if estimate.p else 0.0
+        cells = _sampled_cells(estimate.value, estimate.standard_error, known, is_compared=bool(result))
+        grid.rows.append([f"{estimate.p:g}", *cells, f"{estimate.effective_paths:.0f}"])
     return grid
 
 
@@ -318,12 +298,19 @@ def _exponent_grid(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult
     words = [f"least {symbol}", f"largest {symbol}"] if is_digest else [""] * len(pairs)
     for (each, result), word in zip(pairs, words, strict=True):
         value, error = each.result.lyapunov_exponent, each.result.lyapunov_exponent_error
-        row = [*map(written, each.curve.varied.values()), sampled(value, error), f"{error:.1e}"]
-        if compared:
-            known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
-            row += ["", ""] if known is None else [f"{known:.6g}", _deviation(value, error, known)]
-        grid.rows.append([*row, *[word] * is_digest])
+        known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
+        cells = _sampled_cells(value, error, known, is_compared=bool(compared))
+        grid.rows.append([*map(written, each.curve.varied.values()), *cells, *[word] * is_digest])
     return grid
+
+
+def _sampled_cells(value: float | None, error: float | None, known: float | None, *, is_compared: bool) -> list[str]:
+    """A number with its standard error; where it is compared, what is known of it, and how far away that is."""
+    row = ["none", ""] if value is None or error is None else [sampled(value, error), f"{error:.1e}"]
+    if is_compared:
+        row += ["" if known is None else f"{known:.6g}"]
+        row += ["" if known is None or value is None or not error else _deviation(value, error, known)]
+    return row
 
 
 def _with_error(value: float, error: float) -> str:

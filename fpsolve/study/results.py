@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE, Index
-from fpsolve.messages import Code, Message, message_of
+from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, MOMENTS, P
 
 if TYPE_CHECKING:  # which take half a second to import
@@ -111,6 +111,12 @@ class CurveResult(Result):
         return Status.PARTLY if self.moments.p.size or any(self.estimates.values()) else Status.FAILED
 
     @property
+    def remarks(self) -> dict[Severity, Sequence[str]]:
+        """What is said of it, by how much that means."""
+        reasons = [failure.reason for failure in self.failures]
+        return {Severity.FAILURE: reasons, Severity.WARNING: self.warnings, Severity.NOTE: self.notes}
+
+    @property
     def misses_rtol(self) -> bool:
         """Whether the estimated error of some number exceeds rtol."""
         return any(message_of(each).code in (Code.RTOL_MISSED, Code.INDEX_RTOL_MISSED) for each in self.warnings)
@@ -167,6 +173,11 @@ class SimulatedCurve:
     response: Response | None
     warnings: tuple[Message, ...]
     interrupted: bool = False
+
+    @property
+    def remarks(self) -> dict[Severity, Sequence[str]]:
+        """What is said of it."""
+        return {Severity.WARNING: self.warnings}
 
     @property
     def estimates(self) -> dict[str, tuple[float, float]]:

@@ -13,9 +13,9 @@ from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message
 from fpsolve.output.letters import spelt
-from fpsolve.output.remarks import print_remark
+from fpsolve.output.remarks import print_remark, print_remarks
 from fpsolve.output.screen import Column, Grid, Screen
-from fpsolve.output.terminal import duration, print_comparisons, print_results, print_simulation, print_warnings
+from fpsolve.output.terminal import duration, print_comparisons, print_results, print_simulation
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from tests.conftest import sampled
@@ -116,7 +116,7 @@ def test_what_is_missing_is_told_before_what_is_only_remarkable(case, capsys, mo
         noted, notes=(Message(Code.NO_MOMENT, p=7),), warnings=("a warning",), failures=(Failure(2.0, "a reason"),)
     )
     capsys.readouterr()
-    print_warnings(case, [noted, failed])
+    print_remarks(case, [noted, failed])
     first, second, third = capsys.readouterr().err.splitlines()
     assert re.fullmatch("not converged: .*: a reason", first)
     assert re.fullmatch("warning: .*: a warning", second)
@@ -259,7 +259,7 @@ def test_where_no_table_fits_rows_are_lists(capsys, terminal):
 
 def test_sentences_that_differ_in_numbers_are_one(tmp_path, capsys):
     case, results = many(tmp_path, 200, **KINDS)
-    print_warnings(case, results)
+    print_remarks(case, results)
     warning, note = capsys.readouterr().err.splitlines()
     worst = results[89].curve.label
     assert note.startswith("note: many: 200 of 200 curves: Eq. (37) is for weak noise: from |p| = 89 on")
@@ -271,7 +271,7 @@ def test_sentences_that_differ_in_numbers_are_one(tmp_path, capsys):
 
 def test_curves_that_share_a_sentence_are_named_if_they_are_few(tmp_path, capsys):
     case, results = many(tmp_path, 5, notes=lambda i: ("the same",) if i < 3 else (f"other {'x' * i} {i}",))
-    print_warnings(case, results)
+    print_remarks(case, results)
     labels = [each.curve.label for each in results]
     assert capsys.readouterr().err.splitlines() == [
         f"note: many, {labels[0]}, {labels[1]} and {labels[2]}: the same",
@@ -284,7 +284,7 @@ def test_several_sentences_of_one_curve_are_counted(tmp_path, capsys):
     case, results = many(
         tmp_path, 1, ["vary={}"], failures=lambda _: tuple(Failure(p, Message(Code.NO_MOMENT, p=p)) for p in (2, 3, 4))
     )
-    print_warnings(case, results, file="")
+    print_remarks(case, results, file="")
     assert capsys.readouterr().err == "not converged: many: as there is no Λ(2); and 2 more like this one\n"
 
 
@@ -303,7 +303,7 @@ def test_the_line_of_states_agrees_with_the_warnings(tmp_path, capsys, count, co
 
 def test_equations_and_names_with_numbers_keep_sentences_apart(tmp_path, capsys):
     case, results = many(tmp_path, 4, notes=lambda i: (f"Eq. (3{i}) fails for tau{i}",))
-    print_warnings(case, results)
+    print_remarks(case, results)
     assert capsys.readouterr().err.count("note:") == 4
 
 
