@@ -360,14 +360,14 @@ def test_batches_follow_from_the_case_alone(place):
 
 def test_the_first_sets_come_one_by_one(place):
     """This process, which begins alone, calls others once it sees that sets take long."""
-    from fpsolve.study.solve import Numerics, everything
+    from fpsolve.study.solve import everything
     from fpsolve.study.sweep import Order, batches
 
     num = "{ start = 0.1, stop = 1.0, num = 40 }"
     case = load_case(place / "sweep.toml", [f'vary={{ "noise.D0" = {num}, "noise.tau0" = {num} }}'])
-    found = list(batches(case, lambda curve: Order(curve, everything(case), ""), Numerics.of(case)))
-    assert [len(batch.orders) for batch in found[:8]] == [1] * 6 + [6] * 2
-    assert [order.curve.number for batch in found for order in batch.orders] == list(range(1, 1601))
+    found = list(batches(case, lambda curve: Order(curve, everything(case))))
+    assert [len(batch) for batch in found[:8]] == [1] * 6 + [6] * 2
+    assert [order.curve.number for batch in found for order in batch] == list(range(1, 1601))
 
 
 def test_records_are_read_once(tmp_path, monkeypatch):

@@ -45,39 +45,34 @@ def refuse_obstacles(case: Case) -> None:
             raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
 
 
-def simulated_orders(case: Case) -> tuple[float, ...]:
-    """The p at which a case is simulated."""
-    return tuple(map(float, case.simulated))
-
-
 def simulate_curves(
     case: Case,
     *,
     progress: Callable[[], None] = lambda: None,
     known: Callable[[Curve], SimulatedCurve | None] = lambda curve: None,
+    made: Iterator[SimulatedCurve] | None = None,
 ) -> Iterator[SimulatedCurve]:
     """Simulate the curves of a case one after the other; an interrupt (Ctrl-C) ends it with what is done.
 
     Args:
-        progress: called as often as `simulation_work` counts, but not for what is known.
+        progress: called as often as `simulation_work` counts, but not for what is known, or made elsewhere.
         known: the simulation of a curve, if that is done already.
+        made: the simulations of the other curves in their order, made elsewhere; None where this process makes them.
 
     Raises:
         KeyboardInterrupt: nothing was done yet.
     """
-    orders = simulated_orders(case)
+    orders, setting = case.simulated.tolist(), case.monte_carlo
     for curve in case.curves():
-        if found := known(curve):
-            yield found
-            continue
-        try:
-            simulated = simulate_curve(curve, orders, case.monte_carlo, progress)
-        except KeyboardInterrupt:
-            if curve.number == 1:
-                raise
-            return
-        yield simulated
-        if simulated.interrupted:
+        if (found := known(curve)) is None:
+            try:
+                found = next(made) if made else simulate_curve(curve, orders, setting, progress)
+            except KeyboardInterrupt:
+                if curve.number == 1:
+                    raise
+                return
+        yield found
+        if found.interrupted:
             return
 
 

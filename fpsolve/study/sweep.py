@@ -7,11 +7,11 @@ of the time of one p in strong noise, and nothing of several p, or in weak noise
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -40,33 +40,23 @@ class Order:
 
     curve: Curve
     wanted: Wanted
-    key: str
+    key: str = ""
     is_known: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Batch:
-    """Some parameter sets, and how they are solved."""
+def solve_batch(
+    batch: Sequence[Order],
+    numerics: Numerics,
+    keep: Callable[[Order, Solved], Kept],
+    progress: Callable[[], None] = lambda: None,
+) -> list[Kept]:
+    """The task: solves some sets, and hands each to `keep` before the next is begun.
 
-    orders: tuple[Order, ...]
-    numerics: Numerics
-
-
-@dataclass(frozen=True, eq=False)
-class SolveBatch(Generic[Kept]):
-    """The task: solves a batch, and hands each set to `keep` before the next is begun.
-
-    Attributes:
+    Args:
         keep: takes an order and what was found, and returns what the caller needs to know; it pickles.
         progress: called after each moment; only where the task stays in this process.
     """
-
-    keep: Callable[[Order, Solved], Kept]
-    progress: Callable[[], None] | None = None
-
-    def __call__(self, batch: Batch) -> list[Kept]:
-        progress = self.progress or (lambda: None)
-        return [self.keep(order, solved(order, batch.numerics, progress)) for order in batch.orders]
+    return [keep(order, solved(order, numerics, progress)) for order in batch]
 
 
 def batch_size(planned: int) -> int:
@@ -74,7 +64,7 @@ def batch_size(planned: int) -> int:
     return min(max(planned // BATCHES, 1), MOST_SETS)
 
 
-def batches(case: Case, order: Callable[[Curve], Order | None], numerics: Numerics) -> Iterator[Batch]:
+def batches(case: Case, order: Callable[[Curve], Order | None]) -> Iterator[tuple[Order, ...]]:
     """All batches of a case, without the sets of which nothing is wanted; the first sets come one by one.
 
     So whoever begins sees soon how long they take.
@@ -82,9 +72,8 @@ def batches(case: Case, order: Callable[[Curve], Order | None], numerics: Numeri
     size = batch_size(case.planned)
     starts = [*range(min(size, case.planned)), *range(size, case.planned, size), case.planned]
     for start, stop in pairwise(starts):
-        found = tuple(filter(None, map(order, case.curves(start, stop))))
-        if found:
-            yield Batch(found, numerics)
+        if found := tuple(filter(None, map(order, case.curves(start, stop)))):
+            yield found
 
 
 def solved(order: Order, numerics: Numerics, progress: Callable[[], None] = lambda: None) -> Solved:
@@ -125,5 +114,5 @@ def lost(curve: Curve) -> CurveResult:
 
 
 def result_alone(order: Order, solved: Solved) -> CurveResult | None:
-    """For a `SolveBatch` that keeps nothing but the numbers."""
+    """For a `solve_batch` that keeps nothing but the numbers."""
     return solved.result

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from fpsolve.case.case import Case, load_case
@@ -21,7 +22,7 @@ from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
 from fpsolve.study.solve import Numerics, compare, expected
-from fpsolve.study.sweep import Order, SolveBatch, batches, lost, result_alone
+from fpsolve.study.sweep import Order, batches, lost, result_alone, solve_batch
 from fpsolve.workflow.folders import (
     AGAIN,
     ANEW,
@@ -226,16 +227,15 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
 
 def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:
     """Solve what a case expects, and return it with the `comparisons`; nothing is written."""
-    numerics = Numerics.of(case)
     found: list[CurveResult] = []
     with (
         saying_if_interrupted(lambda: kept(case, len(found)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
         pool or serial() as workers,
     ):
-        tasks = batches(case, lambda curve: Order(curve, expected(case, curve), ""), numerics)
-        for done in workers.run(SolveBatch(result_alone), tasks):
-            results = [lost(order.curve) for order in done.item.orders] if done.result is None else done.result
+        task = partial(solve_batch, numerics=Numerics.of(case), keep=result_alone)
+        for done in workers.run(task, batches(case, lambda curve: Order(curve, expected(case, curve)))):
+            results = [lost(order.curve) for order in done.item] if done.result is None else done.result
             for result in filter(None, results):
                 found.append(result)
                 progress(failed=bool(result.failures))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from fpsolve.case.case import Case, Curve
@@ -16,29 +17,25 @@ from fpsolve.pool import Pool, serial
 from fpsolve.study.records import key_of, record_of
 from fpsolve.study.results import CurveResult, Solved
 from fpsolve.study.solve import Numerics, Wanted, everything, without_failed
-from fpsolve.study.sweep import Batch, Order, SolveBatch, batches, lost
+from fpsolve.study.sweep import Order, batches, lost, solve_batch
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
 Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
+Orders = tuple[Order, ...]
 SOLVED_RECORDS = "records/solved"
 GROWTH = 2
 """Tables are rewritten when they have grown by this factor, so that all of it costs as little as the last ones."""
 
 
-@dataclass(frozen=True)
-class Keep:
-    """Writes what was found of a set into the folder of its case, and says where the numbers are."""
-
-    folder: Path
-
-    def __call__(self, order: Order, solved: Solved) -> Found:
-        curve, result = order.curve, solved.result
-        write_functions(solved, curve, self.folder)
-        is_failed = result is not None and bool(result.failures)
-        if result is None or solved.is_passing:
-            return curve.number, result, is_failed
-        return curve.number, append(self.folder / SOLVED_RECORDS, order.key, record_of(result)), is_failed
+def keep(folder: Path, order: Order, solved: Solved) -> Found:
+    """Write what was found of a set into the folder of its case, and say where the numbers are."""
+    curve, result = order.curve, solved.result
+    write_functions(solved, curve, folder)
+    is_failed = result is not None and bool(result.failures)
+    if result is None or solved.is_passing:
+        return curve.number, result, is_failed
+    return curve.number, append(folder / SOLVED_RECORDS, order.key, record_of(result)), is_failed
 
 
 class Sweep:
@@ -81,9 +78,12 @@ class Sweep:
         is_alone = self.case.planned == 1 and not pool.is_elsewhere
         if self._settled:
             progress(self._settled * self._steps_each, known=True)
-        queue = _Queue(batches(self.case, self._order, self.numerics))
+        queue = _Queue(batches(self.case, self._order))
+        task = partial(solve_batch, numerics=self.numerics, keep=partial(keep, self.folder))
+        if is_alone:
+            task = partial(task, progress=progress)
         with serial() if is_alone else pool as workers:
-            for done in workers.run(SolveBatch(Keep(self.folder), progress if is_alone else None), queue):
+            for done in workers.run(task, queue):
                 for number, found, is_failed in self._lost(done.item, queue) if done.result is None else done.result:
                     if isinstance(found, Address):
                         self.records.expect(found)
@@ -119,22 +119,22 @@ class Sweep:
         order, known = Order(curve, wanted, self._key(curve)), self.results.of(curve)
         return order if known is None else replace(order, wanted=without_failed(wanted, known.failures), is_known=True)
 
-    def _lost(self, batch: Batch, queue: _Queue) -> list[Found]:
+    def _lost(self, batch: Orders, queue: _Queue) -> list[Found]:
         """What is known of a batch whose worker died; the rest is tried again, set by set, which shows the reason."""
         self.records.look()
-        places = {order: self.records.address(order.key) for order in batch.orders}
+        places = {order: self.records.address(order.key) for order in batch}
         left = [order for order, place in places.items() if place is None or order.is_known]
-        if len(batch.orders) > 1:
-            queue.again += [Batch((order,), batch.numerics) for order in left]
+        if len(batch) > 1:
+            queue.again += [(order,) for order in left]
             return [(order.curve.number, place, False) for order, place in places.items() if order not in left]
         return [(order.curve.number, None if order.is_known else lost(order.curve), True) for order in left]
 
 
-class _Queue(Iterator[Batch]):
+class _Queue(Iterator[Orders]):
     """Batches, among which some may come again."""
 
-    def __init__(self, source: Iterator[Batch]) -> None:
-        self.source, self.again = source, deque[Batch]()
+    def __init__(self, source: Iterator[Orders]) -> None:
+        self.source, self.again = source, deque[Orders]()
 
-    def __next__(self) -> Batch:
+    def __next__(self) -> Orders:
         return self.again.popleft() if self.again else next(self.source)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from fpsolve.output.records import Records, append
 from fpsolve.pool import Pool
 from fpsolve.study.records import record_of, simulated_of, simulation_key
 from fpsolve.study.results import SimulatedCurve
-from fpsolve.study.simulate import simulate_curve, simulate_curves, simulated_orders, simulation_steps
+from fpsolve.study.simulate import simulate_curve, simulate_curves, simulation_steps, simulation_work
 from fpsolve.workflow.progress import Advance
 
 SIMULATED_RECORDS = "records/simulated"
@@ -29,7 +30,7 @@ class Simulations:
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
         self.case, self.folder = case, folder
-        self.asked: dict[str, Any] = {"orders": simulated_orders(case), "setting": case.monte_carlo}
+        self.asked: dict[str, Any] = {"orders": case.simulated.tolist(), "setting": case.monte_carlo}
         self.records = Records(folder / SIMULATED_RECORDS)
         if is_fresh:
             self.records.remove()
@@ -48,34 +49,21 @@ class Simulations:
             progress: called as often as `simulation_work` counts.
             pool: who simulates; None for all processors of this machine.
         """
+        others = [curve for curve in self.case.curves() if curve.number not in self._known]
         if self._known:
-            known = (curve for curve in self.case.curves() if curve.number in self._known)
-            progress(sum(map(simulation_steps, known)), known=True)
-        if pool is None:
-            found = simulate_curves(self.case, progress=progress, known=self._found)
-        else:
-            found = self._by_pool(pool, progress)
-        for simulated in found:
-            if not simulated.interrupted and simulated.curve.number not in self._known:
-                append(self.records.folder, self._key(simulated.curve), record_of(simulated))
-            yield simulated
+            progress(simulation_work(self.case) - sum(map(simulation_steps, others)), known=True)
 
-    def _by_pool(self, pool: Pool, progress: Advance) -> Iterator[SimulatedCurve]:
-        done = 0
-        with pool:
-            unknown = (curve for curve in self.case.curves() if curve.number not in self._known)
-            simulated = pool.map(partial(simulate_curve, **self.asked), unknown)
-            try:
-                for curve in self.case.curves():
-                    found = self._found(curve)
-                    if found is None:
-                        found = next(simulated)
-                        progress(simulation_steps(curve))
-                    yield found
-                    done += 1
-            except KeyboardInterrupt:
-                if not done:
-                    raise
+        def made(pool: Pool) -> Iterator[SimulatedCurve]:
+            for curve, found in zip(others, pool.map(partial(simulate_curve, **self.asked), others), strict=True):
+                progress(simulation_steps(curve))
+                yield found
+
+        with pool or nullcontext():
+            elsewhere = made(pool) if pool else None
+            for found in simulate_curves(self.case, progress=progress, known=self._found, made=elsewhere):
+                if not found.interrupted and found.curve.number not in self._known:
+                    append(self.records.folder, self._key(found.curve), record_of(found))
+                yield found
 
     def _found(self, curve: Curve) -> SimulatedCurve | None:
         """Its simulation, if that is known; a record of another form does not count."""
