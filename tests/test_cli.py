@@ -21,7 +21,7 @@ from fpsolve.files import alone
 from fpsolve.model.kinds import parameter_of
 from fpsolve.output import figures
 from fpsolve.output.terminal import digits
-from fpsolve.study import sweep
+from fpsolve.study import solve
 from tests.conftest import heed_signals, sampled
 from tests.test_workflow import DRAWN, HOPELESS, LEAN, TABLES, TEXT, files
 
@@ -272,7 +272,7 @@ def test_a_folder_in_use_exits_2(case, tmp_path, capsys):
     ],
 )
 def test_an_interrupted_run_says_what_is_kept(case, tmp_path, capsys, monkeypatch, number, message):
-    original = sweep.solve_curve
+    original = solve.solve_curve
 
     def interrupted(curve, wanted, numerics, _):
         def progress():
@@ -281,7 +281,7 @@ def test_an_interrupted_run_says_what_is_kept(case, tmp_path, capsys, monkeypatc
 
         return original(curve, wanted, numerics, progress)
 
-    monkeypatch.setattr(sweep, "solve_curve", interrupted)
+    monkeypatch.setattr(solve, "solve_curve", interrupted)
     assert main(["run", case, "--jobs", "1"]) == INTERRUPTED
     assert capsys.readouterr().err.strip() == message
     assert "summary.json" in files(tmp_path / "results/test")
@@ -297,13 +297,13 @@ def raising(failure):
 LONG = """
 import sys
 from fpsolve.cli import main
-from fpsolve.study import sweep
+from fpsolve.study import solve
 
 def wait(*_):
     print("begun", flush=True)
     sys.stdin.read()
 
-sweep.solve_curve = wait
+solve.solve_curve = wait
 sys.exit(main(sys.argv[1:]))
 """
 
@@ -342,7 +342,7 @@ def test_a_second_signal_does_not_hinder_the_message(case, capsys, monkeypatch):
         signal.raise_signal(signal.SIGHUP)
         original(text)
 
-    monkeypatch.setattr(sweep, "solve_curve", lambda *_: signal.raise_signal(signal.SIGTERM))
+    monkeypatch.setattr(solve, "solve_curve", lambda *_: signal.raise_signal(signal.SIGTERM))
     monkeypatch.setattr(cli, "print_error", interrupted)
     assert main(["run", case]) == 128 + signal.SIGTERM
     assert capsys.readouterr().err == "interrupted after 0 of 2 curves; run it again to go on\n"
@@ -428,7 +428,7 @@ def test_a_full_output_is_said_in_one_sentence(case, tmp_path, arguments, unbuff
     ],
 )
 def test_any_failure_to_write_is_said_in_one_sentence(case, capsys, monkeypatch, failure, said):
-    monkeypatch.setattr(sweep, "solve_curve", raising(failure))
+    monkeypatch.setattr(solve, "solve_curve", raising(failure))
     assert main(["check", case]) == BAD_INPUT
     err = capsys.readouterr().err
     assert err.startswith(said)
@@ -689,6 +689,6 @@ def test_an_interrupt_says_what_is_kept_in_every_phase(case, capsys, monkeypatch
 
 
 def test_an_interrupted_check_starts_over(case, capsys, monkeypatch):
-    monkeypatch.setattr(sweep, "solve_curve", raising(KeyboardInterrupt))
+    monkeypatch.setattr(solve, "solve_curve", raising(KeyboardInterrupt))
     assert main(["check", case, "--jobs", "1"]) == INTERRUPTED
     assert capsys.readouterr().err == "interrupted after 0 of 2 curves; run it again to start over\n"

@@ -20,7 +20,7 @@ from fpsolve.cli import main
 from fpsolve.output import records
 from fpsolve.output.records import Records
 from fpsolve.pool import cluster
-from fpsolve.study import sweep
+from fpsolve.study import solve
 from fpsolve.workflow import run_case
 from fpsolve.workflow.sets import SOLVED_RECORDS
 from tests.conftest import heed_signals, sampled
@@ -351,7 +351,7 @@ def test_a_scheduler_that_dies_is_told_in_one_sentence(place):
 
 
 def test_batches_follow_from_the_case_alone(place):
-    from fpsolve.study.sweep import batch_size
+    from fpsolve.study.solve import batch_size
 
     case = load_case(place / "sweep.toml")
     assert case.planned == SIZE**2
@@ -360,8 +360,7 @@ def test_batches_follow_from_the_case_alone(place):
 
 def test_the_first_sets_come_one_by_one(place):
     """This process, which begins alone, calls others once it sees that sets take long."""
-    from fpsolve.study.solve import everything
-    from fpsolve.study.sweep import Order, batches
+    from fpsolve.study.solve import Order, batches, everything
 
     num = "{ start = 0.1, stop = 1.0, num = 40 }"
     case = load_case(place / "sweep.toml", [f'vary={{ "noise.D0" = {num}, "noise.tau0" = {num} }}'])
@@ -399,7 +398,7 @@ def test_a_drawing_that_fails_costs_no_numbers(place, monkeypatch):
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr(sweep, "solve_functions", fail)
+    monkeypatch.setattr(solve, "solve_functions", fail)
     outcome = run_case(case, place / "drawn")
     assert not outcome.failures
     np.testing.assert_array_equal(outcome.results[0].moments.value, before.moments.value)

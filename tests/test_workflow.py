@@ -24,7 +24,7 @@ from fpsolve.exponent.fields import UNRESOLVED
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
 from fpsolve.output.tables import write_results
-from fpsolve.study import sweep
+from fpsolve.study import solve
 from fpsolve.study.solve import compare, solve_curve
 from fpsolve.workflow import Watch, check_case, run_case, sets, simulate_case
 from tests.solving import solve_case, solve_sets
@@ -319,7 +319,7 @@ def interrupt_curve(monkeypatch, number, exception=KeyboardInterrupt):
             raise exception
         return solve_curve(curve, *others)
 
-    monkeypatch.setattr(sweep, "solve_curve", interrupted)
+    monkeypatch.setattr(solve, "solve_curve", interrupted)
 
 
 def test_an_interruption_keeps_the_finished_curves(case, tmp_path, monkeypatch):

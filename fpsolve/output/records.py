@@ -1,33 +1,51 @@
 """Records of what is finished, kept in files that only grow: what a run that ended early had done is not lost.
 
 A record is a line of JSON. Each process that writes has a file of its own, and a record is with the system before the
-next one is begun; a line that is torn, or damaged, is none.
+next one is begun; a line that is torn, or damaged, is none. How a value becomes plain data, and comes back to the last
+bit, follows from the annotation of its attribute: a dataclass is a list of its attributes, an array a compressed text;
+nan and inf, which JSON has not, are texts.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import math
 import os
 import socket
 import zlib
+from base64 import b64decode, b64encode
 from bisect import insort
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from errno import ENOSPC
+from functools import cache, lru_cache
 from pathlib import Path
 from secrets import token_hex
 from time import monotonic, sleep
-from typing import Any, overload
+from types import NoneType, UnionType
+from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
+import numpy as np
+
+from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import MonteCarloSection
+from fpsolve.data import Quantity
 from fpsolve.errors import OutputError, Remedy
-from fpsolve.study.records import is_current, result_of
-from fpsolve.study.results import CurveResult
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import Message, message_of
+from fpsolve.model.kinds import version_of
+from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.study.solve import Numerics, Wanted
 
+RESULT_VERSION = 3
+"""Of what is computed from the same parameters; records of another one are computed anew."""
 SHARED_SECONDS = 60.0
 """After which a file that another machine has written is there, if it ever is."""
 _NAMES: dict[int, str] = {}
 """The file of this process."""
+Record = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -68,7 +86,7 @@ class Records:
     @property
     def outdated(self) -> int:
         """How many another version of fpsolve has written; they are not read."""
-        return sum(not is_current(key) for key in self._addresses)
+        return sum(not key.startswith(f"{RESULT_VERSION}-") for key in self._addresses)
 
     def address(self, key: str) -> Address | None:
         """Where the record of a key is, if there is one."""
@@ -83,7 +101,7 @@ class Records:
             sleep(0.5)
         self._seen.setdefault(address.file, 0)
 
-    def read(self, address: Address) -> dict[str, Any]:
+    def read(self, address: Address) -> Record:
         """A record. Raises OSError or ValueError where there is none."""
         with (self.folder / address.file).open("rb") as file:
             file.seek(address.start)
@@ -145,26 +163,19 @@ class Results(Sequence[CurveResult]):
     def __len__(self) -> int:
         return len(self._order)
 
-    @overload
-    def __getitem__(self, index: int) -> CurveResult: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[CurveResult]: ...
-    def __getitem__(self, index: int | slice) -> CurveResult | Sequence[CurveResult]:
-        if isinstance(index, slice):
+    def __getitem__(self, index: Any) -> Any:
+        numbers = self._order[index]
+        if isinstance(numbers, list):
             return [self[i] for i in range(*index.indices(len(self)))]
-        number = self._order[index]
-        [curve] = self._case.curves(number - 1, number)
+        [curve] = self._case.curves(numbers - 1, numbers)
         return self._result(curve)
-
-    def __iter__(self) -> Iterator[CurveResult]:
-        return (self[i] for i in range(len(self)))
 
     def _result(self, curve: Curve) -> CurveResult:
         found = self._found[curve.number]
         return result_of(self._records.read(found), curve) if isinstance(found, Address) else found
 
 
-def append(folder: Path, key: str, record: dict[str, Any]) -> Address:
+def append(folder: Path, key: str, record: Record) -> Address:
     """Add a record to the file of this process in a folder, on a line of its own also where the last one is torn.
 
     Raises:
@@ -196,7 +207,7 @@ def append(folder: Path, key: str, record: dict[str, Any]) -> Address:
     return Address(path.name, start, len(line))
 
 
-def _parsed(line: bytes) -> tuple[str, dict[str, Any]] | None:
+def _parsed(line: bytes) -> tuple[str, Record] | None:
     """A key and its record; None where the line is torn or damaged."""
     _, mark, content = line.removesuffix(b"}\n").partition(b', "record": ')
     try:
@@ -206,3 +217,169 @@ def _parsed(line: bytes) -> tuple[str, dict[str, Any]] | None:
         return str(head["key"]), head["record"]
     except (ValueError, KeyError, TypeError):
         return None
+
+
+def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
+    """What the record of a result is found by: a digest of all that its numbers and sentences follow from."""
+    mesh, budget = numerics.mesh, numerics.budget
+    return _digest(
+        CurveResult,
+        **_of_curve(curve),
+        p=wanted.p.tolist(),
+        wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated],
+        numerics=[numerics.rtol, budget.unknowns, budget.seconds, mesh and codec(CylinderMesh).plain(mesh)],
+    )
+
+
+def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
+    """What the record of a simulation is found by."""
+    settings = setting.model_dump(mode="json")
+    return _digest(SimulatedCurve, **_of_curve(curve), orders=list(orders), setting=settings)
+
+
+def _of_curve(curve: Curve) -> dict[str, Any]:
+    """The parameters, and the system and the noise as they are written, with the versions of other packages' kinds."""
+    kinds = [[repr(half), version_of(type(half))] for half in curve.problem.halves]  # type: ignore[arg-type]
+    return {"parameters": dict(curve.parameters), "kinds": kinds}
+
+
+def record_of(result: CurveResult | SimulatedCurve) -> Record:
+    """All of a result but its curve."""
+    kind: Any = type(result)
+    return {name: each.plain(getattr(result, name)) for name, each in _recorded(kind).items()}
+
+
+def result_of(record: Mapping[str, Any], curve: Curve) -> CurveResult:
+    """The result of a curve from its record. Raises `ValueError` where that has another form."""
+    return CurveResult(curve, **_made(CurveResult, record))
+
+
+def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
+    """The simulation of a curve from its record. Raises `ValueError` where that has another form."""
+    return SimulatedCurve(curve, **_made(SimulatedCurve, record))
+
+
+def _made(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
+    """The attributes that a record holds."""
+    try:
+        return {name: each.made(record[name]) for name, each in _recorded(kind).items()}
+    except (LookupError, TypeError, AttributeError, ValueError, zlib.error) as failure:
+        raise ValueError(f"this is no record of a {kind.__name__}: {failure!r}") from failure
+
+
+def _digest(kind: type, **content: Any) -> str:
+    """A key from what results of a kind follow from and from their form; it begins with their version."""
+    form = {name: each.form for name, each in _recorded(kind).items()}
+    text = json.dumps({"form": form, **content}, sort_keys=True)
+    return f"{RESULT_VERSION}-{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+class Codec(NamedTuple):
+    """Makes plain data of the values of one kind, and values of plain data.
+
+    Attributes:
+        form: what the plain data look like; it changes with the attributes of a dataclass, and with those in it.
+        plain: gives what JSON can hold.
+        made: the inverse. Raises TypeError, ValueError or LookupError where the data have another form.
+    """
+
+    form: Any
+    plain: Callable[[Any], Any]
+    made: Callable[[Any], Any]
+
+
+@cache
+def codec(kind: Any) -> Codec:
+    """For the values of an attribute with an annotation."""
+    origin, parts, is_row = get_origin(kind), get_args(kind), is_dataclass(kind)
+    if kind in _SIMPLE:
+        return _SIMPLE[kind]
+    if is_row:
+        attributes = _recorded(kind)
+        row = Codec(
+            [kind.__name__, *([name, one.form] for name, one in attributes.items())],
+            lambda value: [one.plain(getattr(value, name)) for name, one in attributes.items()],
+            lambda data: kind(
+                *[one.made(part) for one, part in zip(attributes.values(), _checked(data, list), strict=True)]
+            ),
+        )
+        if kind is not Quantity:
+            return row
+        # a text for each, as there are few of them and many numbers
+        plain = lru_cache(lambda value: json.dumps(row.plain(value)))
+        made = lru_cache(lambda text: row.made(json.loads(text)))
+        return Codec(row.form, plain, lambda data: made(_checked(data, str)))
+    if origin is np.ndarray:
+        return Codec("array", _packed, _unpacked)
+    if origin is Literal:
+        return Codec(parts, str, lambda data: parts[parts.index(data)])
+    if origin is UnionType and NoneType in parts:
+        [inner] = [codec(part) for part in parts if part is not NoneType]
+        return Codec(
+            ["none", inner.form],
+            lambda value: None if value is None else inner.plain(value),
+            lambda data: None if data is None else inner.made(data),
+        )
+    if origin is tuple and parts[1:] == (...,):
+        inner = codec(parts[0])
+        return Codec(
+            [inner.form],
+            lambda value: [inner.plain(each) for each in value],
+            lambda data: tuple(map(inner.made, _checked(data, list))),
+        )
+    if origin is tuple:
+        each = [codec(part) for part in parts]
+        return Codec(
+            [one.form for one in each],
+            lambda value: [one.plain(part) for one, part in zip(each, value, strict=True)],
+            lambda data: tuple(one.made(part) for one, part in zip(each, _checked(data, list), strict=True)),
+        )
+    if origin in (dict, Mapping):
+        inner = codec(parts[1])
+        return Codec(
+            {"": inner.form},
+            lambda value: {key: inner.plain(each) for key, each in value.items()},
+            lambda data: {key: inner.made(each) for key, each in _checked(data, dict).items()},
+        )
+    raise TypeError(f"values of {kind} cannot be recorded")
+
+
+@cache
+def _recorded(kind: Any) -> Mapping[str, Codec]:
+    """For each attribute of a dataclass but a curve; what needs numba is imported for simulations only."""
+    names = {}
+    if kind is SimulatedCurve:
+        from fpsolve.simulation import MonteCarlo, Response
+
+        names = {"MonteCarlo": MonteCarlo, "Response": Response}
+    hints = get_type_hints(kind, localns=names)
+    return {each.name: codec(hints[each.name]) for each in fields(kind) if each.name != "curve"}
+
+
+def _checked(data: Any, kind: Any) -> Any:
+    """Plain data of a kind. Raises TypeError where they are of another one."""
+    if not isinstance(data, kind) or (isinstance(data, bool) and kind is not bool):
+        raise TypeError(f"{data!r} is of another kind than {kind}")
+    return data
+
+
+def _packed(value: FloatArray) -> Record:
+    data = np.ascontiguousarray(value, dtype="<f8").tobytes()
+    return {"shape": list(value.shape), "data": b64encode(zlib.compress(data)).decode("ascii")}
+
+
+def _unpacked(packed: Mapping[str, Any]) -> FloatArray:
+    data = zlib.decompress(b64decode(packed["data"], validate=True))
+    return np.frombuffer(data, dtype="<f8").reshape(tuple(packed["shape"])).astype(float)
+
+
+_SIMPLE: Mapping[Any, Codec] = {
+    Any: Codec("any", lambda value: value, lambda data: data),
+    str: Codec("text", str, lambda data: data if type(data) is str else _checked(data, str)),
+    bool: Codec("bool", bool, lambda data: _checked(data, bool)),
+    int: Codec("int", int, lambda data: _checked(data, int)),
+    float: Codec("float", lambda value: float(value) if math.isfinite(value) else str(float(value)), float),
+    float | str: Codec("number or text", lambda value: value, lambda data: _checked(data, float | str)),
+    Message: Codec("message", lambda value: message_of(value).to_data(), Message.from_data),
+}
+"""For what has no parts."""

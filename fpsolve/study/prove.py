@@ -1,17 +1,19 @@
-"""Proving bounds on Λ(p), λ and δ_p for the curves of a case."""
+"""Proving bounds on Λ(p), λ and δ_p for the curves of a case, of whose numbers the decimals count that it states."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, cast
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Sweep
 from fpsolve.errors import FpsolveError, NoSuchExponent
-from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
+from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.messages import Code, Message
 from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import verdicts
@@ -22,28 +24,12 @@ from fpsolve.proofs.questions import (
     prove_index,
     refuse_unprovable,
 )
-from fpsolve.proofs.statement import Parameters, linear_values, parameters_of
-from fpsolve.study.decimals import Literals, decimal_of, literals_of
+from fpsolve.proofs.statement import DECIMAL, Parameters, linear_values, parameters_of
 
 ORDERS = "moments.p"
-
-
-@dataclass(frozen=True)
-class Question:
-    """What is to be proven.
-
-    Attributes:
-        quantity: the name of Λ(p), λ or δ_p.
-        stated: the parameters of the curve as decimals.
-        p: the moment as a decimal; None for λ and δ_p.
-        width: wanted upper − lower; a share of the scale if None.
-    """
-
-    curve: Curve
-    quantity: str
-    stated: Parameters
-    p: str | None = None
-    width: float | None = None
+Literals = Mapping[float, str]
+"""Decimals by their floats."""
+Question = Callable[[], "Enclosure | IndexEnclosure"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +110,12 @@ class Plan:
     def questions(self) -> Iterator[Question]:
         """All of them, curve by curve."""
         for curve in self.case.curves():
-            stated = self.stated(curve)
-            yield from (Question(curve, MOMENT.name, stated, p, self.width) for p in self._orders)
-            yield from (Question(curve, name, stated, width=self.width) for name in self.indices)
+            problem, stated = curve.problem, self.stated(curve)
+            yield from (partial(prove_bounds, problem, stated, p, self.width) for p in self._orders)
+            if LYAPUNOV_EXPONENT.name in self.indices:
+                yield partial(prove_bounds, problem, stated, None, self.width)
+            if STABILITY_INDEX.name in self.indices:
+                yield partial(prove_index, problem, stated)
 
     def gathered(self, answers: Sequence[Enclosure | IndexEnclosure]) -> list[CurveProof]:
         """What is proven of each curve, from the first answers, in the order of the questions."""
@@ -163,7 +152,42 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
 
 def answer(question: Question) -> Enclosure | IndexEnclosure:
     """The task: proves what is asked."""
-    problem = question.curve.problem
-    if question.quantity == STABILITY_INDEX.name:
-        return prove_index(problem, question.stated)
-    return prove_bounds(problem, question.stated, question.p, question.width)
+    return question()
+
+
+def literals_of(case: Case, keys: Iterable[str]) -> Mapping[str, Literals]:
+    """The decimals that the file and the command line state for dotted keys; those of [vary] for a varied one."""
+    found = list(_leaves(tomllib.loads(case.text, parse_float=Decimal)))
+    for override in case.overrides:
+        with suppress(ValueError):  # a bare word
+            new = list(_leaves(tomllib.loads(override, parse_float=Decimal)))
+            ((replaced, _),) = _leaves(tomllib.loads(f"{override.partition('=')[0]} = 0"))
+            found = [each for each in found if not _is_in(each[0], replaced)] + new
+    places = {key: f"vary.{key}" if key in case.vary.keys else key for key in keys}
+    return {
+        key: {float(number) + 0.0: f"{number}" for path, number in found if _is_in(path, place)}
+        for key, place in places.items()
+    }
+
+
+def decimal_of(value: float, literals: Literals) -> str:
+    """A number as the decimal that is stated, or else, as for those of a range, the shortest that is read as it."""
+    shortest = repr(float(value))
+    text = literals.get(value, shortest) if value else shortest
+    return text if DECIMAL.fullmatch(text) and Decimal(text) != Decimal(shortest) else shortest
+
+
+def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, Decimal | int]]:
+    """The finite numbers in tables and lists, each after the dotted keys of the tables in which it stands."""
+    if isinstance(data, dict):
+        for name, inner in data.items():
+            yield from _leaves(inner, f"{path}.{name}" if path else name)
+    elif isinstance(data, list):
+        for inner in data:
+            yield from _leaves(inner, path)
+    elif isinstance(data, Decimal | int) and not isinstance(data, bool) and Decimal(data).is_finite():
+        yield path, data
+
+
+def _is_in(path: str, place: str) -> bool:
+    return f"{path}.".startswith(f"{place}.")

@@ -21,8 +21,7 @@ from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
-from fpsolve.study.solve import Numerics, compare, expected
-from fpsolve.study.sweep import Order, batches, lost, result_alone, solve_batch
+from fpsolve.study.solve import Numerics, Order, batches, compare, expected, lost, result_alone, solve_batch
 from fpsolve.workflow.folders import (
     AGAIN,
     ANEW,

@@ -10,14 +10,12 @@ from pathlib import Path
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.output.datasets import write_dataset
-from fpsolve.output.records import Address, Records, Results, append
+from fpsolve.output.records import Address, Records, Results, append, key_of, record_of
 from fpsolve.output.tables import Run, write_results
 from fpsolve.output.vtk import write_curves, write_functions
 from fpsolve.pool import Pool, serial
-from fpsolve.study.records import key_of, record_of
 from fpsolve.study.results import CurveResult, Solved
-from fpsolve.study.solve import Numerics, Wanted, everything, without_failed
-from fpsolve.study.sweep import Order, batches, lost, solve_batch
+from fpsolve.study.solve import Numerics, Order, Wanted, batches, everything, lost, solve_batch, without_failed
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
 Found = tuple[int, Address | CurveResult | None, bool]

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from fpsolve.case.case import Case, Curve
-from fpsolve.output.records import Records, append
+from fpsolve.output.records import Records, append, record_of, simulated_of, simulation_key
 from fpsolve.pool import Pool
-from fpsolve.study.records import record_of, simulated_of, simulation_key
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.study.simulate import simulate_curve, simulate_curves, simulation_steps, simulation_work
 from fpsolve.workflow.progress import Advance

@@ -17,7 +17,7 @@ from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.study.records import key_of
+from fpsolve.output.records import key_of
 from fpsolve.study.solve import Numerics, everything
 
 OSCILLATOR = """\
@@ -180,7 +180,7 @@ def test_records_depend_on_the_kind_and_its_version(
 ) -> None:
     keys = set()
     for version in ("windy 1.5", "windy 1.6"):
-        monkeypatch.setattr("fpsolve.study.records.version_of", lambda _, version=version: version)
+        monkeypatch.setattr("fpsolve.output.records.version_of", lambda _, version=version: version)
         case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS))
         keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
     assert len(keys) == 2

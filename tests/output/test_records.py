@@ -13,9 +13,8 @@ from fpsolve.cli import main
 from fpsolve.errors import OutputError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.output.records import Records, append
-from fpsolve.study import records as plain
-from fpsolve.study.records import key_of, record_of, result_of
+from fpsolve.output import records as plain
+from fpsolve.output.records import Records, append, key_of, record_of, result_of
 from fpsolve.study.solve import Numerics, Wanted
 from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
 from tests.solving import solve_case

@@ -21,7 +21,7 @@ from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.vtk import write_density, write_eigenfunctions, write_response
-from fpsolve.study import sweep
+from fpsolve.study import solve
 from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.oracles.perturbation import first_order_eigenfunction
@@ -194,14 +194,14 @@ def test_a_run_that_ends_early_lists_the_curves_that_are_there(tmp_path, monkeyp
     run(case, tmp_path)
     series = tmp_path / case.name / "curves.pvd"
     assert len(pyvista.PVDReader(series).time_values) == 3
-    solve = sweep.solve_curve
+    original = solve.solve_curve
 
     def interrupted(curve, *arguments):
         if curve.number == 3:
             raise KeyboardInterrupt
-        return solve(curve, *arguments)
+        return original(curve, *arguments)
 
-    monkeypatch.setattr(sweep, "solve_curve", interrupted)
+    monkeypatch.setattr(solve, "solve_curve", interrupted)
     with pytest.raises(KeyboardInterrupt):
         run(case, tmp_path, fresh=True)
     assert list(pyvista.PVDReader(series).time_values) == [0.5, 0.75]

@@ -178,9 +178,9 @@ def test_a_folder_holds_proofs_of_its_parameters_only(case, tmp_path):
 def stated(case, *overrides):
     """The decimals of all p and of D0 and ω of the first curve."""
     plan = Plan(load_case(case, overrides), None)
-    questions = list(islice(plan.questions(), plan.each))
-    parameters = questions[0].stated
-    numbers = [each.p for each in questions if each.quantity == "moment"]
+    asked = [each.args for each in islice(plan.questions(), plan.each)]
+    parameters = asked[0][1]
+    numbers = [each[2] for each in asked if len(each) == 4 and each[2] is not None]
     return numbers, *(parameters[key] for key in ("noise.D0", "oscillator.omega"))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
-from fpsolve.study.records import record_of, result_of
+from fpsolve.output.records import record_of, result_of
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import compare
 from tests.solving import solve_sets

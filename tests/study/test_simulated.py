@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from fpsolve import load_case
+from fpsolve.output.records import record_of, simulated_of
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import BINS, MEANS, Response
-from fpsolve.study.records import record_of, simulated_of
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.study.simulate import simulate_curve, simulate_curves
 
