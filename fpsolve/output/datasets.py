@@ -37,7 +37,7 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
     """The results of a case: a dimension for each varied key, or `set` for those of a list, and p.
 
     Args:
-        facts: on the run, see `Run.facts`; they become attributes, tables as JSON.
+        facts: on the run, see `facts_of`; they become attributes, tables as JSON.
     """
     import xarray as xr
 

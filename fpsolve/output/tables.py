@@ -11,11 +11,10 @@ import socket
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
-from datetime import UTC, datetime
+from dataclasses import asdict
+from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
-from time import monotonic
 from typing import Any
 
 from fpsolve import __version__
@@ -34,38 +33,25 @@ MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
 
 
-@dataclass(frozen=True)
-class Run:
-    """One run of a case, from when this is made.
-
-    Attributes:
-        case: what is run.
-        started: when, in UTC.
-    """
-
-    case: Case
-    started: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
-    _clock: float = field(default_factory=monotonic, repr=False)
-
-    def facts(self) -> dict[str, Any]:
-        """Versions, the command, the machine, when and how long until now, and the case as it was written."""
-        packages = {name: version(name) for name in ("numpy", "scipy", "scikit-fem")}
-        return {
-            "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},
-            "command": shlex.join(sys.argv),
-            "host": socket.gethostname(),
-            "started": self.started,
-            "wall_seconds": round(monotonic() - self._clock, 3),
-            "overrides": list(self.case.overrides),
-            "case_text": self.case.text,
-        }
+def facts_of(case: Case, started: datetime, seconds: float) -> dict[str, Any]:
+    """Of a run: versions, the command, the machine, when it began and how long it takes, and the case as written."""
+    packages = {name: version(name) for name in ("numpy", "scipy", "scikit-fem")}
+    return {
+        "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},
+        "command": shlex.join(sys.argv),
+        "host": socket.gethostname(),
+        "started": started.isoformat(timespec="seconds"),
+        "wall_seconds": round(seconds, 3),
+        "overrides": list(case.overrides),
+        "case_text": case.text,
+    }
 
 
 def write_results(case: Case, results: Sequence[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
     """summary.json, which says whether all curves of the case are there, moments.csv and curves.csv, in one go.
 
     Args:
-        facts: on the run, see `Run.facts`.
+        facts: on the run, see `facts_of`.
     """
     state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
     start = json.dumps({**head(case), **state, **facts}, indent=1, ensure_ascii=False).removesuffix("\n}")

@@ -29,6 +29,7 @@ from fpsolve.workflow.folders import (
     SIMULATED,
     SOLVED,
     kept,
+    of_curves,
     own_folder,
     saying_if_interrupted,
 )
@@ -176,7 +177,7 @@ def simulate_case(
     simulated: list[SimulatedCurve] = []
     with (
         own_folder(case, out, (SIMULATED,)) as folder,
-        saying_if_interrupted(lambda: kept(case, len(simulated), folder)),
+        saying_if_interrupted(lambda: kept(len(simulated), of_curves(case), folder)),
     ):
         simulations = Simulations(case, folder, is_fresh=is_fresh)
         interruption = _simulate(simulations, watch, simulated, pool)
@@ -204,8 +205,7 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
     def traced() -> str:
         """How many branches are traced, and where these are."""
         count = sum(len(line.traces) for line in chart.lines)
-        text = f" after {count} branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines"
-        return f"{text}; what was done is kept in {folder}" if count else text
+        return kept(count, f"branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines", folder)
 
     with (
         own_folder(case, out, (CHART,)) as folder,
@@ -228,7 +228,7 @@ def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = SILENT) -
     """Solve what a case expects, and return it with the `comparisons`; nothing is written."""
     found: list[CurveResult] = []
     with (
-        saying_if_interrupted(lambda: kept(case, len(found)), ANEW),
+        saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
         pool or serial() as workers,
     ):
@@ -247,7 +247,7 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
     with saying_if_interrupted(lambda: " before the first curve"), writable(folder):
         sweep = Sweep(case, folder, is_fresh=is_fresh)
     with (
-        saying_if_interrupted(lambda: kept(case, len(sweep.results), folder)),
+        saying_if_interrupted(lambda: kept(len(sweep.results), of_curves(case), folder)),
         writable(folder),
     ):
         try:

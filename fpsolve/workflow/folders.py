@@ -47,10 +47,14 @@ def saying_if_interrupted(what_is_kept: Callable[[], str], again: str = AGAIN) -
         raise KeyboardInterrupt(f"interrupted{what_is_kept()}; {again}") from None
 
 
-def kept(case: Case, done: int, folder: Path | None = None) -> str:
-    """How many curves of a case are done, and where these are, if they are kept."""
-    count = f" after {done} of {case.planned} curve{'s' if case.planned > 1 else ''}"
-    return f"{count}; what was done is kept in {folder}" if done and folder else count
+def kept(done: int, of: str, folder: Path | None = None) -> str:
+    """How much was done of what, and where that is, if it is kept."""
+    return f" after {done} {of}" + (f"; what was done is kept in {folder}" if done and folder else "")
+
+
+def of_curves(case: Case) -> str:
+    """What is counted of a case: "of 3 curves"."""
+    return f"of {case.planned} curve{'s' if case.planned > 1 else ''}"
 
 
 def _agrees(case: Case, folder: Path) -> bool:

@@ -16,7 +16,7 @@ from fpsolve.proofs.certificate import Enclosure, MalformedProof
 from fpsolve.proofs.claims import Claims, claims_from
 from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.study.prove import CurveProof, Plan, answer, refuse_unprovable_case
-from fpsolve.workflow.folders import ANEW, PROVEN, own_folder, saying_if_interrupted
+from fpsolve.workflow.folders import ANEW, PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
 
 EVERY = 30.0
@@ -60,10 +60,6 @@ def prove_case(
     plan = Plan(case, width)
     answers: list[Enclosure | IndexEnclosure] = []
 
-    def kept() -> str:
-        text = f" after {len(answers)} of {plan.total} bounds"
-        return f"{text}; what was done is kept in {folder}" if answers else text
-
     def write() -> list[CurveProof]:
         proofs = plan.gathered(answers)
         if proofs:
@@ -73,7 +69,7 @@ def prove_case(
 
     with (
         own_folder(case, out, (PROVEN,)) as folder,
-        saying_if_interrupted(kept, ANEW),
+        saying_if_interrupted(lambda: kept(len(answers), f"of {plan.total} bounds", folder), ANEW),
         watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
         pool or serial() as workers,
     ):

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from time import monotonic
+from typing import Any
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import Address, Records, Results, append, key_of, record_of
-from fpsolve.output.tables import Run, write_results
+from fpsolve.output.tables import facts_of, write_results
 from fpsolve.output.vtk import write_curves, write_functions
 from fpsolve.pool import Pool, serial
 from fpsolve.study.results import CurveResult, Solved
@@ -46,7 +49,8 @@ class Sweep:
     """
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
-        self.case, self.folder, self.run = case, folder.resolve(), Run(case)
+        self.case, self.folder = case, folder.resolve()
+        self.started, self._clock = datetime.now(UTC), monotonic()
         self.numerics, self.first, self.further = Numerics.of(case), everything(case, 1), everything(case, 2)
         self.records = Records(self.folder / SOLVED_RECORDS)
         self.results = Results(case, self.records)
@@ -95,13 +99,16 @@ class Sweep:
     def write_tables(self) -> None:
         """Write summary.json and the tables beside it, of what is known."""
         self._tabled = len(self.results)
-        write_results(self.case, self.results, self.folder, self.run.facts())
+        write_results(self.case, self.results, self.folder, self._facts())
 
     def write_all(self) -> None:
         """Write the tables, results.nc, and the series over the curves."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        write_dataset(self.case, self.results, self.folder, self.run.facts())
+        write_dataset(self.case, self.results, self.folder, self._facts())
+
+    def _facts(self) -> dict[str, Any]:
+        return facts_of(self.case, self.started, monotonic() - self._clock)
 
     def _wanted(self, curve: Curve) -> Wanted:
         return self.first if curve.number == 1 else self.further
