@@ -398,7 +398,7 @@ def test_a_drawing_that_fails_costs_no_numbers(place, monkeypatch):
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr(solve, "solve_functions", fail)
+    monkeypatch.setattr(solve, "_functions", fail)
     outcome = run_case(case, place / "drawn")
     assert not outcome.failures
     np.testing.assert_array_equal(outcome.results[0].moments.value, before.moments.value)

@@ -7,7 +7,7 @@ from a neighbour's mesh saves half of the time of one p in strong noise, and not
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -80,6 +80,9 @@ class Numerics:
     def of(cls, case: Case) -> Numerics:
         return cls(case.rtol, case.budget, case.cylinder_mesh())
 
+    def solver(self, curve: Curve) -> ExponentSolver:
+        return ExponentSolver(curve.problem, self.mesh, rtol=self.rtol, budget=self.budget)
+
 
 def everything(case: Case, number: int = 1) -> Wanted:
     """What [output] names as `quantities`, of the curve with a number; the density goes with what is drawn of it."""
@@ -132,13 +135,12 @@ def solve_curve(
         progress: called after each moment.
     """
     started = thread_time()
-    solver = ExponentSolver(curve.problem, numerics.mesh, rtol=numerics.rtol, budget=numerics.budget)
+    solver = numerics.solver(curve)
     found = solve_moments(solver, wanted.p, progress=progress)
     estimates, missing = _solve_indices(solver, wanted.indices, found)
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
-    pairs, stationary = _functions(solver, without_failed(wanted, found.failures))
-    undrawn = _undrawn(stationary, solver.near.refinement)
+    pairs, stationary, undrawn = _functions(solver, without_failed(wanted, found.failures))
     slopes = None
     if wanted.differentiated is not None:
         slopes = solve_sensitivities(
@@ -167,7 +169,20 @@ def solve_curve(
         )
         if defect > most
     ]
-    limits = (*of[Severity.WARNING], *_imprecise(estimates, numerics), *undrawn, *unresolved)
+    imprecise = [
+        Message(
+            Code.INDEX_RTOL_MISSED,
+            symbol=INDICES[name].symbol,
+            value=estimate.value,
+            error=estimate.error_estimate,
+            size=estimate.relative_error,
+            rtol=numerics.rtol,
+            remedy=None if numerics.mesh is None else Remedy.MESH,
+        )
+        for name, estimate in estimates.items()
+        if estimate and estimate.relative_error > numerics.rtol
+    ]
+    limits = (*of[Severity.WARNING], *imprecise, *undrawn, *unresolved)
     result = CurveResult(
         curve=curve,
         moments=MomentColumns(
@@ -181,16 +196,7 @@ def solve_curve(
         failures=found.failures or tuple(Failure(None, message) for message in of[Severity.FAILURE]),
         seconds=thread_time() - started,
     )
-    return Solved(result, pairs, None if undrawn else stationary)
-
-
-def solve_functions(
-    curve: Curve, wanted: Wanted, numerics: Numerics
-) -> tuple[tuple[PrincipalPair, ...], PrincipalPair | None]:
-    """The eigenpairs of a parameter set whose numbers are known: those to be drawn, and that at p = 0."""
-    solver = ExponentSolver(curve.problem, numerics.mesh, rtol=numerics.rtol, budget=numerics.budget)
-    pairs, stationary = _functions(solver, wanted)
-    return pairs, None if _undrawn(stationary, solver.near.refinement) else stationary
+    return Solved(result, pairs, stationary)
 
 
 def without_failed(wanted: Wanted, failures: Sequence[Failure]) -> Wanted:
@@ -199,8 +205,10 @@ def without_failed(wanted: Wanted, failures: Sequence[Failure]) -> Wanted:
     return replace(wanted, shown=tuple(p for p in wanted.shown if p not in failed))
 
 
-def _functions(solver: ExponentSolver, wanted: Wanted) -> tuple[tuple[PrincipalPair, ...], PrincipalPair | None]:
-    """The eigenpairs to be drawn that converge, and that at p = 0."""
+def _functions(
+    solver: ExponentSolver, wanted: Wanted
+) -> tuple[tuple[PrincipalPair, ...], PrincipalPair | None, list[Message]]:
+    """The eigenpairs to be drawn that converge, that at p = 0 if it is to be trusted, and else why it is not."""
 
     def pair(p: float) -> PrincipalPair | None:
         try:
@@ -208,7 +216,14 @@ def _functions(solver: ExponentSolver, wanted: Wanted) -> tuple[tuple[PrincipalP
         except NotConverged:
             return None
 
-    return tuple(filter(None, map(pair, wanted.shown))), pair(0.0) if wanted.density else None
+    pairs, stationary = tuple(filter(None, map(pair, wanted.shown))), pair(0.0) if wanted.density else None
+    try:
+        if stationary is not None:
+            stationary_density(stationary)
+    except NotConverged as failure:
+        remedy = solver.near.refinement
+        return pairs, None, [Message(Code.NOTHING_DRAWN, reason=failure.reason, remedy=remedy)]
+    return pairs, stationary, []
 
 
 def _solve_indices(
@@ -240,33 +255,6 @@ def _solve_indices(
                 code, symbol = Code.INDEX_MISSING, "stability index"
         missing.setdefault((code, reason), []).append(symbol)
     return estimates, [Message(code, symbols=symbols, reason=reason) for (code, reason), symbols in missing.items()]
-
-
-def _undrawn(stationary: PrincipalPair | None, remedy: Remedy) -> list[Message]:
-    """Why the stationary density of a pair at p = 0 is not written, and what to do, or nothing."""
-    try:
-        if stationary is not None:
-            stationary_density(stationary)
-    except NotConverged as failure:
-        return [Message(Code.NOTHING_DRAWN, reason=failure.reason, remedy=remedy)]
-    return []
-
-
-def _imprecise(estimates: Mapping[str, Estimate | None], numerics: Numerics) -> list[Message]:
-    """Which indices miss rtol."""
-    of_all = {"rtol": numerics.rtol, "remedy": None if numerics.mesh is None else Remedy.MESH}
-    return [
-        Message(
-            Code.INDEX_RTOL_MISSED,
-            symbol=INDICES[name].symbol,
-            value=estimate.value,
-            error=estimate.error_estimate,
-            size=estimate.relative_error,
-            **of_all,
-        )
-        for name, estimate in estimates.items()
-        if estimate and estimate.relative_error > numerics.rtol
-    ]
 
 
 def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
@@ -342,7 +330,8 @@ def solved(order: Order, numerics: Numerics, progress: Callable[[], None] = lamb
     curve, wanted = order.curve, order.wanted
     if order.is_known:
         try:
-            return Solved(None, *solve_functions(curve, wanted, numerics))
+            pairs, stationary, _ = _functions(numerics.solver(curve), wanted)
+            return Solved(None, pairs, stationary)
         except OSError:
             raise
         except Exception:  # its numbers stay as they are
