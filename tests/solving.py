@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
+from typing import Any
+
 from fpsolve.case.case import Case
 from fpsolve.study.results import CurveResult, Solved
 from fpsolve.study.solve import Numerics, everything, solve_curve
 
-WEAK_NOISE = """
-[oscillator]
-epsilon = 0.1
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.5
-tau0 = 0.5
-r0 = 0.95
-"""
+OSCILLATOR = {"epsilon": 0.1, "omega": 1.0, "restitution": 0.8, "c1": 0.1}
+NOISE = {"D0": 0.5, "tau0": 0.5, "r0": 0.95}
+
+
+def case_text(more: str = "", title: str = "A test", noise: Mapping[str, Any] = NOISE, **oscillator: Any) -> str:
+    """A case file: parameters for which cases are solved at once, or others, and further sections."""
+    sections = {"oscillator": OSCILLATOR | oscillator, "noise": {**NOISE, **noise}}
+    lines = [
+        line
+        for name, values in sections.items()
+        for line in (f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in values.items()))
+    ]
+    return "\n".join([f"title = {json.dumps(title)}", *lines, more])
 
 
 def solve_sets(case: Case) -> list[Solved]:

@@ -8,19 +8,20 @@ import time
 import pytest
 
 from fpsolve import load_case, moment_lyapunov
-from tests.solving import WEAK_NOISE
+from tests.solving import case_text
 from tests.test_sweeps import CASE, MAIN, dask_cluster
 
-WEAK = f"""title = "Weak noise"
-{WEAK_NOISE}
-[moments]
+WEAK = case_text(
+    """[moments]
 p = [2.0]
 [vary]
-"noise.D0" = {{ start = 0.1, stop = 1.0, num = 50 }}
-"oscillator.omega" = {{ start = 0.5, stop = 3.0, num = 50 }}
+"noise.D0" = { start = 0.1, stop = 1.0, num = 50 }
+"oscillator.omega" = { start = 0.5, stop = 3.0, num = 50 }
 [output]
 quantities = ["moment"]
-"""
+""",
+    "Weak noise",
+)
 
 
 def seconds(folder, *options):

@@ -13,21 +13,10 @@ from fpsolve.exponent.quantities import INDICES
 from fpsolve.output.figures import draw
 from fpsolve.study.results import CurveResult, MomentColumns
 from fpsolve.theory.perturbation import second_order
+from tests.solving import case_text
 
-CASE = """
-title = "Moment Lyapunov exponents of a vibro-impact oscillator"
-[oscillator]
-epsilon = 0.1
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.1
-tau0 = 0.5
-r0 = 0.95
-[moments]
-p = { start = -2.0, stop = 4.0, num = 13 }
-"""
+MOMENTS = "[moments]\np = { start = -2.0, stop = 4.0, num = 13 }\n"
+CASE = case_text(MOMENTS, "Moment Lyapunov exponents of a vibro-impact oscillator", {"D0": 0.1})
 
 
 def case_of(folder: Path, sets=()):

@@ -11,16 +11,9 @@ import fpsolve
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.model.quantity import MOMENT
-from tests.solving import WEAK_NOISE
+from tests.solving import case_text
 
-TEXT = f"""title = "A test"
-{WEAK_NOISE}
-[moments]
-p = [2.0, 0.0, -1.0]
-[output]
-eigenfunctions = []
-figure = false
-"""
+TEXT = case_text("[moments]\np = [2.0, 0.0, -1.0]\n[output]\neigenfunctions = []\nfigure = false\n")
 PRODUCT = '[vary]\n"noise.D0" = [1.0, 0.1]\n"noise.treatment" = ["exact", "ou-reduction"]\n'
 ZIP = '[vary]\nmode = "zip"\n"oscillator.omega" = [1.0, 2.0, 2.0]\n"oscillator.c1" = [0.1, 0.1, 0.2]\n'
 HOPELESS = '[vary]\n"oscillator.epsilon" = [0.01, 3.0]\n[budget]\nunknowns = 300\n'

@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 
 from fpsolve import FpsolveError, load_case, open_results, run
-from tests.solving import WEAK_NOISE
+from tests.solving import case_text
 
-CASE = f"""title = "A curve"
-{WEAK_NOISE}
-[moments]
-p = [2.0]
-[output]
-quantities = ["moment"]
-"""
+CASE = case_text("[moments]\np = [2.0]\n[output]\nquantities = ['moment']\n")
 
 
 @pytest.fixture(scope="module")

@@ -13,25 +13,16 @@ from fpsolve.cli import main
 from fpsolve.output.charts import read_line
 from fpsolve.study.chart import chart_work, solve_chart
 from fpsolve.workflow import Watch, chart_case, run
+from tests.solving import case_text
 
-CASE = """
-title = "Stability"
-[oscillator]
-epsilon = 0.1
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.1
-tau0 = 0.5
-r0 = 0.95
-[moments]
+CHART = """[moments]
 p = [2.0]
 [chart]
 x = { key = "oscillator.omega", start = 0.5, stop = 3.0, scale = "log", at = [1.0] }
 y = { key = "noise.D0", start = 0.01, stop = 1.0 }
 zero = ["lyapunov_exponent", { moment = 2.0 }, { stability_index = -1.0 }]
 """
+CASE = case_text(CHART, noise={"D0": 0.1})
 
 
 @pytest.fixture(scope="module")

@@ -8,33 +8,20 @@ import pytest
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.output.figures import _moment_series
-from tests.solving import solve_case
+from tests.solving import case_text, solve_case
 
-CASE = """
-title = "Heavy tails"
-[oscillator]
-epsilon = 0.5
-omega = 1.0
-restitution = 1.0
-c1 = 0.0
-[noise]
-D0 = 0.5
-tau0 = 1.0
-r0 = 1.1
-treatment = "exact"
-[moments]
-p = [-0.4, -0.1, 0.0]
-[monte_carlo]
-paths = 64
-time = 40.0
-p = [-0.4]
-"""
+SECTIONS = "[moments]\np = [-0.4, -0.1, 0.0]\n[monte_carlo]\npaths = 64\ntime = 40.0\np = [-0.4]\n"
+TAILS = {"tau0": 1.0, "r0": 1.1, "treatment": "exact"}
+
+
+def text(c1):
+    return case_text(SECTIONS, "Heavy tails", TAILS, epsilon=0.5, restitution=1.0, c1=c1)
 
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     path = tmp_path_factory.mktemp("heavy") / "heavy.toml"
-    path.write_text(CASE, encoding="utf-8")
+    path.write_text(text(0.0), encoding="utf-8")
     return path
 
 
@@ -53,9 +40,9 @@ def test_every_result_says_it(path, tmp_path, capsys):
 
 
 def test_a_positive_exponent_is_no_slope(path, tmp_path):
-    for c1, is_slope in (("0.0", False), ("-0.5", True)):
+    for c1, is_slope in ((0.0, False), (-0.5, True)):
         other = tmp_path / f"c{c1}.toml"
-        other.write_text(CASE.replace("c1 = 0.0", f"c1 = {c1}"), encoding="utf-8")
+        other.write_text(text(c1), encoding="utf-8")
         (result,) = solve_case(load_case(other, ["output.quantities=['lyapunov_exponent']"]))
         assert (result.lyapunov_exponent.value < 0) == is_slope
         assert ("not Λ′(0)" in result.notes[0]) != is_slope

@@ -12,21 +12,9 @@ from fpsolve.cli import main
 from fpsolve.output.records import record_of, result_of
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import compare
-from tests.solving import solve_sets
+from tests.solving import case_text, solve_sets
 
-CASE = """
-title = "A curve"
-[oscillator]
-epsilon = 0.5
-omega = 1.0
-restitution = 0.8
-c1 = 0.8
-c2 = 0.5
-[noise]
-D0 = 0.1
-tau0 = 0.5
-r0 = 0.95
-[moments]
+SECTIONS = """[moments]
 p = [1.0]
 [monte_carlo]
 paths = 640
@@ -37,16 +25,9 @@ value = 0.0
 atol = 1.0
 source = "a guess"
 """
-
-SLOW = """epsilon = 1.0930367
-omega = 0.07252887
-restitution = 0.57982
-c1 = -0.338098
-impact = "restitution\""""
-SLOW_NOISE = """D0 = 0.09531017
-tau0 = 49.143166
-r0 = 0.61455889
-treatment = "exact\""""
+CASE = case_text(SECTIONS, noise={"D0": 0.1}, epsilon=0.5, c1=0.8, c2=0.5)
+SLOW = {"epsilon": 1.0930367, "omega": 0.07252887, "restitution": 0.57982, "c1": -0.338098, "impact": "restitution"}
+SLOW_NOISE = {"D0": 0.09531017, "tau0": 49.143166, "r0": 0.61455889, "treatment": "exact"}
 
 
 @pytest.fixture(scope="module")
@@ -67,36 +48,23 @@ def result(solved):
     return solved.result
 
 
-def test_results_pickle(case, result):
-    again = pickle.loads(pickle.dumps(result))
-    np.testing.assert_array_equal(again.moments.value, result.moments.value)
-    assert again.estimates == result.estimates
-    assert again.curve == result.curve
-    assert compare(case, [again]) == compare(case, [result])
-
-
-def test_solved_curves_pickle_with_their_eigenpairs(solved):
-    again = pickle.loads(pickle.dumps(solved))
-    np.testing.assert_array_equal(again.result.moments.value, solved.result.moments.value)
-    [pair], [original] = again.eigenpairs, solved.eigenpairs
-    assert pair.p == original.p == 1.0
-    for one, other in ((pair, original), (again.stationary, solved.stationary)):
-        np.testing.assert_array_equal(one.right, other.right)
-        np.testing.assert_array_equal(one.left, other.left)
-
-
-def test_comparisons_pickle(case, result):
-    (comparison,) = compare(case, [result])
+def test_results_pickle(case, solved, result):
+    """Also solved curves with their eigenpairs, comparisons, and simulated curves."""
+    [simulated], [comparison] = simulate_curves(case), compare(case, [result])
+    again, whole, other, sample = pickle.loads(pickle.dumps((result, solved, comparison, simulated)))
+    for each in (again, whole.result):
+        np.testing.assert_array_equal(each.moments.value, result.moments.value)
+        assert each.estimates == result.estimates
+        assert each.curve == result.curve
+        assert compare(case, [each]) == [comparison] == [other]
     assert comparison.met
-    assert pickle.loads(pickle.dumps(comparison)) == comparison
-
-
-def test_simulated_curves_pickle(case):
-    (simulated,) = simulate_curves(case)
-    again = pickle.loads(pickle.dumps(simulated))
-    assert again.result == simulated.result
-    assert again.estimates == simulated.estimates
-    np.testing.assert_array_equal(again.response.density, simulated.response.density)
+    [pair], [original] = whole.eigenpairs, solved.eigenpairs
+    assert pair.p == original.p == 1.0
+    for one, two in ((pair, original), (whole.stationary, solved.stationary)):
+        np.testing.assert_array_equal(one.right, two.right)
+        np.testing.assert_array_equal(one.left, two.left)
+    assert (sample.result, sample.estimates) == (simulated.result, simulated.estimates)
+    np.testing.assert_array_equal(sample.response.density, simulated.response.density)
 
 
 def test_results_are_frozen(result):
@@ -118,13 +86,8 @@ def test_what_did_not_converge_is_printed_once(case, tmp_path, capsys):
 
 def test_a_density_that_is_none_is_not_written(tmp_path, capsys):
     path = tmp_path / "slow.toml"
-    path.write_text(
-        CASE.replace("epsilon = 0.5\nomega = 1.0\nrestitution = 0.8\nc1 = 0.8\nc2 = 0.5", SLOW)
-        .replace("D0 = 0.1\ntau0 = 0.5\nr0 = 0.95", SLOW_NOISE)
-        .replace("[moments]", "[moments]\nrtol = 1e-4")
-        .replace("time = 40.0", "time = 4000.0"),
-        encoding="utf-8",
-    )
+    sections = SECTIONS.replace("[moments]", "[moments]\nrtol = 1e-4").replace("time = 40.0", "time = 4000.0")
+    path.write_text(case_text(sections, noise=SLOW_NOISE, **SLOW), encoding="utf-8")
     assert main(["run", str(path), "--out", str(tmp_path)]) == 0
     assert "the stationary density at p = 0 is not resolved" in " ".join(capsys.readouterr().err.split())
     assert (tmp_path / "slow" / "summary.json").exists()

@@ -19,25 +19,10 @@ from fpsolve.output import figures
 from fpsolve.simulation import response
 from fpsolve.study import simulate as simulated
 from tests.conftest import heed_signals
+from tests.solving import case_text
 
-CASE = """
-title = "A quick simulation"
-[oscillator]
-epsilon = 0.5
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.5
-tau0 = 0.5
-r0 = 0.95
-[moments]
-p = [-1.0, 1.0]
-[monte_carlo]
-paths = 6400
-time = 40.0
-seed = 7
-"""
+SECTIONS = "[moments]\np = [-1.0, 1.0]\n[monte_carlo]\npaths = 6400\ntime = 40.0\nseed = 7\n"
+CASE = case_text(SECTIONS, epsilon=0.5)
 QUICK = ["--paths", "64", "--time", "20"]
 
 

@@ -14,25 +14,10 @@ from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import BINS, MEANS, Response
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.study.simulate import simulate_curve, simulate_curves
+from tests.solving import case_text
 
-CASE = """
-title = "Records"
-[oscillator]
-epsilon = 0.5
-omega = 1.0
-restitution = 0.8
-c1 = 0.8
-c2 = 0.5
-[noise]
-D0 = 0.1
-tau0 = 0.5
-r0 = 0.95
-[moments]
-p = [-1.0, 2.0]
-[monte_carlo]
-paths = 4096
-time = 40.0
-"""
+SECTIONS = "[moments]\np = [-1.0, 2.0]\n[monte_carlo]\npaths = 4096\ntime = 40.0\n"
+CASE = case_text(SECTIONS, noise={"D0": 0.1}, epsilon=0.5, c1=0.8, c2=0.5)
 RESULT = MonteCarlo(
     estimates=(
         MomentEstimate(1.0, 0.1, 1 / 3, "direct", 5e-324),
