@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from tests.solving import case_text
 SECTIONS = "[moments]\np = [-1.0, 1.0]\n[monte_carlo]\npaths = 6400\ntime = 40.0\nseed = 7\n"
 CASE = case_text(SECTIONS, epsilon=0.5)
 QUICK = ["--paths", "64", "--time", "20"]
+TWO = ["--set", 'vary."noise.D0"=[0.1, 0.2]']
 
 
 @pytest.fixture
@@ -42,11 +44,28 @@ def simulate(*arguments):
     return main(["simulate", *map(str, arguments)])
 
 
-def raising(exception):
-    def fail(*_, **__):
-        raise exception
+@pytest.fixture
+def fails(monkeypatch):
+    """Makes the simulation of a curve raise something."""
+    original = simulated.simulate_curve
 
-    return fail
+    def at(number, failure=KeyboardInterrupt):
+        def failing(curve, *others):
+            if curve.number == number:
+                raise failure
+            return original(curve, *others)
+
+        monkeypatch.setattr(simulated, "simulate_curve", failing)
+
+    return at
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The series of the figures, which are not drawn."""
+    found = []
+    monkeypatch.setattr(figures, "draw_series", lambda axes, case, series, *_: found.append(series))
+    return found
 
 
 def names(folder):
@@ -107,8 +126,7 @@ def test_a_seed_gives_the_same_bytes(case, out):
 
 
 def test_each_curve_has_its_file_and_stale_ones_go(case, out):
-    vary = ["--set", 'vary."noise.D0"=[0.1, 0.2]']
-    assert simulate(case, "--out", out, *QUICK, *vary) == 0
+    assert simulate(case, "--out", out, *QUICK, *TWO) == 0
     assert [read(out / f"quick/{name}")["varied"] for name in ("monte_carlo.json", "monte_carlo-2.json")] == [
         {"noise.D0": 0.1}, {"noise.D0": 0.2},
     ]  # fmt: skip
@@ -116,13 +134,13 @@ def test_each_curve_has_its_file_and_stale_ones_go(case, out):
     assert names(out / "quick") == {"monte_carlo.json"}
 
 
-def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out, capsys, monkeypatch):
+def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out, capsys, fails):
     """Nor of a run, whose figure may have its dots."""
     (out / "quick").mkdir(parents=True)
     earlier = {"monte_carlo.json", "monte_carlo-2.json", "response.png", "summary.json", "figure.png", "density.vtu"}
     for name in (*earlier, "notes.txt"):
         (out / "quick" / name).write_text("{}", encoding="utf-8")
-    monkeypatch.setattr(simulated, "simulate_curve", raising(KeyboardInterrupt))
+    fails(1)
     assert simulate(case, "--out", out) == 130
     assert {path.name for path in (out / "quick").iterdir()} == {"notes.txt"}
     assert capsys.readouterr().err.strip() == "interrupted after 0 of 1 curve; run it again to go on"
@@ -162,9 +180,7 @@ def test_no_response_where_the_rest_is_stable(case, out, capsys):
     assert "no stationary response" in capsys.readouterr().err
 
 
-def test_run_adds_markers(case, out, capsys, monkeypatch):
-    drawn = []
-    monkeypatch.setattr(figures, "draw_series", lambda axes, case, series, *_: drawn.append(series))
+def test_run_adds_markers(case, out, capsys, drawn):
     assert main(["run", str(case), "--out", str(out), "--monte-carlo"]) == 0
     assert (out / "quick/summary.json").exists()
     found = read(out / "quick/monte_carlo.json")["estimates"]
@@ -177,16 +193,14 @@ def test_run_adds_markers(case, out, capsys, monkeypatch):
 
 
 def test_run_adds_markers_over_a_parameter(case, out):
-    arguments = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", 'figure={x="noise.D0", y="lyapunov_exponent"}']
+    arguments = [*TWO, "--set", 'figure={x="noise.D0", y="lyapunov_exponent"}']
     assert main(["run", str(case), "--out", str(out), "--monte-carlo", *arguments]) == 0
     assert (out / "quick/figure.png").stat().st_size > 10_000
     assert (out / "quick/monte_carlo-2.json").exists()
 
 
-def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, out, capsys, monkeypatch):
-    drawn = []
-    monkeypatch.setattr(simulated, "simulate_curve", raising(KeyboardInterrupt))
-    monkeypatch.setattr(figures, "draw_series", lambda axes, case, series, *_: drawn.append(series))
+def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, out, capsys, fails, drawn):
+    fails(1)
     assert main(["run", str(case), "--out", str(out), "--monte-carlo"]) == 130
     ((series,),) = drawn
     assert series.simulated is None
@@ -197,18 +211,10 @@ def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, ou
     assert printed.err.strip() == message
 
 
-def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, monkeypatch):
-    drawn, original = [], simulated.simulate_curve
-
-    def failing_later(curve, *others):
-        if curve.number == 2:
-            raise NotConverged("the simulation overflowed")
-        return original(curve, *others)
-
-    monkeypatch.setattr(simulated, "simulate_curve", failing_later)
-    monkeypatch.setattr(figures, "draw_series", lambda axes, case, series, *_: drawn.append(series))
-    sets = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", "monte_carlo.time=100.0"]
-    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *sets]) == 3
+def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, fails, drawn):
+    fails(2, NotConverged("the simulation overflowed"))
+    long = [*TWO, "--set", "monte_carlo.time=100.0"]
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *long]) == 3
     (series,) = drawn
     assert [item.simulated is not None for item in series] == [True, False]
     assert (out / "quick/monte_carlo.json").exists()
@@ -221,42 +227,27 @@ def kept(out, curve, planned):
     return f"interrupted {place}; what was done is kept in {out / 'quick'}; run it again to go on"
 
 
-def test_an_interrupted_simulation_of_a_run_says_how_to_go_on(case, out, capsys, monkeypatch):
-    original = simulated.simulate_curve
-
-    def interrupted(curve, *others):
-        if curve.number == 2:
-            raise KeyboardInterrupt
-        return original(curve, *others)
-
-    monkeypatch.setattr(simulated, "simulate_curve", interrupted)
-    sets = ["--set", 'vary."noise.D0"=[0.1, 0.2]', "--set", "monte_carlo.time=100.0"]
-    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *sets]) == 130
+def test_an_interrupted_simulation_of_a_run_says_how_to_go_on(case, out, capsys, fails):
+    fails(2)
+    long = [*TWO, "--set", "monte_carlo.time=100.0"]
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *long]) == 130
     assert capsys.readouterr().err.strip() == kept(out, 2, 2)
     assert {"summary.json", "monte_carlo.json", "figure.png"} <= {path.name for path in (out / "quick").iterdir()}
 
 
 def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys, monkeypatch):
-    monkeypatch.setattr(response, "stationary_response", raising(KeyboardInterrupt))
-    sets = ["oscillator.c2=0.5", "oscillator.c1=0.8", 'vary."noise.D0"=[0.1, 0.2]']
-    assert simulate(case, "--out", out, *(f"--set={text}" for text in sets)) == 130
+    monkeypatch.setattr(response, "stationary_response", MagicMock(side_effect=KeyboardInterrupt))
+    assert simulate(case, "--out", out, "--set=oscillator.c2=0.5", "--set=oscillator.c1=0.8", *TWO) == 130
     assert names(out / "quick") == {"monte_carlo.json"}
     found = read(out / "quick/monte_carlo.json")
     assert "no stationary response: stopped before it was reached" in found["warnings"]
     assert kept(out, 1, 2) in capsys.readouterr().err
 
 
-def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, monkeypatch):
+def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, fails):
     """What is finished stays, and the message says so."""
-    original = simulated.simulate_curve
-
-    def interrupted(curve, *others):
-        if curve.varied["noise.D0"] == 0.2:
-            raise KeyboardInterrupt
-        return original(curve, *others)
-
-    monkeypatch.setattr(simulated, "simulate_curve", interrupted)
-    assert simulate(case, "--out", out, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]') == 130
+    fails(2)
+    assert simulate(case, "--out", out, *QUICK, *TWO) == 130
     assert names(out / "quick") == {"monte_carlo.json"}
     printed = capsys.readouterr()
     assert kept(out, 2, 2) in printed.err
@@ -274,7 +265,7 @@ def test_simulations_that_are_finished_are_not_made_again(case, out, monkeypatch
         return original(curve, *others)
 
     monkeypatch.setattr(simulated, "simulate_curve", counted)
-    command = [case, *QUICK, "--set", 'vary."noise.D0"=[0.1, 0.2]', "--out"]
+    command = [case, *QUICK, *TWO, "--out"]
     assert simulate(*command, out) == 130
     fails.clear()
     assert simulate(*command, out) == 0
