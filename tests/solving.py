@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from fpsolve.case.case import Case
+from fpsolve.case.case import Case, load_case
 from fpsolve.study.results import CurveResult, Solved
 from fpsolve.study.solve import Numerics, everything, solve_curve
 
@@ -23,6 +24,13 @@ def case_text(more: str = "", title: str = "A test", noise: Mapping[str, Any] = 
         for line in (f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in values.items()))
     ]
     return "\n".join([f"title = {json.dumps(title)}", *lines, more])
+
+
+def case_in(folder: Path, text: str, overrides: Sequence[str] = (), name: str = "test") -> Case:
+    """A case of a text, whose file is in a folder."""
+    path = folder / f"{name}.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_case(path, overrides)
 
 
 def solve_sets(case: Case) -> list[Solved]:

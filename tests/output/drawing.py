@@ -7,22 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from fpsolve.case.case import load_case
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.output.figures import draw
 from fpsolve.study.results import CurveResult, MomentColumns
 from fpsolve.theory.perturbation import second_order
-from tests.solving import case_text
+from tests.solving import case_in, case_text
 
 MOMENTS = "[moments]\np = { start = -2.0, stop = 4.0, num = 13 }\n"
 CASE = case_text(MOMENTS, "Moment Lyapunov exponents of a vibro-impact oscillator", {"D0": 0.1})
 
 
 def case_of(folder: Path, sets=()):
-    path = folder / "drawn.toml"
-    path.write_text(CASE, encoding="utf-8")
-    return load_case(path, sets)
+    return case_in(folder, CASE, sets, "drawn")
 
 
 def results_of(case, fails=lambda number: False):

@@ -11,7 +11,7 @@ import fpsolve
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.model.quantity import MOMENT
-from tests.solving import case_text
+from tests.solving import case_in, case_text
 
 TEXT = case_text("[moments]\np = [2.0, 0.0, -1.0]\n[output]\neigenfunctions = []\nfigure = false\n")
 PRODUCT = '[vary]\n"noise.D0" = [1.0, 0.1]\n"noise.treatment" = ["exact", "ou-reduction"]\n'
@@ -20,8 +20,7 @@ HOPELESS = '[vary]\n"oscillator.epsilon" = [0.01, 3.0]\n[budget]\nunknowns = 300
 
 
 def solved(folder, text, name="test", overrides=()):
-    (folder / f"{name}.toml").write_text(text, encoding="utf-8")
-    case = fpsolve.load_case(folder / f"{name}.toml", overrides)
+    case = case_in(folder, text, overrides, name)
     try:
         results = fpsolve.run(case, folder / "out")
     except NotConverged as failure:
@@ -100,32 +99,54 @@ def test_what_is_not_asked_for_is_not_there(tmp_path):
     assert all(result.sensitivities is None and not result.moments.p.size for result in results)
 
 
-def test_many_runs_are_one_dataset(tmp_path, monkeypatch):
-    solved(tmp_path, TEXT + PRODUCT, "product")
-    solved(tmp_path, TEXT + ZIP, "sets", ["moments.p=[2.0, 4.0]"])
-    solved(tmp_path, TEXT, "alone")
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Runs over different keys, one of them without moments."""
+    folder = tmp_path_factory.mktemp("runs")
+    treatments = "vary={'noise.treatment' = ['exact', 'ou-reduction']}"
+    solved(folder, TEXT, "alone", ["output.quantities=['moment']"])
+    solved(folder, TEXT, "noises", [treatments, "output.quantities=['lyapunov_exponent']"])
+    solved(folder, TEXT + PRODUCT, "product")
+    solved(folder, TEXT + ZIP, "sets", ["moments.p=[2.0, 4.0]"])
+    return folder / "out"
+
+
+def test_many_runs_are_one_dataset(runs, monkeypatch):
+    monkeypatch.chdir(runs.parent)
     found = fpsolve.open_results("out/*")
-    assert dict(found.sizes) == {"set": 8, "p": 4}
+    assert dict(found.sizes) == {"set": 10, "p": 4}
     assert found.p.values.tolist() == [-1.0, 0.0, 2.0, 4.0]
-    assert found.run.values.tolist() == ["alone", *["product"] * 4, *["sets"] * 3]
-    assert found["oscillator.omega"].values.tolist() == [1.0] * 6 + [2.0] * 2
-    assert found["noise.treatment"].values.tolist()[1:3] == ["exact", "ou-reduction"]
+    assert found.run.values.tolist() == ["alone", *["noises"] * 2, *["product"] * 4, *["sets"] * 3]
+    assert found["oscillator.omega"].values.tolist() == [1.0] * 8 + [2.0] * 2
+    assert found["noise.treatment"].values.tolist() == [
+        "ou-reduction", *["exact", "ou-reduction"] * 3, *["ou-reduction"] * 3
+    ]  # fmt: skip
     alone = fpsolve.open_results("out/alone")
     assert float(found.moment.sel(p=2.0)[0]) == float(alone.moment.sel(p=2.0).item())
-    assert np.isnan(found.moment.sel(p=4.0)[:5]).all()
-    assert np.isfinite(found.moment.sel(p=4.0)[5:]).all()
-    assert len(found.to_dataframe()) == 32
+    assert np.isnan(found.moment.sel(p=2.0)).values.tolist() == [False, True, True, *[False] * 7]
+    assert np.isnan(found.moment.sel(p=4.0)).values.tolist() == [*[True] * 7, *[False] * 3]
+    assert np.isnan(found.lyapunov_exponent).values.tolist() == [True, *[False] * 9]
+    assert len(found.to_dataframe()) == 40
+
+
+def test_runs_without_moments_have_no_p(runs):
+    found = fpsolve.open_results(runs / "noises")
+    assert dict(found.sizes) == {"set": 2}
+    assert len(found.to_dataframe()) == 2
 
 
 @pytest.mark.parametrize("places", [("nowhere",), ("out/*.toml", "none*"), ()])
 def test_no_results(tmp_path, monkeypatch, places):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(FpsolveError, match=r"no results.nc"):
+    with pytest.raises(FpsolveError, match=r"no results.nc in .*(nowhere|none\*|nothing); run a case first"):
         fpsolve.open_results(*places)
 
 
-def test_a_damaged_file_is_named(tmp_path):
-    (tmp_path / "results.nc").write_bytes(b"no netCDF")
-    with pytest.raises(FpsolveError, match=r"results.nc cannot be read"):
+@pytest.mark.parametrize(
+    "damaged",
+    [lambda _: b"no netCDF", lambda whole: whole[:3000], lambda whole: b"????".join(whole.rsplit(b"OHDR", 1))],
+)
+def test_a_damaged_file_is_named(runs, tmp_path, damaged):
+    (tmp_path / "results.nc").write_bytes(damaged((runs / "alone/results.nc").read_bytes()))
+    with pytest.raises(FpsolveError, match=r"results\.nc cannot be read: .*; run its case again"):
         fpsolve.open_results(tmp_path)

@@ -97,9 +97,8 @@ def test_more_have_a_colour_for_the_value_of_the_key(drawn, tmp_path):
 def test_line_styles_tell_texts(drawn, tmp_path):
     drawn_case(tmp_path, [intensities(9), BOTH])
     axes, bar = drawn[0].axes
-    styles = [each.get_linestyles()[0] for each in axes.collections if len(each.get_paths()) == 9]
-    assert len(styles) == 2
-    assert styles[0] != styles[1]
+    first, second = [each.get_linestyles()[0] for each in axes.collections if len(each.get_paths()) == 9]
+    assert first != second
     assert {"finite elements, treatment = exact", "finite elements, treatment = ou-reduction"} <= set(words(drawn[0]))
     assert bar.get_ylabel().startswith("noise intensity")
 
@@ -136,30 +135,19 @@ def test_the_parameters_that_are_held_stand_below_the_title(drawn, tmp_path):
     title, told = (text.get_text() for text in headings)
     assert title.startswith("Mine\nwith vary.noise.D0 = ")
     assert "oscillator.omega = 2.0" in " ".join(title.split())
-    shown = [
-        "$\\omega$ = 2 rad/s",
-        "$r$ = 0.8",
-        "$c_1$ = 0.1/s",
-        "$\\varepsilon$ = 0.1",
-        "$\\tau_0$ = 0.5 s",
-        "$r_0$ = 0.95",
-    ]
-    assert [text for text in shown if text not in told] == []
+    shown = "$\\omega$ = 2 rad/s, $r$ = 0.8, $c_1$ = 0.1/s, $\\varepsilon$ = 0.1, $\\tau_0$ = 0.5 s, $r_0$ = 0.95"
+    assert [text for text in shown.split(", ") if text not in told] == []
     assert "D_0" not in told
     assert len(told.splitlines()) <= 2
     assert headings[1].get_fontsize() >= 11
     assert not [text.get_text() for text in texts(drawn[0]) if "/time" in text.get_text()]
 
 
-def test_a_narrow_column_is_as_wide_as_it(drawn, tmp_path):
+def test_the_width_of_a_figure_and_the_ends_of_its_axes(drawn, tmp_path):
     drawn_case(tmp_path, [intensities(2)])
-    drawn_case(tmp_path, [intensities(2), NARROW])
+    drawn_case(tmp_path, [intensities(2), NARROW, "figure.xlim=[-1.0, 2.5]", "figure.ylim=[-0.001, 0.02]"])
     assert [figure.get_figwidth() for figure in drawn] == [7.2, 3.5]
-
-
-def test_ends_of_axes(drawn, tmp_path):
-    drawn_case(tmp_path, [intensities(2), "figure.xlim=[-1.0, 2.5]", "figure.ylim=[-0.001, 0.02]"])
-    axes = drawn[0].axes[0]
+    axes = drawn[1].axes[0]
     assert (axes.get_xlim(), axes.get_ylim()) == ((-1.0, 2.5), (-0.001, 0.02))
 
 
@@ -241,37 +229,26 @@ def chart(folder, x, y, *, r0=0.95, complete=True):
         writer.writerows([["moment 2", 1, place, 2 * place, 0.0, ""] for place in (0.5, 0.7, 0.9)])
 
 
+TRACED = "$\\Lambda(2) = 0$, traced by a chart"
+LINE = [[0.5, 0.7, 0.9], [1.0, 1.4, 1.8]]
+
+
 @pytest.mark.parametrize(
-    ("keys", "more", "words_of_it", "points"),
+    ("keys", "more", "said", "points"),
     [
-        (
-            ("oscillator.omega", "noise.D0"),
-            {},
-            ["$\\Lambda(2) = 0$, traced by a chart"],
-            [[0.5, 0.7, 0.9], [1.0, 1.4, 1.8]],
-        ),
-        (
-            ("noise.D0", "oscillator.omega"),
-            {},
-            ["$\\Lambda(2) = 0$, traced by a chart"],
-            [[1.0, 1.4, 1.8], [0.5, 0.7, 0.9]],
-        ),
-        (
-            ("oscillator.omega", "noise.D0"),
-            {"complete": False},
-            ["$\\Lambda(2) = 0$, traced by a chart, not finished"],
-            [[0.5, 0.7, 0.9], [1.0, 1.4, 1.8]],
-        ),
-        (("oscillator.omega", "noise.D0"), {"r0": 0.9}, [], None),
-        (("oscillator.omega", "noise.tau0"), {}, [], None),
+        (("oscillator.omega", "noise.D0"), {}, [TRACED], [LINE]),
+        (("noise.D0", "oscillator.omega"), {}, [TRACED], [LINE[::-1]]),
+        (("oscillator.omega", "noise.D0"), {"complete": False}, [f"{TRACED}, not finished"], [LINE]),
+        (("oscillator.omega", "noise.D0"), {"r0": 0.9}, [], []),
+        (("oscillator.omega", "noise.tau0"), {}, [], []),
     ],
 )
-def test_the_line_of_a_chart_is_on_the_map(drawn, tmp_path, keys, more, words_of_it, points):
+def test_the_line_of_a_chart_is_on_the_map(drawn, tmp_path, keys, more, said, points):
     chart(tmp_path, *keys, **more)
     drawn_case(tmp_path, PLANE)
-    assert words(drawn[0])[1:] == words_of_it
+    assert words(drawn[0])[1:] == said
     found = [line.get_data() for line in drawn[0].axes[0].lines if np.size(line.get_xdata())]
-    assert [np.array(each).tolist() for each in found] == ([] if points is None else [points])
+    assert [np.array(each).tolist() for each in found] == points
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"x": 1}', '{"x": {"key": "noise.D0"}, "y": 3}'])

@@ -4,11 +4,11 @@ import json
 import math
 import multiprocessing
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.errors import OutputError
 from fpsolve.exponent.adapt import Budget
@@ -17,7 +17,7 @@ from fpsolve.output import records as plain
 from fpsolve.output.records import Records, append, key_of, record_of, result_of
 from fpsolve.study.solve import Numerics, Wanted
 from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
-from tests.solving import solve_case
+from tests.solving import case_in, solve_case
 
 VALUES = {"numbers": [0.1, 1 / 3, 1e-300, math.inf, -0.0], "text": 'Λ(2) "quoted" , "record": {}\n', "nothing": None}
 
@@ -119,8 +119,7 @@ def test_what_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("text", [TEXT + PRODUCT, TEXT + HOPELESS])
 def test_results_are_the_same_from_their_records(tmp_path, text):
-    (tmp_path / "test.toml").write_text(text, encoding="utf-8")
-    for result in solve_case(load_case(tmp_path / "test.toml")):
+    for result in solve_case(case_in(tmp_path, text)):
         record = record_of(result)
         again = result_of(json.loads(json.dumps(record)), result.curve)
         assert same(record_of(again), record)
@@ -137,23 +136,16 @@ def test_results_are_the_same_from_their_records(tmp_path, text):
 
 
 def test_a_key_follows_from_all_that_changes_a_result(tmp_path, monkeypatch):
-    (tmp_path / "test.toml").write_text(TEXT + PRODUCT, encoding="utf-8")
-    curve, other, *_ = load_case(tmp_path / "test.toml").curves()
+    curve, other, *_ = case_in(tmp_path, TEXT + PRODUCT).curves()
     wanted, numerics = Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",)), Numerics(1e-8, Budget(), None)
-    mesh = make_mesh(phi_cells=2, xi_cells=4)
+    asked = [{"p": np.array([1.0, 3.0])}, {"indices": ()}, {"shown": (1.0,)}, {"density": True}]
+    meshes = [make_mesh(phi_cells=2, xi_cells=4), make_mesh(phi_cells=2, xi_cells=4, xi_max=8.5)]
+    solved = [{"rtol": 1e-9}, {"budget": Budget(unknowns=500)}, {"budget": Budget(seconds=5.0)}]
     keys = [
         key_of(curve, wanted, numerics),
         key_of(other, wanted, numerics),
-        key_of(curve, Wanted(np.array([1.0, 3.0]), ("lyapunov_exponent",)), numerics),
-        key_of(curve, Wanted(np.array([1.0, 2.0]), ()), numerics),
-        key_of(curve, Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",), shown=(1.0,)), numerics),
-        key_of(curve, Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",), density=True), numerics),
-        key_of(curve, Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",), differentiated=(1.0,)), numerics),
-        key_of(curve, wanted, Numerics(1e-9, Budget(), None)),
-        key_of(curve, wanted, Numerics(1e-8, Budget(unknowns=500), None)),
-        key_of(curve, wanted, Numerics(1e-8, Budget(seconds=5.0), None)),
-        key_of(curve, wanted, Numerics(1e-8, Budget(), mesh)),
-        key_of(curve, wanted, Numerics(1e-8, Budget(), make_mesh(phi_cells=2, xi_cells=4, xi_max=8.5))),
+        *(key_of(curve, replace(wanted, **each), numerics) for each in (*asked, {"differentiated": (1.0,)})),
+        *(key_of(curve, wanted, replace(numerics, **each)) for each in (*solved, *({"mesh": mesh} for mesh in meshes))),
     ]
     assert len(set(keys)) == len(keys)
     assert keys[0] == key_of(curve, wanted, numerics)

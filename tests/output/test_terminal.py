@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fpsolve.case.case import load_case
 from fpsolve.case.sections import Expectation
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
@@ -19,7 +18,7 @@ from fpsolve.output.terminal import duration, print_comparisons, print_results, 
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from tests.conftest import sampled
-from tests.solving import solve_case
+from tests.solving import case_in, solve_case
 from tests.test_workflow import TEXT
 
 NONLINEAR = ["vary={}", "oscillator.c1=0.8", "oscillator.c2=0.5", "monte_carlo={ paths = 64, time = 100.0 }"]
@@ -28,9 +27,7 @@ QUANTITY = re.compile(r"(\S+) = \S+ ± \S+")
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory):
-    path = tmp_path_factory.mktemp("terminal") / "quick.toml"
-    path.write_text(TEXT, encoding="utf-8")
-    return load_case(path, NONLINEAR)
+    return case_in(tmp_path_factory.mktemp("terminal"), TEXT, NONLINEAR)
 
 
 @pytest.fixture
@@ -85,10 +82,9 @@ def test_remarks_are_whole_in_a_file(capsys, monkeypatch):
 def test_a_star_tells_of_exact_noise_on_any_curve(treatments, star, tmp_path, capsys, monkeypatch):
     """Texts give way to numbers, which are whole."""
     monkeypatch.setenv("COLUMNS", "80")
-    path = tmp_path / "mixed.toml"
-    path.write_text(TEXT, encoding="utf-8")
     sets = [f"vary={{ noise.D0 = [0.1, 1.0], noise.treatment = {treatments} }}".replace("'", '"')]
-    case = load_case(path, [*sets, "output.eigenfunctions=[]", 'figure={ x = "noise.D0", y = "lyapunov_exponent" }'])
+    more = ["output.eigenfunctions=[]", 'figure={ x = "noise.D0", y = "lyapunov_exponent" }']
+    case = case_in(tmp_path, TEXT, [*sets, *more])
     results = solve_case(case)
     print_results(case, results)
     out = capsys.readouterr().out
@@ -99,9 +95,7 @@ def test_a_star_tells_of_exact_noise_on_any_curve(treatments, star, tmp_path, ca
 
 
 def test_tables_without_indices_stand_apart(tmp_path, capsys):
-    path = tmp_path / "moments.toml"
-    path.write_text(TEXT, encoding="utf-8")
-    case = load_case(path, ['noise.treatment="exact"', "output={ quantities = ['moment'] }"])
+    case = case_in(tmp_path, TEXT, ['noise.treatment="exact"', "output={ quantities = ['moment'] }"])
     print_results(case, solve_case(case))
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
     ends = [i for i, line in enumerate(lines) if line.startswith("* for the noise reduced by")]
@@ -134,11 +128,8 @@ def result(curve, D0, **more):
 
 def many(tmp_path, count, overrides=(), **remarks):
     """A case with many curves and made-up results; `remarks` make warnings, notes and failures from a number."""
-    path = tmp_path / "many.toml"
-    path.write_text(
-        TEXT.replace("[0.1, 1.0]", str([round(0.125 + 0.0625 * i, 4) for i in range(count)])), encoding="utf-8"
-    )
-    case = load_case(path, overrides)
+    intensities = [round(0.125 + 0.0625 * i, 4) for i in range(count)]
+    case = case_in(tmp_path, TEXT.replace("[0.1, 1.0]", str(intensities)), overrides, "many")
     return case, [
         result(curve, (curve.number + 0.2) * 1.0123456789e-3, **{kind: make(i) for kind, make in remarks.items()})
         for i, curve in enumerate(case.curves())

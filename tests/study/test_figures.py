@@ -119,16 +119,11 @@ def test_fig2c_short_correlation_times_nearly_coincide():
 def fig3():
     """λ by (ω, D0)."""
     case, results = solved("fig3")
-    omegas, intensities = case.vary.values("oscillator.omega"), case.vary.values("noise.D0")
-    table = {tuple(result.curve.varied.values()): result.lyapunov_exponent.value for result in results}
-    assert set(case.vary.keys) == {"oscillator.omega", "noise.D0"}
-    order = list(case.vary.keys)
-    return np.array(
-        [
-            [table[tuple({"oscillator.omega": w, "noise.D0": d}[key] for key in order)] for d in intensities]
-            for w in omegas
-        ]
-    )
+    keys = "oscillator.omega", "noise.D0"
+    assert set(case.vary.keys) == set(keys)
+    found = {tuple(result.curve.varied[key] for key in keys): result.lyapunov_exponent.value for result in results}
+    omegas, intensities = map(case.vary.values, keys)
+    return np.array([[found[omega, intensity] for intensity in intensities] for omega in omegas])
 
 
 def test_fig3_frequency_lowers_and_noise_raises_the_largest_exponent():

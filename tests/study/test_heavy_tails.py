@@ -8,7 +8,7 @@ import pytest
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.output.figures import _moment_series
-from tests.solving import case_text, solve_case
+from tests.solving import case_in, case_text, solve_case
 
 SECTIONS = "[moments]\np = [-0.4, -0.1, 0.0]\n[monte_carlo]\npaths = 64\ntime = 40.0\np = [-0.4]\n"
 TAILS = {"tau0": 1.0, "r0": 1.1, "treatment": "exact"}
@@ -41,9 +41,7 @@ def test_every_result_says_it(path, tmp_path, capsys):
 
 def test_a_positive_exponent_is_no_slope(path, tmp_path):
     for c1, is_slope in ((0.0, False), (-0.5, True)):
-        other = tmp_path / f"c{c1}.toml"
-        other.write_text(text(c1), encoding="utf-8")
-        (result,) = solve_case(load_case(other, ["output.quantities=['lyapunov_exponent']"]))
+        (result,) = solve_case(case_in(tmp_path, text(c1), ["output.quantities=['lyapunov_exponent']"]))
         assert (result.lyapunov_exponent.value < 0) == is_slope
         assert ("not Λ′(0)" in result.notes[0]) != is_slope
 

@@ -7,12 +7,11 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.output.records import record_of, result_of
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import compare
-from tests.solving import case_text, solve_sets
+from tests.solving import case_in, case_text, solve_sets
 
 SECTIONS = """[moments]
 p = [1.0]
@@ -32,9 +31,7 @@ SLOW_NOISE = {"D0": 0.09531017, "tau0": 49.143166, "r0": 0.61455889, "treatment"
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory):
-    path = tmp_path_factory.mktemp("case") / "one.toml"
-    path.write_text(CASE, encoding="utf-8")
-    return load_case(path)
+    return case_in(tmp_path_factory.mktemp("case"), CASE)
 
 
 @pytest.fixture(scope="module")

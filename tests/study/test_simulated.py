@@ -8,13 +8,12 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from fpsolve import load_case
 from fpsolve.output.records import record_of, simulated_of
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import BINS, MEANS, Response
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.study.simulate import simulate_curve, simulate_curves
-from tests.solving import case_text
+from tests.solving import case_in, case_text
 
 SECTIONS = "[moments]\np = [-1.0, 2.0]\n[monte_carlo]\npaths = 4096\ntime = 40.0\n"
 CASE = case_text(SECTIONS, noise={"D0": 0.1}, epsilon=0.5, c1=0.8, c2=0.5)
@@ -52,9 +51,7 @@ def response(rng):
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory):
-    path = tmp_path_factory.mktemp("records") / "records.toml"
-    path.write_text(CASE, encoding="utf-8")
-    return load_case(path)
+    return case_in(tmp_path_factory.mktemp("records"), CASE)
 
 
 @pytest.fixture(scope="module")
