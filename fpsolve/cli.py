@@ -330,14 +330,24 @@ def prove(
     from fpsolve.output.proofs import print_proofs
     from fpsolve.output.terminal import done_of, print_written
     from fpsolve.study.prove import refuse_unprovable_case
-    from fpsolve.workflow.proofs import prove_case
+    from fpsolve.workflow.proofs import check_proof, prove_case
 
     if (check is None) == (not cases):
         raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
     if check is not None:
         if width is not None or overrides or jobs is not None or scheduler:
             raise FpsolveError("--check takes a proof.json and nothing else, as that says all that is verified")
-        return _verify(check)
+        checked = check_proof(check)
+        for text in checked.objections:
+            print_error(f"{check}: {text}")
+        bounds = f"bounds on {checked.claims.count} number{'s' * (checked.claims.count != 1)}"
+        if checked.objections:
+            objections = f"{len(checked.objections)} objection{'s' * (len(checked.objections) > 1)}"
+            print(f"rejected: {check} ({objections}, {bounds})")
+            return CHECK_FAILED
+        unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
+        print(f"accepted: {check} ({bounds} follow from their certificates{unfinished})")
+        return 0
     code, loaded = 0, load_to_write(cases or [], overrides)
     for case in loaded:
         refuse_unprovable_case(case, width)
@@ -352,23 +362,6 @@ def prove(
         if unmet:
             code = NOT_CONVERGED
     return code
-
-
-def _verify(path: Path) -> int:
-    """Check a proof.json, and say which claims do not follow."""
-    from fpsolve.workflow.proofs import check_proof
-
-    checked = check_proof(path)
-    for text in checked.objections:
-        print_error(f"{path}: {text}")
-    bounds = f"bounds on {checked.claims.count} number{'s' * (checked.claims.count != 1)}"
-    if checked.objections:
-        objections = f"{len(checked.objections)} objection{'s' * (len(checked.objections) > 1)}"
-        print(f"rejected: {path} ({objections}, {bounds})")
-        return CHECK_FAILED
-    unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
-    print(f"accepted: {path} ({bounds} follow from their certificates{unfinished})")
-    return 0
 
 
 @app.command

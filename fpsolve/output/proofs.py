@@ -32,27 +32,27 @@ WORDS = {1: "grows", -1: "decays", 0: "open"}
 
 
 def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_whole: bool) -> None:
-    """proof.json: for each curve its parameters, and every bound with the certificate from which it follows."""
+    """proof.json: for each curve its parameters, and every bound with the certificate from which it follows.
+
+    A bound has a line. Numbers among the parameters are written as the decimals of which the bounds hold.
+    """
     head = {"fpsolve": __version__, "case": case.name, "complete": is_whole}
     lines = ",\n".join(f" {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items())
-    curves = ",\n".join(map(_curve_text, proofs))
-    write_text(folder / PROOF, f'{{\n{lines},\n "curves": [\n{curves}\n ]\n}}\n')
-
-
-def _curve_text(proof: CurveProof) -> str:
-    """A curve as JSON, a line for each bound; numbers among its parameters as the decimals of which the bounds hold."""
-    written = {key: _line(value) for key, value in proof.curve.parameters.items()}
-    written |= {key: text for key, text in proof.stated.items() if DECIMAL.fullmatch(text)}
-    moments = ",\n".join(f"    {_moment(p, found)}" for p, found in proof.moments)
-    parts = {
-        "parameters": f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in written.items())}}}",
-        "moments": f"[\n{moments}\n   ]",
-        "lyapunov_exponent": "null" if proof.exponent is None else _line(_bound(proof.exponent)),
-        "stability_index": "null" if proof.index is None else _index(proof.index),
-        "verdicts": _line(proof.verdicts),
-    }
-    text = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in parts.items())
-    return f"  {{\n{text}\n  }}"
+    curves = []
+    for proof in proofs:
+        written = {key: _line(value) for key, value in proof.curve.parameters.items()}
+        written |= {key: text for key, text in proof.stated.items() if DECIMAL.fullmatch(text)}
+        moments = ",\n".join(f"    {_moment(p, found)}" for p, found in proof.moments)
+        parts = {
+            "parameters": f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in written.items())}}}",
+            "moments": f"[\n{moments}\n   ]",
+            "lyapunov_exponent": "null" if proof.exponent is None else _line(_bound(proof.exponent)),
+            "stability_index": "null" if proof.index is None else _index(proof.index),
+            "verdicts": _line(proof.verdicts),
+        }
+        text = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in parts.items())
+        curves.append(f"  {{\n{text}\n  }}")
+    write_text(folder / PROOF, "\n".join(["{", f'{lines},\n "curves": [', ",\n".join(curves), " ]", "}", ""]))
 
 
 def _bound(found: Enclosure | None) -> dict[str, Any]:
@@ -89,8 +89,12 @@ def print_proofs(case: Case, proofs: Sequence[CurveProof]) -> None:
         screen.show(_moment_grid(case, proof))
         indices = [(LYAPUNOV_EXPONENT.symbol, proof.exponent), (STABILITY_INDEX.symbol, proof.index)]
         screen.packed([f"{symbol} {_between(found)}" for symbol, found in indices if found is not None])
-        if proof.verdicts:
-            screen.say(f"Proven: {_in_short(proof)}.")
+        told = proof.verdicts
+        if sum(found is not None and found.sign != 0 for _, found in proof.moments) > MOST_TOLD:
+            path = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
+            told = [*path, f"of {len(proof.moments)} moments {_counted(proof)}"]
+        if told:
+            screen.say(f"Proven: {'; '.join(told)}.")
         screen.lines([""])
 
 
@@ -137,14 +141,6 @@ def _fate(p: str, found: Enclosure | None) -> str:
 def _order(p: str) -> str:
     """p for the eye."""
     return text if len(text := plain(p)) <= LONGEST else f"{float(p):.10g}"
-
-
-def _in_short(proof: CurveProof) -> str:
-    """The verdicts; of many moments how many grow and how many decay."""
-    if sum(found is not None and found.sign != 0 for _, found in proof.moments) <= MOST_TOLD:
-        return "; ".join(proof.verdicts)
-    path = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
-    return "; ".join([*path, f"of {len(proof.moments)} moments {_counted(proof)}"])
 
 
 def _counted(proof: CurveProof) -> str:

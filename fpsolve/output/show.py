@@ -124,28 +124,30 @@ def load(chosen: argparse.Namespace) -> tuple[Any, float]:
 
 
 def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
-    """The surface with its impact lines, labels and colours."""
+    """The surface with its impact lines, labels and colours, and the words above and below it."""
     source, limits = scaled(strip(reader, p), chosen.field, p)
     bounds = source.GetDataInformation().GetBounds()
     marked = simple.Calculator(Input=source, ResultArrayName="wall", Function="abs(cos(coordsX))")
-    shape = cylinder(marked, limits, bounds) if chosen.cylinder else height(marked)
+    if chosen.cylinder:
+        shape = cylinder(marked, limits, bounds)
+    else:
+        shape = simple.WarpByScalar(Input=marked, Scalars=["POINTS", "scaled"])
     display = simple.Show(shape, view)
     if chosen.cylinder:
         label_cylinder(view, shape, bounds)
     else:
         label_box(view, display, limits, bounds)
-        label_phase(view, display.Scale, limits[0], bounds)
-        mark_impacts(view, display.Scale, limits, bounds)
-    paint_line(impacts(shape, p), view, display.Scale, RED)
+
+    # both edges of the surface at the impact lines, where cos phi = 0
+    facets = simple.ExtractSurface(Input=shape, NonlinearSubdivisionLevel=SUBDIVISION)
+    edges = simple.FeatureEdges(Input=facets, BoundaryEdges=1, FeatureEdges=0, NonManifoldEdges=0, ManifoldEdges=0)
+    paint_line(between(edges, "wall", 0, 1e-6, p), view, display.Scale, RED)
     paint(display, view, limits, SYMBOLS[chosen.field])
-    write_title(reader, view, chosen.field)
 
-
-def write_title(reader: Any, view: Any, field: str) -> None:
-    """The title: the varied parameters, p and Lambda(p), or the name of what has no p; below, the other parameters."""
+    # the varied parameters, p and Lambda(p), or the name of what has no p; below, the other parameters
     facts = servermanager.Fetch(reader).GetFieldData()
     of_p = '"p = %g     Lambda(p) = %.6g (1/time)" % (p[0], round(float(Lambda[0]), 14) + 0.0)'
-    head = repr("stationary density (p = 0)") if field == "stationary_density" else of_p
+    head = repr("stationary density (p = 0)") if chosen.field == "stationary_density" else of_p
     if facts.GetAbstractArray("varied"):
         head = f"varied.GetValue(0) + {chr(10)!r} + {head}"
     annotate(reader, view, head, "Upper Center", 36)
@@ -187,11 +189,6 @@ def scaled(source: Any, field: str, p: float) -> tuple[Any, tuple[float, float]]
     return result, (0.0 if abs(low) < NEXT_TO_ZERO or high - low < 1e-6 else low, high)
 
 
-def height(source: Any) -> Any:
-    """The field as height over the (phi, xi) plane."""
-    return simple.WarpByScalar(Input=source, Scalars=["POINTS", "scaled"])
-
-
 def cylinder(source: Any, limits: tuple[float, float], bounds: tuple[float, ...]) -> Any:
     """phi around the axis, xi along it, and the field as radius from 1 to 1.5."""
     (low, high), (bottom, top) = limits, bounds[2:4]
@@ -203,13 +200,6 @@ def cylinder(source: Any, limits: tuple[float, float], bounds: tuple[float, ...]
     return wrapped
 
 
-def impacts(shape: Any, p: float) -> Any:
-    """Both edges of the surface at the impact lines, where cos phi = 0."""
-    facets = simple.ExtractSurface(Input=shape, NonlinearSubdivisionLevel=SUBDIVISION)
-    edges = simple.FeatureEdges(Input=facets, BoundaryEdges=1, FeatureEdges=0, NonManifoldEdges=0, ManifoldEdges=0)
-    return between(edges, "wall", 0, 1e-6, p)
-
-
 def paint_line(lines: Any, view: Any, scale: list[float], colour: tuple[float, float, float]) -> None:
     """Lines as tubes of one colour, which no surface hides that they lie in."""
     display = simple.Show(lines, view)
@@ -218,36 +208,29 @@ def paint_line(lines: Any, view: Any, scale: list[float], colour: tuple[float, f
     display.Ambient, display.Diffuse, display.AmbientColor = 1, 0, colour
 
 
-def mark_impacts(view: Any, scale: list[float], limits: tuple[float, float], bounds: tuple[float, ...]) -> None:
-    """A red line up the back of the box at each impact phase, with a caption on top."""
-    for phi in (QUARTER, 3 * QUARTER):
-        ends = [[phi, bounds[3], limit] for limit in limits]
-        paint_line(simple.Line(Point1=ends[0], Point2=ends[1]), view, scale, RED)
-        caption(view, "impact", [*(ends[1][i] * scale[i] for i in (0, 1)), ends[1][2] * scale[2] + 0.04], "Left", RED)
-
-
-def label_phase(view: Any, scale: list[float], floor: float, bounds: tuple[float, ...]) -> None:
-    """Ticks at the quarters of the circle along the front of the box, and the name of the axis."""
-    edge, tick = bounds[2], 0.02 / scale[1]
+def label_box(view: Any, display: Any, limits: tuple[float, float], bounds: tuple[float, ...]) -> None:
+    """A box of pleasing shape, with ticks and titles along its edges, and a red line at each impact up its back."""
+    low, high = (*bounds[:4:2], limits[0]), (*bounds[1:4:2], limits[1])
+    axes = view.AxesGrid
+    scale = [BOX[i] / (high[i] - low[i]) for i in range(3)]
+    display.Scale = axes.DataScale = scale
+    axes.Visibility, axes.AxesToLabel = 1, 5  # the height on the left, and xi
+    axes.UseCustomBounds, axes.CustomBounds = 1, [end[i] * scale[i] for i in range(3) for end in (low, high)]
+    axes.XTitle, axes.YTitle, axes.ZTitle = "", "noise xi (1/time)          ", ""
+    for axis in "XYZ":
+        setattr(axes, f"{axis}TitleFontSize", 30)
+        setattr(axes, f"{axis}LabelFontSize", 24)
+    edge, floor, tick = low[1], low[2], 0.02 / scale[1]
     for k, words in enumerate(("0", "pi/2", "pi", "3 pi/2", "2 pi")):
         ends = [[k * QUARTER, edge - depth * tick, floor] for depth in (0, 1, 3)]
         paint_line(simple.Line(Point1=ends[0], Point2=ends[1]), view, scale, BLACK)
         caption(view, words, [ends[2][i] * scale[i] for i in range(3)], "Left")
     name = [2.2 * QUARTER, edge - 9 * tick, floor]
     caption(view, "phase phi (rad)", [name[i] * scale[i] for i in range(3)], "Left")
-
-
-def label_box(view: Any, display: Any, limits: tuple[float, float], bounds: tuple[float, ...]) -> None:
-    """A box of pleasing shape with ticks and titles of xi and of the height."""
-    low, high = (*bounds[:4:2], limits[0]), (*bounds[1:4:2], limits[1])
-    axes = view.AxesGrid
-    display.Scale = axes.DataScale = [BOX[i] / (high[i] - low[i]) for i in range(3)]
-    axes.Visibility, axes.AxesToLabel = 1, 5  # the height on the left, and xi
-    axes.UseCustomBounds, axes.CustomBounds = 1, [end[i] * axes.DataScale[i] for i in range(3) for end in (low, high)]
-    axes.XTitle, axes.YTitle, axes.ZTitle = "", "noise xi (1/time)          ", ""
-    for axis in "XYZ":
-        setattr(axes, f"{axis}TitleFontSize", 30)
-        setattr(axes, f"{axis}LabelFontSize", 24)
+    for phi in (QUARTER, 3 * QUARTER):
+        ends = [[phi, high[1], limit] for limit in limits]
+        paint_line(simple.Line(Point1=ends[0], Point2=ends[1]), view, scale, RED)
+        caption(view, "impact", [*(ends[1][i] * scale[i] for i in (0, 1)), ends[1][2] * scale[2] + 0.04], "Left", RED)
 
 
 def label_cylinder(view: Any, shape: Any, bounds: tuple[float, ...]) -> None:

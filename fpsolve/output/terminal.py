@@ -73,16 +73,6 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
     return grid
 
 
-def counted(results: Sequence[CurveResult]) -> str:
-    """How many curves have become what, which of them have a row, and where all numbers are."""
-    counts = Counter((result.status, _state(result) == BEYOND_RTOL, _state(result)) for result in results)
-    states = ", ".join(f"{count} {state}" for (*_, state), count in sorted(counts.items()))
-    lacking = sum(bool(result.status) for result in results)
-    is_short = len(results) > MOST_ROWS and lacking > MOST_FAILED
-    shown = f"; of those that are not converged the first {MOST_FAILED} are shown" if is_short else ""
-    return f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc"
-
-
 def _state(result: CurveResult) -> str:
     """What became of a curve, for the eye; one that converged may be less precise than rtol asks for."""
     return BEYOND_RTOL if result.status == Status.CONVERGED and result.misses_rtol else result.status.name.lower()
@@ -187,7 +177,11 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
     if len(results) > MOST_TABLES or case.figure.x != "p":
         screen.show(curve_grid(case, results))
         if len(results) > MOST_TABLES:
-            screen.say(counted(results))
+            counts = Counter((result.status, _state(result) == BEYOND_RTOL, _state(result)) for result in results)
+            states = ", ".join(f"{count} {state}" for (*_, state), count in sorted(counts.items()))
+            is_short = len(results) > MOST_ROWS and sum(bool(result.status) for result in results) > MOST_FAILED
+            shown = f"; of those that are not converged the first {MOST_FAILED} are shown" if is_short else ""
+            screen.say(f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc")
     else:
         for result in results:
             if result.moments.p.size:

@@ -34,7 +34,12 @@ def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator
     with alone(folder):
         with writable(folder):
             stale = replaced if _agrees(case, folder) else (SOLVED, SIMULATED, CHART, PROVEN)
-            _remove(folder, "|".join([*stale, _UNFINISHED]))
+            names = "|".join([*stale, _UNFINISHED])
+            for path in {*folder.glob("*"), *folder.glob("*/*")}:
+                if re.fullmatch(names, path.relative_to(folder).as_posix()) and not path.is_dir():
+                    path.unlink()
+                    if path.parent != folder and not any(path.parent.iterdir()):
+                        path.parent.rmdir()
         yield folder
 
 
@@ -77,12 +82,3 @@ def _agrees(case: Case, folder: Path) -> bool:
         return all(map(is_known, found))
     except (ValueError, KeyError, TypeError, AttributeError):  # it is not a table of fpsolve
         return False
-
-
-def _remove(folder: Path, names: str) -> None:
-    """Remove files with names that match, in a folder and one below."""
-    for path in {*folder.glob("*"), *folder.glob("*/*")}:
-        if re.fullmatch(names, path.relative_to(folder).as_posix()) and not path.is_dir():
-            path.unlink()
-            if path.parent != folder and not any(path.parent.iterdir()):
-                path.parent.rmdir()
