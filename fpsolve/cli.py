@@ -87,7 +87,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    """Run a command, and say what went wrong."""
     for stream in (sys.stdout, sys.stderr):  # a terminal that has no Greek shows its names
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors=HANDLER)

@@ -190,7 +190,6 @@ class Result(ABC):
         return axes
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-        """Draw what `to_xarray` gives."""
         draw(found, axes, **kwargs)
 
     def __repr__(self) -> str:

@@ -49,7 +49,6 @@ class Format:
 
     @property
     def style(self) -> dict[Any, Any]:
-        """Settings of matplotlib."""
         sizes = {
             **{"font.size": 13, "axes.titlesize": 11, "figure.titlesize": 12.5, "legend.fontsize": 11},
             **{"lines.linewidth": 1.6, "lines.markersize": 7, "lines.markeredgewidth": 1.6, "axes.linewidth": 0.9},
@@ -183,7 +182,6 @@ def label_of(attributes: Mapping[str, Any], letters: int = 40) -> str:
 
 
 def label_axes(axes: Axes, x: Mapping[str, Any], y: Mapping[str, Any]) -> None:
-    """Name both axes by the attributes of two variables."""
     axes.set(xlabel=label_of(x, 56), ylabel=label_of(y))
 
 
@@ -215,7 +213,6 @@ def plain_numbers(axis: Any) -> None:
 
 
 def _font_size(name: str) -> float:
-    """A size of letters of the style, in points."""
     from matplotlib import rcParams
 
     sizes: Mapping[Any, Any] = rcParams

@@ -111,7 +111,6 @@ def draft(path: Path) -> Iterator[TextIO]:
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
-    """A table with its headings."""
     with draft(path) as file:
         table = csv.writer(file)
         table.writerow(columns)
@@ -119,6 +118,5 @@ def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[Any]])
 
 
 def write_text(path: Path, text: str) -> None:
-    """Text as UTF-8."""
     with atomic(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -301,7 +301,6 @@ def _begin_worker() -> None:
 
 
 def _kill(executor: Executor) -> None:
-    """End the workers at once; what they had finished is kept."""
     for process in list((getattr(executor, "_processes", None) or {}).values()):
         process.kill()
     executor.shutdown(cancel_futures=True)

@@ -199,7 +199,6 @@ def _some(count: int) -> set[int]:
 
 
 def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | None, *, with_theory: bool) -> Series:
-    """Λ(p) of a curve over p."""
     p = result.moments.p
     first, last = (float(p.min()), float(p.max())) if p.size else (math.nan, math.nan)
     line = np.linspace(first, last, 200) if with_theory and p.size else _NOTHING
@@ -263,7 +262,6 @@ def _number(case: Case, result: CurveResult) -> float:
 
 
 def _theory(case: Case, problem: Problem) -> float:
-    """Its perturbation theory, NaN beyond where it is sought."""
     if case.figure.moment is not None:
         return float(perturbed_moments(problem, np.array(case.figure.moment)))
     index = INDICES[case.figure.needed]
@@ -283,7 +281,6 @@ def _simulated(case: Case, sample: SimulatedCurve) -> tuple[float, float] | None
 
 
 def _columns(dots: Sequence[tuple[float | None, ...]]) -> FloatArray | None:
-    """x, y and the errors of some dots; None where there are none."""
     return np.array(dots, dtype=float).T if dots else None
 
 

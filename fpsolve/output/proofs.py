@@ -99,7 +99,6 @@ def print_proofs(case: Case, proofs: Sequence[CurveProof]) -> None:
 
 
 def _moment_grid(case: Case, proof: CurveProof) -> Grid:
-    """p, the bounds on Λ(p), how far they are apart, and what they say of the moment."""
     symbol = MOMENT.symbol
     columns = [Column("p"), Column(f"{symbol} ≥"), Column(f"{symbol} ≤"), Column("width", 2), Column("the moment", 1)]
     grid = Grid(case.heading(proof.curve), columns)
@@ -132,7 +131,6 @@ def _curve_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
 
 
 def _fate(p: str, found: Enclosure | None) -> str:
-    """What becomes of a moment."""
     if found is None or not found.is_proven:
         return "not tried" if found is None else NOT_PROVEN
     return WORDS[found.sign] if float(p) else "is constant"

@@ -80,7 +80,6 @@ class Records:
 
     @property
     def are_there(self) -> bool:
-        """Whether there is one at least."""
         return bool(self._addresses)
 
     @property
@@ -89,7 +88,6 @@ class Records:
         return sum(not key.startswith(f"{RESULT_VERSION}-") for key in self._addresses)
 
     def address(self, key: str) -> Address | None:
-        """Where the record of a key is, if there is one."""
         return self._addresses.get(key)
 
     def expect(self, address: Address) -> None:
@@ -136,7 +134,6 @@ class Results(Sequence[CurveResult]):
         self._order: list[int] = []
 
     def add(self, number: int, found: Address | CurveResult) -> None:
-        """Curve `number`, from 1 on."""
         if number not in self._found:
             insort(self._order, number)
         self._found[number] = found
@@ -153,11 +150,9 @@ class Results(Sequence[CurveResult]):
         return True
 
     def has(self, curve: Curve) -> bool:
-        """Whether there is a result of a curve; it is not read."""
         return curve.number in self._found
 
     def of(self, curve: Curve) -> CurveResult | None:
-        """The result of a curve, if there is one."""
         return self._result(curve) if self.has(curve) else None
 
     def __len__(self) -> int:
@@ -232,7 +227,6 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
 
 
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
-    """What the record of a simulation is found by."""
     settings = setting.model_dump(mode="json")
     return _digest(SimulatedCurve, **_of_curve(curve), orders=list(orders), setting=settings)
 
@@ -244,7 +238,6 @@ def _of_curve(curve: Curve) -> dict[str, Any]:
 
 
 def record_of(result: CurveResult | SimulatedCurve) -> Record:
-    """All of a result but its curve."""
     kind: Any = type(result)
     return {name: each.plain(getattr(result, name)) for name, each in _recorded(kind).items()}
 
@@ -260,7 +253,6 @@ def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
 
 
 def _made(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
-    """The attributes that a record holds."""
     try:
         return {name: each.made(record[name]) for name, each in _recorded(kind).items()}
     except (LookupError, TypeError, AttributeError, ValueError, zlib.error) as failure:

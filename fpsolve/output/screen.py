@@ -82,7 +82,6 @@ class Screen:
         return cls(console, console.width)
 
     def lines(self, texts: Sequence[str], style: str = "") -> None:
-        """Print lines as they are."""
         for text in texts:
             self.console.print(Text(self._spelt(text)), style=style, soft_wrap=True)
 
@@ -142,7 +141,6 @@ class Screen:
         """The columns that are shown, and whether their headings are in several lines; None where no table fits."""
 
         def needed(i: int) -> int:
-            """The least width of a column."""
             is_text = columns[i].is_text
             heading = columns[i].heading.split() if is_folded or is_text else [columns[i].heading]
             parts = [part for row in rows for part in row[i].plain.split(None if is_text else "\n")]
@@ -162,7 +160,6 @@ class Screen:
         return spelt(text, self.console.encoding)
 
     def _cell(self, cell: Cell) -> Text:
-        """A cell as the encoding of the output can show it."""
         text = Text(cell) if isinstance(cell, str) else cell
         plain = self._spelt(text.plain)
         return text if plain == text.plain else Text(plain, text.style)

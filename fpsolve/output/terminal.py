@@ -224,7 +224,6 @@ def traced(chart: Chart) -> str:
 
 
 def plural(word: str, count: int) -> str:
-    """A word for so many."""
     return word if count == 1 else f"{word}{'es' if word.endswith('ch') else 's'}"
 
 
@@ -324,7 +323,6 @@ def _deviation(value: float, error: float, exact: float) -> str:
 
 
 def _moment_grid(case: Case, result: CurveResult) -> Grid:
-    """p, Λ(p), Eq. (37) and the difference."""
     is_exact = result.curve.is_exact
     theory = Column(f"Eq. {MOMENT.closed_form}{'*' if is_exact else ''}", 1)
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
@@ -376,7 +374,6 @@ def print_comparisons(case: Case, comparisons: Sequence[Comparison]) -> None:
 
 
 def agreement(comparisons: Sequence[Comparison]) -> str:
-    """How many values are as expected."""
     return f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok"
 
 

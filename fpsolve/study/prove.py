@@ -80,12 +80,10 @@ class Plan:
 
     @property
     def each(self) -> int:
-        """How many questions a curve has."""
         return len(self.case.p) + len(self.indices)
 
     @property
     def total(self) -> int:
-        """How many questions there are."""
         return self.each * self.case.planned
 
     @cached_property
@@ -108,7 +106,6 @@ class Plan:
         }
 
     def questions(self) -> Iterator[Question]:
-        """All of them, curve by curve."""
         for curve in self.case.curves():
             problem, stated = curve.problem, self.stated(curve)
             yield from (partial(prove_bounds, problem, stated, p, self.width) for p in self._orders)

@@ -118,7 +118,6 @@ class CurveResult(Result):
 
     @property
     def misses_rtol(self) -> bool:
-        """Whether the estimated error of some number exceeds rtol."""
         return any(message_of(each).code in (Code.RTOL_MISSED, Code.INDEX_RTOL_MISSED) for each in self.warnings)
 
     def to_xarray(self) -> xarray.Dataset:

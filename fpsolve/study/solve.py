@@ -60,7 +60,6 @@ class Wanted:
 
     @property
     def draws(self) -> bool:
-        """Whether functions are wanted, and not numbers only."""
         return self.density or bool(self.shown)
 
 
@@ -352,7 +351,6 @@ def solved(order: Order, numerics: Numerics, progress: Callable[[], None] = lamb
 
 
 def failed(curve: Curve, reason: str) -> CurveResult:
-    """A result without numbers."""
     nothing = np.zeros(0)
     failures = (Failure(None, message_of(reason)),)
     return CurveResult(curve, MomentColumns(*[nothing] * 7), dict.fromkeys(INDICES), failures=failures)

@@ -203,7 +203,6 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
     chart = Chart((), ())
 
     def traced() -> str:
-        """How many branches are traced, and where these are."""
         count = sum(len(line.traces) for line in chart.lines)
         return kept(count, f"branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines", folder)
 

@@ -72,7 +72,6 @@ def _agrees(case: Case, folder: Path) -> bool:
     whole = {frozenset(each.items()) for each in known}
 
     def is_known(stated: Mapping[str, Any]) -> bool:
-        """Whether these are the parameters of a curve, or some of them."""
         is_part = len(stated) < len(known[0])
         return frozenset(stated.items()) in whole or (is_part and any(stated.items() <= each.items() for each in known))
 

@@ -97,7 +97,6 @@ class Sweep:
                     self.write_tables()
 
     def write_tables(self) -> None:
-        """Write summary.json and the tables beside it, of what is known."""
         self._tabled = len(self.results)
         write_results(self.case, self.results, self.folder, self._facts())
 
@@ -117,7 +116,6 @@ class Sweep:
         return key_of(curve, self._wanted(curve), self.numerics)
 
     def _order(self, curve: Curve) -> Order | None:
-        """What is to be done for a curve, or None."""
         wanted = self._wanted(curve)
         if self.results.has(curve) and not wanted.draws:
             return None

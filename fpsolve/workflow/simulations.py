@@ -38,7 +38,6 @@ class Simulations:
 
     @property
     def known(self) -> int:
-        """How many were finished at the beginning."""
         return len(self._known)
 
     def curves(self, progress: Advance, pool: Pool | None) -> Iterator[SimulatedCurve]:
