@@ -161,8 +161,7 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
-    from fpsolve.output.remarks import note_missing
-    from fpsolve.output.terminal import done_of, known_of, print_written
+    from fpsolve.output.terminal import done_of, known_of, note_missing, print_written
     from fpsolve.workflow.cases import run_case
 
     code, loaded = 0, load_to_write(cases, overrides, monte_carlo=monte_carlo)
@@ -247,8 +246,7 @@ def check(
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
-    from fpsolve.output.remarks import print_remarks
-    from fpsolve.output.terminal import agreement, print_comparisons
+    from fpsolve.output.terminal import agreement, print_comparisons, print_remarks
     from fpsolve.workflow.cases import check_case
 
     code, loaded = 0, load(cases, overrides)
@@ -282,8 +280,7 @@ def chart(
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """
-    from fpsolve.output.remarks import print_remark
-    from fpsolve.output.terminal import print_chart, print_written, traced
+    from fpsolve.output.terminal import print_chart, print_remark, print_written, traced
     from fpsolve.study.chart import refuse_no_chart
     from fpsolve.workflow.cases import chart_case
 
@@ -456,8 +453,7 @@ def pool_of(jobs: int | None, scheduler: str, cases: Sequence[Case] = ()) -> Poo
 
 def _watch(*, is_json: bool = False, is_quiet: bool = False) -> Watch:
     """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
-    from fpsolve.output.remarks import print_remarks
-    from fpsolve.output.terminal import print_results, print_simulation
+    from fpsolve.output.terminal import print_remarks, print_results, print_simulation
     from fpsolve.workflow.progress import Bars, Watch
 
     if is_quiet:

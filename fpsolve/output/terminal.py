@@ -1,16 +1,21 @@
-"""Results as tables on the terminal: up to ten curves have one each, more a row each, and of many the extreme ones."""
+"""Results on the terminal, as tables: up to ten curves have one each, more a row each, and of many the extreme ones.
+
+What limits the numbers is told below: messages that differ in numbers only once, for all their curves.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.text import Text
 
-from fpsolve.case.case import Case
+from fpsolve.case.case import MOST_DRAWN, Case, Curve
+from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.vary import written
 from fpsolve.exponent.quantities import (
     CRITICAL_RESTITUTION,
@@ -21,14 +26,23 @@ from fpsolve.exponent.quantities import (
     VARIANCE_RATE,
     Index,
 )
+from fpsolve.messages import Message, Severity, message_of
 from fpsolve.model.quantity import moment_at
-from fpsolve.output.remarks import MONTE_CARLO, print_remark, print_remarks
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.tables import asked, in_case_words
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve, Status
 from fpsolve.theory.far import grows_far_out
 
+SUMMARY, MONTE_CARLO = "summary.json", "monte_carlo*.json"
+STYLES = {
+    Severity.FAILURE: ("not converged", "bold red"),
+    Severity.WARNING: ("warning", "yellow"),
+    Severity.NOTE: ("note", "cyan"),
+}
+"""How a remark begins, and its colour, in the order in which remarks are told."""
+MOST_NAMED, MOST_KINDS = 3, 20
+"""Curves that are named of those that share a message, and messages of each severity that are told."""
 MOST_TABLES, MOST_ROWS = 10, 50
 """Curves that have a table each, and that have a row each."""
 MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
@@ -401,3 +415,57 @@ def _comparison_grid(case: Case, comparisons: Sequence[Comparison], *, is_short:
         difference = "" if value is None else f"{value - wanted.value:.1e}"
         grid.rows.append([*row, difference, Text("ok", "green") if item.met else Text("differs", "bold red")])
     return grid
+
+
+def print_remarks(
+    case: Case,
+    found: Sequence[CurveResult | SimulatedCurve],
+    file: str = SUMMARY,
+    severities: Iterable[Severity] = STYLES,
+) -> None:
+    """Print what is said of the curves of a case on the standard error: who, what, whose numbers, where the others are.
+
+    Args:
+        case: whose curves these are.
+        found: what was found of them.
+        file: that holds all messages; empty where nothing is written.
+        severities: of the messages that are printed, in this order.
+    """
+    groups: dict[Severity, dict[Any, list[tuple[Message, Curve]]]] = {severity: {} for severity in severities}
+    for each in found:
+        for severity, kinds in groups.items():
+            for message in map(message_of, each.remarks.get(severity, ())):
+                kinds.setdefault(message.kind, []).append((message, each.curve))
+    for severity, kinds in groups.items():
+        for group in list(kinds.values())[:MOST_KINDS]:
+            worst, whose = max(group, key=lambda one: -math.inf if one[0].size is None else one[0].size)
+            curves = {curve.number: curve for _, curve in group}
+            who, rest = f"{case.name}: {len(curves)} of {len(found)} curves", ""
+            if len(curves) <= MOST_NAMED:
+                *others, last = [curve.label for curve in curves.values()]
+                comma = "; " if any("," in label for label in (*others, last)) else ", "
+                named = " and ".join(filter(None, (comma.join(others), last)))
+                who = f"{case.name}, {named}" if named else case.name
+            if any(message.data != worst.data for message, _ in group):
+                words = "these numbers are of" if worst.size is None else "most for"
+                rest = f"; {words} {whose.label}" if len(curves) > 1 else f"; and {len(group) - 1} more like this one"
+                rest += f" (all in {file})" if file else ""
+            print_remark(f"{who}: {worst.words(CASE_WORDS)}{rest}", severity)
+        if (left := len(kinds) - MOST_KINDS) > 0:
+            print_remark(f"{case.name}: {left} more of this kind{f' are in {file}' if file else ''}", severity)
+
+
+def print_remark(text: str, severity: Severity = Severity.NOTE) -> None:
+    """A sentence on the standard error, in lines that fit, indented from the second on."""
+    word, style = STYLES[severity]
+    Screen.of(errors=True).say(f"{word}: {text}", style)
+
+
+def note_missing(case: Case, *, monte_carlo: bool) -> None:
+    """What a run leaves out: dots of a simulation that has none to give, eigenfunctions of too many curves."""
+    if monte_carlo and case.figure.y == STABILITY_INDEX.name:
+        print_remark(f"{case.name}: a simulation gives no stability index, so that the figure has no dots")
+    if case.leaves_out_eigenfunctions:
+        why = f"no eigenfunctions are written, as there are more than {MOST_DRAWN} curves"
+        wanted = f"name the p that you want, as in [output] eigenfunctions = [{case.usual_p!r}]"
+        print_remark(f"{case.name}: {why}; {wanted}")

@@ -34,8 +34,7 @@ from fpsolve.workflow.folders import (
     saying_if_interrupted,
 )
 from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Phase, Watch, ignore
-from fpsolve.workflow.sets import Sweep
-from fpsolve.workflow.simulations import Simulations
+from fpsolve.workflow.sets import Simulations, Sweep
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,15 @@ from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message
 from fpsolve.output.letters import spelt
-from fpsolve.output.remarks import print_remark, print_remarks
 from fpsolve.output.screen import Column, Grid, Screen
-from fpsolve.output.terminal import duration, print_comparisons, print_results, print_simulation
+from fpsolve.output.terminal import (
+    duration,
+    print_comparisons,
+    print_remark,
+    print_remarks,
+    print_results,
+    print_simulation,
+)
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from tests.conftest import sampled
