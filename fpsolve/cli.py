@@ -100,20 +100,24 @@ def _run(argv: Sequence[str] | None) -> int:
             sys.stdout.flush()
     except CycloptsError:  # cyclopts has said what is wrong
         return BAD_INPUT
+    except NotConverged as failure:
+        print_error(failure.message)
+        return NOT_CONVERGED
     except FpsolveError as failure:
         print_error(failure.message)
-        return NOT_CONVERGED if isinstance(failure, NotConverged) else BAD_INPUT
+        return BAD_INPUT
     except KeyboardInterrupt as interrupt:
         print_error(str(interrupt) or "interrupted")
         return INTERRUPTED
-    except (OSError, SystemExit) as failure:  # rich exits where a pipe is closed
+    except (BrokenPipeError, SystemExit):  # the reader of the output has gone, as with `| head -1`; rich exits then
         _drop_blocked_output()
-        if isinstance(failure, BrokenPipeError | SystemExit):  # the reader of the output has gone, as with `| head -1`
-            return CLOSED_PIPE
+        return CLOSED_PIPE
+    except OSError as failure:
+        _drop_blocked_output()
         place, reason = failure.filename or "the output", failure.strerror or failure
         print_error(f"{place} cannot be written: {reason}; send it to another place")
         return BAD_INPUT
-    return code if isinstance(code, int) else 0
+    return code or 0
 
 
 def print_error(text: str) -> None:

@@ -62,7 +62,7 @@ def processors() -> int:
 
 def limit_processors(count: int) -> None:
     """Let this process use at most so many processors from now on. Raises `ValueError` if `count` is not ≥ 1."""
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+    if type(count) is not int or count < 1:
         raise ValueError(f"got count = {count!r}; must be a whole number >= 1")
     _limits[:] = [count]
 
@@ -201,7 +201,7 @@ def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
     Raises:
         FpsolveError: the count is not a number of processes.
     """
-    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_JOBS):
+    if count is not None and (type(count) is not int or not 1 <= count <= MOST_JOBS):
         known = f"must be a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
         raise FpsolveError(f"jobs: got {count!r}; {known}")
     size = min(count or processors(), tasks)

@@ -85,7 +85,7 @@ def _interrupts_repeated(received: list[int]) -> Iterator[None]:
     send = partial(signal.pthread_kill, main.ident or 0) if hasattr(signal, "pthread_kill") else signal.raise_signal
 
     def repeat(unraisable: Any) -> None:
-        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+        if unraisable.exc_type is not KeyboardInterrupt:
             former(unraisable)
             return
         timers.append(threading.Timer(REPEAT_SECONDS, lambda: send(received.pop() if received else signal.SIGINT)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import unicodedata
+from typing import Any
 
 HANDLER = "fpsolve.spelt"
 """The name under which `codecs` knows `_spell`, which spells letters that an encoding does not have."""
@@ -19,10 +20,8 @@ def spelt(text: str, encoding: str) -> str:
     return text.encode(encoding, errors=HANDLER).decode(encoding)
 
 
-def _spell(failure: UnicodeError) -> tuple[str, int]:
+def _spell(failure: Any) -> tuple[str, int]:
     """For `codecs`: what cannot be encoded, in words of ASCII; "?" where nothing is like it."""
-    if not isinstance(failure, UnicodeEncodeError):
-        raise failure
     words = []
     for letter in failure.object[failure.start : failure.end]:
         name = unicodedata.name(letter, "")

@@ -121,12 +121,16 @@ def test_field_data(solver, grids):
         assert grid.field_data["Lambda"][0] == solver.pair(p).value
 
 
-def test_parameters_are_field_data(tmp_path, fig1_solver):
+def test_files_hold_parameters_and_say_what_is_shown_first(tmp_path, fig1_solver):
+    """ParaView colours by the active scalars when it opens a file."""
     pair, parameters = fig1_solver.pair(0.0), {"oscillator.epsilon": 0.1, "oscillator.impact": "delta", "noise.D0": 1.0}
     _, file = write_eigenfunctions(tmp_path, [pair], pair, parameters=parameters)
-    for path in (file, write_density(tmp_path / "density.vtu", pair, parameters)):
+    density = write_density(tmp_path / "density.vtu", pair, parameters)
+    for path, shown in ((file, "T"), (density, "stationary_density")):
         found = pyvista.read(path).field_data
         assert {name: found[name][0] for name in parameters} == parameters
+        head, _, _ = path.read_text().partition("<AppendedData")
+        assert f'<PointData Scalars="{shown}">' in head
 
 
 def test_files_of_a_curve_hold_its_parameters(tmp_path):
@@ -208,15 +212,6 @@ def test_a_run_that_ends_early_lists_the_curves_that_are_there(tmp_path, monkeyp
     monkeypatch.undo()
     run(load_case(case.path, ["output.eigenfunctions=[]", "expect=[]"]), tmp_path)
     assert not series.exists()
-
-
-def test_what_is_shown_first(tmp_path, fig1_solver):
-    """ParaView colours by the active scalars when it opens a file."""
-    pair = fig1_solver.pair(0.0)
-    _, file = write_eigenfunctions(tmp_path, [pair], pair)
-    for path, name in ((file, "T"), (write_density(tmp_path / "density.vtu", pair), "stationary_density")):
-        head, _, _ = path.read_text().partition("<AppendedData")
-        assert f'<PointData Scalars="{name}">' in head
 
 
 def test_periodic_by_pi(grids):
@@ -315,15 +310,11 @@ def test_collection(tmp_path, fig1_solver):
     assert [float(s.get("timestep")) for s in sets] == sorted(set(moments))
     assert [tmp_path / s.get("file") for s in sets] == files[1:]
     assert {k for k in tmp_path.rglob("*") if k.is_file()} == set(files)
+    assert all(file.stat().st_size < 400e3 for file in files)
     for s in sets:
         assert not Path(s.get("file")).is_absolute()
         assert pyvista.read(tmp_path / s.get("file")).field_data["p"][0] == float(s.get("timestep"))
     assert list(pyvista.PVDReader(files[0]).time_values) == sorted(set(moments))
-
-
-def test_files_are_small(tmp_path, fig1_solver):
-    _, file = write_eigenfunctions(tmp_path, [fig1_solver.pair(2.0)], fig1_solver.pair(0.0))
-    assert file.stat().st_size < 400e3
 
 
 def test_density_file(tmp_path, solver):
