@@ -104,7 +104,6 @@ def _finite(values: Any) -> FloatArray | None:
 
 
 def _said(values: Any) -> str:
-    """What was given, cut to a readable length."""
     text = " ".join(repr(values).split())
     return text if len(text) <= 60 else f"{text[:57]}..."
 

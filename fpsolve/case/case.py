@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import (
+    AliasChoices,
     BeforeValidator,
     InstanceOf,
     PrivateAttr,
@@ -20,7 +21,7 @@ from pydantic import (
 )
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of, varying, with_system
+from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of, varying
 from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
@@ -114,7 +115,9 @@ class Case(Section):
 
     title: Annotated[Text, parameter("the heading of its results", 'title = "Fig. 1"')]
     system: Annotated[
-        InstanceOf[System], BeforeValidator(partial(half_of, "system")), parameter("Eq. (3)", "[oscillator]")
+        InstanceOf[System],
+        BeforeValidator(partial(half_of, "system")),
+        parameter("Eq. (3)", "[oscillator]", validation_alias=AliasChoices("oscillator", "system")),
     ]
     noise: Annotated[
         InstanceOf[Noise], BeforeValidator(partial(half_of, "noise")), parameter("Eqs. (7)-(8)", "[noise]")
@@ -272,8 +275,11 @@ class Case(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _system_by_either_name(cls, data: Any) -> Any:
-        return with_system(data)
+    def _has_one_system(cls, data: Any) -> Any:
+        if {"oscillator", "system"} <= set(data):
+            text = "stands beside [system], but a case has one system; remove one of the two"
+            refuse([(("oscillator",), data["oscillator"], text)])
+        return data
 
     @field_validator(*REFUSALS)
     @classmethod
@@ -314,5 +320,4 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
 
 
 def _spread(p: FloatArray) -> FloatArray:
-    """At most nine of the p, evenly."""
     return np.sort(p)[np.unique(np.linspace(0, p.size - 1, min(p.size, 9)).round().astype(int))]

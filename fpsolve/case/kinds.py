@@ -25,16 +25,6 @@ USUAL: Mapping[Half, str] = {"system": "vibro-impact", "noise": "ou-reduction"}
 """The kinds of sections that name none."""
 
 
-def with_system(data: Any) -> Any:
-    """The tables of a case, [oscillator] under its other name."""
-    if not isinstance(data, dict) or "oscillator" not in data:
-        return data
-    if "system" in data:
-        text = "stands beside [system], but a case has one system; remove one of the two"
-        refuse([(("oscillator",), data["oscillator"], text)])
-    return {"system" if name == "oscillator" else name: table for name, table in data.items()}
-
-
 def half_of(half: Half, table: Any) -> Any:
     """The system or the noise that a table describes; one that is made already is left.
 
@@ -79,7 +69,6 @@ def _details(error: ValidationError) -> list[InitErrorDetails]:
 
 
 def _kind(half: Half, name: Any) -> type[Parametrised]:
-    """The class of a kind; without a name the usual one."""
     if name is not None and name not in (names := kind_names("systems" if half == "system" else "noises")):
         text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
         refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
@@ -107,7 +96,7 @@ def sections_of(fields: Mapping[str, FieldInfo], data: Mapping[str, Any]) -> dic
     found = dict[str, FieldInfo]()
     kinds: Mapping[str, type[Parametrised]] = kinds_of(data)  # type: ignore[assignment]
     for name, field in fields.items():
-        section = "oscillator" if name == "system" in kinds and "system" not in data else name
+        section = "oscillator" if name == "system" and "system" not in data else name
         found[section] = field
         if name in kinds:
             found[section] = described = copy(field)

@@ -115,8 +115,6 @@ def explain(
         varied: the ranges of the values of [vary].
     """
     faults = [(tuple(part for part in each["loc"] if part not in (LIST, TABLE)), each) for each in faults_in(error)]
-    if "system" not in fields:  # the file calls it otherwise
-        faults = [(("oscillator", *path[1:]) if path[:1] == ("system",) else path, each) for path, each in faults]
     misspelt = set[Path]()
     for path, detail in faults:
         if detail["type"] in _UNKNOWN and (guess := _guess(str(path[-1]), _known_keys(path, fields))):

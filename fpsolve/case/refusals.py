@@ -79,7 +79,6 @@ def _unsolvable(valid: Known, vary: Vary, *, with_existence: bool = True) -> Ite
 
 
 def _with(varied: Varied) -> str:
-    """Beginning of a sentence on one of several curves."""
     return f"with {assignments(varied)}: " if varied else ""
 
 
@@ -174,7 +173,6 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
 
 
 def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """What the other sections do not allow."""
     if figure.moment is not None:
         yield from _of_orders(valid, [(("y", "moment"), figure.moment)], "or choose one of them")
     vary: Vary | None = valid.get("vary")
@@ -288,7 +286,6 @@ def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo])
 
 
 def _without(key: str) -> str:
-    """How to go on without what a key lists."""
     return f"or go without by --set '{key}=[]'"
 
 

@@ -247,7 +247,6 @@ class MomentAt(Section):
 
 
 def _ordinate(value: Any) -> Any:
-    """The name of a quantity, or Λ at one p."""
     names = get_args(DrawnName)
     if isinstance(value, MomentAt) or value in names:
         return value
@@ -260,7 +259,6 @@ def _ordinate(value: Any) -> Any:
 
 
 def _limits(value: Any) -> tuple[float, float]:
-    """The two ends of an axis."""
     if is_list(value) and len(value) == 2 and all(map(is_number, value)):
         start, stop = value
         if max(abs(start), abs(stop)) <= _LARGEST and stop - start > _APART * max(abs(start), abs(stop)):
@@ -272,7 +270,6 @@ def _limits(value: Any) -> tuple[float, float]:
 
 
 def _time_unit(value: Any) -> Any:
-    """Letters that stand for a unit of time."""
     if type(value) is str and re.fullmatch(r"[^\W\d_]{1,12}", value):
         return value
     text = f'got {shown_with_kind(value)}; must be a unit of 1 to 12 letters; write, for example, time_unit = "s"'

@@ -189,7 +189,6 @@ def vary_of(value: Any, info: ValidationInfo) -> Vary:
 
 
 def _of_file(table: Mapping[str, Any], parameters: Known, folder: Path) -> Vary:
-    """The sets of a file, beside which nothing else may stand."""
     file, mode = table["file"], table.get("mode", "zip")
     others = [key for key in table if key not in ("file", "mode")]
     if type(file) is not str or not file:
@@ -251,7 +250,6 @@ def _range(key: str, table: Mapping[str, Any], field: FieldInfo, columns: Column
 
 
 def _out_of_range(field: FieldInfo, values: Sequence[float]) -> list[int]:
-    """The places of values that a parameter cannot have."""
     try:
         values_of(field).validate_python(values)
     except ValidationError as error:
