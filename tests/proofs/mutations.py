@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev, hermite_e
 
+from tests.oracles.certificate_statement import model_of
+
 Truth = Callable[[dict[str, str], float | None], float]
 WORDS = ("oscillator.impact", "noise.treatment")
 SIDES = {"upper": 1, "lower": -1}
@@ -123,69 +125,44 @@ def _is_true(entry: dict[str, Any], truth: Truth, tolerance: float) -> bool:
 
 def violated(certificate: dict[str, Any]) -> bool:
     """Whether a side clearly fails at a sample, (*) or its tails: floats suffice to refute, if not to prove."""
-    given = certificate, _constants(certificate["parameters"])
     return any(
-        _violated_side(*given, certificate[name], sign) or _violated_tail(*given, certificate[name], sign)
+        _violated_side(certificate, certificate[name], sign) or _violated_tail(certificate, certificate[name], sign)
         for name, sign in SIDES.items()
     )
 
 
-def _violated_tail(certificate: dict[str, Any], constants: dict[str, float], side: dict[str, Any], sign: int) -> bool:
+def _violated_tail(certificate: dict[str, Any], side: dict[str, Any], sign: int) -> bool:
     """Whether the slope of ln T clearly jumps the wrong way at an end of the core, or that of T in a tail."""
     if side["tails"] is None:
         return False
     nodes, values, tails = (np.array([float(side[name][i]) for i in (0, -1)]) for name in ("nodes", "values", "tails"))
-    u, steep, _, _ = _samples(certificate, constants, nodes)
+    u, steep, _, _ = samples(certificate, nodes)
     rise = sign * (steep / u if certificate["quantity"] == "moment" else steep)
     toward, gauge = np.array([-1, 1]), float(certificate["basis"].get("gauge", 0))
     jump = (toward * (values - tails + rise)).min(axis=0)
     return bool((jump < -1e-6).any() or (toward * (tails + sign * gauge) < -1e-6).any())
 
 
-def _violated_side(certificate: dict[str, Any], constants: dict[str, float], side: dict[str, Any], sign: int) -> bool:
+def _violated_side(certificate: dict[str, Any], side: dict[str, Any], sign: int) -> bool:
     """Whether (*) of the upper (sign 1) or lower side clearly fails at the middle of a cell."""
     nodes, values = (np.array([float(v) for v in side[name]]) for name in ("nodes", "values"))
     z, w = (nodes[1:] + nodes[:-1]) / 2, (values[1:] + values[:-1]) / 2
     slope, delta = np.diff(values) / np.diff(nodes), float(side["delta"])
-    u, steep, mismatch, noise_drift = _samples(certificate, constants, z)
+    u, steep, mismatch, noise_drift = samples(certificate, z)
     moment = certificate["quantity"] == "moment"
     gauge = float(certificate["basis"].get("gauge", 0))
     inward = noise_drift - (gauge + steep / u if moment else 0)
-    excess = (delta - sign * (mismatch / u if moment else mismatch)) / constants["nu"]
+    excess = (delta - sign * (mismatch / u if moment else mismatch)) / float(model_of(certificate).nu)
     margin = excess + w * inward - (sign * w**2 / 2 if moment else 0) - slope / 2
     size = np.abs(excess) + np.abs(w * inward) + w**2 + np.abs(slope)
     return bool((u <= 0).any() and moment) or bool((margin < -1e-4 * size).any())
 
 
-def _constants(parameters: dict[str, str]) -> dict[str, float]:
-    """ω, ε²c₁, ε·unit, ln R/π, ν, b′(0) and whether the noise is bounded, in floats."""
-    v = {name: float(value) for name, value in parameters.items() if name not in WORDS}
-    eps = v["oscillator.epsilon"]
-    loss = eps**2 * (1 - v["oscillator.restitution"])
-    log_r = -loss if parameters["oscillator.impact"] == "delta" else math.log1p(-loss)
-    bounded = parameters.get("noise.treatment") == "exact" and v["noise.r0"] < 1
-    if bounded:
-        room = 1 - v["noise.r0"]
-        unit, nu, slope = math.sqrt(2 * v["noise.D0"] / (v["noise.tau0"] * room)), room / v["noise.tau0"], 1 / room
-    else:
-        if "noise.alpha" in v:
-            alpha, sigma = v["noise.alpha"], v["noise.sigma"]
-        else:
-            alpha = (5 - 3 * v["noise.r0"]) / (2 * (2 - v["noise.r0"]) * v["noise.tau0"])
-            sigma = math.sqrt(2 * v["noise.D0"]) / v["noise.tau0"]
-        unit, nu, slope = sigma / math.sqrt(2 * alpha), 2 * alpha, 0.5
-    mean = eps**2 * v["oscillator.c1"]
-    return {
-        **{"omega": v["oscillator.omega"], "mean": mean, "unit": eps * unit, "kappa": log_r / math.pi},
-        **{"nu": nu, "slope": slope, "bounded": float(bounded)},
-    }
-
-
-def _powers(certificate: dict[str, Any], degrees: int, z: np.ndarray) -> list[np.ndarray]:
-    """B_m, B_m′ and B_m″ at z, each (degrees, points)."""
-    basis, tables = certificate["basis"], []
-    for m in range(degrees):
-        unit = np.eye(degrees)[m]
+def powers(basis: dict[str, Any], degrees: int, z: np.ndarray) -> np.ndarray:
+    """B_m, B_m′ and B_m″ at z by numpy's polynomials, (3, degrees, points)."""
+    tables = []
+    for unit in np.eye(degrees):
+        m = int(np.argmax(unit))
         if basis["kind"] == "core":
             scale = float(basis["scale"])
             y = (z - float(basis["centre"])) / scale
@@ -196,25 +173,26 @@ def _powers(certificate: dict[str, Any], degrees: int, z: np.ndarray) -> list[np
             integral[0] = 0
             b = np.array([1.0]) if m == 0 else integral
             tables.append([chebyshev.chebval(z, chebyshev.chebder(b, j)) for j in range(3)])
-    return list(np.swapaxes(np.array(tables), 0, 1))
+    return np.swapaxes(np.array(tables), 0, 1)
 
 
-def _samples(certificate: dict[str, Any], c: dict[str, float], z: np.ndarray) -> tuple[np.ndarray, ...]:
-    """u, u_z, Lβu − μu (of λ: the drift less μ) at phases × z, and b at z."""
+def samples(certificate: dict[str, Any], z: np.ndarray, phi: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
+    """u, u_z, Lβu − μu (of λ: the drift less μ) at phases × z from Eqs. (17)-(19) in floats, and b at z."""
+    model = model_of(certificate)
+    omega, mean, unit, kappa = (float(each) for each in (model.omega, model.mean, model.unit.a, model.kappa.a))
     cosine, sine = (np.array([[float(v) for v in row] for row in certificate[name]]) for name in ("cosine", "sine"))
-    harmonics, (b0, b1, b2) = np.arange(len(cosine)), _powers(certificate, cosine.shape[1], z)
-    phi = np.linspace(0, np.pi, 8 * len(cosine) + 48, endpoint=False)
-    angle = 2 * np.outer(phi, harmonics)
-    waves, turned = (np.cos(angle), np.sin(angle)), 2 * harmonics
+    b0, b1, b2 = powers(certificate["basis"], cosine.shape[1], z)
+    phi = np.linspace(0, np.pi, 8 * len(cosine) + 48, endpoint=False) if phi is None else phi
+    turned = 2 * np.arange(len(cosine))
+    waves = np.cos(np.outer(phi, turned)), np.sin(np.outer(phi, turned))
     across = waves[0] @ cosine + waves[1] @ sine
     along = (waves[0] * turned) @ sine - (waves[1] * turned) @ cosine
     u, steep, second = across @ b0, across @ b1, across @ b2
-    moment, beta = certificate["quantity"] == "moment", float(certificate["basis"].get("gauge", 0))
-    carrier = u * float(certificate["p"]) if moment else np.ones_like(u)
-    v = along @ b0 + c["kappa"] * carrier
+    beta = float(certificate["basis"].get("gauge", 0))
+    carrier = u * float(model.p) if model.moment else np.ones_like(u)
+    v = along @ b0 + kappa * carrier
     h1, q1 = (np.sin(2 * phi) / 2)[:, None], ((1 - np.cos(2 * phi)) / 2)[:, None]
-    b = c["slope"] * z / (1 - z**2) if c["bounded"] else c["slope"] * z
-    noise = c["nu"] * (second / 2 + beta * steep + beta**2 / 2 * u - b * (steep + beta * u))
-    push = (c["mean"] + c["unit"] * z) * (h1 * v + q1 * carrier)
-    mismatch = noise + c["omega"] * v + push - float(certificate["mu"]) * (u if moment else 1)
+    b = float(model.slope) * z / (1 - z**2 if model.bounded else 1)
+    noise = float(model.nu) * (second / 2 + beta * steep + beta**2 / 2 * u - b * (steep + beta * u))
+    mismatch = noise + omega * v + (mean + unit * z) * (h1 * v + q1 * carrier) - model.mu * (u if model.moment else 1)
     return u, steep, mismatch, b

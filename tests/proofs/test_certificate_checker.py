@@ -28,7 +28,7 @@ from tests.oracles import certificate_checker as checker
 from tests.oracles import certificate_condition as condition
 from tests.oracles import certificate_statement as statement
 from tests.proofs.by_definition import EXACT, PLAIN, applied, trial
-from tests.proofs.mutations import mutations, violated
+from tests.proofs.mutations import WORDS, mutations, violated
 
 REACHED = {**EXACT, "noise.r0": "-1.5"}
 WEAK = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1}
@@ -48,16 +48,10 @@ STEP = 1 if "FPSOLVE_ALL_MUTATIONS" in os.environ else 4
 
 def problem_of(parameters):
     """A problem from the decimals of a certificate."""
-    words = {name.partition(".")[2]: value for name, value in parameters.items()}
-    oscillator = fpsolve.VibroImpactOscillator(
-        **{name: float(words[name]) for name in ("omega", "restitution", "c1", "epsilon")}, impact=words["impact"]
-    )
-    if "alpha" in words:
-        noise = fpsolve.OrnsteinUhlenbeck(float(words["alpha"]), float(words["sigma"]))
-    else:
-        noise = fpsolve.NonGaussianNoise(*(float(words[name]) for name in ("D0", "tau0", "r0")))
-        noise = noise if words["treatment"] == "exact" else noise.ou_reduction()
-    return fpsolve.Problem(oscillator, noise)
+    is_plain = "noise.alpha" in parameters
+    noise = fpsolve.OrnsteinUhlenbeck(1.0, 1.0) if is_plain else fpsolve.NonGaussianNoise(1.0, 1.0, 0.9)
+    values = {name: text if name in WORDS else float(text) for name, text in parameters.items()}
+    return fpsolve.Problem(fpsolve.VibroImpactOscillator(**WEAK), noise).at(values)
 
 
 def truth(parameters, p):
@@ -86,10 +80,7 @@ def objections(entry):
     bound = Bound.model_validate(
         {"lower": Decimal(entry["lower"]), "upper": Decimal(entry["upper"]), "certificate": certificate}
     )
-    parameters = {
-        name: value if name.endswith(("impact", "treatment")) else Decimal(value)
-        for name, value in certificate["parameters"].items()
-    }
+    parameters = {name: text if name in WORDS else Decimal(text) for name, text in certificate["parameters"].items()}
     p = None if entry["p"] is None else Decimal(entry["p"])
     return list(bound.objections(certificate["quantity"], p, parameters))
 
