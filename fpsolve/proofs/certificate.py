@@ -54,7 +54,7 @@ class SideRecord(Record):
 
     Attributes:
         delta: how far it is from mu.
-        nodes, values, tails: W of `factor`, linear between nodes, from left to right; its constants beyond.
+        nodes, values, tails: W of `verify`, linear between nodes, from left to right; its constants beyond.
     """
 
     delta: Annotated[float, Field(ge=0)]
@@ -171,33 +171,26 @@ NOTHING = Enclosure(-math.inf, math.inf)
 def enclosure_of(certificate: Certificate) -> Enclosure:
     """mu − lower.delta and mu + upper.delta, rounded outward; infinite where there is none."""
     lower, upper = _ends(certificate)
-    return Enclosure(
-        -math.inf if lower is None else _outward(lower, -math.inf),
-        math.inf if upper is None else _outward(upper, math.inf),
-        certificate,
-    )
+    return Enclosure(_outward(lower, -math.inf), _outward(upper, math.inf), certificate)
 
 
 @precision()
 def follows(lower: Fraction | None, upper: Fraction | None, certificate: Certificate) -> bool:
     """Whether bounds hold if the certificate does; None claims nothing."""
     low, high = _ends(certificate)
-    if (lower is not None and low is None) or (upper is not None and high is None):
-        return False
     return (lower is None or bool(ball(lower) <= low)) and (upper is None or bool(ball(upper) >= high))
 
 
 def _ends(certificate: Certificate) -> tuple[Any, Any]:
-    """The bounds of a certificate as balls."""
-    mu, lower, upper = ball(certificate.mu), certificate.lower, certificate.upper
-    return (
-        None if lower is None else mu - ball(lower.delta),
-        None if upper is None else mu + ball(upper.delta),
-    )
+    """The bounds of a certificate as balls, infinite where there is none."""
+    below, above = (math.inf if side is None else side.delta for side in (certificate.lower, certificate.upper))
+    return ball(certificate.mu) - ball(below), ball(certificate.mu) + ball(above)
 
 
 def _outward(bound: Any, direction: float) -> float:
     """A float beyond a ball, and so is the decimal that it is printed as."""
+    if not bound.is_finite():
+        return direction
     found = float(bound)
     while not all((each >= bound) if direction > 0 else (each <= bound) for each in (ball(found), ball(repr(found)))):
         found = math.nextafter(found, direction)

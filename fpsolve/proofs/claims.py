@@ -38,14 +38,14 @@ class Bound(Record):
         """That of the number as claimed, 0 where it is open."""
         return int(self.lower is not None and self.lower > 0) - int(self.upper is not None and self.upper < 0)
 
-    def objections(self, quantity: str, p: Decimal | None, parameters: Stated) -> Iterator[str]:
+    def objections(self, parameters: Stated) -> Iterator[str]:
         """Why the bounds need not hold."""
-        if self.certificate is None:
+        certificate = self.certificate
+        p: Decimal | None = vars(self).get("p")  # of a moment
+        if certificate is None:
             if (self.lower, self.upper) != (None, None):
                 yield "there is no certificate"
-            return
-        certificate = self.certificate
-        if certificate.quantity != quantity:
+        elif (certificate.quantity == MOMENT) != (p is not None):
             yield "the certificate is of another quantity"
         elif p is not None and Decimal(certificate.p or "nan") != p:
             yield "the certificate is of another p"
@@ -79,7 +79,7 @@ class IndexBound(Record):
             yield "δ_p needs both bounds, and Λ at two p"
             return
         for moment in self.moments:
-            yield from moment.objections(MOMENT, moment.p, parameters)
+            yield from moment.objections(parameters)
         low, high = (Fraction(each.p) for each in self.moments)
         if self.moments[0].sign * self.moments[1].sign >= 0 or not (0 < low < high or low < high < 0):
             yield "Λ does not change its sign between two p of one sign"
@@ -96,18 +96,19 @@ class CurveClaims(Record):
     stability_index: IndexBound | None
     verdicts: list[str]
 
+    @property
+    def claims(self) -> Mapping[str, Bound | IndexBound]:
+        """All bounds, by the places where they stand."""
+        found: dict[str, Any] = {f"moments.{i}": each for i, each in enumerate(self.moments)}
+        found |= {"lyapunov_exponent": self.lyapunov_exponent, "stability_index": self.stability_index}
+        return {place: each for place, each in found.items() if each is not None}
+
     def objections(self) -> Iterator[str]:
         """What does not follow, after the place where it stands."""
-        exponent, index = self.lyapunov_exponent, self.stability_index
-        for i, moment in enumerate(self.moments):
-            yield from (f"moments.{i}: {text}" for text in moment.objections(MOMENT, moment.p, self.parameters))
-        if exponent:
-            found = exponent.objections("lyapunov_exponent", None, self.parameters)
-            yield from (f"lyapunov_exponent: {text}" for text in found)
-        if index:
-            yield from (f"stability_index: {text}" for text in index.objections(self.parameters))
+        for place, claim in self.claims.items():
+            yield from (f"{place}: {text}" for text in claim.objections(self.parameters))
         signs = [(str(each.p), each.sign) for each in self.moments]
-        proven = verdicts(signs, 0 if exponent is None else exponent.sign)
+        proven = verdicts(signs, 0 if self.lyapunov_exponent is None else self.lyapunov_exponent.sign)
         yield from (f"verdicts: {text!r} does not follow" for text in self.verdicts if text not in proven)
 
 
@@ -122,8 +123,7 @@ class Claims(Record):
     @property
     def count(self) -> int:
         """How many numbers are bounded."""
-        bounds = [each for it in self.curves for each in (*it.moments, it.lyapunov_exponent, it.stability_index)]
-        return sum(each is not None and each.lower is not None for each in bounds)
+        return sum(each.lower is not None for curve in self.curves for each in curve.claims.values())
 
     def objections(self) -> Iterator[str]:
         """What does not follow, after the place where it stands."""

@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.error import Absent
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.quantities import lyapunov_exponent
 from fpsolve.exponent.quantities import stability_index as estimated_index
@@ -130,7 +129,7 @@ def prove_index(problem: Problem, stated: Parameters) -> IndexEnclosure:
     refuse_unprovable(stated)
     try:
         found = estimated_index(problem)
-        if isinstance(found, Absent):
+        if not found:
             return NO_INDEX
         slope = abs(float(moment_lyapunov(problem, [found.value]).derivative[0]))
     except NotConverged:

@@ -13,15 +13,17 @@ with r₀ < 1 it is the end of the support, ν = (1 − r₀)/τ₀ and b = a z/
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.model.exact import ExactLaw, ExactMotion
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
+from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parametrised
+from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.proofs.balls import Balls, ball
 
@@ -32,7 +34,6 @@ DECIMAL = re.compile(r"-?(\d{1,400}(\.\d{0,1100})?|\.\d{1,1100})([eE][-+]?\d{1,3
 """A number; words such as "exact" are none."""
 Parameters = Mapping[str, str]
 """Numbers as decimals, and words, by the keys of a case file."""
-Kind = TypeVar("Kind", bound=Parametrised)
 
 
 @dataclass(frozen=True)
@@ -96,13 +97,12 @@ def parameters_of(problem: Problem) -> Parameters:
         NoSuchExponent: no bound can be proven for these parameters.
         TypeError: no proof is known for such a system with such a noise.
     """
-    stated = {key: value if isinstance(value, str) else repr(value) for key, value in linear_values(problem).items()}
-    system, noise = problem.halves
-    motion, law = problem.system.exact_motion(_named(system, stated)), problem.noise.exact_law(_named(noise, stated))
-    if motion is None or law is None:
+    stated = {key: str(value) for key, value in linear_values(problem).items()}
+    if _exact(problem.system, problem.noise, stated) is None:
+        system, noise = (type(half).__name__ for half in problem.halves)
         raise TypeError(
-            f"got {type(system).__name__} with {type(noise).__name__}; proofs are for a VibroImpactOscillator with "
-            "OrnsteinUhlenbeck or NonGaussianNoise"
+            f"got {system} with {noise}; proofs are for a VibroImpactOscillator with OrnsteinUhlenbeck or "
+            "NonGaussianNoise"
         )
     return stated
 
@@ -114,7 +114,7 @@ def exact_halves(stated: Parameters) -> tuple[ExactMotion, ExactLaw]:
         NoSuchExponent: no bound can be proven for these parameters.
         ValueError: these are no parameters of a system and a noise for which a proof is known, or out of range.
     """
-    system, noise = _kind(map(system_kind, SYSTEMS), stated), _kind(map(noise_kind, NOISES), stated)
+    system, noise = _kinds(stated)
     expected = _keys(system) | _keys(noise)
     if set(stated) != expected:
         raise ValueError(f"parameters must be {', '.join(sorted(expected))}")
@@ -127,10 +127,17 @@ def exact_halves(stated: Parameters) -> tuple[ExactMotion, ExactLaw]:
         decimals = {name: text for name, text in _named(half, stated).items() if name not in half.words}
         numbers = [name for name in decimals if half.fields()[name].annotation is float]
         half(**decimals | {name: float(check_decimal(decimals[name])) for name in numbers})
-    motion, law = system.exact_motion(_named(system, stated)), noise.exact_law(_named(noise, stated))
-    if motion is None or law is None:
+    found = _exact(system, noise, stated)
+    if found is None:
         raise ValueError(f"no proof is known for {system.__name__} with {noise.__name__}")
-    return motion, law
+    return found
+
+
+def _exact(
+    system: System | type[System], noise: Noise | type[Noise], stated: Parameters
+) -> tuple[ExactMotion, ExactLaw] | None:
+    motion, law = system.exact_motion(_named(system, stated)), noise.exact_law(_named(noise, stated))
+    return None if motion is None or law is None else (motion, law)
 
 
 def check_decimal(text: str) -> str:
@@ -142,19 +149,17 @@ def check_decimal(text: str) -> str:
 
 def inert_keys(stated: Parameters) -> set[str]:
     """The keys of other parameters of such a system and such a noise, on which no exponent depends."""
-    halves = _kind(map(system_kind, SYSTEMS), stated), _kind(map(noise_kind, NOISES), stated)
-    return {f"{half.section}.{name}" for half in halves for name in half.inert}
+    return {f"{half.section}.{name}" for half in _kinds(stated) for name in half.inert}
 
 
-def _kind(kinds: Iterable[type[Kind]], stated: Parameters) -> type[Kind]:
-    """The first of the kinds that have most of these keys, and of these the one whose words are stated."""
-    return max(
-        kinds,
-        key=lambda kind: (
-            len(_keys(kind) & set(stated)),
-            sum(stated.get(f"{kind.section}.{name}") == word for name, word in kind.words.items()),
-        ),
-    )
+def _kinds(stated: Parameters) -> tuple[type[System], type[Noise]]:
+    """The first system and noise that have most of these keys, and of these noises the one whose words are stated."""
+
+    def fit(kind: type[Parametrised]) -> tuple[int, int]:
+        words = [stated.get(f"{kind.section}.{name}") == word for name, word in kind.words.items()]
+        return len(_keys(kind) & set(stated)), sum(words)
+
+    return max(map(system_kind, SYSTEMS), key=fit), max(map(noise_kind, NOISES), key=fit)
 
 
 def _keys(kind: type[Parametrised]) -> set[str]:

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from fpsolve.proofs.balls import above, ball, below, precision, rounded
-from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Trial
-from fpsolve.proofs.cells import Cells, Phases
+from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Cells, Phases, Trial
 from fpsolve.proofs.certificate import BasisRecord
 from fpsolve.proofs.statement import cylinder
 from tests.proofs.by_definition import EXACT
@@ -95,7 +94,7 @@ def test_where_u_is_not_positive_nothing_is_bounded():
 @pytest.mark.parametrize("name", ["core, bounded", "core, unbounded"])
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_what_is_left_where_u_is_held(name, sign):
-    """n(φ, z) of `factor` is that of a function of φ alone, the one at which u is held; its growth by differences."""
+    """n(φ, z) of `verify` is that of a function of φ alone, the one at which u is held; its growth by differences."""
     z, phi = sign * 0.5, np.linspace(0, math.pi, 721)
     with precision():
         of, about, *_ = trial(name)

@@ -19,7 +19,7 @@ import pytest
 import fpsolve
 from fpsolve.proofs import prove, prove_lyapunov_exponent
 from fpsolve.proofs.balls import precision
-from fpsolve.proofs.claims import Bound
+from fpsolve.proofs.claims import Bound, MomentBound
 from fpsolve.proofs.galerkin import Galerkin
 from fpsolve.proofs.search import bases, certificate_of
 from fpsolve.proofs.statement import cylinder
@@ -77,12 +77,11 @@ def proven(name):
 def objections(entry):
     """What fpsolve's own check says of an entry."""
     certificate = json.loads(json.dumps(entry["certificate"], default=float))
-    bound = Bound.model_validate(
-        {"lower": Decimal(entry["lower"]), "upper": Decimal(entry["upper"]), "certificate": certificate}
-    )
+    bounds = {name: Decimal(entry[name]) for name in ("lower", "upper")} | {"certificate": certificate}
     parameters = {name: text if name in WORDS else Decimal(text) for name, text in certificate["parameters"].items()}
-    p = None if entry["p"] is None else Decimal(entry["p"])
-    return list(bound.objections(certificate["quantity"], p, parameters))
+    is_path = entry["p"] is None
+    bound = Bound(**bounds) if is_path else MomentBound(**bounds, p=Decimal(entry["p"]))
+    return list(bound.objections(parameters))
 
 
 def entry_of(name):
