@@ -244,14 +244,12 @@ def problem_first(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[Any, .
     Raises:
         TypeError: there is neither a problem nor a motion and a noise.
     """
+    if is_named := "problem" in kwargs:
+        args = (kwargs.pop("problem"), *args)
     if args and isinstance(args[0], Problem):
         return args
-    if "problem" in kwargs:
-        if not isinstance(kwargs["problem"], Problem):
-            raise TypeError(
-                f"got problem = {kwargs['problem']!r}; must be a Problem, made of an oscillator and a noise"
-            )
-        return (kwargs.pop("problem"), *args)
+    if is_named:
+        raise TypeError(f"got problem = {args[0]!r}; must be a Problem, made of an oscillator and a noise")
     halves = list(args[:2])
     for name in ("oscillator", "noise")[len(halves) :]:
         if name not in kwargs:

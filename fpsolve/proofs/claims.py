@@ -186,16 +186,19 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _numbers(data: Any, exact: Sequence[str] = EXACT, is_exact: bool = False) -> Any:
     """Numbers below some keys as decimals, others, and all of certificates, as floats."""
-    if isinstance(data, dict):
-        return {
-            name: _numbers(value, () if name == "certificate" else exact, is_exact or name in exact)
-            for name, value in data.items()
-        }
-    if isinstance(data, list):
-        return [_numbers(each, exact) for each in data]
-    if is_exact and isinstance(data, Decimal | int) and not isinstance(data, bool):
-        return _in_range(Decimal(data))
-    return float(data) if isinstance(data, Decimal) else data
+    match data:
+        case dict():
+            return {
+                name: _numbers(value, () if name == "certificate" else exact, is_exact or name in exact)
+                for name, value in data.items()
+            }
+        case list():
+            return [_numbers(each, exact) for each in data]
+        case bool():
+            return data
+        case Decimal() | int() if is_exact:
+            return _in_range(Decimal(data))
+    return float(data) if type(data) is Decimal else data
 
 
 def _in_range(number: Decimal) -> Decimal:

@@ -127,10 +127,10 @@ def exact_halves(stated: Parameters) -> tuple[ExactMotion, ExactLaw]:
         decimals = {name: text for name, text in _named(half, stated).items() if name not in half.words}
         numbers = [name for name in decimals if half.fields()[name].annotation is float]
         half(**decimals | {name: float(check_decimal(decimals[name])) for name in numbers})
-    found = _exact(system, noise, stated)
-    if found is None:
+    exact = _exact(system, noise, stated)
+    if exact is None:
         raise ValueError(f"no proof is known for {system.__name__} with {noise.__name__}")
-    return found
+    return exact
 
 
 def _exact(
