@@ -18,11 +18,11 @@ import pytest
 from fpsolve import cli
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
-from fpsolve.model.kinds import parameter_of
+from fpsolve.model.problem import Problem
 from fpsolve.output import figures
 from fpsolve.output.terminal import digits
 from fpsolve.study import solve
-from tests.conftest import heed_signals, sampled
+from tests.conftest import FIG1, FIG1_NOISE, heed_signals, sampled
 from tests.test_workflow import DRAWN, HOPELESS, LEAN, TABLES, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -176,7 +176,8 @@ def test_the_help_names_the_units(command, capsys):
     told = " ".join(re.sub("[│╭╮╰╯─]", " ", capsys.readouterr().out).split())
     units = dict(re.findall(r"(\w+) in ([\w/]+)", told.partition("Units: ")[2].partition(".")[0]))
     keys = {"omega": "oscillator", "c1": "oscillator", "D0": "noise", "tau0": "noise"}
-    assert units == {key: parameter_of(f"{section}.{key}").unit for key, section in keys.items()}
+    known = Problem(FIG1, FIG1_NOISE).parameters
+    assert units == {key: known[f"{section}.{key}"].quantity.unit for key, section in keys.items()}
 
 
 def test_set_takes_negative_values(case):

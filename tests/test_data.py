@@ -20,7 +20,6 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent import INDICES
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate, Failure
-from fpsolve.model.kinds import parameter_of
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -443,10 +442,11 @@ def test_results_stay_values(results):
 
 
 def test_parameters():
-    assert parameter_of("noise.D0").title == "noise intensity $D_0$ (1/time)"
-    assert parameter_of("oscillator.restitution").attributes["units"] == "1"
-    assert parameter_of("noise.sigma").unit == "1/time^(3/2)"
-    assert parameter_of("oscillator.mass").unit == "unknown"
+    known = Problem(FIG1, REDUCED).parameters | Problem(FIG1, UNIT_NOISE).parameters
+    assert known["noise.D0"].quantity.title == "noise intensity $D_0$ (1/time)"
+    assert known["oscillator.restitution"].quantity.attributes["units"] == "1"
+    assert known["noise.sigma"].quantity.unit == "1/time^(3/2)"
+    assert known["noise.treatment"].quantity.unit == "unknown"
     strong = VibroImpactOscillator(omega=2.0, restitution=0.9, c1=0.0, epsilon=1.0)
     values = Problem(strong, UNIT_NOISE).values
     assert values["oscillator.omega"] == 2.0

@@ -13,9 +13,8 @@ from importlib.metadata import entry_points
 from typing import Any, Literal
 
 from fpsolve.model.noise import Noise
-from fpsolve.model.parameters import Parametrised, quantities_of, unknown_parameter
+from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import System
-from fpsolve.model.quantity import Quantity
 
 SYSTEMS: Mapping[str, str] = {
     "vibro-impact": "vibro_impact:VibroImpactOscillator",
@@ -76,17 +75,3 @@ def _kind(name: str, room: Literal["systems", "noises"], base: type[Any]) -> Any
     if not (isinstance(made, type) and issubclass(made, base) and getattr(made, "kind", "") == name):
         raise ValueError(f'kind = "{name}" is {made!r}; must be a subclass of {base.__name__} with kind = "{name}"')
     return made
-
-
-def parameter_of(key: str) -> Quantity:
-    """A parameter by its key alone, such as "noise.D0", of the first of our kinds that has it."""
-    return _known().get(key) or unknown_parameter(key)
-
-
-@cache
-def _known() -> Mapping[str, Quantity]:
-    found: dict[str, Quantity] = {}
-    for kind in (*map(system_kind, SYSTEMS), *map(noise_kind, NOISES)):
-        for quantity in quantities_of(kind).values():  # type: ignore[arg-type]
-            found.setdefault(quantity.name, quantity)
-    return found

@@ -80,13 +80,11 @@ def test_furstenberg_khasminskii_integral_is_the_slope_at_zero(solver):
 
 def test_phase_flux_is_the_same_through_every_phase(solver):
     """∂φ of the flux ∫(ω + ε h₁ξ + ε² h₂) ρ dξ vanishes, tested with cos 2kφ and sin 2kφ."""
-    from fpsolve.model.systems.vibro_impact import h1
-
     density = stationary_density(solver.pair(0.0))
     eps, oscillator = solver.problem.system.epsilon, solver.problem.system
 
     def speed(phi, xi):
-        return oscillator.omega + eps * h1(phi) * xi + eps**2 * oscillator.h2(phi)
+        return oscillator.omega + eps * oscillator.terms[1].h(phi) * xi + eps**2 * oscillator.h2(phi)
 
     for k in (1, 2):
         for wave in (np.cos, np.sin):
@@ -98,13 +96,11 @@ def test_phase_flux_is_the_same_through_every_phase(solver):
 @pytest.mark.parametrize("p", [-1.0, 2.0])
 def test_tilted_mean_of_the_derivative_of_the_generator_is_the_slope(fig1_solver, p):
     """Λ′(p) = E_tilted[ε q₁ξ + ε² q₂] + ln R × (impacts per unit time); here without impact."""
-    from fpsolve.model.systems.vibro_impact import q1
-
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.1, epsilon=0.2)
     pair = ExponentSolver(Problem(oscillator, FIG1_NOISE.ou_reduction())).pair(p)
     density = tilted_density(pair)
     eps = oscillator.epsilon
-    slope = density.mean(lambda phi, xi: eps * xi * q1(phi) + eps**2 * oscillator.q2(phi))
+    slope = density.mean(lambda phi, xi: eps * xi * oscillator.terms[1].q(phi) + eps**2 * oscillator.q2(phi))
     assert slope == pytest.approx(pair.derivative, rel=1e-10)
     assert density.mean(lambda phi, xi: 1.0) == pytest.approx(1, abs=1e-13)
 

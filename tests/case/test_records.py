@@ -16,10 +16,11 @@ from fpsolve.case.kinds import kinds_of, parameters_of, sections_of
 from fpsolve.case.vary import values_of
 from fpsolve.exponent.adapt import Budget
 from fpsolve.model import faults
-from fpsolve.model.kinds import parameter_of
 from fpsolve.model.parameters import STRICT, example_of, symbol_of
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import P
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from tests.conftest import FIG1, FIG1_NOISE
 
 
 def fields_of(annotation: Any) -> Mapping[str, FieldInfo]:
@@ -65,9 +66,9 @@ KEYS_OF_FIGURES |= {"p"}
 
 
 def test_figures_name_what_they_are_drawn_over() -> None:
+    about = {key: parameter.quantity for key, parameter in Problem(FIG1, FIG1_NOISE).parameters.items()} | {"p": P}
     assert {
-        key: (symbol_of(RECORDS["moments.p" if key == "p" else key]), (P if key == "p" else parameter_of(key)).title)
-        for key in KEYS_OF_FIGURES
+        key: (symbol_of(RECORDS["moments.p" if key == "p" else key]), about[key].title) for key in KEYS_OF_FIGURES
     } == {
         "p": ("$p$", "order of the moment $p$"),
         "oscillator.omega": (r"$\omega$", r"natural frequency $\omega$ (rad/time)"),

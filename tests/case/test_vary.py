@@ -18,10 +18,10 @@ from fpsolve.case.sections import Sweep
 from fpsolve.case.vary import Vary, assignments, legend
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
-from fpsolve.model.kinds import parameter_of
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
+from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import second_order
-from tests.conftest import sampled
+from tests.conftest import FIG1, FIG1_NOISE, sampled
 
 TEXT = """\
 title = "varied"
@@ -179,7 +179,8 @@ def test_texts_and_numbers_are_written_for_the_eye() -> None:
     varied = {"noise.D0": 0.1234567890123, "noise.treatment": "exact", "oscillator.impact": "delta"}
     assert assignments(varied, "g") == "noise.D0 = 0.123457, noise.treatment = exact, oscillator.impact = delta"
     assert assignments(varied).startswith("noise.D0 = 0.1234567890123, ")
-    assert legend(varied, parameter_of) == "$D_0$ = 0.123457/time, treatment = exact, impact = delta"
+    known = Problem(FIG1, FIG1_NOISE).parameters
+    assert legend(varied, lambda key: known[key].quantity) == "$D_0$ = 0.123457/time, treatment = exact, impact = delta"
 
 
 def test_a_mesh_is_judged_for_each_treatment(write: Write) -> None:

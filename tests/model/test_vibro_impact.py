@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fpsolve.model.systems.vibro_impact import IMPACT_PHASES, ImpactLaw, VibroImpactOscillator, h1, q1
+from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
+from tests.conftest import FIG1
+
+h1, q1 = FIG1.terms[1].h, FIG1.terms[1].q
 
 
 def test_polar_coefficients_come_from_the_cartesian_system(rng):
@@ -24,9 +27,9 @@ def test_polar_coefficients_come_from_the_cartesian_system(rng):
 
 
 def test_impacts_are_where_the_displacement_vanishes_and_the_noise_does_not_turn_the_phase():
-    np.testing.assert_allclose(np.cos(IMPACT_PHASES), 0, atol=1e-15)
-    np.testing.assert_allclose(h1(IMPACT_PHASES), 0, atol=1e-15)
-    np.testing.assert_allclose(q1(IMPACT_PHASES), 1)
+    [jump] = FIG1.jumps
+    np.testing.assert_allclose([math.cos(jump.phase), h1(jump.phase)], 0, atol=1e-15)
+    np.testing.assert_allclose(q1(jump.phase), 1)
 
 
 def test_impact_laws_by_their_formulas():

@@ -10,11 +10,12 @@ from fpsolve.exponent.fields import fields
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator, h1, q1
+from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.oracles import perturbation
 
 OU = OrnsteinUhlenbeck(alpha=1.7, sigma=0.9)
 OSCILLATOR = VibroImpactOscillator(omega=1.3, restitution=0.8, c1=0.1, epsilon=0.2)
+h1, q1 = OSCILLATOR.terms[1].h, OSCILLATOR.terms[1].q
 
 
 def partial(f, x, h=1e-5):

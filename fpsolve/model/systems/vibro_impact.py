@@ -21,9 +21,6 @@ from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
 
-IMPACT_PHASES = (math.pi / 2, 3 * math.pi / 2)
-"""φ in [0, 2π] where cos φ = 0: the mass is at the wall."""
-
 
 class ImpactLaw(StrEnum):
     """How the amplitude changes at an impact.
@@ -51,17 +48,7 @@ class Motion(NamedTuple):
 
 
 DAMPING = ((0.0, 0.0), (0.0, 1.0))
-"""A of the force on the velocity alone, which damps or, multiplied by noise, drives."""
-
-
-def h1(phi: ArrayLike) -> FloatArray:
-    """h₁(φ) = ½ sin 2φ, Eq. (18), e′ᵀA e of `DAMPING`."""
-    return CoefficientMatrix(1, DAMPING).h(phi)
-
-
-def q1(phi: ArrayLike) -> FloatArray:
-    """q₁(φ) = ½(1 − cos 2φ), Eq. (18), eᵀA e of `DAMPING`."""
-    return CoefficientMatrix(1, DAMPING).q(phi)
+"""A of the force on the velocity alone, which damps or drives: h₁ = ½ sin 2φ and q₁ = ½(1 − cos 2φ), Eq. (18)."""
 
 
 @told_in_words
