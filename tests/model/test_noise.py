@@ -36,20 +36,13 @@ def test_density_is_normalised_and_has_the_variance_of_eq_10(r0):
 
 
 @pytest.mark.parametrize("r0", DEPARTURES)
-def test_drift_is_half_sigma_squared_times_the_log_derivative_of_the_density(r0):
+def test_drift_by_the_density_and_by_the_potential(r0):
+    """½σ² (ln P_s)′ = −V′/τ₀."""
     noise = NonGaussianNoise(D0=0.7, tau0=1.3, r0=r0)
     xi = 0.7 * min(noise.half_width, 3 * noise.standard_deviation) * np.linspace(-1, 1, 11)
     h = 1e-5 * noise.standard_deviation
-    slope = (np.log(noise.density(xi + h)) - np.log(noise.density(xi - h))) / (2 * h)
+    slope, gradient = ((f(xi + h) - f(xi - h)) / (2 * h) for f in (lambda x: np.log(noise.density(x)), noise.potential))
     np.testing.assert_allclose(noise.drift(xi), 0.5 * noise.diffusion**2 * slope, rtol=1e-7, atol=1e-9)
-
-
-@pytest.mark.parametrize("r0", DEPARTURES)
-def test_drift_is_minus_the_gradient_of_the_potential_over_tau(r0):
-    noise = NonGaussianNoise(D0=0.7, tau0=1.3, r0=r0)
-    xi = 0.7 * min(noise.half_width, 3 * noise.standard_deviation) * np.linspace(-1, 1, 11)
-    h = 1e-5 * noise.standard_deviation
-    gradient = (noise.potential(xi + h) - noise.potential(xi - h)) / (2 * h)
     np.testing.assert_allclose(noise.drift(xi), -gradient / 1.3, rtol=1e-7, atol=1e-8)
 
 

@@ -31,6 +31,7 @@ from tests.proofs.by_definition import EXACT, PLAIN, applied, trial
 from tests.proofs.mutations import WORDS, mutations, violated
 
 REACHED = {**EXACT, "noise.r0": "-1.5"}
+CORE = {"kind": "core", "centre": 0.0, "scale": 1.0, "gauge": 0.0}
 WEAK = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1}
 MIDDLE = {"omega": 1.3, "restitution": 0.75, "c1": -0.1, "epsilon": 0.5, "impact": "restitution"}
 PROOFS = {
@@ -178,7 +179,7 @@ def test_tails_of_any_sign(parameters, toward, end, sign, kappa, rng):
     """A tail may begin beyond the middle of the noise, and be flatter than u: the least δ taken bounds it all."""
     certificate = {
         **{"quantity": "moment", "p": "0.5", "parameters": parameters, "mu": 0.3},
-        "basis": {"kind": "core", "centre": 0.0, "scale": 0.5, "gauge": 0.7 * toward},
+        "basis": CORE | {"scale": 0.5, "gauge": 0.7 * toward},
         "cosine": [[1.0, 0.02], [0.01, 0.01]],
         "sine": [[0.0, 0.0], [0.03, -0.01]],
     }
@@ -215,7 +216,7 @@ def test_the_slope_at_an_end_of_the_core(toward, sign):
     """q times the slope of ln T falls there: W may jump to κ by the least, over the phase, of q u_z/u and no more."""
     certificate = {
         **{"quantity": "moment", "p": "0.5", "parameters": PLAIN, "mu": 0.0},
-        "basis": {"kind": "core", "centre": 0.0, "scale": 1.0, "gauge": 0.0},
+        "basis": CORE,
         **{"cosine": [[1.0, 0.02], [0.0, 0.01]], "sine": [[0.0, 0.0], [0.0, 0.01]]},
     }
     model, end = statement.model_of(certificate), 0.5 * toward
@@ -237,7 +238,7 @@ def constant(parameters, kind):
     whole = kind == "whole"
     certificate = {
         **{"quantity": "moment", "p": "1.5", "mu": 0.0, "phases": 8},
-        "basis": {"kind": "whole"} if whole else {"kind": "core", "centre": 0.0, "scale": 1.0, "gauge": 0.0},
+        "basis": {"kind": "whole"} if whole else CORE,
         "parameters": {**parameters, "oscillator.epsilon": "0"},
         **{"cosine": [[1.0, 0.0]], "sine": [[0.0, 0.0]]},
     }
@@ -294,7 +295,7 @@ def test_the_square_of_w(name, sign):
     w, nu = 0.5, 0.3 / 0.6
     certificate = {
         **{"quantity": "moment", "p": "1.5", "mu": 0.0, "parameters": {**EXACT, "oscillator.epsilon": "0"}},
-        "basis": {"kind": "core", "centre": 0.0, "scale": 1.0, "gauge": 0.0},
+        "basis": CORE,
         **{"cosine": [[1.0, 0.0]], "sine": [[0.0, 0.0]]},
     }
     model = statement.model_of(certificate)
@@ -342,7 +343,7 @@ def altered(entry, changes):
         ({"upper.tails": None}, "tails"),
         ({"lower.tails": [1.0]}, "tails"),
         ({"basis": {"kind": "core"}}, "read"),
-        ({"basis": {"kind": "core", "centre": 0.0, "scale": 0.0, "gauge": 0.0}}, "scale"),
+        ({"basis": CORE | {"scale": 0.0}}, "scale"),
         ({"upper.tails": lambda old: [0.3, old[1]]}, "flatter"),
         ({"lower.tails": lambda old: [0.3, old[1]]}, "lower tail beyond -7.48704 is flatter"),
         ({"upper.tails": [-0.3, 0.7]}, "jumps"),
@@ -358,7 +359,7 @@ def test_reasons(changes, reason, plain):
 
 
 def test_gauge_needs_a_moment_and_steep_tails(plain):
-    gauge = {"kind": "core", "centre": 0.0, "scale": 1.0, "gauge": 0.5}
+    gauge = CORE | {"gauge": 0.5}
     assert "gauge" in checker.check(altered(entry_of("path"), {"basis": gauge}))
     assert "flatter" in checker.check(altered(plain, {"basis": gauge}))
 

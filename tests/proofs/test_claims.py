@@ -169,14 +169,11 @@ def test_verdicts_that_do_not_follow(data, text):
     assert objections(data) == [f"curves.0.verdicts: {text!r} does not follow"]
 
 
-def test_verdicts_follow_from_signs_only(data):
+def test_verdicts_follow_from_signs_only_and_name_p_in_full(data):
     curve = only(data, "moments")
     curve["moments"][0]["lower"] = -1.0
     curve["verdicts"] = ["the moment of order 2 grows"]
     assert objections(data) == ["curves.0.verdicts: 'the moment of order 2 grows' does not follow"]
-
-
-def test_verdicts_name_p_in_full():
     assert verdicts([("2.0000001", 1), ("0.0", 0), ("-0.50", -1), ("1", 0)], -1) == [
         "almost every path decays",
         "the moment of order 2.0000001 grows",

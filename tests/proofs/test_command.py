@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from fractions import Fraction
 from itertools import islice
+from pathlib import Path
 
 import pytest
 
@@ -195,15 +196,12 @@ def test_numbers_are_the_decimals_that_a_case_states(case):
 
 
 def test_numbers_of_vary_take_the_place_of_those_of_the_section(case):
-    varied = [f"noise.D0={LONG}", 'vary."noise.D0"=[1.0, 2.0]']
-    with open(case, encoding="utf-8") as file:  # noqa: PTH123
-        text = file.read().replace("D0 = 1.0", f"D0 = {LONG}")
-    with open(case, "w", encoding="utf-8") as file:  # noqa: PTH123
-        file.write(text)
+    varied = 'vary."noise.D0"=[1.0, 2.0]'
+    Path(case).write_text(MOMENTS.replace("D0 = 1.0", f"D0 = {LONG}"), encoding="utf-8")
     assert stated(case)[1] == LONG
-    assert stated(case, varied[1])[1] == "1.0"
+    assert stated(case, varied)[1] == "1.0"
     assert stated(case, f"vary.noise.D0=[{LONG}]")[1] == LONG
-    assert stated(case, varied[1], "vary={}")[1] == LONG
+    assert stated(case, varied, "vary={}")[1] == LONG
 
 
 def test_p_of_a_range_is_the_float_as_it_stands(case):

@@ -168,10 +168,9 @@ def test_transition_of_ornstein_uhlenbeck_noise(a):
     assert step.mean1**2 + step.mean2**2 == pytest.approx(var_mean, rel=1e-9)
 
 
-def noise_after(noise, xi, time, rng):
-    h = default_step(STRONG, noise)
-    step = noise.step(h)
-    mean, end, push = np.empty((3, xi.size))
+def noise_after(noise, xi, time, rng, h=None, bias=0.0):
+    h = h or default_step(STRONG, noise)
+    step, (mean, end, push) = noise.step(h, bias), np.zeros((3, xi.size))
     for _ in range(math.ceil(time / h)):
         draw(step, xi, mean, end, push, rng)
         xi[:] = end
@@ -212,11 +211,7 @@ def test_noise_with_a_bias_has_its_law():
     b, n, h = 0.4, 200_000, 0.02
     for noise in (FIG1_NOISE, FIG1_NOISE.ou_reduction()):
         rng = np.random.default_rng(5)
-        xi, step = noise.sample(n, rng), noise.step(h, bias=b)
-        mean, end, push = np.empty((2, n)), np.empty(n), np.zeros(n)
-        for _ in range(math.ceil(6 * 0.5 / h)):
-            draw(step, xi, mean[0], end, push, rng)
-            xi[:] = end
+        xi = noise_after(noise, noise.sample(n, rng), 6 * 0.5, rng, h, b)
         grid = np.linspace(-1, 1, 200_001) * min(noise.half_width, 12 * noise.standard_deviation)
         weight = np.nan_to_num(noise.density(grid)) * np.exp(2 * b * grid)
         expected = np.sum(weight * grid) / np.sum(weight)
@@ -250,8 +245,7 @@ def test_norms_are_taken_out_of_the_state():
         logs.append(log_norm + np.log(np.hypot(x, u)))
         if interval:
             np.testing.assert_allclose(np.hypot(x, u), 1, rtol=1e-14)
-    np.testing.assert_allclose(logs[1], logs[0], atol=1e-9)
-    np.testing.assert_allclose(logs[2], logs[0], atol=1e-9)
+    np.testing.assert_allclose(logs[1:], [logs[0]] * 2, atol=1e-9)
 
 
 @pytest.mark.parametrize("r0", [-1.0, 0.5, 0.7, 0.95, 1.0, 1.2])
