@@ -82,11 +82,7 @@ class VibroImpactOscillator(System):
     epsilon: Annotated[
         float,
         parameter(
-            "small parameter of Eq. (6); 1 is the unscaled system",
-            "epsilon = 0.1",
-            r"$\varepsilon$",
-            ge=1e-12,
-            le=1e6,
+            "small parameter of Eq. (6); 1 is the unscaled system", "epsilon = 0.1", r"$\varepsilon$", ge=1e-12, le=1e6
         ),
     ]
     c2: Annotated[
