@@ -61,7 +61,7 @@ def real_number(value: Any, name: str) -> float:
     """One number; texts and booleans are none. Raises `ValueError` where it is not a finite real number."""
     array = _finite(value)
     if array is None or array.ndim:
-        raise ValueError(f"{name} must be a finite number, got {_said(value)}")
+        raise ValueError(f"{name} must be a finite number, got {shown(value)}")
     return float(array)
 
 
@@ -74,7 +74,7 @@ def real_numbers(values: Any, name: str, *, may_be_empty: bool = False) -> Float
     array = _finite(values)
     if array is None or array.ndim > 1 or not (array.size or may_be_empty):
         size = "" if may_be_empty else "non-empty "
-        raise ValueError(f"{name} must be a finite number or a {size}list of finite numbers, got {_said(values)}")
+        raise ValueError(f"{name} must be a finite number or a {size}list of finite numbers, got {shown(values)}")
     return np.atleast_1d(array)
 
 
@@ -82,7 +82,7 @@ def real_array(values: Any, name: str) -> FloatArray:
     """Numbers as an array of their shape. Raises `ValueError` where they are not finite real numbers."""
     array = _finite(values)
     if array is None:
-        raise ValueError(f"{name} must be a finite number or an array of finite numbers, got {_said(values)}")
+        raise ValueError(f"{name} must be a finite number or an array of finite numbers, got {shown(values)}")
     return array
 
 
@@ -103,8 +103,12 @@ def _finite(values: Any) -> FloatArray | None:
     return None
 
 
-def _said(values: Any) -> str:
-    text = " ".join(repr(values).split())
+def shown(value: Any) -> str:
+    """A value as Python writes it, in one line of a readable length."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # of a whole number with thousands of digits
+        return "a number too long to show"
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
+from fpsolve.arrays import shown
 from fpsolve.model.parameters import meaning_of
 
 Kind = TypeVar("Kind")
@@ -71,17 +72,8 @@ def _sentence(detail: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
         return f"{what}: unknown; the parameters are {', '.join(fields)}"
     meaning = meaning_of(fields[name])
     must = f"must be {accepted(fields[name])}" + (f" ({meaning})" if meaning else "")
-    found = "missing" if detail["type"] == "missing" else f"got {_shown(detail['input'])}"
+    found = "missing" if detail["type"] == "missing" else f"got {shown(detail['input'])}"
     return f"{name}: {found}; {must}"
-
-
-def _shown(value: Any) -> str:
-    """A value as Python writes it, in one line of a readable length."""
-    try:
-        text = " ".join(repr(value).split())
-    except ValueError:  # of a whole number with thousands of digits
-        return "a number too long to show"
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def accepted(field: FieldInfo) -> str:

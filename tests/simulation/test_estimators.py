@@ -151,6 +151,7 @@ def test_drift_is_noticed(monkeypatch):
         ({"time": 3.0}, "two transients"),
         *(({"time": time}, "^time must be a finite number, got") for time in (math.nan, math.inf, "x", False)),
         ({"time": 1e308}, "a million transients; reduce it"),
+        ({"time": 10**5000}, "^time must be a finite number, got a number too long to show"),
         ({"paths": 10}, "32 to"),
         ({"seed": -1}, "seed = -1"),
         ({"estimator": "exact"}, "direct, population"),
