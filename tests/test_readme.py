@@ -13,8 +13,8 @@ README = Path(__file__).parents[1] / "README.md"
 def test_the_blocks_of_python_run(tmp_path, monkeypatch, capsys):
     matplotlib.use("Agg")
     monkeypatch.chdir(tmp_path)
-    fig1 = fpsolve.load_case(README.parent / "cases/fig1.toml", ["output.figure=false", "output.eigenfunctions=[]"])
-    fpsolve.run(fig1)  # as the README does above them
+    numbers = "output={ figure = false, quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"
+    fpsolve.run(fpsolve.load_case(README.parent / "cases/fig1.toml", [numbers]))  # as the README does above them
     text = README.read_text(encoding="utf-8").replace("paths=4096", "paths=256")
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert len(blocks) >= 4

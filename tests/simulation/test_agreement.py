@@ -27,12 +27,13 @@ def test_agrees_with_finite_elements():
     assert np.max([row.simulated.standard_error for row in given]) < 2e-3
 
 
-def test_a_sample_agrees_with_finite_elements():
-    """Moderate noise as it stands, and strong noise that is reduced."""
-    table = list(rows([(0.5, 0.6, "exact"), (1.0, 0.8, "reduced")], paths=4096, transients=8, step=cheap_step))
+@pytest.mark.parametrize("chosen", [(1.0, 0.8, "reduced"), pytest.param((0.5, 0.6, "exact"), marks=pytest.mark.slow)])
+def test_a_sample_agrees_with_finite_elements(chosen):
+    """Strong noise that is reduced, and moderate noise as it stands."""
+    table = list(rows([chosen], paths=4096, transients=8, step=cheap_step))
     given = [row for row in table if row.simulated.value is not None]
-    assert sum(row.simulated.estimator == "population" for row in given) >= 8
-    assert sum(row.simulated.estimator == "direct" for row in given) >= 3
+    assert sum(row.simulated.estimator == "population" for row in given) >= 4
+    assert sum(row.simulated.estimator == "direct" for row in given) >= 1
     assert np.max(np.abs([row.deviation for row in given])) <= 4
     assert np.max([row.simulated.standard_error for row in given]) < 2e-3
 
