@@ -29,8 +29,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.bordered import Bordered
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import Bordered, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver

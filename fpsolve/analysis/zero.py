@@ -17,7 +17,7 @@ from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slo
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.bordered import Bordered
+from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy

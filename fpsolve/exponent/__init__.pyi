@@ -1,7 +1,7 @@
 from .adapt import Budget as Budget
-from .bordered import second_derivative as second_derivative
 from .eigen import PrincipalPair as PrincipalPair
 from .eigen import principal_pair as principal_pair
+from .eigen import second_derivative as second_derivative
 from .eigen import spectrum as spectrum
 from .error import Estimate as Estimate
 from .error import Failure as Failure

@@ -189,45 +189,35 @@ class Index(Quantity):
     interval: tuple[float, float] = field(default=(-math.inf, math.inf), kw_only=True)
 
 
-def _theory(problem: Problem, name: str) -> float:
-    """A number of second-order perturbation theory; NaN where that does not apply."""
-    return float(getattr(second_order_or_none(problem), name, math.nan))
+def _index(
+    quantity: Quantity,
+    solve: Callable[[ExponentSolver, float | None], Estimate | Absent],
+    interval: tuple[float, float] = (-math.inf, math.inf),
+) -> Index:
+    """The theory is the number of this name of second-order perturbation theory; NaN where that does not apply."""
+
+    def theory(problem: Problem) -> float:
+        return float(getattr(second_order_or_none(problem), quantity.name, math.nan))
+
+    return Index(**vars(quantity), solve=solve, theory=theory, interval=interval)
 
 
-LYAPUNOV_EXPONENT = Index(
-    **vars(quantity.LYAPUNOV_EXPONENT),
-    solve=lambda solver, _: solver.lyapunov_exponent(),
-    theory=lambda problem: _theory(problem, "lyapunov_exponent"),
+def _restitution_by_theory(problem: Problem) -> float:
+    theory, system = second_order_or_none(problem), problem.system
+    return system.impact_value(theory.critical_log_factor) if theory and system.impact_parameter else math.nan
+
+
+LYAPUNOV_EXPONENT = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())
+STABILITY_INDEX = _index(
+    quantity.STABILITY_INDEX, lambda solver, root: nonzero_root(solver, guess=root), SEARCH_INTERVAL
 )
-STABILITY_INDEX = Index(
-    **vars(quantity.STABILITY_INDEX),
-    solve=lambda solver, root: nonzero_root(solver, guess=root),
-    theory=lambda problem: _theory(problem, "stability_index"),
-    interval=SEARCH_INTERVAL,
-)
-VARIANCE_RATE = Index(
-    **vars(quantity.VARIANCE_RATE),
-    solve=lambda solver, _: solver.variance_rate(),
-    theory=lambda problem: _theory(problem, "variance_rate"),
-)
-IMPACT_RATE = Index(
-    **vars(quantity.IMPACT_RATE),
-    solve=lambda solver, _: impact_rate(solver),
-    theory=lambda problem: _theory(problem, "impact_rate"),
-)
-CRITICAL_IMPACT_FACTOR = Index(
-    **vars(quantity.CRITICAL_IMPACT_FACTOR),
-    solve=lambda solver, _: critical_impact_factor(solver),
-    theory=lambda problem: _theory(problem, "critical_impact_factor"),
-)
+VARIANCE_RATE = _index(quantity.VARIANCE_RATE, lambda solver, _: solver.variance_rate())
+IMPACT_RATE = _index(quantity.IMPACT_RATE, lambda solver, _: impact_rate(solver))
+CRITICAL_IMPACT_FACTOR = _index(quantity.CRITICAL_IMPACT_FACTOR, lambda solver, _: critical_impact_factor(solver))
 CRITICAL_RESTITUTION = Index(
     **vars(quantity.CRITICAL_RESTITUTION),
     solve=lambda solver, _: critical_restitution(solver),
-    theory=lambda problem: (
-        problem.system.impact_value(_theory(problem, "critical_log_factor"))
-        if problem.system.impact_parameter
-        else math.nan
-    ),
+    theory=_restitution_by_theory,
     interval=(0.0, 1.0),
 )
 INDICES: Mapping[str, Index] = {

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, dataset
 from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
@@ -27,8 +27,7 @@ from fpsolve.exponent.adapt import (
     misplaced,
     widened,
 )
-from fpsolve.exponent.bordered import second_derivative, slope_rounding
-from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.eigen import PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.factors import one_thread
@@ -36,7 +35,7 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
-from fpsolve.model.problem import Problem, checked_moment, checked_moments
+from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
 from fpsolve.theory.far import far_places, grows_far_out, log_tail, variance_tail
 from fpsolve.theory.perturbation import Scale, scale_of
 
@@ -169,7 +168,9 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite.
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
         """
-        return self.place.solution(checked_moment(p, self.problem), tolerance)
+        point = real_number(p, "p")
+        refuse_infinite(self.problem, point)
+        return self.place.solution(point, tolerance)
 
     @cached_property
     def scales(self) -> Scale:

@@ -40,13 +40,10 @@ def sparse_lu(matrix: Any, **options: Any) -> Any:
 
 
 class Factors(Protocol):
-    """Solves A x = b, or Aᵀx = b."""
+    """Of a matrix A."""
 
-    def solve(self, b: FloatArray) -> FloatArray:
-        """x of A x = b."""
-
-    def solve_transposed(self, b: FloatArray) -> FloatArray:
-        """x of Aᵀx = b."""
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """x of A x = b, or of Aᵀx = b."""
 
 
 def factorised(operator: KroneckerSum) -> Factors:
@@ -68,11 +65,8 @@ class DenseFactors:
             pivots = np.einsum("ii->i", self._lu)
             pivots[pivots == 0] = np.finfo(float).eps * np.max(np.abs(pivots))
 
-    def solve(self, b: FloatArray) -> FloatArray:
-        return np.asarray(dgetrs(self._lu, self._pivots, b)[0])
-
-    def solve_transposed(self, b: FloatArray) -> FloatArray:
-        return np.asarray(dgetrs(self._lu, self._pivots, b, trans=1)[0])
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        return np.asarray(dgetrs(self._lu, self._pivots, b, trans=transposed)[0])
 
     def right_quotient(self, b: FloatArray) -> FloatArray:
         """b A⁻¹."""
@@ -103,26 +97,18 @@ class BlockFactors:
                     dgemm(-1.0, quotient, row, beta=1.0, c=blocks[k - j][min(j, k)], overwrite_c=1)
             self._steps.append((pivot, list(zip(others, right, left, strict=True))))
 
-    def solve(self, b: FloatArray) -> FloatArray:
-        rest = b.reshape(self._shape).T.copy()
-        for i, (_, others) in zip(range(len(rest) - 1, -1, -1), self._steps, strict=True):
-            for j, _right, left in others:
-                rest[j] -= left @ rest[i]
-        for i, (pivot, others) in enumerate(reversed(self._steps)):
-            for j, right, _left in others:
-                rest[i] -= right @ rest[j]
-            rest[i] = pivot.solve(rest[i])
-        return rest.T.ravel()
-
-    def solve_transposed(self, b: FloatArray) -> FloatArray:
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         rest = b.reshape(self._shape).T.copy()
         for i, (pivot, others) in zip(range(len(rest) - 1, -1, -1), self._steps, strict=True):
-            rest[i] = pivot.solve_transposed(rest[i])
-            for j, right, _left in others:
-                rest[j] -= right.T @ rest[i]
-        for i, (_pivot, others) in enumerate(reversed(self._steps)):
-            for j, _right, left in others:
-                rest[i] -= left.T @ rest[j]
+            if transposed:
+                rest[i] = pivot.solve(rest[i], transposed=True)
+            for j, right, left in others:
+                rest[j] -= right.T @ rest[i] if transposed else left @ rest[i]
+        for i, (pivot, others) in enumerate(reversed(self._steps)):
+            for j, right, left in others:
+                rest[i] -= left.T @ rest[j] if transposed else right @ rest[j]
+            if not transposed:
+                rest[i] = pivot.solve(rest[i])
         return rest.T.ravel()
 
 
@@ -137,8 +123,5 @@ class SparseFactors:
             shifted = matrix + 1e-15 * abs(matrix).max() * identity(operator.size, format="csc")
             self._lu = sparse_lu(shifted, diag_pivot_thresh=0.01)
 
-    def solve(self, b: FloatArray) -> FloatArray:
-        return np.asarray(self._lu.solve(b))
-
-    def solve_transposed(self, b: FloatArray) -> FloatArray:
-        return np.asarray(self._lu.solve(b, trans="T"))
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        return np.asarray(self._lu.solve(b, trans="T" if transposed else "N"))

@@ -30,43 +30,27 @@ ALL_ORDERS = slice(None)
 
 
 @dataclass(frozen=True)
-class Power:
-    """The coefficient pⁿ."""
+class OfMoment:
+    """The coefficient pⁿ R^p, n ≤ 1 unless R = 1, less 1 where only the change at a jump counts.
+
+    Attributes:
+        n: the power of p.
+        log_factor: ln R.
+        is_change: whether 1 is taken away.
+    """
 
     n: int
+    log_factor: float = 0.0
+    is_change: bool = False
 
     def __call__(self, p: float, derivative: int = 0) -> float:
         """Its k-th derivative."""
-        return math.perm(self.n, derivative) * float(p) ** max(self.n - derivative, 0)
-
-
-@dataclass(frozen=True)
-class JumpPower:
-    """The coefficient R^p − 1."""
-
-    log_factor: float
-
-    def __call__(self, p: float, derivative: int = 0) -> float:
-        """Its k-th derivative."""
-        if derivative == 0:
+        if self.is_change and not derivative:
             return math.expm1(p * self.log_factor)
-        return self.log_factor**derivative * math.exp(p * self.log_factor)
-
-
-@dataclass(frozen=True)
-class JumpPowerSlope:
-    """The coefficient ∂R^p/∂ ln R = p R^p."""
-
-    log_factor: float
-
-    def __call__(self, p: float, derivative: int = 0) -> float:
-        """Its k-th derivative."""
-        log = self.log_factor
-        grown = derivative * log ** max(derivative - 1, 0) + p * log**derivative
-        return grown * math.exp(p * log)
-
-
-OfMoment = Power | JumpPower | JumpPowerSlope
+        if not self.log_factor:
+            return math.perm(self.n, derivative) * float(p) ** max(self.n - derivative, 0)
+        parts = p**self.n * self.log_factor**derivative, self.n * derivative * self.log_factor ** max(derivative - 1, 0)
+        return sum(parts) * math.exp(p * self.log_factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,51 +130,47 @@ class Terms:
         # nothing is left of the other side: where ξ is large that would count
         self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - _rows(0.5 * direction, self._jump)
 
-    def _term(self, order: int, of_p: OfMoment, phase: Any, g: Coefficient | None, text: str) -> Term:
+    def _term(self, phase: Any, g: Coefficient | None, text: str, of_p: OfMoment = OfMoment(0), order: int = 0) -> Term:
         noises = tuple(g if axis == self._noise else one for axis in range(1, self._count + 1))
         return Term(order, of_p, phase, noises, text)
 
     def whole(self) -> Iterator[Term]:
         """L(p) of Eq. (19)."""
-        yield self._term(0, Power(0), self.phi.identity, None, "L_ξ, the generator of the noise")
+        yield self._term(self.phi.identity, None, "L_ξ, the generator of the noise")
         for term in self.system.terms:
             yield from self._driven(term)
         # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
-        text, jump, vertices = "upwind loads between cells", self._jump, self._vertices
+        text, jump = "upwind loads between cells", self._jump
         if not np.all(self._is_exact):
             typical = np.where(self._is_exact, 0.0, self.typical_speed())
-            yield self._term(0, Power(0), -0.5 * jump.T @ _rows(typical, jump), one, text)
+            yield self._term(-0.5 * jump.T @ _rows(typical, jump), one, text)
         for j in self._two_way:
-            yield self._term(0, Power(0), -0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(vertices[j])), text)
+            yield self._term(-0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(self._vertices[j])), text)
         for ray in self.system.jumps:
             text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
+            change = OfMoment(0, ray.log_factor, is_change=True)
             for load, sign in self._loads(ray):
                 size, flux = self._flux(ray, sign)
-                yield self._term(2, JumpPower(ray.log_factor), size * load, flux, text)
+                yield self._term(size * load, flux, text, change, order=2)
 
     def changed(self, by: ParameterDerivative) -> Iterator[Term]:
         """∂L(p)/∂θ of the same terms where the motion and its jumps change with θ.
 
         Where θ is the size of the speed for the typical ξ it is held: [T] = 0 there but for the error of the elements.
         """
-        text, moved = "∂/∂θ", Moved(self.system.epsilon, by.terms)
+        text, jump, moved = "∂/∂θ", self._jump, Moved(self.system.epsilon, by.terms)
         for term in by.terms:
             yield from self._driven(term)
         for j in self._two_way:
-            yield self._term(
-                0,
-                Power(0),
-                -0.5 * self._jump[[j]].T @ self._jump[[j]],
-                self._faster(moved, float(self._vertices[j])),
-                text,
-            )
-        for ray, change in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
+            yield self._term(-0.5 * jump[[j]].T @ jump[[j]], self._faster(moved, float(self._vertices[j])), text)
+        for ray, slope in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
+            change = OfMoment(0, ray.log_factor, is_change=True)
             for load, sign in self._loads(ray):
-                if change:
+                if slope:
                     size, flux = self._flux(ray, sign)
-                    yield self._term(2, JumpPowerSlope(ray.log_factor), change * size * load, flux, text)
+                    yield self._term(slope * size * load, flux, text, OfMoment(1, ray.log_factor), order=2)
                 if by.terms:
-                    yield self._term(2, JumpPower(ray.log_factor), load, self._more_flux(moved, ray, sign), text)
+                    yield self._term(load, self._more_flux(moved, ray, sign), text, change, order=2)
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h ∂φ with the loads at the φ-vertices, and p q."""
@@ -199,10 +179,10 @@ class Terms:
         if not term.h.vanishes:
             loads = self._trace.T @ _rows(term.h(self._vertices), self._jump)
             along = size * (self.phi.convection(term.h) + loads)
-            yield self._term(term.order, Power(0), along, term.g, f"{text}{_written(term.h)} ∂φ")
+            yield self._term(along, term.g, f"{text}{_written(term.h)} ∂φ", order=term.order)
         if not term.q.vanishes:
             along = size * self.phi.mass(term.q)
-            yield self._term(term.order, Power(1), along, term.g, f"p {text}{_written(term.q)}")
+            yield self._term(along, term.g, f"p {text}{_written(term.q)}", OfMoment(1), order=term.order)
 
     def typical_speed(self) -> FloatArray:
         """θ at the φ-vertices for the typical ξ, shape (m,)."""

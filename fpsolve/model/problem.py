@@ -12,7 +12,7 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_number, real_numbers
+from fpsolve.arrays import FloatArray, real_numbers
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise, NoiseDerivative
@@ -195,13 +195,6 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     for jump in system.jumps:
         if p * jump.log_factor > math.log(most) and crosses_both_ways(system, jump, xi):
             raise NoSuchExponent(Message(Code.INFINITE_ON_RAY, p=p, phase=jump.phase, factor=most))
-
-
-def checked_moment(p: Any, problem: Problem) -> float:
-    """One p, finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
-    point = real_number(p, "p")
-    refuse_infinite(problem, point)
-    return point
 
 
 def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = False) -> FloatArray:

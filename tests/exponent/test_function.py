@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.bordered import second_derivative
+from fpsolve.exponent.eigen import second_derivative
 from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver

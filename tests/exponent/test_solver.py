@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.bordered import second_derivative
-from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent.eigen import principal_pair, second_derivative
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator

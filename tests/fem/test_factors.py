@@ -25,7 +25,7 @@ def operator(request, rng):
 def test_all_kinds_solve_the_same_systems(operator, kind, rng):
     factors, matrix, b = kind(operator), operator.toarray(), rng.standard_normal(operator.size)
     np.testing.assert_allclose(factors.solve(b), np.linalg.solve(matrix, b), rtol=1e-8, atol=1e-10)
-    np.testing.assert_allclose(factors.solve_transposed(b), np.linalg.solve(matrix.T, b), rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(factors.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-8, atol=1e-10)
 
 
 def test_products_transposes_and_bounds(operator, rng):

@@ -10,7 +10,7 @@ from fpsolve.exponent.eigen import spectrum
 from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.fem.terms import JumpPower, Power
+from fpsolve.fem.terms import OfMoment
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.plane import CoefficientMatrix
@@ -110,13 +110,17 @@ def test_noise_may_enter_by_any_function():
     assert "cube(ξ)" in str(cubed)
 
 
-@pytest.mark.parametrize("coefficient", [Power(0), Power(1), Power(2), Power(3), JumpPower(-0.2), JumpPower(0.0)])
+POWERS = [OfMoment(n) for n in range(4)]
+JUMPS = [OfMoment(0, -0.2, is_change=True), OfMoment(0, 0.0, is_change=True), OfMoment(1, -0.2)]
+
+
+@pytest.mark.parametrize("coefficient", POWERS + JUMPS)
 @pytest.mark.parametrize("derivative", [0, 1, 2])
 def test_coefficients_and_their_derivatives(coefficient, derivative):
     p, h = 1.3, 1e-4
     slope = (coefficient(p + h, derivative) - coefficient(p - h, derivative)) / (2 * h)
     assert coefficient(p, derivative + 1) == pytest.approx(slope, abs=1e-7)
-    assert coefficient(0.0) == (1 if coefficient == Power(0) else 0)
+    assert coefficient(0.0) == (1 if coefficient == OfMoment(0) else 0)
 
 
 @pytest.mark.parametrize("p", sampled(0.5, -3.0, 4.0))

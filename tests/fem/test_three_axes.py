@@ -76,7 +76,9 @@ def test_sums_of_three_factors(operator, rng):
     np.testing.assert_allclose(operator.shifted(0.3).toarray(), matrix - 0.3 * np.kron(np.eye(4), rest), atol=1e-12)
     for factors in (DenseFactors(operator.toarray()), BlockFactors(operator), SparseFactors(operator)):
         np.testing.assert_allclose(factors.solve(v), np.linalg.solve(matrix, v), rtol=1e-8, atol=1e-10)
-        np.testing.assert_allclose(factors.solve_transposed(v), np.linalg.solve(matrix.T, v), rtol=1e-8, atol=1e-10)
+        np.testing.assert_allclose(
+            factors.solve(v, transposed=True), np.linalg.solve(matrix.T, v), rtol=1e-8, atol=1e-10
+        )
 
 
 def test_sparse_factors_among_dense_ones(operator, rng):
