@@ -267,7 +267,7 @@ def matrix_at(system: System, xi: ArrayLike, orders: slice = slice(None)) -> Flo
     """A(ξ) = Σ ε^n g(ξ) A over the terms of some orders, shape (*ξ.shape, 2, 2)."""
     xi = np.asarray(xi, dtype=float)
     total = np.zeros((*xi.shape, 2, 2))
-    wanted = range(1 + max(term.order for term in system.terms))[orders]
+    wanted = range(1 + max((term.order for term in system.terms), default=0))[orders]
     for term in system.terms:
         if term.order in wanted:
             total += system.epsilon**term.order * term.g(xi)[..., None, None] * np.array(term.matrix)
