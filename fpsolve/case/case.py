@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any
+from unicodedata import category
 
 import numpy as np
 from pydantic import (
@@ -54,6 +57,8 @@ COMPUTED = ("oscillator", "system", "noise", "moments", "vary", "mesh")
 MOST_DRAWN = 10
 """Of so many curves at most eigenfunctions are written unasked."""
 USUAL_P = 2.0
+_NO_FOLDER = re.compile(r".*[. ]|(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE | re.DOTALL)
+"""Names that are ".", "..", or what Windows changes or has for devices."""
 
 
 @dataclass(frozen=True)
@@ -313,10 +318,19 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
         faults += (document.fault(*fault) for fault in explain(error, fields, parameters or {}))
     except RecursionError:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
+    faults += _faults_of_name(Path(path).stem)
     if faults:
         raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
     case._path, case._overrides, case._text = Path(path), tuple(overrides), document.text
     return case
+
+
+def _faults_of_name(name: str) -> Iterator[Fault]:
+    """Why a file's name without its ending, which names the folder of the results, is none of a folder everywhere."""
+    if any(category(letter)[0] == "C" for letter in name) or "\\" in name or _NO_FOLDER.fullmatch(name):
+        text = f"got {json.dumps(name)} as the file's name without its ending, which names the folder of its results; "
+        remedy = "must have no control characters and no backslash, not end in a dot or a space, and be no device"
+        yield Fault("", None, f"{text}{remedy}; rename the file")
 
 
 def _spread(p: FloatArray) -> FloatArray:

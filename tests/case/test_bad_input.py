@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fpsolve.case.case import load_case
+from fpsolve.cli import BAD_INPUT, main
 from fpsolve.errors import CaseError
 from fpsolve.fem.mesh import make_mesh, write_mesh
 from fpsolve.simulation.setup import default_step, obstacles, transient
@@ -225,6 +226,18 @@ def test_no_file(tmp_path: Path, name: str, sentence: str) -> None:
     write(tmp_path, GOOD)
     assert only_message(tmp_path / name) == f"{tmp_path / name}: {sentence.format(tmp_path)}"
     assert "cannot be read (" in only_message(tmp_path / "a\0b.toml")
+
+
+@pytest.mark.parametrize("name", [".", "..", "a.", "a ", "a\x1b[31m", "a\nb", "a\\b", "NUL", "com1.old", "a\u202eb"])
+def test_names_that_are_no_folder(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The results of `..toml` would be in the folder of all results, those of `...toml` in the one above."""
+    monkeypatch.chdir(tmp_path)
+    path = Path(f"{name}.toml")
+    path.write_text(GOOD, encoding="utf-8")
+    with pytest.raises(CaseError, match="names the folder of its results; must have no control characters"):
+        load_case(path)
+    assert main(["run", str(path)]) == BAD_INPUT
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
 
 
 def test_a_link_to_a_case(tmp_path: Path) -> None:
