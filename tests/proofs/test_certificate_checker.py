@@ -20,8 +20,7 @@ import fpsolve
 from fpsolve.proofs import prove, prove_lyapunov_exponent
 from fpsolve.proofs.balls import precision
 from fpsolve.proofs.claims import Bound, MomentBound
-from fpsolve.proofs.galerkin import Galerkin
-from fpsolve.proofs.search import bases, certificate_of
+from fpsolve.proofs.search import Galerkin, bases, certificate_of
 from fpsolve.proofs.statement import cylinder
 from tests.conftest import sampled
 from tests.oracles import certificate_checker as checker
