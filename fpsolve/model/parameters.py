@@ -19,7 +19,7 @@ SIZE = {"ge": 1e-15, "le": 1e15}
 """The range of a positive parameter: whatever the others are, no formula overflows or divides by nothing."""
 DERIVED = {"ge": 1e-32, "le": 1e32}
 """That of what is made of such parameters."""
-STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+STRICT: ConfigDict = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
 def parameter(
