@@ -441,29 +441,20 @@ def _draw_map(axes: Any, case: Case, results: Sequence[CurveResult], keys: tuple
     edges = _edges(x), _edges(y)
     label_axes(axes, *(case.about(key).attributes for key in keys))
     _draw_values(axes, values, edges, setting.quantity.timed(setting.time_unit).attributes)
-    for axis, each, ends, limits in zip(
-        (axes.xaxis, axes.yaxis), (x, y), edges, (setting.xlim, setting.ylim), strict=True
+    limits = setting.xlim, setting.ylim
+    for axis, each, ends, limit in zip((axes.xaxis, axes.yaxis), (x, y), edges, limits, strict=True):
+        scale_axis(axis, scale_of(each), limit or (float(ends[0]), float(ends[-1])))
+    sought = "" if setting.moment is not None else " from {:g} to {:g}".format(*INDICES[setting.needed].interval)
+    unsolved: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.45", "hatch": "/////"}
+    absent: dict[str, Any] = {"facecolor": "0.8", "edgecolor": "none"}
+    for where, style, label in (
+        (failed, unsolved, "failed or not solved"),
+        (np.isnan(values) & ~failed, absent, f"no {setting.quantity.words}{sought}"),
     ):
-        scale_axis(axis, scale_of(each), limits or (float(ends[0]), float(ends[-1])))
-    range_of_index = (
-        "" if setting.moment is not None else " from {:g} to {:g}".format(*INDICES[setting.needed].interval)
-    )
-    unsolved: dict[str, Any] = {
-        "facecolor": "white",
-        "edgecolor": "0.45",
-        "hatch": "/////",
-        "label": "failed or not solved",
-    }
-    absent: dict[str, Any] = {
-        "facecolor": "0.8",
-        "edgecolor": "none",
-        "label": f"no {setting.quantity.words}{range_of_index}",
-    }
-    for where, style in ((failed, unsolved), (np.isnan(values) & ~failed, absent)):
         (left, low), (width, height) = edges, map(np.diff, edges)
         cells = [Rectangle((left[j], low[i]), width[j], height[i]) for i, j in np.argwhere(where)]
         if cells:
-            axes.add_collection(PatchCollection(cells, linewidth=0, **style))
+            axes.add_collection(PatchCollection(cells, linewidth=0, label=label, **style))
     known = values[np.isfinite(values)]
     if known.size and known.min() < 0 < known.max():
         wide = points(1.5)
