@@ -141,7 +141,7 @@ def groups(values: Sequence[Value]) -> list[int]:
             runs[-1].append(place)
         else:
             runs.append([place])
-    first = {place: min(run) for run in runs for place in run}
+    first = {place: start for run, start in zip(runs, map(min, runs), strict=True) for place in run}
     return [first[i] for i in range(len(values))]
 
 

@@ -15,7 +15,7 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.case.sections import Sweep
-from fpsolve.case.vary import Vary, assignments, legend
+from fpsolve.case.vary import Vary, assignments, groups, legend
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
@@ -74,6 +74,13 @@ def test_sets_side_by_side() -> None:
     assert list(vary.sets(1)) == [{"noise.D0": 0.5, "noise.r0": 0.9}, {"noise.D0": 0.1, "noise.r0": 0.8}]
     assert vary.values("noise.D0") == (0.1, 0.5)
     assert list(vary.among(["noise.r0"])) == [{"noise.r0": 0.9}, {"noise.r0": 0.8}]
+
+
+@pytest.mark.parametrize("value", ["exact", 0.1])
+def test_many_equal_values_are_grouped_at_once(value: float | str) -> None:
+    started = time.process_time()
+    assert groups((value,) * 20_000) == [0] * 20_000
+    assert time.process_time() - started < 1
 
 
 @pytest.mark.parametrize("mode", ["product", "zip"])
