@@ -108,3 +108,14 @@ def test_a_pair_is_of_one_number(p):
 @pytest.mark.parametrize("p", [1, (1.0,), np.float32(1), np.array(1), range(1, 2), [Fraction(1)], Decimal(1)], ids=repr)
 def test_all_real_numbers_are_orders_of_moments(p):
     assert moment_lyapunov(FIG1, WEAK_NOISE, p).value == moment_lyapunov(FIG1, WEAK_NOISE, 1.0).value
+
+
+@pytest.mark.parametrize("p", [[2.0, -1.0, 2.0, 0.5], np.resize([3.0, -2.0, 0.5, 1.5, -0.5, 2.5, 1.0], 40)])
+def test_numbers_stand_at_their_p(fig1_solver, p):
+    """In whatever order these come, and however often; the second array is interpolated."""
+    found = solve_moments(fig1_solver, p)
+    np.testing.assert_array_equal(found.p, p)
+    for i, each in enumerate(p):
+        pair = fig1_solver.pair(float(each))
+        assert found.value[i] == pytest.approx(pair.value, rel=1e-8)
+        assert found.derivative[i] == pytest.approx(pair.derivative, rel=1e-8)
