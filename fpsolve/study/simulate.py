@@ -11,7 +11,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.pool import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
 from fpsolve.study.results import SimulatedCurve
-from fpsolve.theory.validity import simulated_tail_note
+from fpsolve.theory.far import simulated_tail_note
 
 SIGNIFICANT = 3.0
 """Standard errors by which λ must exceed 0 before a stationary response is sought."""

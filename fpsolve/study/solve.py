@@ -32,8 +32,8 @@ from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity, message_of
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns, Solved
-from fpsolve.theory import validity
-from fpsolve.theory.perturbation import perturbed_moments
+from fpsolve.theory.far import heavy_tail_note
+from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
 Kept = TypeVar("Kept")
 BATCHES, MOST_SETS = 256, 64
@@ -151,10 +151,10 @@ def solve_curve(
         )
     exponent = estimates[LYAPUNOV_EXPONENT.name]
     notes = (
-        validity.heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
+        heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
         *found.notes,
         *curve.problem.remarks,
-        validity.weak_noise_note(curve.problem, found.p, found.value),
+        weak_noise_note(curve.problem, found.p, found.value),
         *of[Severity.NOTE],
         *(slopes.notes if slopes else ()),
     )

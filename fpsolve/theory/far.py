@@ -117,6 +117,17 @@ def grows_far_out(problem: Problem) -> bool:
     return False
 
 
+def heavy_tail_note(problem: Problem, exponent: float | None) -> Message | None:
+    """What λ, Λ(p) and δ_p mean for noise with algebraic tails, see `far_places`."""
+    is_no_slope = exponent is not None and exponent > 0
+    return Message(Code.HEAVY_TAILS, is_no_slope=is_no_slope) if grows_far_out(problem) else None
+
+
+def simulated_tail_note(problem: Problem) -> Message | None:
+    """What a simulation cannot see."""
+    return Message(Code.UNSEEN_TAILS) if grows_far_out(problem) else None
+
+
 def variance_tail(problem: Problem) -> float:
     """s with which what noise beyond z adds to Λ″(0) falls like z^(−s); s ≤ 0 where Λ″(0) is infinite.
 

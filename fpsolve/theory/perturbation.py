@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoPerturbationTheory
+from fpsolve.messages import Code, Message
 from fpsolve.model.plane import (
     Harmonics,
     System,
@@ -34,6 +35,9 @@ from fpsolve.model.plane import (
     written_coefficient,
 )
 from fpsolve.model.problem import Problem
+
+WEAK = 0.05
+"""Share of the terms of Eq. (37) that the orders beyond may have."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +159,25 @@ def perturbed_moments(problem: Problem, p: FloatArray) -> FloatArray:
     """ε²Λ₂(p), Eq. (37), shape (n,); NaN where perturbation theory does not apply."""
     theory = second_order_or_none(problem)
     return np.full(np.shape(p), math.nan) if theory is None else np.asarray(theory.moment_exponent(p), dtype=float)
+
+
+def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> Message | None:
+    """On Eq. (37) where the orders ε⁴ and above, Λ − ε²Λ₂, are not small against its terms before they cancel.
+
+    Eq. (37) is a parabola, convex for every p; what limits it is the p from which on this criterion is broken.
+    """
+    theory = second_order_or_none(problem)
+    if theory is None:
+        return None
+    rest = value - theory.moment_exponent(p)
+    scale = theory.scale.moment(p)
+    shares = np.divide(np.abs(rest), scale, out=np.zeros_like(scale), where=scale > 0)
+    beyond = shares > WEAK
+    if not np.any(beyond):
+        return None
+    worst, first = int(np.argmax(shares)), np.min(np.abs(p[beyond]))
+    found = {"first": first, "p": p[worst], "rest": rest[worst], "size": shares[worst]}
+    return Message(Code.STRONG_NOISE, is_reduced=problem.noise.approximates_spectrum, most=WEAK, **found)
 
 
 def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: ArrayLike) -> FloatArray:

@@ -7,7 +7,7 @@ from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.theory import validity
+from fpsolve.theory.perturbation import weak_noise_note
 from tests.conftest import FIG1, FIG1_NOISE
 from tests.oracles import perturbation
 
@@ -40,8 +40,8 @@ def test_weak_noise_needs_no_note_and_strong_noise_gets_its_size():
     weak, strong = FIG1, VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.6)
     noise = FIG1_NOISE.ou_reduction()
     values = [moment_lyapunov(oscillator, noise, p, rtol=1e-6).value for oscillator in (weak, strong)]
-    assert validity.weak_noise_note(Problem(weak, noise), p, values[0]) is None
-    note = validity.weak_noise_note(Problem(strong, noise), p, values[1])
+    assert weak_noise_note(Problem(weak, noise), p, values[0]) is None
+    note = weak_noise_note(Problem(strong, noise), p, values[1])
     rest = values[1] - perturbation.moment_exponent(strong, noise, p)
     shares = np.abs(rest[p != 0]) / perturbation.moment_scale(strong, noise, p[p != 0])
     worst = shares.argmax()
