@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
@@ -336,7 +337,13 @@ def solve_moments(
     def report() -> None:
         next(reports, lambda: None)()
 
-    result = _interpolated(solver, points, report) or _one_by_one(solver, points, report)
+    result = None
+    if points.size > FEW_MOMENTS and not grows_far_out(solver.problem):
+        ends = float(points.min()), float(points.max())
+        with suppress(NotConverged):
+            function = MomentLyapunovFunction(solver.problem, ends, solver=solver, among=points, progress=report)
+            result = function.moments(points) if function.is_converged else None
+    result = result or _one_by_one(solver, points, report)
     for each in reports:
         each()
     return result if points.size == asked.size else _at(result, asked)
@@ -348,18 +355,6 @@ def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
     index = [places[each] for each in p.tolist() if each in places]
     names = ("p", "value", "derivative", "error_estimate", "residual")
     return replace(result, **{name: getattr(result, name)[index] for name in names})
-
-
-def _interpolated(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov | None:
-    """Λ at many p; None where that takes as many solves, or does not converge."""
-    if p.size <= FEW_MOMENTS or grows_far_out(solver.problem):
-        return None
-    ends = float(p.min()), float(p.max())
-    try:
-        function = MomentLyapunovFunction(solver.problem, ends, solver=solver, among=p, progress=progress)
-        return function.moments(p) if function.is_converged else None
-    except NotConverged:
-        return None
 
 
 def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov:
