@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 from string import ascii_lowercase
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -24,10 +25,10 @@ from fpsolve.study.chart import Chart, charted
 
 _TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
 """Of regions, the darker the more of the quantities grow there."""
-_ROOMY, _NAMED = 0.15, 0.01
-"""Shares of the frame from which on a region has room for its name, or for a letter; others are in chart.json only."""
+_NAMED = 0.01
+"""Share of the frame from which on a region has room for a letter; smaller ones are in chart.json only."""
 _CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "color": "black", "linewidth": 1.1, "zorder": 3}
-_LETTER: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0, "color": "0.15"}
+_FORM = Format(height=4.0)
 _SPECIAL = {"fold": ("fold", "^"), "crossing": ("crossing", "o"), "at ": ("value asked for", "s")}
 """Beginnings of labels, what the legend calls such points, and their markers."""
 
@@ -87,7 +88,7 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
     keys = frame[0].key, frame[1].key
     held = held_in_words(case.curve({}), keys, unit)
     paths = [folder / "chart.png", folder / "chart.pdf"]
-    with figure_for(paths, case.headline, held, Format(height=4.0)) as figure:
+    with figure_for(paths, case.headline, held, _FORM) as figure:
         axes = figure.add_subplot()
         label_axes(axes, *(case.about(key).attributes for key in keys))
         for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
@@ -102,17 +103,19 @@ def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
                     chosen = np.array([start in label for label in branch.labels])
                     hollow = {"color": colour, "markersize": 7, "markerfacecolor": "white"}
                     axes.plot(branch.x[chosen], branch.y[chosen], marker, **hollow)
-            name = f"{line.zero.latex}: {appears}" if appears else line.zero.latex
-            axes.plot([], [], color=colour, linewidth=2, label=name)
+            if line.branches:
+                name = f"{line.zero.latex}: {appears}" if appears else line.zero.latex
+                axes.plot([], [], color=colour, linewidth=2, label=name)
             for points in chart.closed_forms[i]:
                 axes.plot(points[:, 0], points[:, 1], **_CLOSED_FORM)
-        axes.plot([], [], label="closed form, Eqs. (38)-(39)", **_CLOSED_FORM)
+        if any(chart.closed_forms):
+            axes.plot([], [], label="closed form, Eqs. (38)-(39)", **_CLOSED_FORM)
         labels = [label for line in chart.lines for branch in line.branches for label in branch.labels]
         for start, (name, marker) in _SPECIAL.items():
             if any(start in label for label in labels):
                 axes.plot([], [], marker, label=name, color="0.35", markersize=7, markerfacecolor="none")
         for name, letter in small.items():
-            axes.plot([], [], marker=f"${letter}$", label=name, markersize=8, **_LETTER)
+            axes.plot([], [], " ", label=f"{letter}: {name}")
 
 
 def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varied) -> tuple[list[FloatArray], bool]:
@@ -161,16 +164,36 @@ def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, s
     style: dict[str, Any] = {"cmap": ListedColormap(_TINTS), "vmin": -0.5, "vmax": len(_TINTS) - 0.5}
     axes.pcolormesh(x.value(edges), y.value(edges), tints.T, rasterized=True, **style)
     letters, small = iter(ascii_lowercase), dict[str, str]()
-    for each in regions.each:
+    middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15"}
+    for number, each in enumerate(regions.each):
         name = each.name.replace("δ_p", r"$\delta_p$")
-        place = x.value(each.at[0]), y.value(each.at[1])
-        middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15"}
-        if each.share > _ROOMY:
-            axes.text(*place, "\n".join(name.split(", ")), fontsize=9.5, **middle)
-        elif each.share > _NAMED:
-            small[name] = next(letters, "z")
-            axes.text(*place, small[name], fontsize=12, weight="bold", **middle)
+        parts = name.split(", ")
+        narrow = [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]
+        for lines in (parts, narrow):
+            words = axes.text(0, 0, "\n".join(lines), fontsize=9.5, **middle)
+            if place := _room(words, regions.index == number):
+                words.set_position((x.value(place[0]), y.value(place[1])))
+                break
+            words.remove()
+        else:
+            if each.share > _NAMED:
+                small[name] = rf"$\mathbf{{{next(letters, 'z')}}}$"
+                axes.text(x.value(each.at[0]), y.value(each.at[1]), small[name], fontsize=12, **middle)
     return small
+
+
+def _room(words: Any, inside: FloatArray) -> tuple[float, float] | None:
+    """Where the middle of words is deepest in a region with all of them inside, in shares of the sides; or None."""
+    from scipy.ndimage import distance_transform_edt, minimum_filter
+
+    box, n, inches = words.get_window_extent(), inside.shape[0], words.figure.dpi
+    shares = 1.15 * box.width / (0.85 * _FORM.width * inches), 1.15 * box.height / (_FORM.height * inches)
+    fits = minimum_filter(inside, [max(1, round(n * share)) for share in shares], mode="constant")
+    if not fits.any():
+        return None
+    depth = np.where(fits, distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1], 0)
+    u, v = np.unravel_index(int(np.argmax(depth)), depth.shape)
+    return (float(u) + 0.5) / n, (float(v) + 0.5) / n
 
 
 def _appears(zero: Zero) -> str | None:

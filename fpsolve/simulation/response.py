@@ -104,7 +104,7 @@ class Response(Result):
         with canvas_of(ax) as axes:
             draw_line(axes, found.amplitude_density, 2 * found.amplitude_density_error, **style)
             finish(axes, **style)
-            axes.set(xlim=(0, self.reach), ylim=(0, None))
+            axes.set(xlim=(0, self.reach), ylim=(0, 1.15 * axes.get_ylim()[1]))  # with room for the legend
             if ax is None:
                 axes.set_title(found.attrs["title"], parse_math=False)
         return axes

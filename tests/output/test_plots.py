@@ -83,7 +83,7 @@ def test_stability_index_is_marked_on_the_zero_line(drawn, tmp_path):
 
 
 def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
-    edges, density = np.linspace(0, 3, 31), np.exp(-np.linspace(0, 3, 30))
+    edges, density = np.linspace(0, 3, 31), np.exp(-3 * (np.linspace(0, 3, 30) - 1.5) ** 2)
     response = Response(
         means=dict.fromkeys(MEANS, (1.0, 0.01)), x_edges=edges, v_edges=np.linspace(-3, 3, 21),
         density=np.ones((30, 20)), amplitude_edges=edges, amplitude_density=density, amplitude_error=0.01 * density,
@@ -96,6 +96,8 @@ def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
     assert [label.get_text().rpartition(" ")[2] for label in labels] == units
     left, right = bar.yaxis.label.get_window_extent(), radial.yaxis.label.get_window_extent()
     assert right.x0 - left.x1 > 1.5 * left.width
+    curve = radial.lines[0].get_path().transformed(radial.transData)
+    assert not curve.intersects_bbox(radial.get_legend().get_window_extent(), filled=False)
 
 
 @pytest.mark.parametrize(("p", "count"), [("[-1.0, 2.0]", 1), ("[1.0, 2.0]", 0)])
