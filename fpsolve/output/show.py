@@ -159,7 +159,7 @@ def annotate(reader: Any, view: Any, expression: str, place: str, size: int) -> 
     """A text from the field data, which follows the time."""
     source = simple.PythonAnnotation(Input=reader, ArrayAssociation="Field Data", Expression=expression)
     text = simple.Show(source, view)
-    text.FontSize, text.WindowLocation, text.Justification = size, place, "Center"
+    text.FontSize, text.LineSpacing, text.WindowLocation, text.Justification = size, 1.3, place, "Center"
 
 
 def between(source: Any, name: str, low: float, high: float, p: float, every: bool = True) -> Any:

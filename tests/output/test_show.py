@@ -226,6 +226,7 @@ for time in {times!r}:
         elif kind == "PythonCalculator":
             lowest = simple.GetColorTransferFunction("scaled").RGBPoints[0]
         elif kind == "PythonAnnotation":
+            assert display.LineSpacing > 1.2  # or lines touch
             titles.append(servermanager.Fetch(source).GetRowData().GetAbstractArray(0).GetVariantValue(0).ToString())
     found.append([titles, captions, [view.AxesGrid.XTitle, view.AxesGrid.YTitle], lowest])
 print(json.dumps(found))
