@@ -106,6 +106,10 @@ class Code(Enum):
         "failure: Λ({p:g}) did not converge: it is at least {rate:.3g}, as much as paths grow that hold the noise "
         "beyond {z:g} standard deviations, and no eigenfunction belongs to them"
     )
+    HELD_TOO_FAR = (
+        "failure: Λ({p:g}) did not converge: it is positive, as paths grow that hold the noise beyond {z:g} standard "
+        "deviations, and not the {value:.3g} of all others"
+    )
     NO_EIGENVALUE = (
         "failure: the principal eigenvalue at p = {p:g} was not found on this mesh: backward error {residual:.1e} (at "
         "most {limit:g}), and {size:.1e} of the more positive of T and T* has the wrong sign (at most {most:g})"

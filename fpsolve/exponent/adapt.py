@@ -32,8 +32,8 @@ from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import System, phase_speed
 from fpsolve.model.problem import Problem
-from fpsolve.theory.far import Place, far_places, outlook
-from fpsolve.theory.frozen import frozen_noise
+from fpsolve.theory.far import Place, far_places, grows_far_out, outlook
+from fpsolve.theory.frozen import FURTHEST, frozen_noise
 
 LOOSE = 1e-3
 """Share of the rates within which a place is solved before it is compared with others."""
@@ -270,7 +270,10 @@ class AllPlaces:
         far = self.far.solution(p, tolerance) if other_places(near.pair) else None
         if far is None or far.pair.value - far.error < near.pair.value + 10 * near.error:
             near = self.near.solution(p, tolerance)
-        return max((each for each in (near, far) if each), key=lambda each: each.pair.value)
+        found = max((each for each in (near, far) if each), key=lambda each: each.pair.value)
+        if found.pair.value + found.error < 0 and grows_far_out(self.near.problem):
+            raise NotConverged(Message(Code.HELD_TOO_FAR, p=p, z=FURTHEST, value=found.pair.value))
+        return found
 
 
 @dataclass

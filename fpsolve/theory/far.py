@@ -17,11 +17,14 @@ from fpsolve.theory.frozen import FURTHEST, FrozenNoise, eigenvalues_at, frozen_
 
 NEAR = 4.0
 """z up to which a place is reached from 0 with ease."""
-POINTS = 2000
+POINTS, FEWEST_POINTS, PASSES = 2000, 20, 4
+"""Of finite differences, those that must hold a place, and how often they are taken anew."""
 WIDEST = 100.0
 """The furthest z looked at, over that of the place."""
 NEGLIGIBLE = 1e-10
 """Share of its maximum where the tilted density of a place is said to end."""
+MOST_ACTION = 50.0
+"""Of ψ² no more than exp(−100) is beyond."""
 FAR_OUT = 1e6, 1e9
 """z at which tails are compared."""
 
@@ -98,7 +101,7 @@ def _kept(problem: Problem, p: float) -> Outlook:
     frozen = frozen_noise(problem)
     assert frozen is not None
     z, _ = frozen.peaks(p)
-    places = tuple(_held(problem, p, *_well(frozen, p, float(each))) for each in z[np.abs(z) > NEAR])
+    places = tuple(_held(problem, p, *_well(problem, frozen, p, float(each))) for each in z[np.abs(z) > NEAR])
     return Outlook(places, (1 - 1e-6) * float(np.max(frozen.rate(p)[1:-1])), frozen.at_the_ends(p))
 
 
@@ -152,8 +155,11 @@ def log_tail(problem: Problem, z: float) -> float:
     return float(problem.noise.log_density(xi)) + math.log(abs(xi))
 
 
-def _well(frozen: FrozenNoise, p: float, center: float) -> tuple[float, float]:
-    """z from the least favourable one on the way inwards to that on the way outwards."""
+def _well(problem: Problem, frozen: FrozenNoise, p: float, center: float) -> tuple[float, float]:
+    """z from the least favourable one on the way inwards to that on the way outwards.
+
+    Or to where −ln ψ ~ ∫ √(2(F(center) − F))/σ dξ exceeds `MOST_ACTION`: few paths are held so far from the center.
+    """
     side = math.copysign(1.0, center)
     order = np.argsort(side * frozen.z)
     z, rate = side * frozen.z[order], frozen.rate(p)[order]
@@ -162,22 +168,37 @@ def _well(frozen: FrozenNoise, p: float, center: float) -> tuple[float, float]:
     inward, outward = np.diff(rate[: at + 1]) <= 0, np.diff(rate[at:]) >= 0
     first = int(np.flatnonzero(inward)[-1]) + 1 if inward.any() else 0
     last = at + int(np.argmax(outward)) if outward.any() else z.size - 1
+    fall = np.sqrt(2 * np.maximum(rate[at] - rate, 0)) * problem.noise.standard_deviation / problem.noise.diffusion
+    action = np.cumsum(0.5 * (fall[1:] + fall[:-1]) * np.diff(z))
+    before, beyond = action[at - 1] - action[:at], action[at:] - action[at - 1]
+    first = max(first, int(np.count_nonzero(before > MOST_ACTION)))
+    last = min(last, at + 1 + int(np.count_nonzero(beyond <= MOST_ACTION)))
     return side * float(z[first]), side * float(min(z[last], WIDEST * abs(center)))
 
 
 def _held(problem: Problem, p: float, inner: float, outer: float) -> Place:
-    """The largest eigenvalue of ½σ²∂² with P_s and p G(ξ), and where it is, by finite differences even in ln |ξ|."""
+    """The largest eigenvalue of ½σ²∂² with P_s and p G(ξ), and where it is, by finite differences even in s = ln |ξ|.
+
+    It is that of (a ψ′)′ − (a χ′)′ψ/χ + p G ψ with a = ½σ²/ξ² and χ = √(P_s |ξ|), of which only ln χ is needed: next to
+    r₀ = 1 P_s falls by thousands of orders of magnitude from point to point. There a place has a relative width
+    ~√(r₀ − 1), and the points are taken again where it is until enough of them hold it.
+    """
     noise, unit = problem.noise, problem.noise.standard_deviation
-    step = math.log(outer / inner) / (POINTS + 1)
-    z = inner * np.exp(0.5 * step * np.arange(2 * POINTS + 3))
-    density, size = noise.log_density(unit * z), np.log(np.abs(z))
-    mass = (density + size)[2:-1:2]
-    flux = (density - size)[1::2] + 2 * math.log(noise.diffusion / unit / step) - math.log(2)
-    growth = p * eigenvalues_at(problem, unit * z[2:-1:2])[0]
-    diagonal = growth - np.exp(flux[:-1] - mass) - np.exp(flux[1:] - mass)
-    beside = np.exp(flux[1:-1] - 0.5 * (mass[:-1] + mass[1:]))
-    last = (POINTS - 1, POINTS - 1)
-    value, vector = scipy.linalg.eigh_tridiagonal(finite(diagonal), finite(beside), select="i", select_range=last)
-    tilted = vector[:, 0] ** 2 / np.exp(size[2:-1:2])
-    held = z[2:-1:2][tilted > NEGLIGIBLE * np.max(tilted)]
-    return Place(float(value[0]), float(np.min(held)), float(np.max(held)))
+    for _ in range(PASSES):
+        step = math.log(outer / inner) / (POINTS + 1)
+        fine = inner * np.exp(0.5 * step * np.arange(2 * POINTS + 3))
+        z, log = fine[::2], 0.5 * (noise.log_density(unit * fine) + np.log(np.abs(fine)))
+        slope = (log[2:] - log[:-2])[1::2] / step
+        bend = (log[2:] - 2 * log[1:-1] + log[:-2])[1::2] * (2 / step) ** 2
+        a, beside = (0.5 * (noise.diffusion / unit / each) ** 2 for each in (z[1:-1], fine[1::2]))
+        growth = p * eigenvalues_at(problem, unit * z[1:-1])[0] - a * (slope**2 - 2 * slope + bend)
+        diagonal, beside = growth - (beside[:-1] + beside[1:]) / step**2, beside[1:-1] / step**2
+        last = (POINTS - 1, POINTS - 1)
+        value, vector = scipy.linalg.eigh_tridiagonal(finite(diagonal), finite(beside), select="i", select_range=last)
+        tilted = vector[:, 0] ** 2 / np.abs(z[1:-1])
+        held = np.flatnonzero(tilted > NEGLIGIBLE * np.max(tilted)) + 1
+        if held.size >= FEWEST_POINTS:
+            break
+        inner, outer = z[max(held[0] - 2, 0)], z[min(held[-1] + 2, z.size - 1)]
+    ends = z[held[[0, -1]]]
+    return Place(float(value[0]), float(np.min(ends)), float(np.max(ends)))

@@ -247,3 +247,28 @@ def test_rare_moments_are_told_whatever_else_is_asked():
     rates = [result.notes[0].rpartition("grows at ")[2] for result in (alone, together)]
     assert float(rates[0]) == pytest.approx(float(rates[1]), rel=1e-2)
     assert float(rates[0]) < 0.05 * alone.value[0]
+
+
+@pytest.mark.parametrize("departure", [1e-12, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4])
+def test_next_to_gaussian_noise(departure):
+    """Λ(p) > 0 tends to that for r₀ = 1, linearly; no warning, as pytest makes errors of them."""
+    limit, close = (moment_lyapunov(problem(0.5, 1.0, r0, 0.1, restitution=0.8), -0.5) for r0 in (1.0, 1 + departure))
+    assert abs(close.value[0] - limit.value[0]) < 2e-3 * departure + 1e-13
+    exponents = [lyapunov_exponent(problem(0.5, 1.0, r0, 0.1, restitution=0.8)).value for r0 in (1.0, 1 + departure)]
+    assert exponents[1] == pytest.approx(exponents[0], abs=4e-3 * departure + 1e-13)
+
+
+@pytest.mark.parametrize("departure", [1e-6, 1e-5, 1e-4, 1e-3])
+def test_next_to_gaussian_noise_the_place_is_far_out_and_narrow(departure):
+    case, p = problem(0.5, 1.0, 1 + departure, 0.1, restitution=0.8), -0.5
+    place = min(far_places(case, p), key=lambda each: each.lower)
+    closed, xi = hydrogen(case.noise, 0.1, p)
+    assert place.rate == pytest.approx(closed, rel=1e-3)
+    assert place.lower < -xi / case.noise.standard_deviation < place.upper < 0
+
+
+@pytest.mark.parametrize("departure", [1e-12, 1e-6, 1e-4])
+def test_what_is_not_positive_is_no_value_of_heavy_tails(departure):
+    """With c₁ > 0 the place around 0 has Λ < 0; that far out is too narrow, or too far, for any mesh."""
+    with pytest.raises(NotConverged):
+        moment_lyapunov(problem(0.5, 1.0, 1 + departure, 0.1, restitution=0.8, c1=1.0), -0.5)

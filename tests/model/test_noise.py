@@ -4,6 +4,7 @@ import math
 import pickle
 import re
 
+import mpmath
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -33,6 +34,20 @@ def test_density_is_normalised_and_has_the_variance_of_eq_10(r0):
     noise = NonGaussianNoise(D0=0.7, tau0=1.3, r0=r0)
     assert integral(noise, lambda xi: 1.0) == pytest.approx(1, abs=1e-10)
     assert integral(noise, lambda xi: xi**2) == pytest.approx(2 * 0.7 / (1.3 * (5 - 3 * r0)), rel=1e-8)
+
+
+@pytest.mark.parametrize("departure", [1e-12, 9e-7, 1.1e-6, 1e-5, 1e-4, 1e-3, 9e-3, 1.1e-2, 0.1])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_the_logarithm_of_the_density_is_exact_to_rounding_next_to_1(departure, sign):
+    """Against Eq. (9) in forty digits."""
+    noise = NonGaussianNoise(D0=0.3, tau0=1.7, r0=1 + sign * departure)
+    with mpmath.workdps(40):
+        D0, tau0, r0, half = map(mpmath.mpf, (noise.D0, noise.tau0, noise.r0, 0.5))
+        a, curvature = 1 / abs(r0 - 1), tau0 * (r0 - 1) / (2 * D0)
+        total = mpmath.beta(a + 1 if sign < 0 else a - half, half) / mpmath.sqrt(abs(curvature))
+        xi = [x for x in (0.0, 0.1, 1.0, 5.0, 30.0, 1e6) if 1 + curvature * x**2 > 0]
+        known = [float(-mpmath.log1p(curvature * mpmath.mpf(x) ** 2) / (r0 - 1) - mpmath.log(total)) for x in xi]
+    np.testing.assert_allclose(noise.log_density(xi), known, rtol=1e-14, atol=1e-14)
 
 
 @pytest.mark.parametrize("r0", DEPARTURES)

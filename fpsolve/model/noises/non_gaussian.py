@@ -30,6 +30,8 @@ Departure = Annotated[
 ]
 NEAR_GAUSSIAN = 0.1
 """|r₀ − 1| up to which the reduction is made."""
+_LARGE = 100.0
+"""From it on four terms of a series of 1/x are exact to rounding."""
 _SMALL = 0.05
 """Below it a series is closer than a difference of logarithms."""
 
@@ -198,11 +200,19 @@ class NonGaussianNoise(TreatedNoise):
 
     @property
     def _log_normalisation(self) -> float:
-        """ln Z of Eq. (9): Z = B(a + 1, ½)/√|b| for r₀ < 1 and B(a − ½, ½)/√b for r₀ > 1, with a = 1/|r₀ − 1|."""
+        """ln Z of Eq. (9): Z = B(x, ½)/√|b| with x = a + 1 for r₀ < 1, a − ½ for r₀ > 1, and a = 1/|r₀ − 1|.
+
+        For large x, where Γ functions would cancel, by ln Γ(x + ½) − ln Γ(x) = ½ ln x − 1/(8x) + 1/(192x³) − …
+        """
         from scipy.special import betaln
 
-        a = 1 / abs(self.r0 - 1)
-        return float(betaln(a + 1 if self.r0 < 1 else a - 0.5, 0.5)) - 0.5 * math.log(abs(self.curvature))
+        a, size = 1 / abs(self.r0 - 1), 0.5 * math.log(abs(self.curvature))
+        x = a + 1 if self.r0 < 1 else a - 0.5
+        if x < _LARGE:
+            return float(betaln(x, 0.5)) - size
+        square = 1 / x**2
+        series = (-1 / 8 + square * (1 / 192 + square * (-1 / 640 + square * 17 / 14336))) / x
+        return 0.5 * math.log(math.pi / x) - series - size
 
     @property
     def correlation_time(self) -> float:
