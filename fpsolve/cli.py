@@ -15,13 +15,13 @@ from time import monotonic
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, CycloptsError, Parameter, Token
+from cyclopts import App, CycloptsError, CycloptsPanel, Parameter, Token
 from rich.console import Console
 
 from fpsolve import __version__
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import CaseError, FpsolveError, NotConverged
-from fpsolve.messages import Severity, message_of
+from fpsolve.messages import Severity, escaped, message_of
 from fpsolve.output.letters import HANDLER
 from fpsolve.signals import ended_by_signals
 
@@ -42,6 +42,7 @@ app = App(
     version=lambda: f"fpsolve {__version__}",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
+    error_formatter=lambda error: CycloptsPanel(escaped(str(error))),
 )
 
 UNITS = "Units: omega in rad/time, c1 in 1/time, D0 in 1/time, tau0 in time"
@@ -125,7 +126,7 @@ def print_error(text: str) -> None:
     from rich.text import Text
 
     try:
-        Console(stderr=True).print(Text(message_of(text).words(CASE_WORDS)), style="bold red", soft_wrap=True)
+        Console(stderr=True).print(Text(escaped(message_of(text).words(CASE_WORDS))), style="bold red", soft_wrap=True)
     except (OSError, SystemExit):  # there is no place left to say it
         _drop_blocked_output()
 
@@ -343,10 +344,10 @@ def prove(
         bounds = f"bounds on {checked.claims.count} number{'s' * (checked.claims.count != 1)}"
         if checked.objections:
             objections = f"{len(checked.objections)} objection{'s' * (len(checked.objections) > 1)}"
-            print(f"rejected: {check} ({objections}, {bounds})")
+            print(f"rejected: {escaped(str(check))} ({objections}, {bounds})")
             return CHECK_FAILED
         unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
-        print(f"accepted: {check} ({bounds} follow from their certificates{unfinished})")
+        print(f"accepted: {escaped(str(check))} ({bounds} follow from their certificates{unfinished})")
         return 0
     code, loaded = 0, load_to_write(cases or [], overrides)
     for case in loaded:
@@ -398,7 +399,7 @@ def mesh(
     write_mesh(made, output)
     cells = (made.phi_lines.size - 1) * (made.z_lines.size - 1)
     unknowns = (made.phi_lines.size - 1) * (phi_degree + 1) * ((made.z_lines.size - 1) * xi_degree + 1)
-    print(f"written: {output} ({cells} cells, {unknowns} unknowns)")
+    print(f"written: {escaped(str(output))} ({cells} cells, {unknowns} unknowns)")
     return 0
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import re
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -96,7 +97,8 @@ def figure_for(
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
-    with rc_context(form.style):
+    with rc_context(form.style), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph .* missing", UserWarning)  # it draws boxes for letters without one
         layout = ConstrainedLayoutEngine(h_pad=0.07 * form.scale)
         figure = Figure(figsize=(form.width, 1.3 * form.height), dpi=form.dpi, layout=layout)
         FigureCanvasAgg(figure)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fpsolve.messages import Message, message_of
+from fpsolve.messages import Message, escaped, message_of
 from fpsolve.messages import Remedy as Remedy
 
 
@@ -82,7 +82,7 @@ class CaseError(FpsolveError):
         self.file, self.faults = file, tuple(faults)
         lines = [self._line(fault) for fault in self.faults[: self.SHOWN]]
         more = len(self.faults) - len(lines)
-        super().__init__("\n".join([*lines, f"{file}: and {more} more"] if more else lines))
+        super().__init__("\n".join(map(escaped, [*lines, f"{file}: and {more} more"] if more else lines)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.file, self.faults)

@@ -9,6 +9,7 @@ from functools import partial
 from string import Formatter
 from types import MappingProxyType
 from typing import Any
+from unicodedata import category
 
 ALMOST_EVERY = "growth rate of almost every path (Furstenberg-Khasminskii)"
 _RARE = "Λ(p) > 0 for every p ≠ 0, as rare paths that hold the noise far out carry the moments in the end"
@@ -320,6 +321,18 @@ class Message(str):
 def message_of(text: str) -> Message:
     """A text as a message; a message as it is."""
     return text if type(text) is Message else Message(Code.TEXT, text=text)
+
+
+def is_control(letter: str) -> bool:
+    """Whether a letter is none to be printed: a control character, one that turns or hides text, half a letter."""
+    return category(letter)[0] == "C" or letter in "\u2028\u2029"
+
+
+def escaped(text: str) -> str:
+    """A text in which control characters, but for line ends, are shown as in Python, ESC as \\x1b."""
+    return "".join(
+        each.encode("unicode_escape").decode() if is_control(each) and each != "\n" else each for each in text
+    )
 
 
 def _words(code: Code, data: Mapping[str, Any], audience: Audience) -> str:

@@ -215,6 +215,36 @@ def test_titles_and_sources_are_plain_text(tmp_path, capsys):
     assert "in [/x] of [vary]" in out
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "a\x1b[31mb.toml"],
+        ["check", "\x1b[31m.toml"],
+        ["check", "test.toml", "--set", "oscillator.\x1bomega=2.0"],
+        ["check", "test.toml", "--set", "omega\x9b=2.0"],
+        ["check", "test.toml", "--set", "oscillator.omega=2.0 # \u202e"],
+        ["check", "test.toml", "--\x1b"],
+        ["prove", "--check", "\x1b.json"],
+        ["mesh", "\x1b.vut"],
+        ["ru\x1b"],
+        ["mesh", "\x1b.vtu"],
+    ],
+)
+def test_control_characters_are_shown_and_not_printed(case, capsys, arguments):
+    Path("a\x1b[31mb.toml").write_text(TEXT, encoding="utf-8")
+    code, printed = main(arguments), "".join(capsys.readouterr())
+    assert code == (0 if arguments[-1] == "\x1b.vtu" else BAD_INPUT)
+    assert any(text in printed for text in (r"\x1b", r"\x9b", r"\u202e"))
+    assert printed.replace("\n", "").isprintable()
+
+
+def test_a_folder_with_control_characters_is_shown(case, capsys):
+    assert main(["run", case, "--out", "a\x1bb", "--set", LEAN]) == 0
+    printed = "".join(capsys.readouterr())
+    assert r"written: a\x1bb" in printed
+    assert printed.replace("\n", "").isprintable()
+
+
 def test_check_says_when_a_case_expects_nothing(case, capsys):
     assert main(["check", case]) == 0
     assert "nothing is expected; add [[expect]]" in capsys.readouterr().out

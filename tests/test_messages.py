@@ -14,7 +14,7 @@ import pytest
 import fpsolve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import FpsolveError, MeshError, NoSuchExponent, NotConverged, OutputError
-from fpsolve.messages import Code, Message, Remedy, Severity, message_of
+from fpsolve.messages import Code, Message, Remedy, Severity, escaped, message_of
 
 AUDIENCES = {"Python": {}, "case files": CASE_WORDS}
 PACKAGE = Path(fpsolve.__file__).parent
@@ -141,3 +141,9 @@ def test_nothing_reads_a_sentence(path):
         said = ("failure", "error", "reason", "message", "warning")
         texts = [each for each in searched if isinstance(each, ast.Call) and getattr(each.func, "id", "") == "str"]
         assert not [each for each in texts if each.args and ast.unparse(each.args[0]) in said], path
+
+
+def test_control_characters_are_shown_as_python_writes_them():
+    text = "a\x1b[31m\tb\x9b\u202e\u2028\ud800\nδ_p ± 1, 日本"
+    assert escaped(text) == r"a\x1b[31m\tb\x9b\u202e\u2028\ud800" + "\nδ_p ± 1, 日本"
+    assert escaped(escaped(text)) == escaped(text)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any
-from unicodedata import category
 
 import numpy as np
 from pydantic import (
@@ -46,6 +45,7 @@ from fpsolve.case.vary import EXAMPLE, Vary, assignments, vary_of
 from fpsolve.errors import CaseError, Fault
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.messages import is_control
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parameter, parameter
 from fpsolve.model.plane import System
@@ -267,7 +267,9 @@ class Case(Section):
 
     def _with_changes(self, title: str) -> str:
         split = [map(str.strip, text.split("=", 1)) for text in self._overrides]
-        told = [shortened(f"{key} = {value}") for key, value in split if key.partition(".")[0] in COMPUTED]
+        told = [
+            shortened(f"{key} = {value}".expandtabs(1)) for key, value in split if key.partition(".")[0] in COMPUTED
+        ]
         return f"{title}\nwith {', '.join(told)}" if told else title
 
     def place(self, curve: Curve) -> str:
@@ -327,7 +329,7 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
 
 def _faults_of_name(name: str) -> Iterator[Fault]:
     """Why a file's name without its ending, which names the folder of the results, is none of a folder everywhere."""
-    if any(category(letter)[0] == "C" for letter in name) or "\\" in name or _NO_FOLDER.fullmatch(name):
+    if any(map(is_control, name)) or "\\" in name or _NO_FOLDER.fullmatch(name):
         text = f"got {json.dumps(name)} as the file's name without its ending, which names the folder of its results; "
         remedy = "must have no control characters and no backslash, not end in a dot or a space, and be no device"
         yield Fault("", None, f"{text}{remedy}; rename the file")

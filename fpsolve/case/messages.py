@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
+from fpsolve.messages import is_control
 from fpsolve.model.faults import accepted, choices, fields_of
 from fpsolve.model.parameters import example_of, meaning_of
 
@@ -87,7 +88,11 @@ def _toml(value: Any) -> str:
         return f"[{', '.join(map(_toml, value))}]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
-    return json.dumps(value, ensure_ascii=False) if type(value) in (bool, str) else str(value)
+    if type(value) not in (bool, str):
+        return str(value)
+    return "".join(
+        json.dumps(each)[1:-1] if is_control(each) else each for each in json.dumps(value, ensure_ascii=False)
+    )
 
 
 def faults_in(error: ValidationError) -> Iterator[ErrorDetails]:

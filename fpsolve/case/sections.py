@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from fpsolve.analysis.zero import Axis, Zero, zero_of
 from fpsolve.arrays import FloatArray
@@ -23,6 +23,7 @@ from fpsolve.case.messages import LIST, TABLE, Refusal, is_list, nearest, quoted
 from fpsolve.errors import MeshError
 from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh, vertices_at
+from fpsolve.messages import is_control
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.quantity import Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
@@ -46,11 +47,21 @@ Value = float | str
 Varied = Mapping[str, Value]
 """The values of the varied keys on one curve."""
 NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MOMENTS)]
-Text = Annotated[str, Field(min_length=1)]
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
 Scale = Literal["linear", "log"]
 MarkedName = Literal["stability_index", "lyapunov_exponent"]
+
+
+def _printed(text: str) -> str:
+    controls = [each for each in dict.fromkeys(text) if is_control(each) and each != "\n"]
+    if controls:
+        accepted = "must have no control characters but line ends"
+        raise ValueError(f"got {shown(text)}; {accepted}; leave out {', '.join(map(shown, controls))}")
+    return text
+
+
+Text = Annotated[str, Field(min_length=1), AfterValidator(_printed)]
 
 
 def is_number(value: Any) -> bool:

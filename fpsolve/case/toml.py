@@ -13,6 +13,7 @@ from typing import Any
 
 from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.errors import CaseError, Fault
+from fpsolve.messages import is_control
 
 _BLANK = re.compile(r"(?:\s|#[^\n]*)*")
 _KEY = re.compile(r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')
@@ -157,6 +158,8 @@ class Document:
     def override(self, text: str, typed: str) -> None:
         """Apply one `key=value` of the command line, with what was typed; what is wrong with it joins the faults."""
         try:
+            if any(is_control(letter) and letter not in "\t\n" for letter in text):
+                raise ValueError("has control characters")
             text = _quoted_if_bare(text)
             assigned = _Scanner(text).scan().assigned
             if len(assigned) != 1:

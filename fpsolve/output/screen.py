@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from fpsolve.messages import escaped
 from fpsolve.output.letters import spelt
 
 ENDLESS = 1_000_000
@@ -157,7 +158,7 @@ class Screen:
             kept.remove(leaving.pop())
 
     def _spelt(self, text: str) -> str:
-        return spelt(text, self.console.encoding)
+        return spelt(escaped(text), self.console.encoding)
 
     def _cell(self, cell: Cell) -> Text:
         text = Text(cell) if isinstance(cell, str) else cell

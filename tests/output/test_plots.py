@@ -46,6 +46,11 @@ def test_title_is_clear_of_the_power_of_ten(drawn, tmp_path, title, scale):
     assert words.y1 < drawn[0].bbox.y1
 
 
+def test_letters_that_no_font_has_draw_no_warning(tmp_path):
+    picture(tmp_path, series(), title="日本")
+    assert (tmp_path / "figure.png").stat().st_size
+
+
 @pytest.mark.parametrize("count", [3, 33, 200])
 def test_all_that_is_simulated_is_drawn(drawn, tmp_path, count):
     p = np.linspace(-2, 2, count)
