@@ -6,11 +6,12 @@ import csv
 import errno
 import json
 import os
+import stat
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
-from typing import Any, TextIO
+from typing import Any, NoReturn, TextIO
 
 from fpsolve.errors import OutputError
 from fpsolve.messages import Code, Message, Remedy
@@ -22,6 +23,8 @@ NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP)
 """What file systems answer that have no locks."""
 TEMPORARY = r"\.fpsolve-[a-z0-9_]{8}(\.\w+)?"
 """The pattern of the names of unfinished files, which a killed run leaves."""
+LARGEST = 2**29
+"""Bytes of a file that is read as a whole."""
 
 
 @contextmanager
@@ -96,6 +99,26 @@ def alone(folder: Path) -> Iterator[None]:
         with suppress(OSError):
             path.unlink()
         lock.release()
+
+
+def plain_text(path: Path) -> str:
+    """The text of a file. Raises OSError or ValueError where it is a pipe or a device, too large, or not in UTF-8."""
+    about = path.stat()
+    if not stat.S_ISREG(about.st_mode) or about.st_size > LARGEST:
+        raise ValueError(f"{path} is no plain file, or larger than {LARGEST} bytes")
+    return path.read_text(encoding="utf-8")
+
+
+def parsed_json(text: str | bytes) -> Any:
+    """The data of JSON without NaN and infinities. Raises ValueError, also where lists are nested too deeply."""
+
+    def refuse(constant: str) -> NoReturn:
+        raise ValueError(f"{constant} is no JSON")
+
+    try:
+        return json.loads(text, parse_constant=refuse)
+    except RecursionError:
+        raise ValueError("lists are nested too deeply") from None
 
 
 def write_json(path: Path, data: Any) -> None:

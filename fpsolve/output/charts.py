@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-import json
+import io
 from collections.abc import Iterable
 from pathlib import Path
 from string import ascii_lowercase
@@ -19,7 +19,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
 from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
-from fpsolve.files import write_csv, write_json
+from fpsolve.files import parsed_json, plain_text, write_csv, write_json
 from fpsolve.output.tables import head, in_case_words
 from fpsolve.study.chart import Chart, charted
 
@@ -128,20 +128,29 @@ def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varie
         parameters: those of which the chart must hold all but the two keys.
     """
     try:
-        summary = json.loads((folder / "chart.json").read_text(encoding="utf-8"))
+        summary = parsed_json(plain_text(folder / "chart.json"))
         found = summary["x"]["key"], summary["y"]["key"]
         if set(found) != set(keys) or not summary["parameters"].items() <= parameters.items():
             return [], True
-        with (folder / "chart.csv").open(encoding="utf-8", newline="") as file:
-            rows = [row for row in csv.DictReader(file) if row["line"] == zero.name]
+        table = csv.DictReader(io.StringIO(plain_text(folder / "chart.csv"), newline=""))
+        rows = [row for row in table if row["line"] == zero.name]
         branches = []
         of_line = (each for line in summary["lines"] if line["line"] == zero.name for each in line["branches"])
         for number, branch in enumerate(of_line, start=1):
             points = [[float(row[key]) for key in "xy"] for row in rows if row["branch"] == str(number)]
             path = np.array(points + points[:1] if branch["closed"] else points).T
+            if len(path) != 2 or not np.isfinite(path).all():
+                raise ValueError("a branch has no points")
             branches.append(path if found == keys else path[::-1])
         return branches, bool(summary["complete"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):  # there is none, or it is no chart of ours
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        csv.Error,
+    ):  # there is none, or it is none of ours
         return [], True
 
 

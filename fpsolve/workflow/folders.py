@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from fpsolve.case.case import Case
-from fpsolve.files import TEMPORARY, alone, writable
+from fpsolve.errors import OutputError, Remedy
+from fpsolve.files import TEMPORARY, alone, parsed_json, plain_text, writable
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
 SOLVED = (
@@ -21,6 +20,9 @@ SIMULATED = r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)"
 CHART, PROVEN = r"chart\.(csv|json|png|pdf)", r"proof\.json"
 """Patterns of the names of the files that a run writes, a simulation, a chart, and proofs."""
 _UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
+_FOLDERS = r"records|records/(solved|simulated)|eigenfunctions(-\d+)?"
+_TABLES = {SOLVED: r"summary\.json", SIMULATED: r"monte_carlo(-\d+)?\.json", CHART: r"chart\.json", PROVEN: PROVEN}
+"""Of each kind of files those that state the parameters."""
 
 
 @contextmanager
@@ -28,15 +30,22 @@ def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator
     """The folder of a case for one run alone. Files that match `replaced`, or are of other parameters, are removed.
 
     Raises:
-        OutputError: the folder cannot be made or written to, or another run writes into it.
+        OutputError: the folder cannot be made or written to, another run writes into it, or something in it has the
+            name of what will be written and cannot be replaced; nothing is removed.
     """
     folder = Path(out) / case.name
     with alone(folder):
         with writable(folder):
-            stale = replaced if _agrees(case, folder) else (SOLVED, SIMULATED, CHART, PROVEN)
-            names = "|".join([*stale, _UNFINISHED])
-            for path in {*folder.glob("*"), *folder.glob("*/*")}:
-                if re.fullmatch(names, path.relative_to(folder).as_posix()) and not path.is_dir():
+            there = {path.relative_to(folder).as_posix(): path for path in _entries(folder)}
+            for name, path in there.items():
+                is_folder = path.is_dir() and not path.is_symlink()
+                if re.fullmatch(_FOLDERS, name) and not is_folder:
+                    raise OutputError(f"{path} cannot be written to: it is no folder, or a link to one", Remedy.FOLDER)
+                if re.fullmatch("|".join(replaced), name) and is_folder:
+                    raise OutputError(f"{path} cannot be written: Is a directory", Remedy.FOLDER)
+            names = "|".join([*replaced, *_stale(case, there), _UNFINISHED])
+            for name, path in there.items():
+                if re.fullmatch(names, name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink()
                     if path.parent != folder and not any(path.parent.iterdir()):
                         path.parent.rmdir()
@@ -62,22 +71,39 @@ def of_curves(case: Case) -> str:
     return f"of {case.planned} curve{'s' if case.planned > 1 else ''}"
 
 
-def _agrees(case: Case, folder: Path) -> bool:
-    """Whether the tables in a folder are all of parameters that the case has."""
-    patterns = ("summary.json", "monte_carlo*.json", "chart.json", "proof.json")
-    tables = [table for pattern in patterns for table in folder.glob(pattern)]
-    if not tables:
-        return True
-    known = [curve.parameters for curve in case.curves()]
-    whole = {frozenset(each.items()) for each in known}
+def _entries(folder: Path) -> Iterator[Path]:
+    """What is in a folder, and in the folders in it; what links lead to is not."""
+    for path in sorted(folder.iterdir()):
+        yield path
+        if path.is_dir() and not path.is_symlink():
+            yield from sorted(path.iterdir())
 
-    def is_known(stated: Mapping[str, Any]) -> bool:
-        is_part = len(stated) < len(known[0])
-        return frozenset(stated.items()) in whole or (is_part and any(stated.items() <= each.items() for each in known))
 
-    try:
-        contents = [json.loads(table.read_text(encoding="utf-8")) for table in tables]
-        found = [curve["parameters"] for content in contents for curve in content.get("curves", [content])]
-        return all(map(is_known, found))
-    except (ValueError, KeyError, TypeError, AttributeError):  # it is not a table of fpsolve
-        return False
+def _stale(case: Case, there: Mapping[str, Path]) -> list[str]:
+    """Which kinds of files in a folder are not of the parameters of a case.
+
+    A kind whose tables state complete parameters that the case has is. One without a table is as the others are, but a
+    chart says nothing without its table.
+    """
+    curves = [curve.parameters for curve in case.curves()]
+    known = {frozenset(each.items()) for each in curves}
+    states = {
+        kind: [path for name, path in there.items() if re.fullmatch(table, name)] for kind, table in _TABLES.items()
+    }
+
+    def agrees(path: Path) -> bool:
+        try:
+            content = parsed_json(plain_text(path))
+            if path.name == "chart.json":
+                stated, axes = content["parameters"], {content["x"]["key"], content["y"]["key"]}
+                is_whole = {*stated, *axes} == set(curves[0]) and axes.isdisjoint(stated)
+                return is_whole and any(stated.items() <= each.items() for each in curves)
+            stated = [each["parameters"] for each in content.get("curves", [content])]
+            is_empty = path.name == "proof.json" and not stated
+            return not is_empty and all(frozenset(each.items()) in known for each in stated)
+        except (OSError, ValueError, LookupError, TypeError, AttributeError):  # it is not a table of fpsolve
+            return False
+
+    agreeing = {kind: all(map(agrees, tables)) for kind, tables in states.items()}
+    are_all = all(agreeing.values())
+    return [kind for kind in _TABLES if not (agreeing[kind] if states[kind] else are_all and kind != CHART)]
