@@ -182,7 +182,7 @@ def run(
             lines = (out / case.name / "summary.json").read_text(encoding="utf-8").splitlines()
             print(" ".join(line.strip() for line in lines))
         else:
-            what = done_of(case, len(outcome.results), sum(bool(each.failures) for each in outcome.results))
+            what = done_of(case, len(outcome.results), sum(each.status.fails for each in outcome.results))
             print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known, outcome.outdated))
         if outcome.interruption:
             return INTERRUPTED

@@ -202,9 +202,12 @@ def test_missing_stability_index_is_null_and_said(tmp_path):
     overrides = ["oscillator.omega=10.0", "oscillator.c1=-1.0", "oscillator.restitution=0.5"]
     overrides += ["output={ quantities = ['stability_index'] }"]
     case = write(tmp_path, TEXT, overrides)
-    fpsolve.run(case, tmp_path / "out")
+    result = fpsolve.run(case, tmp_path / "out")[0]
     curve = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"][0]
     assert curve["stability_index"] is None
+    assert curve["status"] == result.status.word == "no index"
+    assert not result.status.fails
+    assert ",no index," in (tmp_path / "out/test/curves.csv").read_text(encoding="utf-8").splitlines()[1]
     assert curve["warnings"] == ["no stability index: Λ(p) has no root p ≠ 0 in [-20, 20]"]
 
 

@@ -437,7 +437,7 @@ def _draw_map(axes: Any, case: Case, results: Sequence[CurveResult], keys: tuple
             axis.searchsorted(float(result.curve.varied[key])) for axis, key in zip((x, y), keys, strict=True)
         )
         values[row, column] = number = _number(case, result)
-        failed[row, column] = math.isnan(number) and bool(result.failures)
+        failed[row, column] = math.isnan(number) and result.status.fails
     edges = _edges(x), _edges(y)
     label_axes(axes, *(case.about(key).attributes for key in keys))
     _draw_values(axes, values, edges, setting.quantity.timed(setting.time_unit).attributes)

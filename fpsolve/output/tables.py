@@ -78,7 +78,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
             found = [result.estimates[each.name] for each in asked(case)]
             numbers = [number for each in found for number in ((each.value, each.error_estimate) if each else ("", ""))]
             counts = [done.p.size, (case.p.size if has_moments else 0) - done.p.size]
-            by_curve.writerow([*varied, *numbers, *counts, result.status.name.lower(), round(result.seconds, 6)])
+            by_curve.writerow([*varied, *numbers, *counts, result.status.word, round(result.seconds, 6)])
         summary.write("\n ]\n}\n")
 
 
@@ -137,7 +137,7 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
     return {
         **_parameters(result.curve),
-        "status": result.status.name.lower(),
+        "status": result.status.word,
         **found,
         "discretisation": result.discretisation,
         "warnings": in_case_words([*result.warnings, *(failure.reason for failure in result.failures)]),

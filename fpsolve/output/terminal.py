@@ -48,7 +48,6 @@ MOST_TABLES, MOST_ROWS = 10, 50
 MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
 """Failed curves that are named among more, p whose Λ has a column, and quantities whose extremes are shown."""
 DIGITS = 7
-BEYOND_RTOL = "beyond rtol"
 MAIN = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
 STAR = "* for the noise reduced by Eqs. (12)-(14)"
 
@@ -77,19 +76,14 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
     chosen = _chosen(results, quantities) if is_digest else [("", result) for result in results]
     has_status = len(results) > MOST_TABLES or any(result.status for _, result in chosen)
     columns = [*varied_columns(case), *quantities]
-    is_whole = all(_state(result) == "converged" for _, result in chosen)
+    is_whole = all(result.status == Status.CONVERGED for _, result in chosen)
     columns += [Column("status", 1 if is_whole else 0)] * has_status + [Column("which", is_text=True)] * is_digest
     is_starred = any("*" in each.heading for each in quantities)
     grid = Grid(case.headline, columns, remark=STAR if is_starred else "")
     for which, result in chosen:
         varied, numbers = map(written, result.curve.varied.values()), (each.text(result) for each in quantities)
-        grid.rows.append([*varied, *numbers, *[_state(result)] * has_status, *[which] * is_digest])
+        grid.rows.append([*varied, *numbers, *[result.status.word] * has_status, *[which] * is_digest])
     return grid
-
-
-def _state(result: CurveResult) -> str:
-    """What became of a curve, for the eye; one that converged may be less precise than rtol asks for."""
-    return BEYOND_RTOL if result.status == Status.CONVERGED and result.misses_rtol else result.status.name.lower()
 
 
 def varied_columns(case: Case) -> list[Column]:
@@ -127,7 +121,7 @@ def _quantities(case: Case) -> list[_Shown]:
 
 def _index(index: Index, rank: int) -> _Shown:
     def text(result: CurveResult) -> str:
-        is_lost = result.estimates[index.name] is None and result.status != Status.CONVERGED
+        is_lost = result.estimates[index.name] is None and result.status.fails
         return "" if is_lost else index_text(index, result, DIGITS)
 
     def value(result: CurveResult) -> float | None:
@@ -168,7 +162,7 @@ def _chosen(results: Sequence[CurveResult], quantities: Sequence[_Shown]) -> lis
     extremes: dict[tuple[str, str], tuple[float, CurveResult]] = {}
     failed: list[CurveResult] = []
     for result in results:
-        if result.status and len(failed) < MOST_FAILED:
+        if result.status.fails and len(failed) < MOST_FAILED:
             failed.append(result)
         for heading, value_of in shown[:MOST_EXTREMES]:
             if (value := value_of(result)) is None:
@@ -191,9 +185,12 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
     if len(results) > MOST_TABLES or case.figure.x != "p":
         screen.show(curve_grid(case, results))
         if len(results) > MOST_TABLES:
-            counts = Counter((result.status, _state(result) == BEYOND_RTOL, _state(result)) for result in results)
-            states = ", ".join(f"{count} {state}" for (*_, state), count in sorted(counts.items()))
-            is_short = len(results) > MOST_ROWS and sum(bool(result.status) for result in results) > MOST_FAILED
+            counts = Counter(result.status for result in results)
+            states = ", ".join(
+                f"{counts[each]} {each.word}" for each in sorted(counts, key=lambda each: (each.fails, each))
+            )
+            failed = sum(count for each, count in counts.items() if each.fails)
+            is_short = len(results) > MOST_ROWS and failed > MOST_FAILED
             shown = f"; of those that are not converged the first {MOST_FAILED} are shown" if is_short else ""
             screen.say(f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc")
     else:

@@ -46,12 +46,22 @@ class MomentColumns:
 
 
 class Status(IntEnum):
-    """What became of a parameter set."""
+    """What became of a parameter set; after a case with one that fails the exit code is 3."""
 
     CONVERGED = 0
     PARTLY = 1
     FAILED = 2
     MISSING = 3
+    BEYOND_RTOL = 4
+    NO_INDEX = 5
+
+    @property
+    def word(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+    @property
+    def fails(self) -> bool:
+        return self in (Status.PARTLY, Status.FAILED)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,20 +115,19 @@ class CurveResult(Result):
 
     @property
     def status(self) -> Status:
-        """Whether all that was asked for is there."""
-        if not self.failures:
-            return Status.CONVERGED
-        return Status.PARTLY if self.moments.p.size or any(self.estimates.values()) else Status.FAILED
+        """Whether all that was asked for is there, within rtol."""
+        if self.failures:
+            return Status.PARTLY if self.moments.p.size or any(self.estimates.values()) else Status.FAILED
+        codes = {message_of(each).code for each in self.warnings}
+        if not codes.isdisjoint((Code.RTOL_MISSED, Code.INDEX_RTOL_MISSED)):
+            return Status.BEYOND_RTOL
+        return Status.NO_INDEX if Code.INDEX_MISSING in codes else Status.CONVERGED
 
     @property
     def remarks(self) -> dict[Severity, Sequence[str]]:
         """What is said of it, by how much that means."""
         reasons = [failure.reason for failure in self.failures]
         return {Severity.FAILURE: reasons, Severity.WARNING: self.warnings, Severity.NOTE: self.notes}
-
-    @property
-    def misses_rtol(self) -> bool:
-        return any(message_of(each).code in (Code.RTOL_MISSED, Code.INDEX_RTOL_MISSED) for each in self.warnings)
 
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
@@ -134,7 +143,7 @@ class CurveResult(Result):
 
     def _said(self) -> str:
         found, exponent = self.moments, self.lyapunov_exponent
-        parts = [self.curve.label, self.status.name.lower(), f"{found.p.size} p", f"λ = {exponent}" if exponent else ""]
+        parts = [self.curve.label, self.status.word, f"{found.p.size} p", f"λ = {exponent}" if exponent else ""]
         return ", ".join(filter(None, parts))
 
 

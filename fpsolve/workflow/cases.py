@@ -235,7 +235,7 @@ def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = SILENT) -
             results = [lost(order.curve) for order in done.item] if done.result is None else done.result
             for result in filter(None, results):
                 found.append(result)
-                progress(failed=bool(result.failures))
+                progress(failed=result.status.fails)
     found.sort(key=lambda result: result.curve.number)
     return Outcome(found, comparisons=tuple(compare(case, found)))
 

@@ -47,7 +47,7 @@ def keep(folder: Path, order: Order, solved: Solved) -> Found:
     """Write what was found of a set into the folder of its case, and say where the numbers are."""
     curve, result = order.curve, solved.result
     write_functions(solved, curve, folder)
-    is_failed = result is not None and bool(result.failures)
+    is_failed = result is not None and result.status.fails
     if result is None or solved.is_passing:
         return curve.number, result, is_failed
     return curve.number, append(folder / SOLVED_RECORDS, order.key, record_of(result)), is_failed

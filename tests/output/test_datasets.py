@@ -72,7 +72,7 @@ def test_what_failed_is_nan_and_said(tmp_path):
     _, results, found = solved(tmp_path, TEXT + HOPELESS)
     assert found.status.values.tolist() == [0, 1]
     assert found.status.attrs["flag_meanings"].split()[1] == "partly"
-    assert found.status.attrs["flag_values"].tolist() == [0, 1, 2, 3]
+    assert found.status.attrs["flag_values"].tolist() == [0, 1, 2, 3, 4, 5]
     bad = found.isel({"oscillator.epsilon": 1})
     assert results[1].moments.p.tolist() == [0.0]
     assert np.isnan(bad.moment).values.tolist() == [True, False, True]

@@ -286,16 +286,24 @@ def test_several_sentences_of_one_curve_are_counted(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("count", [12, 60])
-@pytest.mark.parametrize("code", [Code.RTOL_MISSED, Code.INDEX_RTOL_MISSED])
-def test_the_line_of_states_agrees_with_the_warnings(tmp_path, capsys, count, code):
-    """A curve of which it is said that rtol is not met does not count among those that converged."""
+@pytest.mark.parametrize(
+    ("code", "state", "said"),
+    [
+        (Code.RTOL_MISSED, "beyond rtol", "rtol = 1e-08 is not met"),
+        (Code.INDEX_RTOL_MISSED, "beyond rtol", "rtol = 1e-08 is not met"),
+        (Code.INDEX_MISSING, "no index", "no δ_p: for a reason"),
+    ],
+)
+def test_the_line_of_states_agrees_with_the_warnings(tmp_path, capsys, count, code, state, said):
+    """A curve of which it is said that rtol is not met, or that an index is not there, is not one that converged."""
     told = Message(code, rtol=1e-8, count=1, of=2, p=2.0, symbol="λ", value=1.0, error=1e-3, size=1e-3)
+    told = Message(code, symbols=["δ_p"], reason="for a reason") if code is Code.INDEX_MISSING else told
     case, results = many(tmp_path, count, warnings=lambda i: (told,) if i < 5 else ())
     print_results(case, results)
     out, err = capsys.readouterr()
-    assert f"{count} curves: {count - 5} converged, 5 beyond rtol; " in out
-    assert f"warning: many: 5 of {count} curves: rtol = 1e-08 is not met" in err
-    assert out.count("│ beyond rtol │") == (5 if count == 12 else 1)  # of many the extreme ones are shown
+    assert f"{count} curves: {count - 5} converged, 5 {state}; " in out
+    assert f"warning: many: 5 of {count} curves: {said}" in err
+    assert len(re.findall(f"│ +{state} │", out)) == (5 if count == 12 else 1)  # of many the extreme ones are shown
 
 
 def test_equations_and_names_with_numbers_keep_sentences_apart(tmp_path, capsys):
