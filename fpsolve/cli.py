@@ -164,6 +164,10 @@ def run(
 
     What an earlier run has finished, also one that was killed, is not solved again.
 
+    Without [output] quantities a case computes all of: moment,
+    lyapunov_exponent, stability_index, variance_rate, impact_rate,
+    critical_impact_factor, critical_restitution, sensitivities, eigenfunctions.
+
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
     from fpsolve.output.terminal import done_of, known_of, note_missing, print_written

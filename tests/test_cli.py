@@ -16,6 +16,7 @@ from types import SimpleNamespace
 import pytest
 
 from fpsolve import cli
+from fpsolve.case.sections import QUANTITY_NAMES
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.model.problem import Problem
@@ -545,6 +546,13 @@ def test_wrong_usage_exits_2(arguments, capsys):
 def test_help_shows_an_example(command, capsys):
     assert main([command, "--help"]) == 0
     assert f"Example: fpsolve {command} " in capsys.readouterr().out
+
+
+def test_help_and_readme_name_all_quantities(capsys):
+    assert main(["run", "--help"]) == 0
+    words, readme = capsys.readouterr().out.split(), (CASES.parent / "README.md").read_text(encoding="utf-8")
+    assert {*QUANTITY_NAMES} <= {word.strip(",.") for word in words}
+    assert {*QUANTITY_NAMES} == {*re.findall(r'"(\w+)"', re.search(r"(?ms)^quantities = \[.*?^\]", readme)[0])}
 
 
 def test_help_names_the_exit_codes(capsys):
