@@ -30,19 +30,23 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
 from fpsolve.errors import OutputError, Remedy
+from fpsolve.exponent.quantities import INDICES
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Message, message_of
 from fpsolve.model.kinds import version_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.study.solve import Numerics, Wanted
+from fpsolve.study.solve import Numerics, Wanted, everything
 
 RESULT_VERSION = 3
 """Of what is computed from the same parameters; records of another one are computed anew."""
 SHARED_SECONDS = 60.0
 """After which a file that another machine has written is there, if it ever is."""
+LONGEST, MOST_NUMBERS = 2**28, 2**24
+"""Of a line, in bytes, and of an array."""
 _NAMES: dict[int, str] = {}
 """The file of this process."""
 Record = dict[str, Any]
@@ -71,7 +75,7 @@ class Records:
             start = self._seen.get(path.name, 0)
             with path.open("rb") as file:
                 file.seek(start)
-                for line in file:
+                while len(line := file.readline(LONGEST)) not in (0, LONGEST):  # what is longer is no record
                     if found := _parsed(line):
                         self._addresses[found[0]] = Address(path.name, start, len(line))
                         self._seen[path.name] = start + len(line)
@@ -129,7 +133,7 @@ class Results(Sequence[CurveResult]):
     """
 
     def __init__(self, case: Case, records: Records) -> None:
-        self._case, self._records = case, records
+        self._case, self._records, self._asked = case, records, everything(case).p
         self._found: dict[int, Address | CurveResult] = {}
         self._order: list[int] = []
 
@@ -143,11 +147,12 @@ class Results(Sequence[CurveResult]):
         if (address := self._records.address(key)) is None:
             return False
         try:
-            result_of(self._records.read(address), curve)
+            is_whole = fits(result_of(self._records.read(address), curve), self._asked)
         except (OSError, ValueError):
             return False
-        self.add(curve.number, address)
-        return True
+        if is_whole:
+            self.add(curve.number, address)
+        return is_whole
 
     def has(self, curve: Curve) -> bool:
         return curve.number in self._found
@@ -206,11 +211,11 @@ def _parsed(line: bytes) -> tuple[str, Record] | None:
     """A key and its record; None where the line is torn or damaged."""
     _, mark, content = line.removesuffix(b"}\n").partition(b', "record": ')
     try:
-        head = json.loads(line)
+        head = json.loads(line.decode())
         if not mark or zlib.crc32(content) != head["crc32"]:
             return None
         return str(head["key"]), head["record"]
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
@@ -255,8 +260,59 @@ def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
 def _made(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
     try:
         return {name: each.made(record[name]) for name, each in _recorded(kind).items()}
-    except (LookupError, TypeError, AttributeError, ValueError, zlib.error) as failure:
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError, zlib.error) as failure:
         raise ValueError(f"this is no record of a {kind.__name__}: {failure!r}") from failure
+
+
+def fits(result: CurveResult, asked: Sequence[float]) -> bool:
+    """Whether the numbers of a result are of the p that were asked for, each found or failed, and can be written."""
+    found, slopes, failed = result.moments, result.sensitivities, [each.p for each in result.failures]
+    columns = [getattr(found, each.name) for each in fields(found)]
+    p, solved = found.p.tolist(), {*found.p.tolist(), *failed}
+    indices = list(filter(None, result.estimates.values()))
+    is_whole = (
+        all(each.shape == found.p.shape for each in columns[:-1])
+        and found.p.ndim == found.rare.ndim == 1
+        and not any(np.isinf(each).any() for each in columns)
+        and bool(np.isfinite(found.value).all())
+        and len(set(p)) == len(p)
+        and {*p, *found.rare.tolist()} <= set(asked) <= (solved if None not in solved else {*asked})
+        and result.estimates.keys() == INDICES.keys()
+        and 0 <= result.seconds < math.inf
+    )
+    if is_whole and slopes is not None:
+        keys, rows = slopes.theta.keys(), [*slopes.moments, *slopes.indices.values()]
+        indices += [each for row in rows for each in row.values()]
+        is_whole = (
+            slopes.p.shape == (len(slopes.moments),)
+            and set(slopes.p.tolist()) <= set(p)
+            and keys == slopes.quantities.keys()
+            and keys <= result.curve.parameters.keys()
+            and all(row.keys() <= keys for row in rows)
+            and slopes.indices.keys() <= INDICES.keys()
+            and all(map(math.isfinite, slopes.theta.values()))
+        )
+    return is_whole and not any(math.isinf(each.value) or each.error_estimate < 0 for each in indices)
+
+
+def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
+    """Whether the numbers of a simulation are of the p that were asked for, and can be written and drawn."""
+    found, response = simulated.result, simulated.response
+    numbers = [found.lyapunov_exponent, found.lyapunov_exponent_error, found.variance_rate, found.variance_rate_error]
+    numbers += [found.time, found.step]
+    for each in found.estimates:
+        numbers += [each.p, each.effective_paths, each.value or 0.0, each.standard_error or 0.0]
+    is_whole = [each.p for each in found.estimates] == list(orders)
+    if response is not None:
+        edges = response.x_edges, response.v_edges, response.amplitude_edges
+        *cells, count = [each.size - 1 for each in edges]
+        numbers += [response.outside, response.impact_rate, response.time, *sum(response.means.values(), ())]
+        is_whole &= (
+            all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in edges)
+            and response.density.shape == tuple(cells)
+            and response.amplitude_density.shape == response.amplitude_error.shape == (count,)
+        )
+    return is_whole and all(map(math.isfinite, numbers))
 
 
 def _digest(kind: type, **content: Any) -> str:
@@ -361,17 +417,45 @@ def _packed(value: FloatArray) -> Record:
 
 
 def _unpacked(packed: Mapping[str, Any]) -> FloatArray:
-    data = zlib.decompress(b64decode(packed["data"], validate=True))
-    return np.frombuffer(data, dtype="<f8").reshape(tuple(packed["shape"])).astype(float)
+    shape = tuple(_checked(size, int) for size in packed["shape"])
+    if min(shape, default=1) < 0 or (count := math.prod(shape)) > MOST_NUMBERS:
+        raise ValueError(f"there is no array of shape {shape}")
+    unpacker = zlib.decompressobj()
+    data = unpacker.decompress(b64decode(_checked(packed["data"], str), validate=True), 8 * count + 1)
+    return np.frombuffer(data, dtype="<f8").reshape(shape).astype(float)
+
+
+def _number(data: Any) -> float:
+    return float(data if data in ("nan", "inf", "-inf") else _checked(data, int | float))
+
+
+def _text(data: Any) -> str:
+    _checked(data, str).encode()  # half a pair of UTF-16 is no text
+    return str(data)
+
+
+def _strict(data: Any) -> Any:
+    """What strict JSON in UTF-8 can hold."""
+    _text(json.dumps(data, allow_nan=False, ensure_ascii=False))
+    return data
+
+
+def _message(data: Any) -> Message:
+    """A message that can be said in the words of case files, too, and sorted by its size."""
+    message = Message.from_data(data)
+    _text(message + message.words(CASE_WORDS))
+    if message.size is not None:
+        _number(message.size)
+    return message
 
 
 _SIMPLE: Mapping[Any, Codec] = {
-    Any: Codec("any", lambda value: value, lambda data: data),
-    str: Codec("text", str, lambda data: data if type(data) is str else _checked(data, str)),
+    Any: Codec("any", lambda value: value, _strict),
+    str: Codec("text", str, _text),
     bool: Codec("bool", bool, lambda data: _checked(data, bool)),
     int: Codec("int", int, lambda data: _checked(data, int)),
-    float: Codec("float", lambda value: float(value) if math.isfinite(value) else str(float(value)), float),
+    float: Codec("float", lambda value: float(value) if math.isfinite(value) else str(float(value)), _number),
     float | str: Codec("number or text", lambda value: value, lambda data: _checked(data, float | str)),
-    Message: Codec("message", lambda value: message_of(value).to_data(), Message.from_data),
+    Message: Codec("message", lambda value: message_of(value).to_data(), _message),
 }
 """For what has no parts."""

@@ -25,6 +25,7 @@ from fpsolve.output.records import (
     key_of,
     record_of,
     simulated_of,
+    simulation_fits,
     simulation_key,
 )
 from fpsolve.output.tables import facts_of, write_results
@@ -206,9 +207,10 @@ class Simulations:
         """Its simulation, if that is known; a record of another form does not count."""
         address = self.records.address(self._key(curve))
         try:
-            return None if address is None else simulated_of(self.records.read(address), curve)
-        except ValueError:
+            found = None if address is None else simulated_of(self.records.read(address), curve)
+        except (OSError, ValueError):
             return None
+        return found if found and simulation_fits(found, self.asked["orders"]) else None
 
     def _key(self, curve: Curve) -> str:
         return simulation_key(curve, **self.asked)

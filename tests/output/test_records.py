@@ -1,9 +1,12 @@
 """Records: exact, in files that only grow; what is torn or damaged is none."""
 
+import base64
+import copy
 import json
 import math
 import multiprocessing
 import os
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +17,8 @@ from fpsolve.errors import OutputError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.output import records as plain
-from fpsolve.output.records import Records, append, key_of, record_of, result_of
-from fpsolve.study.solve import Numerics, Wanted
+from fpsolve.output.records import Records, Results, _packed, append, key_of, record_of, result_of
+from fpsolve.study.solve import Numerics, Wanted, everything, solve_curve
 from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
 from tests.solving import case_in, solve_case
 
@@ -170,6 +173,7 @@ def rewritten(folder, change):
         lambda record: record | {"estimates": {"lyapunov_exponent": [0.0, 0.0]}},
         lambda record: record | {"seconds": "soon"},
         lambda record: record | {"warnings": "none"},
+        lambda record: record | {"moments": [_packed(np.array([7.0])), *record["moments"][1:]]},
     ],
 )
 def test_a_record_of_another_form_is_solved_anew(tmp_path, capsys, change):
@@ -184,6 +188,87 @@ def test_a_record_of_another_form_is_solved_anew(tmp_path, capsys, change):
     assert (tmp_path / "test/moments.csv").read_bytes() == moments
     assert main([*command, "--quiet"]) == 0
     assert "1 of 1 known from an earlier run" in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """A case, its first curve, and the record of that."""
+    case = case_in(tmp_path_factory.mktemp("solved"), TEXT + PRODUCT)
+    [curve] = case.curves(0, 1)
+    return case, curve, record_of(solve_curve(curve, everything(case), Numerics.of(case)).result)
+
+
+def is_taken(folder, solved, change):
+    """Whether a record is taken as it is, or changed, with a right checksum."""
+    case, curve, record = solved
+    content = json.dumps(change(copy.deepcopy(record))).encode()
+    (folder / "x.jsonl").write_bytes(b'{"key": "key", "crc32": %d, "record": %s}\n' % (zlib.crc32(content), content))
+    return Results(case, Records(folder).look()).find(curve, "key")
+
+
+def column(i, values):
+    """Another column of the moments."""
+    return lambda record: record["moments"].__setitem__(i, _packed(np.array(values))) or record
+
+
+def estimate(value, i):
+    return lambda record: record["estimates"]["lyapunov_exponent"].__setitem__(i, value) or record
+
+
+def slope(key, i=3):
+    """Another attribute of the sensitivities."""
+    return lambda record: record["sensitivities"].__setitem__(i, key) or record
+
+
+WRONG = {
+    "p of others": column(0, [7.0, 0.0, -1.0]),
+    "p twice": column(0, [2.0, 2.0, -1.0]),
+    "p is nan": column(0, [2.0, 0.0, math.nan]),
+    "p missing": lambda record: record | {"moments": [_packed(np.zeros(0))] * 7},
+    "one value too many": column(1, [1.0, 2.0, 3.0, 4.0]),
+    "values in a table": column(1, [[1.0, 2.0, 3.0]]),
+    "no value": column(1, [math.nan, 0.0, 0.0]),
+    "infinite error": column(3, [math.inf, 0.0, 0.0]),
+    "rare of others": column(6, [7.0]),
+    "no shape": lambda record: record["moments"][0].update(shape=[-1]) or record,
+    "a large shape": lambda record: record["moments"][0].update(shape=[3 * 10**9]) or record,
+    "much in little": lambda record: record["moments"][0].update(
+        data=base64.b64encode(zlib.compress(bytes(10**8))).decode()
+    ) or record,
+    "seconds are infinite": lambda record: record | {"seconds": "inf"},
+    "seconds are true": lambda record: record | {"seconds": True},
+    "seconds are a text": lambda record: record | {"seconds": "1.0"},
+    "seconds are too large": lambda record: record | {"seconds": 10**400},
+    "λ is infinite": estimate("inf", 0),
+    "error is negative": estimate(-1.0, 1),
+    "no λ": lambda record: record["estimates"].pop("lyapunov_exponent") and record,
+    "another index": lambda record: record["estimates"].update(x=None) or record,
+    "discretisation": lambda record: record | {"discretisation": {"xi": math.nan}},
+    "half a letter": lambda record: record | {"discretisation": {"xi": "\ud800"}},
+    "a message with half a letter": lambda record: record | {
+        "warnings": [{"code": "TEXT", "data": {"text": "\ud800"}}]
+    },
+    "a message that cannot be said": lambda record: record | {"notes": [{"code": "INFINITE", "data": {"p": "x"}}]},
+    "a message of no size": lambda record: record | {"notes": [{"code": "TEXT", "data": {"text": "x", "size": "x"}}]},
+    "fewer derivatives": slope([]),
+    "derivatives by another key": slope({"oscillator.x": 1.0}, 0),
+    "nested": lambda record: record | {"notes": json.loads("[" * 900 + "]" * 900)},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
+def test_a_record_whose_numbers_do_not_fit_is_none(tmp_path, solved, change):
+    assert is_taken(tmp_path, solved, lambda record: record)
+    assert not is_taken(tmp_path, solved, change)
+
+
+def test_a_line_that_is_nested_or_endless_is_no_record(tmp_path, solved, monkeypatch):
+    assert is_taken(tmp_path, solved, lambda record: record)
+    whole = (tmp_path / "x.jsonl").read_bytes()
+    (tmp_path / "x.jsonl").write_bytes(b"[" * 100_000 + b"\n" + whole)
+    assert Records(tmp_path).look().are_there
+    monkeypatch.setattr(plain, "LONGEST", 1000)
+    assert not Records(tmp_path).look().are_there
 
 
 def test_records_of_another_version_are_named(tmp_path, capsys):

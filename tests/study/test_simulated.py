@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from fpsolve.output.records import record_of, simulated_of
+from fpsolve.output.records import record_of, simulated_of, simulation_fits
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import BINS, MEANS, Response
 from fpsolve.study.results import SimulatedCurve
@@ -35,6 +35,12 @@ RESULT = MonteCarlo(
     warnings=("Λ(p) at p = 2", 'a "quoted" one\nof two lines'),
     interrupted=True,
     parameters={"noise.D0": 0.1, "noise.treatment": "exact"},
+)
+
+FINITE = replace(
+    RESULT,
+    estimates=tuple(replace(each, value=None, standard_error=0.1, effective_paths=9.0) for each in RESULT.estimates),
+    **{key: 1.0 for key, value in vars(RESULT).items() if isinstance(value, float)},
 )
 
 
@@ -150,6 +156,37 @@ def test_what_is_no_record_is_refused(curve, change):
         simulated_of(record | {name: other(record[name])}, curve)
     with pytest.raises(ValueError, match="this is no record of a SimulatedCurve: "):
         simulated_of({}, curve)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"time": math.inf},
+        {"lyapunov_exponent": math.nan},
+        {"estimates": RESULT.estimates[:-1]},
+        {"estimates": (replace(RESULT.estimates[0], effective_paths=math.inf), *RESULT.estimates[1:])},
+    ],
+)
+def test_numbers_that_cannot_be_written_are_no_simulation(curve, change):
+    orders = [each.p for each in RESULT.estimates]
+    assert simulation_fits(SimulatedCurve(curve, FINITE, None, ()), orders)
+    assert not simulation_fits(SimulatedCurve(curve, replace(FINITE, **change), None, ()), orders)
+
+
+def test_a_response_that_cannot_be_drawn_is_none(curve):
+    estimates = (MomentEstimate(2.0, None, None, "direct", 9.0),)
+    finite = replace(FINITE, estimates=estimates)
+    edges, cells = np.arange(4.0), np.zeros(3)
+    whole = Response({"x": (0.0, 0.1)}, edges, edges, np.zeros((3, 3)), edges, cells, cells, 0.0, 1.0, 1.0)
+
+    def is_taken(**change):
+        return simulation_fits(SimulatedCurve(curve, finite, replace(whole, **change), ()), [2.0])
+
+    assert is_taken()
+    assert not is_taken(x_edges=edges[::-1])
+    assert not is_taken(v_edges=np.arange(3.0))
+    assert not is_taken(amplitude_error=np.zeros(2))
+    assert not is_taken(means={"x": (0.0, math.nan)})
 
 
 @pytest.mark.parametrize(
