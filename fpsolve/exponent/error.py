@@ -34,11 +34,22 @@ MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
 
 
+def digits(value: float, error: float, most: int = 17) -> str:
+    """A number with the digits that its error leaves, at most so many significant ones; 0 where it leaves none."""
+    if abs(value) <= error:
+        return "0"
+    count = 13
+    if error > 0 and math.isfinite(value):
+        count = max(math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1, 1)
+    return f"{value:#.{min(count, most)}g}".rstrip(".")
+
+
 @dataclass(frozen=True, repr=False)
 class Estimate(Result):
     """A number, the estimate of its error, and what both are measured by.
 
     Attributes:
+        error_estimate: half a unit in the last place of the value at least.
         scale: size of the terms that the number is the sum of, where they may cancel.
         meaning: what the number is, where its name may mislead.
         quantity: what it is called, and its unit.
@@ -50,13 +61,16 @@ class Estimate(Result):
     meaning: str = ""
     quantity: Quantity = field(default=UNNAMED, compare=False)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "error_estimate", max(self.error_estimate, 0.5 * math.ulp(self.value)))
+
     @property
     def relative_error(self) -> float:
         """The error over the larger of |value| and the scale."""
         return self.error_estimate / max(abs(self.value), self.scale, sys.float_info.min)
 
     def __str__(self) -> str:
-        return f"{self.value:.10g} ± {self.error_estimate:.0e}"
+        return f"{digits(self.value, self.error_estimate)} ± {self.error_estimate:.0e}"
 
     def _said(self) -> str:
         unit = "" if self.quantity.unit in ("1", UNNAMED.unit) else f", in {self.quantity.unit}"

@@ -63,7 +63,7 @@ class MomentLyapunov(Result):
         value: Λ(p), per unit time, shape (n,).
         derivative: Λ′(p), shape (n,); NaN at p = 0 where λ did not converge, as Λ(0) = 0 needs no solve.
         error_estimate: estimate of |error of `value`|, from the highest modes, the ends of a noise interval and the
-            bound of rounding, shape (n,).
+            bound of rounding, at least half a unit in the last place of the value, shape (n,).
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
         solver: what solved them.
         warnings: on the p where `error_estimate` exceeds rtol.
@@ -84,6 +84,10 @@ class MomentLyapunov(Result):
     failures: tuple[Failure, ...] = ()
     rare: FloatArray = field(default_factory=lambda: np.zeros(0))
     notes: tuple[Message, ...] = ()
+
+    def __post_init__(self) -> None:
+        least = 0.5 * np.spacing(np.abs(self.value))
+        object.__setattr__(self, "error_estimate", np.maximum(self.error_estimate, least))
 
     @property
     def pairs(self) -> tuple[PrincipalPair, ...]:

@@ -17,6 +17,7 @@ from rich.text import Text
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.vary import written
+from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import (
     CRITICAL_RESTITUTION,
     IMPACT_RATE,
@@ -91,20 +92,12 @@ def varied_columns(case: Case) -> list[Column]:
     return [Column(key.partition(".")[2]) for key in case.vary.keys]
 
 
-def index_text(index: Index, result: CurveResult, most: int) -> str:
+def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
     """An index of a curve with its digits, or that there is none."""
     estimate = result.estimates[index.name]
     if estimate is not None:
         return digits(estimate.value, estimate.error_estimate, most)
     return "none" if index == CRITICAL_RESTITUTION or grows_far_out(result.curve.problem) else "none found"
-
-
-def digits(value: float, error: float, most: int = 13) -> str:
-    """A number with the digits that its error leaves, at most so many significant ones; 0 where it leaves none."""
-    if abs(value) <= error:
-        return "0"
-    count = most if error <= 0 else math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
-    return f"{value:#.{min(max(count, 1), most)}g}".rstrip(".")
 
 
 def _quantities(case: Case) -> list[_Shown]:
@@ -203,7 +196,7 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
                 error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
                 if index == IMPACT_RATE:
                     groups.append([])
-                groups[-1].append(f"{index.symbol} = {index_text(index, result, most=9)}{error}")
+                groups[-1].append(f"{index.symbol} = {index_text(index, result)}{error}")
             for group in groups:
                 screen.packed(group)
             screen.lines([""])

@@ -1,6 +1,7 @@
 """Λ as a function of p: interpolation against solves, its derivatives against the eigenvectors, roots, convexity."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -138,7 +139,23 @@ def test_zero_as_a_node_is_no_fault(interval):
 
 
 def test_an_estimate_is_printed_with_its_error():
-    assert str(Estimate(-0.37345849855446, 1.04e-12, 1.0)) == "-0.3734584986 ± 1e-12"
+    assert str(Estimate(-0.37345849855446, 1.04e-12, 1.0)) == "-0.373458498554 ± 1e-12"
+    assert str(Estimate(math.nan, math.nan, 1.0)) == "nan ± nan"
+
+
+@pytest.mark.parametrize("value", [0.00637, -1.44561121e-05, 1e300, 0.5])
+def test_no_error_is_below_the_rounding_of_its_number(value):
+    found = Estimate(value, 1e-30 * abs(value), 1.0)
+    assert found.error_estimate == 0.5 * math.ulp(value)
+    text, _, error = str(found).partition(" ± ")
+    assert abs(float(text) - value) <= 2 * float(error)  # the digits follow the error
+    assert Estimate(0.0, 0.0, 1.0).error_estimate == 0.0
+
+
+def test_no_error_of_a_moment_is_below_its_rounding():
+    found = moment_lyapunov(FIG1, FIG1_NOISE, [0.0, 2.0], rtol=1e-6)
+    fewer = replace(found, error_estimate=np.zeros(2))
+    assert fewer.error_estimate.tolist() == [0.0, 0.5 * math.ulp(found.value[1])]
 
 
 def test_moments_one_by_one_are_checked_for_convexity(monkeypatch):
