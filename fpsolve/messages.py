@@ -102,7 +102,7 @@ class Code(Enum):
     OUT_OF_RANGE = "failure: Λ({p:g}) is beyond floating-point numbers ({reason})"
     FAR_OUT = "failure: {reason}; this moment is carried by rare paths, with noise far out in its tails"
     NEAR_ZERO = "failure: p near 0 goes with p = {p:g}: {reason}"
-    ZERO_NOT_FINER = "failure: p = 0 did not converge on a finer mesh: {reason}"
+    NOT_FINER = "failure: p = {p:g} did not converge on a finer mesh: {reason}"
     HELD_BEYOND = (
         "failure: Λ({p:g}) did not converge: it is at least {rate:.3g}, as much as paths grow that hold the noise "
         "beyond {z:g} standard deviations, and no eigenfunction belongs to them"
@@ -298,6 +298,10 @@ class Message(str):
     def reasons(self) -> Iterator[Message]:
         """The messages among its data."""
         return (value for value in self.data.values() if type(value) is Message)
+
+    def tells_of(self, code: Code) -> bool:
+        """Whether it, or a reason of it, has a code."""
+        return self.code is code or any(each.tells_of(code) for each in self.reasons())
 
     def words(self, audience: Audience) -> str:
         """The text in the words of an audience."""

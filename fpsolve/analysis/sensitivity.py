@@ -29,14 +29,13 @@ from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.eigen import Bordered, PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import Bordered, PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.messages import Code, Message
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import ParameterDerivative, Problem, checked_moments, of_problem, with_original
 from fpsolve.model.quantity import (
@@ -230,10 +229,14 @@ def solve_sensitivities(
         try:
             slopes = solve()
         except (NotConverged, NoSuchExponent) as failure:
-            symbol = record.symbol if p is None else "Λ(p)"
-            notes.append(Message(Code.NO_SENSITIVITIES, p=p, symbol=symbol, reason=failure.message))
-            return {}
-        return {key: replace(each, quantity=record.by(parameters[key].quantity)) for key, each in slopes.items()}
+            reason = failure.message
+        except MemoryError:
+            reason = Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
+        else:
+            return {key: replace(each, quantity=record.by(parameters[key].quantity)) for key, each in slopes.items()}
+        symbol = record.symbol if p is None else "Λ(p)"
+        notes.append(Message(Code.NO_SENSITIVITIES, p=p, symbol=symbol, reason=reason))
+        return {}
 
     def of_root() -> Slopes:
         index = nonzero_root(solver, guess=root)
@@ -271,8 +274,7 @@ class Gradient:
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
         pair = self._solver.pair(p)
-        with one_thread():
-            finer = principal_pair(pair.generator.enriched(), p, start=pair)
+        finer = self._solver.near.finer_pair(pair, pair.generator.chosen.enriched())
         return {key: _between(changed_value(pair, by), changed_value(finer, by)) for key, by in self._along.items()}
 
     def lyapunov_exponent(self) -> dict[str, Estimate]:

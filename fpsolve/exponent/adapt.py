@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NoReturn
 
 import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
@@ -23,7 +23,7 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.discretisation import MOST_DEGREE, Cells, Discretisation, NoisePart, PhaseCells, Polynomials, States
-from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, one_thread
+from fpsolve.fem.factors import MAX_BAND, MAX_DENSE_UNKNOWNS, one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
@@ -61,10 +61,14 @@ FEWEST_CELLS, FALL_PER_CELL = 4, 8.0
 WIDER = 4.0
 COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
+A_THIRD_MORE = 4 / 3
+"""What a budget may be exceeded by."""
 Tolerance = Callable[[float, float], float]
 """The largest error allowed, from p and a value of Λ(p)."""
 SECONDS_PER_UNKNOWN = 3e-8
 """A solve takes about this times the power 1.5 of the number of unknowns; it is corrected by the last one."""
+SECONDS_PER_CUBE = 1e-10
+"""Where jumps lead from every state of a chain to all others, times its third power."""
 
 
 @told_in_words
@@ -74,8 +78,8 @@ class Budget:
 
     Args:
         unknowns: of the largest system; memory grows with it, some 30 kB each, 1.8 GB in all for the 60,000.
-        seconds: of the processor for one p; foreseen before every solve from the last one, so that it may take a third
-            more.
+        seconds: of the processor for one p; foreseen before every solve from the last one, and looked at before every
+            factorisation, so that it may take a third more.
 
     Raises:
         ParameterError: a number is out of its range.
@@ -114,8 +118,13 @@ class NearPlace:
     known: dict[float, Solution] = field(init=False, default_factory=dict)
     _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
 
-    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+    def solution(self, p: float, tolerance: Tolerance | None = None, started: float | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
+
+        Args:
+            p: the moment.
+            tolerance: the largest error allowed.
+            started: when work on this p began, by `time.thread_time`; now if not given.
 
         Raises:
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
@@ -126,7 +135,8 @@ class NearPlace:
         if p not in self.known or (self.mesh is None and not self.meets(self.known[p], allowed)):
             try:
                 with one_thread():
-                    self.known[p] = _Search(self, p, allowed).found()
+                    begun = time.thread_time() if started is None else started
+                    self.known[p] = _Search(self, p, allowed, begun).found()
             except NotConverged as failure:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure
@@ -139,6 +149,8 @@ class NearPlace:
             except np.linalg.LinAlgError as failure:
                 told = Message(Code.NOT_SOLVED, p=p, reason=str(failure), remedy=self.remedy)
                 raise NotConverged(told) from failure
+            except MemoryError as failure:
+                raise NotConverged(Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)) from failure
             except ArithmeticError as failure:
                 raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
         return self.known[p]
@@ -160,6 +172,26 @@ class NearPlace:
         except NotConverged as failure:
             raise NotConverged(failure.reason, failure.partial, self.remedy) from failure
 
+    def finer_pair(self, pair: PrincipalPair, chosen: Discretisation) -> PrincipalPair:
+        """That at the same p on a finer discretisation, which tells the errors of what the other says.
+
+        Raises:
+            NotConverged: it cannot be made, has a third more unknowns than the budget allows, or does not resolve it.
+        """
+        limit = A_THIRD_MORE * self.budget.unknowns if self.mesh is None else math.inf
+        reason: Message | str
+        if chosen.size > limit:
+            reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=self.budget.unknowns)
+        else:
+            try:
+                with one_thread():
+                    return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
+            except MeshError as failure:
+                reason = failure.message
+            except MemoryError:
+                raise NotConverged(Message(Code.NO_MEMORY), remedy=Remedy.MEMORY) from None
+        raise NotConverged(Message(Code.NOT_FINER, p=pair.p, reason=reason, remedy=self.remedy))
+
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
         side = p or (-1.0 if self.problem.noise.has_algebraic_tails else 1.0)  # where Λ is finite
@@ -169,10 +201,10 @@ class NearPlace:
         except NotConverged as failure:
             raise NotConverged(Message(Code.NEAR_ZERO, p=q, reason=failure.message), failure.partial) from failure
 
-    def loose(self, p: float, places: Sequence[Place]) -> Solution:
+    def loose(self, p: float, places: Sequence[Place], started: float | None = None) -> Solution:
         """That at p, to compare with other places: where one outdoes it, its eigenvalue is no exact one."""
         best = max((place.rate for place in places), default=0.0)
-        return self.solution(p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)))
+        return self.solution(p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)), started)
 
     def searched(self, search: _Search, start: Solution | None) -> Solution:
         """A solution within a tolerance from a first discretisation, or from a solution that does not suffice.
@@ -227,9 +259,9 @@ class FarPlaces(NearPlace):
 
     small_p, is_far = 0.0, True
 
-    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+    def solution(self, p: float, tolerance: Tolerance | None = None, started: float | None = None) -> Solution:
         try:
-            return super().solution(p, tolerance)
+            return super().solution(p, tolerance, started)
         except NotConverged as failure:
             raise NotConverged(Message(Code.FAR_OUT, reason=failure.message), failure.partial) from failure
 
@@ -263,17 +295,21 @@ class AllPlaces:
         """That of the larger eigenvalue. Raises `NotConverged`."""
         if p == 0:
             return self.near.solution(p, tolerance)
-        elsewhere = outlook(self.near.problem, p)
+        started, elsewhere = time.thread_time(), outlook(self.near.problem, p)
         elsewhere.refuse(p, elsewhere.highest)
-        near = self.near.loose(p, elsewhere.places)
+        near = self.near.loose(p, elsewhere.places, started)
         elsewhere.refuse(p, max(near.pair.value + near.error, *(place.rate for place in elsewhere.places), 0.0))
-        far = self.far.solution(p, tolerance) if other_places(near.pair) else None
+        far = self.far.solution(p, tolerance, started) if other_places(near.pair) else None
         if far is None or far.pair.value - far.error < near.pair.value + 10 * near.error:
-            near = self.near.solution(p, tolerance)
+            near = self.near.solution(p, tolerance, started)
         found = max((each for each in (near, far) if each), key=lambda each: each.pair.value)
         if found.pair.value + found.error < 0 and grows_far_out(self.near.problem):
             raise NotConverged(Message(Code.HELD_TOO_FAR, p=p, z=FURTHEST, value=found.pair.value))
         return found
+
+
+class _OutOfTime(Exception):
+    """A search has used up its budget within a stage."""
 
 
 @dataclass
@@ -283,16 +319,26 @@ class _Search:
     place: NearPlace
     p: float
     tolerance: Tolerance
-    started: float = field(default_factory=time.thread_time)
+    started: float
     stages: int = 0
     best: Solution | None = None
     error: float = math.inf
     share: float = math.inf
     failure: Exception | None = None
     last: tuple[float, int] = (0.0, 0)
+    ticked: float = math.inf
+    longest: float = 0.0
 
     def found(self) -> Solution:
         """A solution within the tolerance, or the one on the given mesh."""
+        try:
+            return self.sought()
+        except _OutOfTime:
+            seconds = time.thread_time() - self.started + self.longest
+            return self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.place.budget.seconds))
+
+    def sought(self) -> Solution:
+        """The same, which `tick` may end."""
         if self.place.mesh is not None:
             coarse, fine = self.place.given
             pair = self.tried(coarse).pair
@@ -353,7 +399,7 @@ class _Search:
         while True:
             self.check(chosen)
             try:
-                pair = principal_pair(Generator(self.place.problem, chosen), self.p, start=pair)
+                pair = principal_pair(Generator(self.place.problem, chosen), self.p, start=pair, clock=self.tick)
             except (MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError) as failure:
                 self.failure, pair = failure, None
                 chosen = chosen.doubled()
@@ -371,6 +417,8 @@ class _Search:
         size, elapsed = chosen.size, time.thread_time() - self.started
         cost = max(SECONDS_PER_UNKNOWN, (elapsed - self.last[0]) / max(self.last[1], 1) ** 1.5 if self.last[1] else 0.0)
         seconds = elapsed + cost * size**1.5
+        if not self.last[1] and self.place.problem.noise.longest_jump > MAX_BAND:
+            seconds += SECONDS_PER_CUBE * size**3
         if size > self.place.budget.unknowns:
             self.stop(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=self.place.budget.unknowns))
         if seconds > self.place.budget.seconds:
@@ -378,6 +426,14 @@ class _Search:
         if self.stages >= MAX_STAGES:
             self.stop(Message(Code.MESHES_SPENT, count=MAX_STAGES))
         self.last, self.stages = (elapsed, size), self.stages + 1
+        self.ticked, self.longest = math.inf, 0.0
+
+    def tick(self) -> None:
+        """End the search where the next factorisation, by the longest of this stage, leaves no time."""
+        now = time.thread_time()
+        self.longest, self.ticked = max(self.longest, now - self.ticked), now
+        if now - self.started + self.longest > A_THIRD_MORE * self.place.budget.seconds:
+            raise _OutOfTime
 
     def note(self, solution: Solution, error: float, allowed: float) -> None:
         """Keep the best solution; stop where only rounding is left."""
@@ -386,7 +442,7 @@ class _Search:
         if solution.pair.rounding > allowed:
             self.stop(Message(Code.ROUNDED, size=solution.pair.rounding))
 
-    def stop(self, reason: Message) -> None:
+    def stop(self, reason: Message) -> NoReturn:
         """Raise `NotConverged` with the best solution."""
         if best := self.best:
             reached = {"value": best.pair.value, "error": self.error, "size": self.share}

@@ -22,7 +22,7 @@ from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator
 
 from fpsolve.arrays import FloatArray, dense, finite, one
 from fpsolve.data import brief
-from fpsolve.errors import NotConverged, SingularMatrix
+from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
 from fpsolve.exponent.fields import EigenfunctionPlot
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.factors import Factors, one_thread
@@ -44,6 +44,8 @@ STEPS_PER_FACTOR = 5
 SLOW = 1e-2
 """A step that lowers the backward error by less than this factor calls for new LU factors."""
 MAX_DENSE_UNKNOWNS = 4000
+LARGEST_NORM = 1e150
+"""Of L(p): vectors of this size have lengths."""
 SURVEYED_UNKNOWNS = 600
 """Up to so many, a chain is checked by all eigenvalues."""
 
@@ -89,6 +91,7 @@ def principal_pair(
     p: float,
     *,
     start: PrincipalPair | Sequence[PrincipalPair] | None = None,
+    clock: Callable[[], None] = lambda: None,
 ) -> PrincipalPair:
     """The principal eigenvalue Λ(p) of Eq. (19) with T and T*.
 
@@ -97,15 +100,19 @@ def principal_pair(
         p: the moment.
         start: the pair of a neighbouring p or of another generator, or several pairs, between which the eigenfunctions
             are interpolated in p where they are of this generator; it saves time.
+        clock: called before each factorisation; what it raises ends the search.
 
     Raises:
+        NumericalFailure: the numbers of L(p) are too large to be squared.
         NotConverged: the iteration stalls, or both T and T* change sign: the mesh does not resolve the problem.
             `partial` is the pair that was reached.
     """
     pairs, pencil = [start] if isinstance(start, PrincipalPair) else start, generator.at(p)
+    if not pencil.matrix.norm < LARGEST_NORM:
+        raise NumericalFailure(f"L(p) has the size {pencil.matrix.norm:.0e}")
     searches: list[Callable[[], tuple[FloatArray, FloatArray]]] = [
         lambda: _carried(pairs, pencil, generator) if pairs else _simplest(pencil, generator),
-        lambda: _from_the_right(pencil, generator),
+        lambda: _from_the_right(pencil, generator, clock),
     ]
     if generator.problem.noise.mixes_slowly:  # states that hardly mix have a positive pair each
         searches.reverse()
@@ -115,7 +122,7 @@ def principal_pair(
             vectors = search()
         except NotConverged:  # the other searches may still find it
             continue
-        pair = _pair(generator, pencil, rayleigh_iteration(pencil, *vectors))
+        pair = _pair(generator, pencil, rayleigh_iteration(pencil, *vectors, clock))
         if pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= SURELY_POSITIVE:
             break
         found.append(pair)
@@ -179,11 +186,12 @@ def _simplest(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatAr
     return vector, vector
 
 
-def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray]:
+def _from_the_right(pencil: Pencil, generator: Generator, clock: Callable[[], None]) -> tuple[FloatArray, FloatArray]:
     """Right and left vectors near the principal ones, from shifts that start at an upper bound of Λ(p)."""
     space, shift = pencil.space, generator.upper_bound(pencil.p) + 0.25 * generator.unit_rate
     right, left = _simplest(pencil, generator)
     for _ in range(2):
+        clock()
         factor = pencil.factorised(shift)
         right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, pencil.p)
         shift -= 0.95 / inverse_distance
@@ -217,7 +225,9 @@ class Iterate(NamedTuple):
 
 
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # a start may be useless, as its residual tells then
-def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> Iterate:
+def rayleigh_iteration(
+    pencil: Pencil, x: FloatArray, y: FloatArray, clock: Callable[[], None] = lambda: None
+) -> Iterate:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
     space, operator = pencil.space, pencil.matrix
     mx = space.weighed(x)
@@ -225,6 +235,7 @@ def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> Iterate:
     size, stalls = operator.norm, 0
     for _ in range(MAX_ITERATIONS):
         shift, last = best.value, best.residual
+        clock()
         factor = pencil.factorised(shift)
         for _ in range(STEPS_PER_FACTOR):
             new = _improved(factor, space, shift, size, best)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, dataset
-from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
+from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
     WIDER,
     AllPlaces,
@@ -30,8 +30,6 @@ from fpsolve.exponent.adapt import (
 from fpsolve.exponent.eigen import PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
-from fpsolve.fem.factors import one_thread
-from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
@@ -262,13 +260,7 @@ class ExponentSolver:
     def at_zero(self) -> tuple[PrincipalPair, PrincipalPair]:
         """The pair at p = 0, and that of a finer and wider discretisation. Raises `NotConverged`."""
         pair = self.near.solution(0.0).pair
-        try:
-            generator = Generator(self.problem, widened(pair.generator).enriched())
-        except MeshError as failure:
-            told = Message(Code.ZERO_NOT_FINER, reason=failure.message, remedy=self.near.remedy)
-            raise NotConverged(told) from failure
-        with one_thread():
-            return pair, self.near.pair_on(generator, 0.0, pair)
+        return pair, self.near.finer_pair(pair, widened(pair.generator).enriched())
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""

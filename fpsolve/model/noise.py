@@ -122,6 +122,11 @@ class Noise(Parametrised):
         return 0.0
 
     @property
+    def longest_jump(self) -> int:
+        """How many states further ξ jumps at most; 0 for continuous paths."""
+        return 0
+
+    @property
     def diffusion(self) -> float:
         """σ, the coefficient of dW, where it is constant; else its value at ξ = 0."""
         raise NotImplementedError

@@ -195,7 +195,8 @@ def solve_curve(
         failures=found.failures or tuple(Failure(None, message) for message in of[Severity.FAILURE]),
         seconds=thread_time() - started,
     )
-    return Solved(result, pairs, stationary)
+    told = (*(failure.reason for failure in result.failures), *result.warnings, *result.notes)
+    return Solved(result, pairs, stationary, is_passing=any(each.tells_of(Code.NO_MEMORY) for each in told))
 
 
 def without_failed(wanted: Wanted, failures: Sequence[Failure]) -> Wanted:
@@ -243,6 +244,8 @@ def _solve_indices(
             reason = unsolved.get(failure.message, failure.message)
         except NoSuchExponent as failure:
             code, reason = Code.INDEX_MISSING, failure.message
+        except MemoryError:
+            code, reason = Code.INDEX_FAILED, Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
         else:
             if isinstance(found, Estimate):
                 estimates[index.name] = found

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
-from fpsolve.analysis.sensitivity import SMALL_P, sensitivities
+from fpsolve.analysis.sensitivity import SMALL_P, Gradient, sensitivities
 from fpsolve.arrays import identity
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.quantities import lyapunov_exponent
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.generator import Generator
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.systems.vibro_impact import DAMPING
 from tests.conftest import sampled
@@ -52,6 +55,34 @@ def test_of_the_indices_are_central_differences(seed):
             if np.isfinite(whole[i]):
                 size = max(abs(whole[i]), 1e-3 if i != 1 else 1.0) / max(abs(theta[key]), 0.1)
                 assert found[name][key].value == pytest.approx(expected[i], rel=1e-6, abs=1e-6 * size), (key, name)
+
+
+HEAVY = Problem(
+    VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3), NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.2)
+)
+
+
+def test_a_finer_mesh_beyond_the_budget_costs_what_needs_it_alone(monkeypatch):
+    """At p = 0 that is four times as wide as what λ itself takes."""
+    rtol, made = 1e-3, list[int]()
+    size = max(ExponentSolver(HEAVY, rtol=rtol).near.solution(p).pair.generator.size for p in (0.0, -0.5))
+    monkeypatch.setattr(Generator, "at", lambda self, p, own=Generator.at: made.append(self.size) or own(self, p))
+    found = sensitivities(HEAVY, -0.5, rtol=rtol, budget=Budget(unknowns=size))
+    assert max(made) <= 4 / 3 * size
+    assert "lyapunov_exponent" not in found.indices
+    assert any("p = 0 did not converge on a finer mesh: the next mesh has" in note for note in found.notes)
+    assert lyapunov_exponent(HEAVY, rtol=rtol, budget=Budget(unknowns=size)).value > 0
+
+
+def test_what_memory_does_not_suffice_for_costs_itself_alone(monkeypatch):
+    def fail(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(Gradient, "lyapunov_exponent", fail)
+    found = sensitivities(HEAVY, -0.5, rtol=1e-3)
+    assert found.moments[0]
+    assert "variance_rate" in found.indices
+    assert any("no sensitivities of λ: not enough memory" in note for note in found.notes)
 
 
 def test_noise_of_its_own_parameters():

@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 
 from fpsolve.errors import NoSuchExponent, NotConverged
+from fpsolve.exponent import adapt
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import truncation
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
-from fpsolve.fem.generator import Generator
+from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.mesh import make_mesh
+from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
@@ -204,6 +206,38 @@ def test_a_budget_ends_the_search_with_the_best_value(budget):
     with pytest.raises(NotConverged) as again:  # at once, without another search
         solver.solution(2.0)
     assert again.value is caught.value
+
+
+@pytest.mark.parametrize(
+    ("noise", "p"), [(FIG1_NOISE.ou_reduction(), 1e5), (NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.01), -1.0)]
+)
+def test_a_budget_holds_within_a_third(noise, p, monkeypatch):
+    """By a clock on which each factorisation takes a second, in all places of the noise together."""
+    elapsed, factorised = [0.0], Pencil.factorised
+
+    def slowly(pencil, shift):
+        elapsed[0] += 1
+        return factorised(pencil, shift)
+
+    monkeypatch.setattr(Pencil, "factorised", slowly)
+    monkeypatch.setattr(adapt.time, "thread_time", lambda: elapsed[0])
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.5, epsilon=0.1)
+    with pytest.raises(NotConverged, match=r"more than budget.seconds = 6"):
+        moment_lyapunov(oscillator, noise, p, budget=Budget(seconds=6.0))
+    assert 4 <= elapsed[0] <= 8
+
+
+def test_a_chain_of_which_all_states_are_neighbours_is_foreseen_to_take_long():
+    rates = np.ones((60, 60))
+    np.fill_diagonal(rates, 0.0)
+    chain = MarkovChain(states=np.linspace(-1, 1, 60), rates=rates)
+    with pytest.raises(NotConverged, match=r"the next mesh needs some .* more than budget.seconds = 0.05; no mesh"):
+        moment_lyapunov(FIG1, chain, 2.0, budget=Budget(seconds=0.05))
+
+
+def test_p_of_any_size_ends_at_once_without_a_warning():
+    with pytest.raises(NotConverged, match=r"Λ\(1e\+300\) is beyond floating-point numbers"):
+        moment_lyapunov(FIG1, WEAK_NOISE, 1e300)
 
 
 def test_a_tolerance_below_rounding_is_refused():

@@ -63,3 +63,14 @@ def test_rates_with_and_without_their_diagonal():
 def test_what_is_no_chain_is_refused(states, rates, message):
     with pytest.raises(ValueError, match=message):
         MarkovChain(states, rates)
+
+
+def test_many_states_that_are_hardly_connected():
+    """Two groups, and one way there and back: the numbers of all ways are beyond floats."""
+    rates = np.kron(np.eye(2), np.ones((120, 120)))
+    rates[119, 120] = rates[120, 119] = 1e-3
+    np.fill_diagonal(rates, 0.0)
+    assert MarkovChain(states=np.linspace(-1, 1, 240), rates=rates).longest_jump == 119
+    rates[119, 120] = 0.0
+    with pytest.raises(ValueError, match="every state must be reached"):
+        MarkovChain(states=np.linspace(-1, 1, 240), rates=rates)

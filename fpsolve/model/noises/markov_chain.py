@@ -58,6 +58,8 @@ class MarkovChain(Noise):
             raise ValueError(f"got {states.shape} states and {rates.shape} rates; must be (n,) and (n, n), n >= 2")
         if not (np.all(np.isfinite(states)) and np.all(np.isfinite(rates)) and np.ptp(states) > 0):
             raise ValueError(f"got the states {self.states}; must be finite numbers that differ, with finite rates")
+        from scipy.sparse.csgraph import connected_components
+
         jumps = rates - np.diag(np.diagonal(rates))
         leaving = jumps.sum(axis=1)
         stated = -np.diagonal(rates)
@@ -65,8 +67,7 @@ class MarkovChain(Noise):
             raise ValueError(
                 "rates from one state to another must be >= 0, and each diagonal entry 0 or minus the sum of its row"
             )
-        reached = np.linalg.matrix_power(np.eye(states.size) + (jumps > 0), states.size - 1) > 0
-        if not np.all(reached):
+        if connected_components(jumps > 0, connection="strong")[0] > 1:
             raise ValueError("every state must be reached from every other one; leave out those that are not")
         object.__setattr__(self, "states", tuple(states.tolist()))
         object.__setattr__(self, "rates", tuple(map(tuple, (jumps - np.diag(leaving)).tolist())))
@@ -95,6 +96,11 @@ class MarkovChain(Noise):
     @property
     def largest_jump_rate(self) -> float:
         return float(-np.min(self.rates))
+
+    @property
+    def longest_jump(self) -> int:
+        first, last = np.nonzero(self.rates)
+        return int(np.max(np.abs(first - last)))
 
     @property
     def standard_deviation(self) -> float:
