@@ -101,6 +101,7 @@ def assert_same_results(folder, out, whole="whole"):
     assert [{**curve, "seconds": 0} for curve in curves[0]] == [{**curve, "seconds": 0} for curve in curves[1]]
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_number_of_processes(place):
     run(place, "two", "--jobs", "2")
     assert_same_results(place, "two")
@@ -190,6 +191,7 @@ def test_what_is_no_file_holds_no_records(tmp_path):
     assert len(list(tmp_path.iterdir())) == 3
 
 
+@pytest.mark.slow
 def test_a_changed_parameter_solves_only_what_it_changes(place):
     shutil.copytree(place / "whole", place / "changed")
     omega, D0 = "[0.5, 0.7]", f'{{ start = 0.1, stop = 1.0, num = {SIZE}, scale = "log" }}'

@@ -113,6 +113,7 @@ def test_too_long_lists(tmp_path: Path) -> None:
         assert fault.line
 
 
+@pytest.mark.slow
 def test_the_longest_lists_take_no_longer_than_reading_them(tmp_path: Path) -> None:
     """Within seconds; comparing all pairs would take minutes."""
     longest = TOO_MANY.replace(", 0.100001", "")

@@ -21,7 +21,7 @@ from fpsolve.errors import CaseError
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
 from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import second_order
-from tests.conftest import FIG1, FIG1_NOISE, sampled
+from tests.conftest import FIG1, FIG1_NOISE
 
 TEXT = """\
 title = "varied"
@@ -279,7 +279,8 @@ def test_overrides_of_ranges_and_files(write: Write, tmp_path: Path) -> None:
     assert not load_case(write('file = "other.csv"'), ["vary={}"]).vary
 
 
-@pytest.mark.parametrize("kind", sampled("product", "file"))
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["product", "file"])
 def test_ten_thousand_sets_are_read_within_seconds(write: Write, tmp_path: Path, kind: str) -> None:
     rows = (f"{0.1 + i / 1000},{1 + i / 7000},{'exact' if i % 3 else 'ou-reduction'}\n" for i in range(10_000))
     sets_file(tmp_path, "noise.D0,oscillator.omega,noise.treatment\n" + "".join(rows))

@@ -147,6 +147,7 @@ def test_of_two_places_that_slow_noise_may_hold_the_faster_counts(tau0, p, D0, v
     assert along.value[-1] == pytest.approx(value, rel=3e-7)
 
 
+@pytest.mark.slow
 def test_a_mesh_that_leaves_the_faster_place_out_is_warned_of():
     oscillator = VibroImpactOscillator(**NO_LOSS, epsilon=math.sqrt(0.1))
     noise = NonGaussianNoise(D0=1.3, tau0=20.0, r0=1.0).ou_reduction()

@@ -195,6 +195,7 @@ def test_sensitivities():
     assert found["system.epsilon"].value == pytest.approx(slope, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_discretisation_for_another_p_is_not_taken_where_there_is_a_corner():
     """At p = 12 the tilted density lies eleven standard deviations out, and polynomials do; at p = 1 they do not."""
     problem = Problem(replace(SYSTEM, epsilon=0.5), OrnsteinUhlenbeck(alpha=0.3, sigma=1.2))

@@ -146,7 +146,8 @@ def test_convex_and_continuous_over_the_change_of_place():
     assert result.derivative[-1] == 0
 
 
-@pytest.mark.parametrize("seed", sampled(*range(SETS)))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(SETS))
 def test_random_sets(seed):
     rng = np.random.default_rng(1000 + seed)
     case = problem(

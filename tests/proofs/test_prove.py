@@ -87,6 +87,7 @@ def test_the_lyapunov_exponent_agrees_with_the_slope_of_the_moments():
     assert other.lower > found.upper
 
 
+@pytest.mark.slow
 def test_noise_whose_ends_are_reached():
     """For r₀ < 0; both kinds of trial functions and the finite elements agree."""
     given = problem(**FIG1 | {"epsilon": 0.6, "r0": -1.0})

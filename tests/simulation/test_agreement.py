@@ -38,7 +38,8 @@ def test_a_sample_agrees_with_finite_elements(chosen):
     assert np.max([row.simulated.standard_error for row in given]) < 2e-3
 
 
-@pytest.mark.parametrize("count", [16, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [200])
 @pytest.mark.parametrize(("estimator", "paths", "time"), sampled(("direct", 2048, 100.0), ("population", 2048, 50.0)))
 def test_standard_errors_are_honest(estimator, paths, time, count):
     """Over 200 seeds the estimates deviate by their standard error, within 20 %, and their mean is Λ(p)."""

@@ -75,7 +75,7 @@ def small(seed, estimator="direct", orders=(-1.0, 1.0)):
     return simulate(MODERATE, NOISE, list(orders), estimator=estimator, paths=640, time=60.0, seed=seed)
 
 
-@pytest.mark.parametrize("estimator", ["direct", "population"])
+@pytest.mark.parametrize("estimator", sampled("direct", "population"))
 def test_seed_decides_whatever_the_threads(monkeypatch, estimator):
     found = small(3, estimator)
     for threads in (1, 2, 3):
