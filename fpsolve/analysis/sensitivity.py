@@ -191,7 +191,7 @@ def sensitivities(
     For noise of Eq. (7) with r₀ = 1 ∂/∂r₀ is the derivative from below, as Λ is infinite, or another, above.
 
     Args:
-        problem: a motion and its noise, in one argument or two.
+        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
         p: one moment, or an array of shape (n,); none by default.
         original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).
         rtol, mesh, budget: as for `moment_lyapunov`.

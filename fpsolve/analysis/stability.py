@@ -277,7 +277,8 @@ def boundary(
     """The line λ = 0, Λ(p) = 0 or δ_p = v in a frame of two parameters.
 
     Args:
-        problem: a motion and its noise, in one argument or two; its other parameters are held.
+        oscillator, noise: a motion and its noise, whose other parameters are held; or one `Problem` of both, in their
+            place or as `problem`.
         zero: "lyapunov_exponent", {"moment": p} or {"stability_index": v}.
         x, y: the frame.
         original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).

@@ -51,7 +51,7 @@ class MomentLyapunovFunction(Result):
     Λ′ = ⟨T*, L′T⟩. There are as many points as rtol needs: the last coefficients of the Chebyshev series are the error.
 
     Args:
-        problem: a motion and its noise, in one argument or two.
+        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
         interval: the smallest and the largest p.
         mesh: a mesh for all p; None chooses one for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
@@ -298,13 +298,13 @@ def moment_lyapunov(
     """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
 
     Args:
-        problem: a motion and its noise, in one argument or two.
+        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
         p: one moment, or an array of shape (n,).
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
         budget: what the choice of a mesh may cost; None for the default one.
 
-    Many p are interpolated, see `MomentLyapunovFunction`, where that saves solves; the result then has no `pairs`.
+    Many p are interpolated, see `MomentLyapunovFunction`, where that saves solves; then `pairs` solves each p.
 
     Raises:
         ValueError: p is not finite, or empty, or rtol is not positive.

@@ -144,7 +144,7 @@ def lyapunov_exponent(
     For noise with algebraic tails a positive λ is not Λ′(0), see `theory.far_places`; `meaning` says so.
 
     Args:
-        problem: a motion and its noise, in one argument or two.
+        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
         rtol, mesh, budget: as for `moment_lyapunov`.
 
     Raises:
@@ -163,7 +163,7 @@ def stability_index(
     For noise with algebraic tails there is none: Λ(p) > 0 for every p ≠ 0, see `theory.far_places`.
 
     Args:
-        problem: a motion and its noise, in one argument or two.
+        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
         rtol, mesh, budget: as for `moment_lyapunov`.
 
     Raises:

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
+from inspect import signature
 from textwrap import wrap
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
@@ -222,13 +223,28 @@ def of_problem(function: Callable[Concatenate[Problem, P], R_co]) -> OfProblem[P
     def with_pair(*args: Any, **kwargs: Any) -> R_co:
         return function(*problem_first(args, kwargs), **kwargs)
 
-    return with_pair
+    return _signed(with_pair, 0)
 
 
 def of_problem_too(method: Callable[..., None]) -> Callable[..., None]:
     """The same for a method, such as `__init__`."""
 
-    return wraps(method)(lambda self, *args, **kwargs: method(self, *problem_first(args, kwargs), **kwargs))
+    @wraps(method)
+    def with_pair(self: Any, *args: Any, **kwargs: Any) -> None:
+        method(self, *problem_first(args, kwargs), **kwargs)
+
+    return _signed(with_pair, 1)
+
+
+def _signed(function: Any, at: int) -> Any:
+    """The function, of which `help` shows (oscillator, noise) in place of a problem, as every example writes it."""
+    made = signature(function)
+    old = [*made.parameters.values()]
+    halves = [
+        old[at].replace(name=name, annotation=kind) for name, kind in (("oscillator", "System"), ("noise", "Noise"))
+    ]
+    function.__signature__ = made.replace(parameters=[*old[:at], *halves, *old[at + 1 :]])
+    return function
 
 
 def problem_first(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[Any, ...]:

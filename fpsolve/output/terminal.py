@@ -27,7 +27,7 @@ from fpsolve.exponent.quantities import (
     VARIANCE_RATE,
     Index,
 )
-from fpsolve.messages import Message, Severity, message_of
+from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import moment_at
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.tables import asked, in_case_words
@@ -425,6 +425,8 @@ def print_remarks(
     for each in found:
         for severity, kinds in groups.items():
             for message in map(message_of, each.remarks.get(severity, ())):
+                if message.code is Code.STRONG_NOISE and not (file and shows_perturbed_moments(case, len(found))):
+                    continue
                 kinds.setdefault(message.kind, []).append((message, each.curve))
     for severity, kinds in groups.items():
         for group in list(kinds.values())[:MOST_KINDS]:
@@ -443,6 +445,12 @@ def print_remarks(
             print_remark(f"{who}: {worst.words(CASE_WORDS)}{rest}", severity)
         if (left := len(kinds) - MOST_KINDS) > 0:
             print_remark(f"{case.name}: {left} more of this kind{f' are in {file}' if file else ''}", severity)
+
+
+def shows_perturbed_moments(case: Case, count: int) -> bool:
+    """Whether the table of so many curves or the figure shows Eq. (37)."""
+    over_p = case.figure.x == "p" and (count <= MOST_TABLES or case.output.figure)
+    return over_p or (case.figure.moment is not None and case.output.figure)
 
 
 def print_remark(text: str, severity: Severity = Severity.NOTE) -> None:

@@ -60,7 +60,8 @@ def prove(problem: Problem, p: float, *, width: float | None = None) -> Enclosur
     True
 
     Args:
-        problem: an oscillator and its noise, in one argument or two; its numbers are the decimals they are printed as.
+        oscillator, noise: the motion and its noise, whose numbers are the decimals they are printed as; or one
+            `Problem` of both, in their place or as `problem`.
         p: order of the moment, in the same sense.
         width: wanted upper − lower, in 1/time; 1e-7 of the scale of Λ(p) if None.
 

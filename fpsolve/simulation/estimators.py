@@ -159,7 +159,8 @@ def simulate(
     none, and KeyboardInterrupt is raised.
 
     Args:
-        problem: the oscillator and its noise, in one argument or two; c₂ and c₃ are not used.
+        oscillator, noise: the motion, whose c₂ and c₃ are not used, and its noise; or one `Problem` of both, in their
+            place or as `problem`.
         p: orders of the moments, one or several.
         estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
         paths: how many; a multiple of 32 is used.

@@ -161,7 +161,8 @@ def stationary_response(
     """Simulate the nonlinear system of Eq. (3) until it is stationary, and then for `time` at least.
 
     Args:
-        problem: the oscillator, with c₂ or c₃ > 0, and its noise, in one argument or two.
+        oscillator, noise: the motion, with c₂ or c₃ > 0, and its noise; or one `Problem` of both, in their place or as
+            `problem`.
         exponent, variance_rate: λ > 0 and Λ″(0) of the linear system. ln A forgets its start in 1/λ, or, where it
             wanders more than it drifts, in 2Λ″(0)/λ².
         paths, time, step, seed: as for `simulate`; the time is at least 20 times that.

@@ -1,10 +1,12 @@
 """Motions in the plane: h and q of a matrix, the paper's oscillator among them, and what is refused."""
 
 import math
+from inspect import signature
 
 import numpy as np
 import pytest
 
+import fpsolve
 from fpsolve.arrays import identity
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.plane import CoefficientMatrix, Jump, angular_frequency, growth_rate, matrix_at, phase_speed
@@ -114,3 +116,10 @@ def test_problems_are_made_of_a_motion_and_a_noise(wrong):
     for halves, kind in (((wrong, noise), "motion"), ((oscillator, wrong), "noise")):
         with pytest.raises(TypeError, match=rf"^got .* as a {kind}; the first arguments must be an oscillator and"):
             Problem(*halves)
+
+
+def test_help_shows_the_signature_of_the_examples():
+    for name in ("moment_lyapunov", "MomentLyapunovFunction", "boundary", "prove", "sensitivities", "simulate"):
+        shown = signature(getattr(fpsolve, name))
+        assert [*shown.parameters][:2] == ["oscillator", "noise"]
+        assert "problem:" not in getattr(fpsolve, name).__doc__

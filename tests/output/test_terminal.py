@@ -255,7 +255,7 @@ def test_where_no_table_fits_rows_are_lists(capsys, terminal):
 
 
 def test_sentences_that_differ_in_numbers_are_one(tmp_path, capsys):
-    case, results = many(tmp_path, 200, **KINDS)
+    case, results = many(tmp_path, 200, ["output.figure=true"], **KINDS)
     print_remarks(case, results)
     warning, note = capsys.readouterr().err.splitlines()
     worst = results[89].curve.label
@@ -304,6 +304,25 @@ def test_the_line_of_states_agrees_with_the_warnings(tmp_path, capsys, count, co
     assert f"{count} curves: {count - 5} converged, 5 {state}; " in out
     assert f"warning: many: 5 of {count} curves: {said}" in err
     assert len(re.findall(f"│ +{state} │", out)) == (5 if count == 12 else 1)  # of many the extreme ones are shown
+
+
+@pytest.mark.parametrize(
+    ("count", "overrides", "is_shown"),
+    [
+        (3, [], True),  # in a column of the tables
+        (12, ["output.figure=true"], True),
+        (12, [], False),
+        (3, ['figure={ x = "noise.D0", y = "lyapunov_exponent" }'], False),
+        (3, ['figure={ x = "noise.D0", y = { moment = 2.0 } }', "output.figure=true"], True),
+    ],
+)
+def test_weak_noise_is_spoken_of_where_its_equation_is_shown(tmp_path, capsys, count, overrides, is_shown):
+    told = Message(Code.STRONG_NOISE, first=2.0, most=0.05, p=6.0, rest=1.0, size=0.5)
+    case, results = many(tmp_path, count, overrides, notes=lambda _: (told,))
+    print_remarks(case, results)
+    assert ("Eq. (37) is for weak noise" in capsys.readouterr().err) == is_shown
+    print_remarks(case, results, file="")
+    assert capsys.readouterr().err == ""
 
 
 def test_equations_and_names_with_numbers_keep_sentences_apart(tmp_path, capsys):
