@@ -133,7 +133,7 @@ class Results(Sequence[CurveResult]):
     """
 
     def __init__(self, case: Case, records: Records) -> None:
-        self._case, self._records, self._asked = case, records, everything(case).p
+        self._case, self._records, self._asked = case, records, everything(case).p.tolist()
         self._found: dict[int, Address | CurveResult] = {}
         self._order: list[int] = []
 

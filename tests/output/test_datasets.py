@@ -2,7 +2,10 @@
 
 import json
 import math
+import os
+import shutil
 
+import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -114,24 +117,45 @@ def runs(tmp_path_factory):
 def test_many_runs_are_one_dataset(runs, monkeypatch):
     monkeypatch.chdir(runs.parent)
     found = fpsolve.open_results("out/*")
-    assert dict(found.sizes) == {"set": 10, "p": 4}
-    assert found.p.values.tolist() == [-1.0, 0.0, 2.0, 4.0]
-    assert found.run.values.tolist() == ["alone", *["noises"] * 2, *["product"] * 4, *["sets"] * 3]
-    assert found["oscillator.omega"].values.tolist() == [1.0] * 8 + [2.0] * 2
-    assert found["noise.treatment"].values.tolist() == [
+    assert dict(found.sizes) == {"row": 3 + 2 + 4 * 3 + 3 * 2}
+    assert len(found.to_dataframe()) == 23
+    assert found["run"].values.tolist() == [*["alone"] * 3, *["noises"] * 2, *["product"] * 12, *["sets"] * 6]
+    assert np.unique(found["set"]).tolist() == [*range(1, 11)]
+    first = found.to_dataframe().groupby("set").first()
+    assert first["oscillator.omega"].tolist() == [1.0] * 8 + [2.0] * 2
+    assert first["noise.treatment"].tolist() == [
         "ou-reduction", *["exact", "ou-reduction"] * 3, *["ou-reduction"] * 3
     ]  # fmt: skip
+    assert np.isnan(first.lyapunov_exponent).tolist() == [True, *[False] * 9]
     alone = fpsolve.open_results("out/alone")
     assert float(found.moment.sel(p=2.0)[0]) == float(alone.moment.sel(p=2.0).item())
-    assert np.isnan(found.moment.sel(p=2.0)).values.tolist() == [False, True, True, *[False] * 7]
-    assert np.isnan(found.moment.sel(p=4.0)).values.tolist() == [*[True] * 7, *[False] * 3]
-    assert np.isnan(found.lyapunov_exponent).values.tolist() == [True, *[False] * 9]
-    assert len(found.to_dataframe()) == 40
+    assert alone.p.values.tolist() == [2.0, 0.0, -1.0]
+    for p, number in {2.0: 8, 4.0: 3, 0.0: 5}.items():
+        chosen = found.sel(p=p)
+        assert dict(chosen.sizes) == {"set": number}
+        assert np.isfinite(chosen.moment).all()
+    assert np.isnan(found.moment).values.tolist() == np.isnan(found.p).values.tolist()
+    negative = found.where(found.lyapunov_exponent < 0, drop=True)
+    assert len(negative.to_dataframe()) == np.sum(found.lyapunov_exponent < 0) > 0
+    for name in ("alone", "product", "sets"):
+        with xr.open_dataset(runs / name / "results.nc") as file:
+            own = found.isel(row=found.run == name)
+            np.testing.assert_array_equal(own.moment, file.moment.values.ravel())
+            assert own.moment.attrs == file.moment.attrs
+
+
+def test_runs_of_other_noises_are_one_dataset(runs, tmp_path):
+    noise = TEXT.partition("[noise]")[0] + '[noise]\nkind = "sine-wiener"\namplitude = 1.0\nsigma = 1.0\n'
+    solved(tmp_path, noise + TEXT[TEXT.index("[moments]") :], "sine")
+    found = fpsolve.open_results(runs / "alone", tmp_path / "out/sine")
+    assert np.isnan(found["noise.sigma"]).values.tolist() == [True] * 3 + [False] * 3
+    assert found["noise.treatment"].values.tolist() == ["ou-reduction"] * 3 + [""] * 3
 
 
 def test_runs_without_moments_have_no_p(runs):
     found = fpsolve.open_results(runs / "noises")
-    assert dict(found.sizes) == {"set": 2}
+    assert dict(found.sizes) == {"row": 2}
+    assert np.isnan(found.p).all()
     assert len(found.to_dataframe()) == 2
 
 
@@ -148,5 +172,75 @@ def test_no_results(tmp_path, monkeypatch, places):
 )
 def test_a_damaged_file_is_named(runs, tmp_path, damaged):
     (tmp_path / "results.nc").write_bytes(damaged((runs / "alone/results.nc").read_bytes()))
-    with pytest.raises(FpsolveError, match=r"results\.nc cannot be read: .*; run its case again"):
+    with pytest.raises(FpsolveError, match=r"results\.nc cannot be read as results of a run: .*; run its case again"):
         fpsolve.open_results(tmp_path)
+
+
+def rewritten(name, make):
+    """Another dataset in the place of one of a file."""
+
+    def change(file):
+        if name in file:
+            del file[name]
+        make(file)
+
+    return change
+
+
+def named(file):
+    """A variable with a dimension of its own."""
+    file["x"], file["extra"] = [0, 1, 2], [0, 1, 2]
+    file["x"].make_scale("x")
+    file["extra"].dims[0].attach_scale(file["x"])
+
+
+FOREIGN = {
+    "empty": (lambda file: [file.pop(name) for name in list(file)], "no variable status over its sets"),
+    "another program's": (
+        lambda file: [file.pop(name) for name in list(file)] and file.update(x=[0, 1, 2]), "no variable status"
+    ),
+    "an array for a parameter": (
+        lambda file: file.attrs.update({"oscillator.c1": np.arange(3)}), "attribute oscillator.c1 is no number"
+    ),
+    "a further variable": (lambda file: file.update(extra=np.zeros((7, 2))), "dimensions of extra have no names"),
+    "a variable with names": (named, "no run writes a variable such as extra"),
+    "a scale that is a text": (lambda file: file["moment"].attrs.update(scale_factor="abc"), "."),
+    "p twice": (lambda file: file["p"].write_direct(np.array([2.0, 2.0, 0.0])), "p are not finite and different"),
+    "p is nan": (lambda file: file["p"].write_direct(np.array([2.0, math.nan, 0.0])), "p are not finite"),
+    "three thousand million sets": (
+        rewritten("status", lambda file: file.create_dataset("status", (3 * 10**9,), "i1", chunks=(1000,))),
+        "it states 3000000.* bytes of numbers and can hold",
+    ),
+    "texts for numbers": (rewritten("seconds", lambda file: file.update(seconds="x")), "such as seconds"),
+    "a link": (rewritten("p", lambda file: file.update(p=h5py.ExternalLink("/dev/zero", "/"))), "of its own"),
+    "a group": (lambda file: file.create_group("x"), "x is no variable of its own"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "reason"), FOREIGN.values(), ids=FOREIGN)
+def test_what_is_no_file_of_a_run_is_named_and_left_out(runs, tmp_path, change, reason):
+    bad = tmp_path / "results.nc"
+    shutil.copy(runs / "alone/results.nc", bad)
+    with h5py.File(bad, "r+") as file:
+        change(file)
+    with pytest.raises(
+        FpsolveError, match=rf"{bad} cannot be read as .* run: .*{reason}.*; run its case again"
+    ) as raised:
+        fpsolve.open_results(runs / "product", bad)
+    assert "\n" not in str(raised.value)
+    with pytest.warns(UserWarning, match=rf"left out: {bad} cannot be read"):
+        found = fpsolve.open_results(bad, runs / "product", errors="warn")
+    assert found.equals(fpsolve.open_results(runs / "product"))
+    with (
+        pytest.warns(UserWarning, match="left out"),
+        pytest.raises(FpsolveError, match=rf"none of {bad} is a file of a run"),
+    ):
+        fpsolve.open_results(bad, errors="warn")
+
+
+def test_what_is_no_plain_file_is_refused(runs, tmp_path):
+    os.mkfifo(tmp_path / "results.nc")
+    with pytest.raises(FpsolveError, match=r"results\.nc cannot be read as results of a run: it is no plain file"):
+        fpsolve.open_results(tmp_path)
+    with pytest.raises(FpsolveError, match='errors is "raise" or "warn", not "ignore"'.replace('"ignore"', "'ignore'")):
+        fpsolve.open_results(runs / "alone", errors="ignore")
