@@ -42,6 +42,23 @@ def test_the_time_to_go_follows_from_the_sets_of_this_run_alone(clock):
         assert counted(task) == "320 of 400 sets"
 
 
+@pytest.mark.parametrize("count", [100, 400, 4000])
+@pytest.mark.parametrize("first", [0.0, 2.0, 5.0])
+def test_the_first_time_to_go_is_near_the_true_one(clock, count, first):
+    """Also where the first set takes longer than a hundred others, as code is compiled and processes start."""
+    bars, each, shown = Bars(console(), clock), 0.05, []
+    with bars.bar(Phase("case", "solving", count, SETS)) as advance:
+        [task] = bars._display.tasks
+        for number in range(count):
+            clock.now += each + first * (number == 0)
+            advance()
+            left = seconds_left(task)
+            if left is not None and number < count - 1:
+                shown.append(left / (each * (count - 1 - number)))
+    assert (min(shown) > 1 / 1.5 and max(shown) < 1.5) if shown else count * each + first <= 5.0
+    assert len(task.fields["marks"]) < 1000
+
+
 @pytest.mark.parametrize(
     ("phase", "done", "failed", "told"),
     [

@@ -20,6 +20,8 @@ SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT = "sets", "p", "nodes", "points", 
 """What a phase counts."""
 LINE_SECONDS, LINE_SHARE = 10.0, 0.1
 """A line in a file comes after as long at least, and as far."""
+KNOWN_SECONDS, KNOWN_SHARE, KNOWN_STEPS = 5.0, 0.05, 8
+"""A time to go is shown after as long, as far, and as many steps: the first ones are slow, and processes start then."""
 ROOMY = 80
 """Columns of a terminal from which on there is room for the name of the case."""
 
@@ -100,7 +102,7 @@ class Bars:
     def bar(self, phase: Phase) -> Iterator[Advance]:
         """Shows a phase as long as the body lasts, and those before it."""
         display = self._display
-        number = display.add_task(phase.name, total=phase.total, phase=phase, known=0, failed=0)
+        number = display.add_task(phase.name, total=phase.total, phase=phase, known=0, failed=0, marks=[(0.0, 0.0)])
         task = display.tasks[-1]
         printed, printed_at = 0, self.clock()
 
@@ -110,6 +112,9 @@ class Bars:
             sums = {"known": task.fields["known"] + earlier, "failed": task.fields["failed"] + failed}
             display.update(number, advance=count, **sums)
             printed += earlier
+            marks, own = task.fields["marks"], task.completed - task.fields["known"]
+            if own > 1.01 * marks[-1][1]:
+                marks.append((task.elapsed or 0.0, own))
             if self.is_live or not phase.total or not phase.unit or task.completed >= phase.total:
                 return
             is_far = task.completed - printed >= LINE_SHARE * phase.total
@@ -143,11 +148,15 @@ def counted(task: Task) -> str:
 
 
 def seconds_left(task: Task) -> float | None:
-    """Seconds to go, by the rate of the steps that this run has done; None as long as there is none."""
-    total, own = task.fields["phase"].total, task.completed - task.fields["known"]
-    if total is None or own <= 0 or task.stop_time is not None:
+    """Seconds to go, by the rate of the later half of the steps that this run has done; None until that is known."""
+    total, known = task.fields["phase"].total, task.fields["known"]
+    own, elapsed = task.completed - known, task.elapsed or 0.0
+    if total is None or task.stop_time is not None:
         return None
-    return (task.elapsed or 0.0) * (total - task.completed) / own
+    if elapsed < KNOWN_SECONDS or own < max(KNOWN_STEPS, KNOWN_SHARE * (total - known)):
+        return None
+    then, before = max(mark for mark in task.fields["marks"] if mark[1] <= own / 2)
+    return (elapsed - then) * (total - task.completed) / (own - before)
 
 
 def timed(task: Task) -> str:
