@@ -66,9 +66,7 @@ def by_differences(case, p, value, phases=128):
             (problem(0.5, 1.0, 1.1, 0.2, restitution=0.8, c1=0.1), -0.5, None),
             (problem(0.5, 1.0, 1.1, 0.2), -0.5, 0.02688),
             (problem(0.7, 0.8, 1.1, 0.15), -0.3, None),
-            (problem(0.4, 1.5, 1.08, 0.12), -0.7, None),
             (problem(1.0, 0.7, 1.15, 0.2, omega=1.5, restitution=0.7, c1=-0.2), -0.4, None),
-            (problem(0.3, 2.0, 1.12, 0.3), -0.6, None),
             (problem(0.6, 0.6, 1.25, 0.08, c1=0.3), -0.2, None),
         )
     ],

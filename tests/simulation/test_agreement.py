@@ -13,24 +13,12 @@ from tests.conftest import sampled
 from tests.simulation.problems import MODERATE, REDUCED, exact
 
 
-@pytest.mark.slow
-def test_agrees_with_finite_elements():
-    """90 combinations by both estimators, see tests/agreement.py; those without an estimate say so themselves."""
-    table = list(rows(paths=4096, transients=8, step=cheap_step))
-    assert len(table) == 180
-    given = [row for row in table if row.simulated.value is not None]
-    assert sum(row.simulated.estimator == "population" for row in given) >= 78
-    assert sum(row.simulated.estimator == "direct" for row in given) >= 50
-    deviations = np.abs([row.deviation for row in given])
-    assert np.mean(deviations <= 3) >= 0.95
-    assert np.max(deviations) <= 5
-    assert np.max([row.simulated.standard_error for row in given]) < 2e-3
-
-
-@pytest.mark.parametrize("chosen", [(1.0, 0.8, "reduced"), pytest.param((0.5, 0.6, "exact"), marks=pytest.mark.slow)])
-def test_a_sample_agrees_with_finite_elements(chosen):
-    """Strong noise that is reduced, and moderate noise as it stands."""
-    table = list(rows([chosen], paths=4096, transients=8, step=cheap_step))
+@pytest.mark.parametrize(
+    ("epsilon", "restitution", "noise"), sampled((1.0, 0.8, "reduced"), (0.5, 0.6, "exact"), (0.1, 1.0, "exact"))
+)
+def test_agrees_with_finite_elements(epsilon, restitution, noise):
+    """Strong noise that is reduced, and weaker noise as it stands; all 18 by `python -m tests.agreement`."""
+    table = list(rows([(epsilon, restitution, noise)], paths=4096, transients=8, step=cheap_step))
     given = [row for row in table if row.simulated.value is not None]
     assert sum(row.simulated.estimator == "population" for row in given) >= 4
     assert sum(row.simulated.estimator == "direct" for row in given) >= 1
@@ -39,15 +27,14 @@ def test_a_sample_agrees_with_finite_elements(chosen):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [200])
-@pytest.mark.parametrize(("estimator", "paths", "time"), sampled(("direct", 2048, 100.0), ("population", 2048, 50.0)))
-def test_standard_errors_are_honest(estimator, paths, time, count):
-    """Over 200 seeds the estimates deviate by their standard error, within 20 %, and their mean is Λ(p)."""
+@pytest.mark.parametrize(("estimator", "paths", "time"), [("direct", 2048, 100.0), ("population", 2048, 50.0)])
+def test_standard_errors_are_honest(estimator, paths, time):
+    """Over 64 seeds the estimates deviate by their standard error, within 35 %, and their mean is Λ(p)."""
     orders = [1.0] if estimator == "population" else [-1.0, 0.5, 1.0]
     reference = exact(MODERATE, REDUCED, orders)
     runs = [
         simulate(MODERATE, REDUCED, orders, estimator=estimator, paths=paths, time=time, seed=seed)
-        for seed in range(count)
+        for seed in range(64)
     ]
     exponent = ExponentSolver(Problem(MODERATE, REDUCED)).lyapunov_exponent().value
     check_standard_errors([(run.lyapunov_exponent, run.lyapunov_exponent_error) for run in runs], exponent)
