@@ -7,6 +7,8 @@ from codecs import BOM_UTF8
 from pathlib import Path
 from typing import NamedTuple
 
+from fpsolve.files import LARGEST
+
 
 class Unreadable(Exception):
     """A file that is no text: a sentence on why, and what to do; the line, where that is in the file."""
@@ -30,11 +32,15 @@ class Words(NamedTuple):
 def read_text(path: Path, words: Words) -> str:
     """The text of a file in UTF-8, without a byte order mark where it may have one. Raises Unreadable."""
     try:
-        mode = path.stat().st_mode
+        about = path.stat()
+        mode = about.st_mode
         if stat.S_ISDIR(mode):
             raise Unreadable(f"is a directory; name {words.kind} in it, such as {words.example}")
         if not stat.S_ISREG(mode):
             raise Unreadable(f"is a pipe or a device, not a file; write {words.content} into a file and name that")
+        if about.st_size > LARGEST:
+            said = f"has {about.st_size} bytes, and {words.kind} has at most {LARGEST}"
+            raise Unreadable(f"{said}; name another, such as {words.example}")
         content = path.read_bytes()
     except FileNotFoundError:
         raise Unreadable(f"no such file; look in {path.parent.resolve()} or give the full path") from None

@@ -219,11 +219,14 @@ NO_FILE = "is a pipe or a device, not a file; write the case into a file and nam
         ("nowhere.toml", "no such file; look in {} or give the full path"),
         ("", "is a directory; name a case file in it, such as fig1.toml"),
         *((name, NO_FILE) for name in ("/dev/zero", "/dev/null", "pipe.toml")),  # reading them might never end
+        ("huge.toml", f"has {2**40} bytes, and a case file has at most {2**29}; name another, such as fig1.toml"),
         ("bad.toml/case.toml", "cannot be read (Not a directory); check its name and permissions"),
     ],
 )
 def test_no_file(tmp_path: Path, name: str, sentence: str) -> None:
     os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "huge.toml").touch()
+    os.truncate(tmp_path / "huge.toml", 2**40)
     write(tmp_path, GOOD)
     assert only_message(tmp_path / name) == f"{tmp_path / name}: {sentence.format(tmp_path)}"
     assert "cannot be read (" in only_message(tmp_path / "a\0b.toml")

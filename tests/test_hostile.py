@@ -1,0 +1,15 @@
+"""A sample of the folders, files and records that `python -m tests.hostile` tries by the hundred."""
+
+import pytest
+
+from tests.conftest import sampled
+from tests.hostile import tried
+
+
+@pytest.mark.parametrize(
+    ("kind", "count"), sampled(("cases", 12), ("netcdf", 6), ("folders", 4), ("records", 4), keep=2)
+)
+def test_nothing_ends_in_a_traceback_or_is_lost(kind, count):
+    ended, wrong = tried(kind, 7, count)
+    assert not wrong
+    assert ended.total() == count
