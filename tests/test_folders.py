@@ -2,6 +2,7 @@
 
 import json
 import os
+from pathlib import Path
 
 import pytest
 
@@ -119,6 +120,19 @@ def test_nothing_is_written_or_removed_through_a_link(case, folder, tmp_path, na
     (folder / name).write_text("", encoding="utf-8")
     with pytest.raises(OutputError, match="no folder"):
         left(case, tmp_path, SOLVED)
+
+
+def test_a_folder_that_cannot_be_read_is_left_alone(case, folder, tmp_path, monkeypatch):
+    (folder / "private").mkdir()
+    listed = Path.iterdir
+
+    def refusing(path):
+        if path.name == "private":
+            raise PermissionError(13, "Permission denied", str(path))
+        return listed(path)
+
+    monkeypatch.setattr(Path, "iterdir", refusing)
+    assert left(case, tmp_path) == {*EVERYTHING, "private"}
 
 
 HEAD = "line,branch,x,y,width,label\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fpsolve.case.case import Case
@@ -76,7 +76,8 @@ def _entries(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.iterdir()):
         yield path
         if path.is_dir() and not path.is_symlink():
-            yield from sorted(path.iterdir())
+            with suppress(PermissionError):  # somebody else's
+                yield from sorted(path.iterdir())
 
 
 def _stale(case: Case, there: Mapping[str, Path]) -> list[str]:
