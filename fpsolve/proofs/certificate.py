@@ -17,8 +17,8 @@ from fpsolve.proofs.basis import Basis, Core, Whole
 from fpsolve.proofs.statement import Parameters, check_decimal, exact_halves
 
 MOMENT = "moment"
-MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 16_384, "values": 2**23}
-"""Of what a certificate may hold, so that a file cannot ask for more than a machine has."""
+MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 8192, "values": 2**23, "work": 2 * 10**8}
+"""Of what a certificate may hold, so that a file cannot ask for more memory than a machine has, nor for minutes."""
 
 
 class MalformedProof(FpsolveError):
@@ -111,7 +111,16 @@ class Certificate(Record):
         values = cells * max(self.phases, 8 * len(self.cosine), 8 * len(self.cosine[0]))
         if values > MOST["values"]:
             raise ValueError("nodes, phases and coefficients are too many together")
+        if self.work > MOST["work"]:
+            raise ValueError(f"asks for {self.work:.1e} operations; at most {MOST['work']:.0e} are done")
         return self
+
+    @property
+    def work(self) -> int:
+        """About how many operations it takes to verify, some 2e-7 s each."""
+        cells = sum(len(side.nodes) for side in (self.upper, self.lower) if side is not None)
+        rows, columns = len(self.cosine), len(self.cosine[0])
+        return cells * (self.phases * (20 + rows) // 20 + 6 * rows * columns)
 
     @model_validator(mode="after")
     def _is_of_an_oscillator(self) -> Self:

@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from fpsolve.proofs.certificate import MOMENT, Certificate, MalformedProof, Record, follows
 from fpsolve.proofs.statement import DECIMAL, inert_keys
@@ -22,6 +22,8 @@ EXACT = "lower", "upper", "p", "parameters"
 """The keys whose numbers are read as the decimals that they are written as; others are floats."""
 SMALLEST, MOST_DIGITS = -400, 2000
 """Of such a number: the least power of ten, and how many digits it may have; it must be a finite float, too."""
+MOST_WORK = 2 * 10**10
+"""Operations for all certificates of a file, about an hour."""
 Stated = Mapping[str, Decimal | str]
 """The parameters of a curve."""
 
@@ -119,6 +121,18 @@ class Claims(Record):
     case: str
     complete: bool
     curves: Annotated[list[CurveClaims], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _is_done_in_time(self) -> Self:
+        found = [claim for curve in self.curves for claim in curve.claims.values()]
+        bounds = [each for claim in found for each in (claim.moments if isinstance(claim, IndexBound) else [claim])]
+        work = sum(each.certificate.work for each in bounds if each.certificate is not None)
+        if work > MOST_WORK:
+            raise ValueError(
+                f"{len(bounds)} certificates ask for {work:.1e} operations; at most {MOST_WORK:.0e} are done for one "
+                "file: divide the curves among several"
+            )
+        return self
 
     @property
     def count(self) -> int:

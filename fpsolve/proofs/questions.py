@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from fpsolve.errors import NotConverged
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.quantities import lyapunov_exponent
 from fpsolve.exponent.quantities import stability_index as estimated_index
@@ -19,6 +20,8 @@ from fpsolve.theory.perturbation import scale_of
 
 SHARE = 1e-7
 """The width that is sought if none is given, as a share of the scale of what is bounded."""
+GUESS = Budget(seconds=15.0)
+"""What one of the two guesses of a number may cost."""
 INDEX_WIDTH, WIDENINGS = 1e-6, 4
 """The width sought for δ_p, and how often it is tried again with one ten times as large."""
 
@@ -114,9 +117,9 @@ def prove_bounds(problem: Problem, stated: Parameters, p: str | None, width: flo
     for rtol in (1e-8, 1e-3):  # what finite elements find, at a smaller accuracy if need be
         with suppress(NotConverged):
             if p is None:
-                guess = lyapunov_exponent(problem, rtol=rtol).value
+                guess = lyapunov_exponent(problem, rtol=rtol, budget=GUESS).value
             else:
-                guess = float(moment_lyapunov(problem, [order], rtol=rtol).value[0])
+                guess = float(moment_lyapunov(problem, [order], rtol=rtol, budget=GUESS).value[0])
             break
     theory = scale_of(problem)
     scale = max(abs(guess or 0.0), float(theory.linear if p is None else theory.moment(order)))

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from time import thread_time
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,6 +27,8 @@ from fpsolve.proofs.certificate import NOTHING, BasisRecord, Certificate, Enclos
 from fpsolve.proofs.statement import Cylinder, Parameters, cylinder
 from fpsolve.proofs.verify import objection
 
+SECONDS = 60.0
+"""Of the processor for one bound; the next trial is foreseen from the last one, so that it may take a third more."""
 SMALLEST, GROWTH, MOST_UNKNOWNS = (5, 9), 1.35, 25_000
 """Modes on either side and polynomials of the first trial, by what one of both grows, and how far."""
 ABSENT = 1e9
@@ -181,9 +184,9 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0)
     Raises:
         NoSuchExponent: the noise has algebraic tails, r₀ > 1.
     """
-    noise, best, size = cylinder(stated), NOTHING, SMALLEST
+    noise, best, size, started = cylinder(stated), NOTHING, SMALLEST, thread_time()
     for basis in bases(noise, p):
-        for found, waves, degrees in _enlarged(stated, noise, basis, p, guess, size):
+        for found, waves, degrees in _enlarged(stated, noise, basis, p, guess, size, started):
             if best.certificate is None or _apart(found) < _apart(best.certificate):
                 best, size = enclosure_of(found), (waves, degrees)
             if best.width <= width:
@@ -192,11 +195,22 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0)
 
 
 def _enlarged(
-    stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, guess: float, size: tuple[int, int]
+    stated: Parameters,
+    noise: Cylinder,
+    basis: Basis,
+    p: str | None,
+    guess: float,
+    size: tuple[int, int],
+    started: float,
 ) -> Iterator[tuple[Certificate, int, int]]:
     """Certificates by larger and larger trials, as long as the bounds come closer, and the sizes of the trials."""
     delta, idle, value, (waves, degrees) = math.inf, 0, math.inf, size
+    cost, unknowns = 0.0, (2 * waves + 1) * degrees
     while idle < PATIENCE[delta > FAR * abs(value)] and (2 * waves + 1) * degrees <= MOST_UNKNOWNS:
+        begun = thread_time()
+        cost, unknowns = cost * ((2 * waves + 1) * degrees / unknowns) ** 1.5, (2 * waves + 1) * degrees
+        if begun - started + cost > SECONDS:
+            return
         try:
             pair, basis = _solved(noise, basis, p, guess, waves, degrees)
         except ArithmeticError:
@@ -211,6 +225,7 @@ def _enlarged(
             yield certificate, waves, degrees
         elif delta < math.inf:
             idle += 1
+        cost = thread_time() - begun
         waves, degrees = (
             math.ceil(GROWTH * n) + 1 if edge > 0.1 * max(pair.edges) else n
             for n, edge in zip((waves, degrees), pair.edges, strict=True)

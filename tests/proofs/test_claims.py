@@ -8,6 +8,7 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, main
+from fpsolve.proofs import claims
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import claims_from, plain, verdicts
 from fpsolve.workflow.proofs import prove_case
@@ -261,6 +262,18 @@ def _at(data, path):
     return data
 
 
+def test_a_file_of_many_certificates_is_refused_by_its_work(data, monkeypatch):
+    monkeypatch.setattr(claims, "MOST_WORK", 10**5)
+    with pytest.raises(MalformedProof, match=r"certificates ask for .* operations; at most 1e\+05 are done"):
+        claims_from(json.dumps(data))
+
+
+MUCH = {
+    **{"nodes": [float(i) for i in range(10_000)], "values": [0.0] * 10_000, "phases": 800},
+    **{"cosine": [[0.0] * 100] * 100, "sine": [[0.0] * 100] * 100},
+}
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -271,8 +284,9 @@ def _at(data, path):
         ({"cosine": [[1.0, 2.0], [1.0]], "sine": [[1.0, 2.0], [1.0]]}, "tables of one shape"),
         ({"cosine": [], "sine": []}, "must have at least 1 item"),
         ({"cosine": [[0.0] * 401], "sine": [[0.0] * 401]}, "must have at most 400 items"),
-        ({"phases": 10**9}, "must be less than or equal to 16384"),
-        ({"nodes": [float(i) for i in range(20_000)], "values": [0.0] * 20_000, "phases": 16_384}, "too many together"),
+        ({"phases": 10**9}, "must be less than or equal to 8192"),
+        ({"nodes": [float(i) for i in range(20_000)], "values": [0.0] * 20_000, "phases": 8192}, "too many together"),
+        (MUCH, "asks for 1.3e+09 operations; at most 2e+08 are done"),
         ({"tails": None}, "a core its tails"),
         ({"tails": None, "basis": {"kind": "whole"}}, "only bounded noise has a whole support"),
         ({"p": "1e9999"}, "must be a decimal number"),

@@ -1,12 +1,13 @@
 """Proven bounds: as close as they should be, and around values that are known otherwise."""
 
+import itertools
 import math
 
 import pytest
 
 import fpsolve
 from fpsolve.errors import NoSuchExponent
-from fpsolve.proofs import objection, prove, prove_lyapunov_exponent, prove_stability_index
+from fpsolve.proofs import objection, prove, prove_lyapunov_exponent, prove_stability_index, search
 from tests import random_proofs
 
 FIG1 = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1, "D0": 1.0, "tau0": 0.5, "r0": 0.95}
@@ -124,6 +125,17 @@ def test_a_width_beyond_reach_is_told():
     assert found.is_proven
     assert not found.is_met
     assert found.width < 1e-12
+
+
+def test_a_bound_takes_no_longer_than_stated(monkeypatch):
+    """By a clock that each look sets forward by a second: a trial is foreseen to take as long as the last one."""
+    seconds = itertools.count()
+    monkeypatch.setattr(search, "thread_time", lambda: next(seconds))
+    monkeypatch.setattr(search, "SECONDS", 6.0)
+    found = prove(problem(**FIG1 | {"reduced": True}), 1.0, width=1e-30)
+    assert found.is_proven
+    assert not found.is_met
+    assert 6 <= next(seconds) <= 9
 
 
 def test_algebraic_tails_are_refused():
