@@ -23,6 +23,7 @@ from itertools import islice
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
+from fpsolve.arrays import shown
 from fpsolve.errors import FpsolveError
 
 Item = TypeVar("Item")
@@ -63,7 +64,7 @@ def processors() -> int:
 def limit_processors(count: int) -> None:
     """Let this process use at most so many processors from now on. Raises `ValueError` if `count` is not ≥ 1."""
     if type(count) is not int or count < 1:
-        raise ValueError(f"got count = {count!r}; must be a whole number >= 1")
+        raise ValueError(f"got count = {shown(count)}; must be a whole number >= 1")
     _limits[:] = [count]
 
 
@@ -203,7 +204,7 @@ def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
     """
     if count is not None and (type(count) is not int or not 1 <= count <= MOST_JOBS):
         known = f"must be a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
-        raise FpsolveError(f"jobs: got {count!r}; {known}")
+        raise FpsolveError(f"jobs: got {shown(count)}; {known}")
     size = min(count or processors(), tasks)
     if size == 1:
         return serial()
@@ -216,6 +217,8 @@ def cluster(address: str) -> Pool:
     Raises:
         FpsolveError: Dask is not installed, nothing answers, or the workers cannot run fpsolve.
     """
+    if type(address) is not str:
+        raise FpsolveError(f'scheduler: got {shown(address)}; must be an address, such as "tcp://host:8786"')
     clients: list[Any] = []
     with _client(address) as client:
         threads = sum(client.nthreads().values())

@@ -14,13 +14,14 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 
 from fpsolve.analysis.scan import Sample
 from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
-from fpsolve.arrays import FloatArray, real_number
+from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT
 from fpsolve.model.problem import Problem, refuse_infinite
 
@@ -44,6 +45,7 @@ def axis_faults(
             yield ("at", i), value, f"got {value}; {known}"
 
 
+@told_in_words
 @checked_dataclass(frozen=True, config=STRICT)
 class Axis:
     """One side of a chart.
@@ -140,7 +142,8 @@ def zero_of(value: str | Mapping[str, float]) -> Zero:
             if kind in ("moment", "stability_index") and real_number(p, kind) != 0:
                 return Zero(kind, float(p))  # type: ignore[arg-type]
     raise ValueError(
-        f'got {value!r}; must be "lyapunov_exponent", {{"moment": p}} or {{"stability_index": v}} with a number != 0'
+        f'got {shown(value)}; must be "lyapunov_exponent", {{"moment": p}} or {{"stability_index": v}}, with a number '
+        "!= 0"
     )
 
 
@@ -160,7 +163,7 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
     known = problem.differentiable
     for axis in (x, y):
         if not isinstance(axis, Axis):
-            raise ValueError(f"got {axis!r} as an axis; must be an Axis")
+            raise ValueError(f"got {shown(axis)} as an axis; must be an Axis")
         if axis.key not in known:
             raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known) or 'none'}")
         for name, value in (("start", axis.start), ("stop", axis.stop)):

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, shown
 from fpsolve.errors import OutputError
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.model.problem import parameter_lines
@@ -235,7 +235,7 @@ class EigenfunctionPlot:
 def surface_of(pair: PrincipalPair, field: str) -> Surface:
     """A function of a pair where it is not negligible, with its words. Raises `ValueError`, `OutputError`."""
     if field not in FIELDS:
-        raise ValueError(f"got field = {field!r}; must be one of {', '.join(map(repr, FIELDS))}")
+        raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
     (name, quantity), problem = FIELDS[field], pair.generator.problem
     nodes, noise = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity
     unit = quantity.unit if name == "right" else density_unit(noise)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_number
+from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
@@ -135,12 +135,12 @@ class ExponentSolver:
 
     def __post_init__(self) -> None:
         for name, kind, words in _KINDS:
-            if not isinstance(getattr(self, name), kind):
-                raise TypeError(f"got {name} = {getattr(self, name)!r}; must be {words}")
+            if not isinstance(getattr(self, name), kind) or getattr(self, name) is True:
+                raise TypeError(f"got {name} = {shown(getattr(self, name))}; must be {words}")
         if not math.isfinite(self.problem.noise.standard_deviation):
             raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))
-        if not (math.isfinite(self.rtol) and self.rtol > 0):
-            raise ValueError(f"rtol is {self.rtol!r}; it must be a positive number such as 1e-8")
+        if not 0 < self.rtol <= sys.float_info.max:
+            raise ValueError(f"rtol is {shown(self.rtol)}; it must be a positive number such as 1e-8")
 
     @cached_property
     def near(self) -> NearPlace:

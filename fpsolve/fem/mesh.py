@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.errors import MeshError
 from fpsolve.files import atomic
 from fpsolve.messages import Code, Message, Remedy
@@ -62,7 +62,7 @@ class CylinderMesh:
         for name in ("phi_degree", "xi_degree"):
             degree = getattr(self, name)
             if not isinstance(degree, int | np.integer) or not 1 <= degree <= MAX_DEGREE:
-                raise MeshError(f"{name} is {degree!r}; it must be a whole number from 1 to {MAX_DEGREE}")
+                raise MeshError(f"{name} is {shown(degree)}; it must be a whole number from 1 to {MAX_DEGREE}")
         turns = self.span / math.pi
         if not (abs(turns - 1) < TOLERANCE or abs(turns - 2) < TOLERANCE):
             raise MeshError(f"the phase spans {self.span:.9g}; it must span the half circle, pi, or the circle, 2 pi")
@@ -124,10 +124,17 @@ def make_mesh(
         MeshError: a number is out of its range.
     """
     for name, count in (("phi_cells", phi_cells), ("xi_cells", xi_cells)):
-        if not isinstance(count, int | np.integer) or not 1 <= count <= MAX_CELLS:
-            raise MeshError(f"{name} is {count!r}; it must be a whole number from 1 to {MAX_CELLS}")
-    if not 0.01 <= grading <= 100:
-        raise MeshError(f"grading is {grading!r}; it must be a number from 0.01 to 100, and 1 is uniform")
+        if not isinstance(count, int | np.integer) or count is True or not 1 <= count <= MAX_CELLS:
+            raise MeshError(f"{name} is {shown(count)}; it must be a whole number from 1 to {MAX_CELLS}")
+    try:
+        xi_min, xi_max = real_number(xi_min, "xi_min"), real_number(xi_max, "xi_max")
+        is_graded = 0.01 <= real_number(grading, "") <= 100
+    except ValueError as fault:
+        if "xi" in str(fault):
+            raise MeshError(f"{fault}; the ends of the noise are in standard deviations") from None
+        is_graded = False
+    if not is_graded:
+        raise MeshError(f"grading is {shown(grading)}; it must be a number from 0.01 to 100, and 1 is uniform")
     if full_circle:
         quarter = np.linspace(0, np.pi / 2, -(-phi_cells // 2) + 1)[:-1]
         half = np.linspace(np.pi / 2, 3 * np.pi / 2, phi_cells + 1)

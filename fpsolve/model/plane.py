@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, one
+from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, one, real_array, real_number, shown
 from fpsolve.model.exact import ExactMotion
 from fpsolve.model.parameters import Parametrised
 
@@ -80,8 +81,14 @@ class Function:
     f: Callable[[Any], Any]
 
     def __call__(self, x: Any) -> Any:
-        x = np.asarray(x, dtype=float)
-        return np.broadcast_to(np.asarray(self.f(x), dtype=float), x.shape)
+        x, made = np.asarray(x, dtype=float), self.f(np.asarray(x, dtype=float))
+        with suppress(ValueError):  # of lists of unequal lengths, and of shapes that do not fit
+            found = np.asarray(made)
+            if found.dtype.kind in "biuf":
+                return np.broadcast_to(found.astype(float), x.shape)
+        raise ValueError(
+            f"g returned {shown(made)} for an array of shape {x.shape}; must be real numbers of this shape"
+        )
 
     def __hash__(self) -> int:
         try:
@@ -97,6 +104,8 @@ class Function:
                 values = self(PROBES)
         except Exception:  # it may be defined near 0 only
             return None
+        if not np.isfinite(values).all():
+            return None
         offset, slope = float(values[PROBES == 0][0]), float(values[-1] - values[0]) / float(PROBES[-1] - PROBES[0])
         near = np.abs(values - offset - slope * PROBES) <= 1e-14 * (abs(offset) + abs(slope * PROBES))
         return (offset, slope) if np.all(near) else None
@@ -107,7 +116,7 @@ def coefficient(g: Coefficient) -> Constant | Linear | Function:
     if isinstance(g, Constant | Linear | Function):
         return g
     if not callable(g):
-        raise TypeError(f"got g = {g!r}; must be a function of xi")
+        raise TypeError(f"got g = {shown(g)}; must be a function of xi")
     return Function(g)
 
 
@@ -155,12 +164,13 @@ class CoefficientMatrix:
     g: Constant | Linear | Function = one
 
     def __post_init__(self) -> None:
-        entries = np.array(self.matrix, dtype=float)
-        is_order = isinstance(self.order, int) and self.order >= 0
-        if entries.shape != (2, 2) or not np.all(np.isfinite(entries)) or not is_order:
+        entries, is_order = np.zeros(0), type(self.order) is int and self.order >= 0
+        with suppress(ValueError):
+            entries = real_array(self.matrix, "matrix")
+        if entries.shape != (2, 2) or not is_order:
             raise ValueError(
-                f"got order = {self.order} and matrix = {self.matrix}; must be a whole number >= 0 and two rows of two "
-                "finite numbers, such as ((0.0, 0.0), (0.0, 1.0))"
+                f"got order = {shown(self.order)} and matrix = {shown(self.matrix)}; must be a whole number >= 0 and "
+                "two rows of two finite numbers, such as ((0.0, 0.0), (0.0, 1.0))"
             )
         object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
         object.__setattr__(self, "g", coefficient(self.g))
@@ -194,8 +204,13 @@ class Jump:
     leading: float | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.phase) and math.isfinite(self.log_factor)):
-            raise ValueError(f"got phase = {self.phase}, log_factor = {self.log_factor}; both must be finite")
+        try:
+            for value in (self.phase, self.log_factor, 0.0 if self.leading is None else self.leading):
+                real_number(value, "")
+        except ValueError:
+            numbers = f"phase = {shown(self.phase)}, log_factor = {shown(self.log_factor)}"
+            more = f"and leading, here {shown(self.leading)}, one too where it is not None"
+            raise ValueError(f"got {numbers}; both must be finite numbers, {more}") from None
 
     @property
     def second_order(self) -> float:

@@ -13,7 +13,7 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_numbers
+from fpsolve.arrays import FloatArray, real_numbers, shown
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise, NoiseDerivative
@@ -62,7 +62,7 @@ class Problem:
     def __post_init__(self) -> None:
         for half, kind, needed in ((self.system, "motion", System), (self.noise, "noise", Noise)):
             if not isinstance(half, needed):
-                raise TypeError(f"got {half!r} as a {kind}; the first arguments must be an oscillator and a noise")
+                raise TypeError(f"got {shown(half)} as a {kind}; the first arguments must be an oscillator and a noise")
 
     @property
     def halves(self) -> tuple[Parametrised, Parametrised]:
@@ -95,6 +95,8 @@ class Problem:
 
     def at(self, values: Mapping[str, float | str]) -> Problem:
         """The problem with other values of some parameters, by their keys. Raises `ValueError`."""
+        if not isinstance(values, Mapping):
+            raise TypeError(f'got {shown(values)}; must be values by their keys, such as {{"noise.D0": 2.0}}')
         known = {half.section: half for half in self.halves}
         new = dict[str, dict[str, float | str]]()
         for key, value in values.items():
@@ -258,7 +260,7 @@ def problem_first(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[Any, .
     if args and isinstance(args[0], Problem):
         return args
     if is_named:
-        raise TypeError(f"got problem = {args[0]!r}; must be a Problem, made of an oscillator and a noise")
+        raise TypeError(f"got problem = {shown(args[0])}; must be a Problem, made of an oscillator and a noise")
     halves = list(args[:2])
     for name in ("oscillator", "noise")[len(halves) :]:
         if name not in kwargs:

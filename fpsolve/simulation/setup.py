@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, real_numbers
+from fpsolve.arrays import FloatArray, real_numbers, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
@@ -54,7 +54,7 @@ def check_settings(noise: Noise, p: float | Sequence[float], estimator: Estimato
     is_whole = all(isinstance(each, int | np.integer) for each in (paths, seed))
     if estimator not in get_args(Estimator) or not is_whole or not BATCHES <= paths <= MAX_PATHS or seed < 0:
         raise ValueError(
-            f"got estimator = {estimator!r}, paths = {paths!r}, seed = {seed!r}; must be one of "
+            f"got estimator = {shown(estimator)}, paths = {shown(paths)}, seed = {shown(seed)}; must be one of "
             f"{', '.join(get_args(Estimator))}, a whole number from {BATCHES} to {MAX_PATHS}, and one >= 0"
         )
 

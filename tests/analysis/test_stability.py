@@ -386,8 +386,8 @@ def test_what_the_paper_says_of_each_parameter(zero, key, values, sign):
         ({"start": 0.0, "stop": 1.0, "at": (2.0,)}, "at: got 2.0; must be from start = 0.0 to stop = 1.0; remove it"),
         ({"start": 0.0, "stop": math.inf}, "finite"),
         ({"start": math.nan, "stop": 1.0}, "finite"),
-        ({"start": "0", "stop": 1.0}, "valid number"),
-        ({"start": 0.0, "stop": 1.0, "scale": "cubic"}, "'linear' or 'log'"),
+        ({"start": "0", "stop": 1.0}, "finite number"),
+        ({"start": 0.0, "stop": 1.0, "scale": "cubic"}, 'must be one of "linear", "log"'),
         ({"start": 0.0, "stop": 1.0, "steps": 3}, "steps"),
     ],
 )

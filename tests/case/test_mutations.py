@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from fpsolve.case.case import load_case
+from fpsolve.cli import BAD_INPUT
 from fpsolve.errors import CaseError, MeshError
 from fpsolve.fem.mesh import make_mesh, read_mesh, write_mesh
 from tests.snapshots import good
@@ -129,3 +130,12 @@ def test_mutated_meshes_are_read_or_refused(ending, tmp_path):
         except MeshError:
             refused += 1
     assert refused > COUNT // 10
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_mutated_cases_run_or_are_refused(seed):
+    from tests.mutated_cases import faults
+
+    codes, found = faults(seed, COUNT // 4)
+    assert found == []
+    assert codes[BAD_INPUT]

@@ -8,6 +8,7 @@ import pytest
 
 import fpsolve
 from fpsolve.arrays import identity
+from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.plane import CoefficientMatrix, Jump, angular_frequency, growth_rate, matrix_at, phase_speed
 from fpsolve.model.problem import Problem, of_problem
@@ -123,3 +124,52 @@ def test_help_shows_the_signature_of_the_examples():
         shown = signature(getattr(fpsolve, name))
         assert [*shown.parameters][:2] == ["oscillator", "noise"]
         assert "problem:" not in getattr(fpsolve, name).__doc__
+
+
+@pytest.mark.parametrize(
+    "g",
+    [
+        lambda x: np.zeros(3),
+        lambda x: np.zeros((2, *np.shape(x))),
+        lambda x: [[1.0], [2.0, 3.0]],
+        lambda x: None,
+        lambda x: "x",
+        lambda x: x + 1j,
+    ],
+)
+def test_a_coefficient_of_another_shape_is_one_sentence(g):
+    system = PlaneSystem([CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), g)])
+    with pytest.raises(ValueError, match=r"^g returned .* for an array of shape \(\d+,\); must be [^\n]*$"):
+        fpsolve.moment_lyapunov(system, OrnsteinUhlenbeck(alpha=1.0, sigma=1.0), 2.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: CoefficientMatrix(True, ROTATION), "^got order = True and matrix = .*; must be a whole number >= 0"),
+        (lambda: CoefficientMatrix(0, [[True, 1.0], [0.0, 1.0]]), "must be .* two rows of two finite numbers"),
+        (lambda: CoefficientMatrix(0, [["0", "1"], ["1", "0"]]), "must be .* two rows of two finite numbers"),
+        (lambda: CoefficientMatrix(0, ROTATION, np.zeros((2, 2))), r"^got g = array\(.*; must be a function of xi$"),
+        (lambda: Jump(True, 0.0), "got phase = True, log_factor = 0.0; both must be finite"),
+        (lambda: Jump(0.0, "x"), "both must be finite"),
+        (lambda: Jump(0.0, 0.0, math.nan), "and leading, here nan"),
+        (lambda: PlaneSystem([True]), r"^got terms = \[True\]; must be a list, each a CoefficientMatrix$"),
+        (lambda: PlaneSystem([CoefficientMatrix(0, ROTATION)], 3.0), "^got jumps = 3.0; must be a list, each a Jump$"),
+        (lambda: PlaneSystem([CoefficientMatrix(0, ROTATION)], epsilon=True), "epsilon must be a finite number"),
+        (
+            lambda: MarkovChain.telegraph(0.5, 1e300),
+            r"^got rates of sizes up to 1e\+300; must be from 1e-15",
+        ),
+        (lambda: MarkovChain.telegraph(1e-300, 1.0), "^got states of sizes up to 1e-300; must be from"),
+        (lambda: MarkovChain.telegraph(True, 1.0), "^amplitude must be a finite number, got True$"),
+    ],
+)
+def test_numbers_that_are_none_are_one_sentence(make, said):
+    with pytest.raises((ValueError, TypeError), match=said):
+        make()
+
+
+def test_a_tolerance_is_a_number():
+    system = PlaneSystem([CoefficientMatrix(0, ROTATION)])
+    with pytest.raises(TypeError, match=r"^got rtol = True; must be a number"):
+        fpsolve.lyapunov_exponent(system, OrnsteinUhlenbeck(alpha=1.0, sigma=1.0), rtol=True)

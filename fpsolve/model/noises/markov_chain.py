@@ -11,9 +11,9 @@ import numpy as np
 from pydantic import Field
 from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, real_array, real_number, shown
 from fpsolve.model.noise import Noise
-from fpsolve.model.parameters import parameter, stated_field
+from fpsolve.model.parameters import SIZE, parameter, stated_field
 
 _BALANCED = 1e-12
 Row = Annotated[tuple[float, ...], Field(strict=False)]
@@ -53,11 +53,21 @@ class MarkovChain(Noise):
     }
 
     def __post_init__(self) -> None:
-        states, rates = np.array(self.states, dtype=float), np.array(self.rates, dtype=float)
+        try:
+            states, rates = real_array(self.states, "states"), real_array(self.rates, "rates")
+        except ValueError:
+            told = f"got the states {shown(self.states)} and rates {shown(self.rates)}"
+            raise ValueError(f"{told}; must be finite numbers that differ, with finite rates") from None
         if states.ndim != 1 or states.size < 2 or rates.shape != 2 * states.shape:
             raise ValueError(f"got {states.shape} states and {rates.shape} rates; must be (n,) and (n, n), n >= 2")
-        if not (np.all(np.isfinite(states)) and np.all(np.isfinite(rates)) and np.ptp(states) > 0):
-            raise ValueError(f"got the states {self.states}; must be finite numbers that differ, with finite rates")
+        if np.ptp(states) == 0:
+            raise ValueError(
+                f"got the states {shown(self.states)}; must be finite numbers that differ, with finite rates"
+            )
+        sizes = {"states": np.abs(states).max(), "rates": np.abs(rates).max()}
+        for name, size in sizes.items():
+            if not SIZE["ge"] <= size <= SIZE["le"]:
+                raise ValueError(f"got {name} of sizes up to {size:g}; must be from {SIZE['ge']:g} to {SIZE['le']:g}")
         from scipy.sparse.csgraph import connected_components
 
         jumps = rates - np.diag(np.diagonal(rates))
@@ -75,7 +85,8 @@ class MarkovChain(Noise):
     @classmethod
     def telegraph(cls, amplitude: float, rate: float) -> MarkovChain:
         """ξ = ±amplitude, each state left at this rate."""
-        return cls((-amplitude, amplitude), ((-rate, rate), (rate, -rate)))
+        size, rate = real_number(amplitude, "amplitude"), real_number(rate, "rate")
+        return cls((-size, size), ((-rate, rate), (rate, -rate)))
 
     @property
     def probabilities(self) -> FloatArray:

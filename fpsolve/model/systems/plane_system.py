@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from typing import Annotated, Any, ClassVar, Self
@@ -14,7 +14,7 @@ from numpy.polynomial import chebyshev
 from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import FloatArray, identity, one
+from fpsolve.arrays import FloatArray, identity, one, real_number, shown
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
 from fpsolve.model.quantity import Quantity
@@ -133,8 +133,13 @@ class PlaneSystem(System):
     }
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "terms", tuple(self.terms))
-        object.__setattr__(self, "jumps", tuple(self.jumps))
+        for name, kind in (("terms", CoefficientMatrix), ("jumps", Jump)):
+            given = getattr(self, name)
+            stated = tuple(given) if isinstance(given, Iterable) else (None,)
+            if not all(isinstance(each, kind) for each in stated):
+                raise TypeError(f"got {name} = {shown(given)}; must be a list, each a {kind.__name__}")
+            object.__setattr__(self, name, stated)
+        real_number(self.epsilon, "epsilon")
         rays = np.sort(np.mod([jump.phase for jump in self.jumps], math.pi))
         if np.any(np.diff(np.append(rays, rays[:1] + math.pi)) < 1e-6) and rays.size > 1:
             raise ValueError(f"got jumps at {[jump.phase for jump in self.jumps]}; their phases must differ modulo pi")
