@@ -181,7 +181,7 @@ def fault(name: str, arguments: Mapping[str, Any]) -> str:
         if not last.filename.startswith(PACKAGE) and "pathlib" not in last.filename:  # which names the kinds it takes
             return f"{type(error).__name__} of {at}: {text}"
         lines = text.split("\n") if isinstance(error, ParameterError | FpsolveError) else [text]  # one of each fault
-        if not text or any(len(line) > 400 or "\n" in line for line in lines) or "Traceback" in text:
+        if not text or any(len(line) > 600 or "\n" in line for line in lines) or "Traceback" in text:
             return f"{type(error).__name__} is no sentence ({at}): {text[:300]}"
         if "a fault of fpsolve" in text:
             return text

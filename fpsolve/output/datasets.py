@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import warnings
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from glob import glob
@@ -109,7 +110,7 @@ def open_results(*places: str | Path, errors: Literal["raise", "warn"] = "raise"
     there = [
         path
         for place in map(str, places)
-        for path in ([Path(place)] if Path(place).exists() else sorted(map(Path, glob(place))))  # noqa: PTH207  (absolute)
+        for path in map(Path, [place] if os.path.exists(place) else sorted(glob(place)))  # noqa: PTH110, PTH207
     ]
     files = [path / RESULTS if path.is_dir() else path for path in there]
     paths = [path for path in files if path.suffix == ".nc" and (path.exists() or path.is_symlink())]
