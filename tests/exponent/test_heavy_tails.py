@@ -27,6 +27,7 @@ from fpsolve.fem.mesh import make_mesh
 from fpsolve.model import CoefficientMatrix
 from fpsolve.theory import far_places, frozen_noise
 from fpsolve.theory.far import grows_far_out, variance_tail
+from tests import random_heavy_tails
 from tests.conftest import sampled
 from tests.oracles import asinh_grid, killed_paths
 
@@ -271,3 +272,11 @@ def test_what_is_not_positive_is_no_value_of_heavy_tails(departure):
     """With c₁ > 0 the place around 0 has Λ < 0; that far out is too narrow, or too far, for any mesh."""
     with pytest.raises(NotConverged):
         moment_lyapunov(problem(0.5, 1.0, 1 + departure, 0.1, restitution=0.8, c1=1.0), -0.5)
+
+
+@pytest.mark.parametrize("seed", sampled(10, 6, 8, 14, 1, 94))
+def test_random_sets_next_to_gaussian_noise(seed):
+    """A hundred, up to r₀ = 1.6: `python -m tests.random_heavy_tails`."""
+    found = random_heavy_tails.outcome(seed)
+    assert not isinstance(found, str)
+    assert found[1] < 1
