@@ -110,7 +110,7 @@ class MarkovChain(Noise):
 
     @property
     def longest_jump(self) -> int:
-        first, last = np.nonzero(self.rates)
+        first, last = np.nonzero(np.array(self.rates))
         return int(np.max(np.abs(first - last)))
 
     @property
