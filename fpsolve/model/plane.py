@@ -164,7 +164,8 @@ class CoefficientMatrix:
     g: Constant | Linear | Function = one
 
     def __post_init__(self) -> None:
-        entries, is_order = np.zeros(0), type(self.order) is int and self.order >= 0
+        entries: FloatArray = np.zeros(0)
+        is_order = type(self.order) is int and self.order >= 0
         with suppress(ValueError):
             entries = real_array(self.matrix, "matrix")
         if entries.shape != (2, 2) or not is_order:
