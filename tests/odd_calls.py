@@ -224,7 +224,7 @@ def printed_by(call: Callable[[], str]) -> tuple[str, str]:
 
 
 def faults(seed: int, count: int, names: list[str] | None = None) -> list[str]:
-    """What goes wrong in so many calls, in a folder of their own, outside of which nothing is written."""
+    """What goes wrong in so many calls, in a folder of their own."""
     rng, found = random.Random(seed), []
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
         for number in range(count):
