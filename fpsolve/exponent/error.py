@@ -62,6 +62,8 @@ class Estimate(Result):
     quantity: Quantity = field(default=UNNAMED, compare=False)
 
     def __post_init__(self) -> None:
+        if self.error_estimate < 0:
+            raise ValueError(f"got {self.error_estimate} as the estimate of an error; must be >= 0")
         object.__setattr__(self, "error_estimate", max(self.error_estimate, 0.5 * math.ulp(self.value)))
 
     @property
