@@ -67,6 +67,7 @@ def test_run_prints_a_table_and_writes_the_results(shown):
     assert "summary.json" in files(shown.folder)
 
 
+@pytest.mark.slow
 def test_eigenfunctions_that_are_left_out_are_told_once_with_the_remedy(case, tmp_path, capsys):
     many = ["--set", 'vary."noise.D0"={start=0.1, stop=1.0, num=11}', "--set", "moments.p=[-1.0, 1.5]"]
     Path(case).write_text(TEXT.replace("eigenfunctions = [2.0]", ""), encoding="utf-8")

@@ -41,11 +41,13 @@ def kinds(outputs):
     return {kind: text for each in outputs for kind, text in each.data.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", SHOWN)
 def test_results_show_as_html(outputs, cell):
     assert SHOWN[cell] in kinds(outputs[cell])["text/html"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", DRAWN)
 def test_pictures_show(outputs, cell):
     """All of them, not just the first, in a notebook that has not set up matplotlib."""

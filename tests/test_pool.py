@@ -188,7 +188,8 @@ with parallel(2) as workers:
 """
 
 
-@pytest.mark.parametrize("is_file", sampled(False, True))
+@pytest.mark.slow
+@pytest.mark.parametrize("is_file", [False, True])
 def test_a_script_needs_no_guard(tmp_path, is_file):
     """Its processes do not run it again, nor look for it where it came through a pipe."""
     script = tmp_path / "script.py"

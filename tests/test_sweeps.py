@@ -167,6 +167,7 @@ def test_a_full_disk(place):
     assert len(lines(place, "full")) == SIZE**2
 
 
+@pytest.mark.slow
 def test_torn_and_damaged_records_are_solved_again(place):
     shutil.copytree(place / "whole", place / "torn")
     [path] = (place / "torn/sweep" / SOLVED_RECORDS).glob("*")

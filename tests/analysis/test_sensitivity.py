@@ -74,6 +74,7 @@ def test_a_finer_mesh_beyond_the_budget_costs_what_needs_it_alone(monkeypatch):
     assert lyapunov_exponent(HEAVY, rtol=rtol, budget=Budget(unknowns=size)).value > 0
 
 
+@pytest.mark.slow
 def test_what_memory_does_not_suffice_for_costs_itself_alone(monkeypatch):
     def fail(*_):
         raise MemoryError

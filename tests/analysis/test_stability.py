@@ -230,6 +230,7 @@ def test_a_fold_of_strong_noise():
     assert len(weak.traces) == 1
 
 
+@pytest.mark.slow
 def test_an_extended_line_holds_the_old_points(weak):
     wider = weak.extended(Axis("oscillator.omega", 0.2, 6.0), Axis("oscillator.c1", -2.0, 2.0))
     [new], [old] = wider.branches, weak.branches
@@ -446,6 +447,7 @@ def test_a_problem_without_such_parameters_is_refused():
         boundary(Problem(oscillator(), OrnsteinUhlenbeck(1.0, 1.0)), LAMBDA, OMEGA, C1, original=NOISE)
 
 
+@pytest.mark.slow
 def test_noise_of_its_own_and_chains_have_lines_too():
     gaussian = boundary(Problem(oscillator(), NOISE.ou_reduction()), LAMBDA, OMEGA, C1, **COARSE)
     assert held(gaussian, shares(line()))

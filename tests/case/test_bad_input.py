@@ -102,6 +102,7 @@ def without(section: str) -> str:
 TOO_MANY = f"[{', '.join(f'0.{i:06}' for i in range(1, 100_002))}]"
 
 
+@pytest.mark.slow
 def test_too_long_lists(tmp_path: Path) -> None:
     text = GOOD + f"[monte_carlo]\np = {TOO_MANY}\n"
     for start in ("p = [-1.0, 1.0, 2.0]", '"noise.D0" = [0.1, 0.5]', "eigenfunctions = [1.0]"):

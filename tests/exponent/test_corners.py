@@ -124,7 +124,8 @@ def test_moments_by_finite_volumes(p):
     assert abs(fine - near.pair.value) < 1.2 * abs(fine - coarse) < 1e-3
 
 
-@pytest.mark.parametrize("p", sampled(1.0, -1.0))
+@pytest.mark.slow
+@pytest.mark.parametrize("p", [1.0, -1.0])
 def test_the_error_is_within_its_estimate(p):
     for rtol in (1e-4, 1e-5):
         found = ExponentSolver(PROBLEM, rtol=rtol).solution(p)

@@ -17,7 +17,7 @@ from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.surfaces import can_render, flat_figure
-from tests.conftest import FIG1, UNIT_NOISE, sampled
+from tests.conftest import FIG1, UNIT_NOISE
 
 HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.5)
 EXACT = NonGaussianNoise(D0=0.5, tau0=1.0, r0=0.9)
@@ -135,7 +135,8 @@ def test_picture_of_the_plane(pair, monkeypatch, tmp_path):
     assert picture.save(tmp_path / "picture.png").read_bytes() == picture.png == picture._repr_png_()
 
 
-@pytest.mark.parametrize("cylinder", sampled(False, True))
+@pytest.mark.slow
+@pytest.mark.parametrize("cylinder", [False, True])
 def test_picture_in_space(pair, cylinder):
     if not can_render():
         pytest.skip("nothing can be rendered here: apt-get install libegl1 libgl1-mesa-dri")

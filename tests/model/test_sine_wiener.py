@@ -92,6 +92,7 @@ def test_sensitivities_are_differences_of_moment_equations():
         assert found[key].value == pytest.approx((ahead - behind) / (2 * h), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_chart_over_its_parameters():
     """On Λ(2) = 0 over damping and amplitude the moment equations have the eigenvalue 0."""
     frame = Axis("system.damping", 0.1, 0.6), Axis("noise.amplitude", 0.5, 2.0)

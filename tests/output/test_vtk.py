@@ -31,7 +31,7 @@ ROOT = Path(__file__).parents[2]
 NO_FIGURE = "output.figure=false"
 
 
-@pytest.fixture(scope="module", params=sampled(*MESHES, keep=2))
+@pytest.fixture(scope="module", params=sampled(*MESHES))
 def solver(request):
     return ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[request.param])
 

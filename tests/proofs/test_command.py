@@ -81,6 +81,7 @@ def test_several_processes_write_the_same_file(case, tmp_path):
     assert [curve["parameters"]["noise.D0"] for curve in read(tmp_path)["curves"]] == [0.5, 1.0]
 
 
+@pytest.mark.slow
 def test_a_width_that_is_not_met_is_told_and_the_bounds_are_kept(case, tmp_path, capsys):
     weak = ["oscillator.epsilon=0.05", "noise.D0=0.1", "moments.p=[1.0]"]
     assert main(["prove", case, "--width", "1e-30", *(f"--set={each}" for each in weak), "--quiet"]) == NOT_CONVERGED

@@ -36,7 +36,7 @@ def problem(*, reduced=False, impact="delta", **numbers):
         pytest.param(STRONG | {"r0": 0.95}, 1.0, 0.475228026738, 1e-3, marks=pytest.mark.slow),
         (FIG1 | {"reduced": True}, 2.0, 0.014163143653, 1e-9),
         pytest.param(FIG1 | {"epsilon": 0.3, "reduced": True}, 2.0, 0.129043772, 1e-8, marks=pytest.mark.slow),
-        (MIDDLE | {"r0": 0.95, "reduced": True}, 2.0, 0.04887793797, 1e-8),
+        pytest.param(MIDDLE | {"r0": 0.95, "reduced": True}, 2.0, 0.04887793797, 1e-8, marks=pytest.mark.slow),
         pytest.param(
             FIG1 | {"epsilon": 1.0, "D0": 0.3, "reduced": True}, 1.0, 0.1243172991, 1e-5, marks=pytest.mark.slow
         ),

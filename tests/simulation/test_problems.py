@@ -17,6 +17,7 @@ from fpsolve.model.systems.vibro_impact import DAMPING, VibroImpactOscillator
 from fpsolve.simulation.estimators import simulate
 from fpsolve.simulation.response import stationary_response
 from fpsolve.simulation.setup import PROGRESS_STEPS
+from tests.conftest import sampled
 
 OSCILLATOR = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5, c2=0.3, impact="restitution")
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9)
@@ -43,7 +44,7 @@ def response(*args, **kwargs):
     )
 
 
-@pytest.mark.parametrize("estimator", ["direct", "population"])
+@pytest.mark.parametrize("estimator", sampled("direct", "population"))
 def test_moments_of_a_problem_are_those_of_its_halves(estimator):
     orders = [-1.0, 30.0]
     found = moments(OSCILLATOR, NOISE, orders, estimator=estimator)

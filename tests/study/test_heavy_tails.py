@@ -25,6 +25,7 @@ def path(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_every_result_says_it(path, tmp_path, capsys):
     assert main(["run", str(path), "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr()
@@ -58,6 +59,7 @@ def test_a_simulation_does_not_see_them(path, tmp_path, capsys):
     assert "a simulation shows Λ(p) without these paths" in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.slow
 def test_pictures_of_a_place_far_out_are_small(path, tmp_path):
     """The interval is hundreds of noise units long: cells of the picture grow with the distance."""
     shown = 'output={quantities=["moment", "eigenfunctions"], eigenfunctions=[-0.1]}'
