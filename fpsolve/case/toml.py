@@ -158,6 +158,8 @@ class Document:
     def override(self, text: str, typed: str) -> None:
         """Apply one `key=value` of the command line, with what was typed; what is wrong with it joins the faults."""
         try:
+            if type(text) is not str:
+                raise ValueError("is no text")
             if any(is_control(letter) and letter not in "\t\n" for letter in text):
                 raise ValueError("has control characters")
             text = _quoted_if_bare(text)

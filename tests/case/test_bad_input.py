@@ -245,6 +245,13 @@ def test_names_that_are_no_folder(tmp_path: Path, name: str, monkeypatch: pytest
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.parametrize("override", [[], 2.0, None])
+def test_an_override_that_is_no_text(tmp_path: Path, override: Any) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(GOOD, encoding="utf-8")
+    assert "is no text; write it as in --set oscillator.omega=2.0" in only_message(path, [override])
+
+
 def test_a_link_to_a_case(tmp_path: Path) -> None:
     (tmp_path / "link.toml").symlink_to(write(tmp_path, GOOD))
     assert load_case(tmp_path / "link.toml").title == "good"
