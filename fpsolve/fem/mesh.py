@@ -128,10 +128,11 @@ def make_mesh(
             raise MeshError(f"{name} is {shown(count)}; it must be a whole number from 1 to {MAX_CELLS}")
     try:
         xi_min, xi_max = real_number(xi_min, "xi_min"), real_number(xi_max, "xi_max")
-        is_graded = 0.01 <= real_number(grading, "") <= 100
     except ValueError as fault:
-        if "xi" in str(fault):
-            raise MeshError(f"{fault}; the ends of the noise are in standard deviations") from None
+        raise MeshError(f"{fault}; the ends of the noise are in standard deviations") from None
+    try:
+        is_graded = 0.01 <= real_number(grading, "grading") <= 100
+    except ValueError:
         is_graded = False
     if not is_graded:
         raise MeshError(f"grading is {shown(grading)}; it must be a number from 0.01 to 100, and 1 is uniform")
