@@ -1,6 +1,6 @@
 """Folders of results, netCDF files and records with random faults, and what fpsolve makes of them.
 
-`python -m tests.hostile [folders|netcdf|records|cases ...] [--seed S] [--count N]` prints how each ended. Nothing may
+`python -m tests.hostile [folders|netcdf|records ...] [--seed S] [--count N]` prints how each ended. Nothing may
 end in a traceback or without an end, nothing outside of the folder of results may change, and nothing that was found
 may be lost.
 """
@@ -34,7 +34,7 @@ from fpsolve.cli import main as command
 from fpsolve.errors import FpsolveError
 from tests.solving import case_text
 
-COUNTS = {"folders": 500, "netcdf": 300, "records": 500, "cases": 3000}
+COUNTS = {"folders": 500, "netcdf": 300, "records": 500}
 PATIENCE = 120
 """Seconds after which a command hangs."""
 TEXT = case_text(
@@ -443,31 +443,7 @@ def netcdf(rng: random.Random, count: int) -> Iterator[tuple[str, Callable[[], s
             yield f"file {number}", run
 
 
-def cases(rng: random.Random, count: int) -> Iterator[tuple[str, Callable[[], str]]]:
-    """Case files with random faults."""
-    from tests.case.test_mutations import CASES, GOOD, mutated, refusals
-
-    with tempfile.TemporaryDirectory() as name:
-        path = Path(name) / "case.toml"
-
-        def run() -> str:
-            text = rng.choice([GOOD, rng.choice(CASES).read_text(encoding="utf-8")])
-            cut = rng.choice([0, 0, rng.randrange(len(text))])
-            path.write_text(mutated(text[cut:] + text[:cut], rng), encoding="utf-8")
-            try:
-                with in_time():
-                    faults = refusals(path, rng.sample(GOOD.splitlines(), rng.randint(0, 1)))
-            except Exception:
-                raise Wrong(f"{path.read_text(encoding='utf-8')}\n{traceback.format_exc()}") from None
-            if not all(faults) or [*path.parent.iterdir()] != [path]:
-                raise Wrong(f"{faults}, {[*path.parent.iterdir()]}")
-            return "refused" if faults else "read"
-
-        for number in range(count):
-            yield f"case {number}", run
-
-
-KINDS = {"folders": folders, "netcdf": netcdf, "records": records, "cases": cases}
+KINDS = {"folders": folders, "netcdf": netcdf, "records": records}
 
 
 def tried(
