@@ -6,6 +6,8 @@ from .noises.non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .noises.non_gaussian import ReducedNoise as ReducedNoise
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .noises.sine_wiener import SineWiener as SineWiener
+from .noises.white import Interpretation as Interpretation
+from .noises.white import White as White
 from .plane import CoefficientMatrix as CoefficientMatrix
 from .plane import Jump as Jump
 from .plane import System as System

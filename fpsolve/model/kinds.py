@@ -25,6 +25,7 @@ NOISES: Mapping[str, str] = {
     "ou-reduction": "non_gaussian:ReducedNoise",
     "ornstein-uhlenbeck": "ornstein_uhlenbeck:OrnsteinUhlenbeck",
     "sine-wiener": "sine_wiener:SineWiener",
+    "white": "white:White",
     "markov-chain": "markov_chain:MarkovChain",
 }
 

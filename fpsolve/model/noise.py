@@ -20,6 +20,7 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.exact import ExactLaw
 from fpsolve.model.parameters import Parametrised
+from fpsolve.model.plane import CoefficientMatrix, System
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,8 @@ class Noise(Parametrised):
         approximates_spectrum: whether `spectral_density` is that of a process which stands for this one.
         tails_beyond: the name of a parameter, the value above which P_s has algebraic tails, and what else to do.
         may_tilt: whether functions of ξ gain by a factor exp(s ξ), as where P_s falls to both sides.
+        is_white: whether it has no value but ξ dt = s dW; it then has one state, ξ = 0, and moves what it drives by
+            diffusion, see `motion`.
     """
 
     section: ClassVar[str] = "noise"
@@ -56,6 +59,7 @@ class Noise(Parametrised):
     approximates_spectrum: ClassVar[bool] = False
     tails_beyond: ClassVar[tuple[str, float, str] | None] = None
     may_tilt: ClassVar[bool] = True
+    is_white: ClassVar[bool] = False
 
     @property
     @abstractmethod
@@ -177,6 +181,16 @@ class Noise(Parametrised):
     def is_simulated(self) -> bool:
         """Whether this kind states a `step`."""
         return type(self).step is not Noise.step
+
+    def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
+        """A system as this noise moves it: the motion at ξ, and matrices B of Bx ∘ dW, which have no ξ."""
+        return system, ()
+
+    def changed_motion(
+        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
+    ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
+        """∂/∂θ of `motion`, from that of the terms of the system, or by a parameter of the noise with this name."""
+        return terms, ()
 
     @property
     def replaces(self) -> Noise | None:

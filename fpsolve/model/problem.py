@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import wraps
+from functools import cached_property, wraps
 from inspect import signature
 from textwrap import wrap
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
@@ -36,12 +36,14 @@ class ParameterDerivative:
         terms: Σ ε^n g(ξ) A x of these is ∂/∂θ of the motion.
         jumps: ∂ ln R/∂θ of each of the jumps of the motion; empty where none changes.
         noise: that of the noise; None where it does not change.
+        diffusions: that of each of the `diffusions`; empty where none changes.
     """
 
     theta: float
     terms: tuple[CoefficientMatrix, ...] = ()
     jumps: tuple[float, ...] = ()
     noise: NoiseDerivative | None = None
+    diffusions: tuple[CoefficientMatrix, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ class Problem:
 
     Raises:
         TypeError: one of them is something else.
+        ValueError: white noise would drive the system in a way that has no meaning, see `White.motion`.
     """
 
     system: System
@@ -63,6 +66,22 @@ class Problem:
         for half, kind, needed in ((self.system, "motion", System), (self.noise, "noise", Noise)):
             if not isinstance(half, needed):
                 raise TypeError(f"got {shown(half)} as a {kind}; the first arguments must be an oscillator and a noise")
+        if self.noise.is_white:
+            _ = self._moved  # refuses what has no meaning
+
+    @cached_property
+    def _moved(self) -> tuple[System, Sequence[CoefficientMatrix]]:
+        return self.noise.motion(self.system)
+
+    @property
+    def motion(self) -> System:
+        """The system as its noise moves it along a path: itself, or what is left of it beside white noise."""
+        return self._moved[0]
+
+    @property
+    def diffusions(self) -> Sequence[CoefficientMatrix]:
+        """ε^order B of every Bx ∘ dW by which white noise moves the state."""
+        return self._moved[1]
 
     @property
     def halves(self) -> tuple[Parametrised, Parametrised]:
@@ -122,10 +141,16 @@ class Problem:
         for key in keys:
             section, _, name = key.partition(".")
             theta = float(values[key])
-            if section == self.noise.section:
-                found[key] = ParameterDerivative(theta, noise=self.noise.derivative(name))
-            else:
-                found[key] = ParameterDerivative(theta, *self.system.derivative(name))
+            terms: Sequence[CoefficientMatrix] = ()
+            jumps: Sequence[float] = ()
+            noise = None
+            if section != self.noise.section:
+                terms, jumps = self.system.derivative(name)
+            elif not self.noise.is_white:
+                noise = self.noise.derivative(name)
+            own = name if section == self.noise.section else ""
+            terms, diffusions = self.noise.changed_motion(self.system, terms, own)
+            found[key] = ParameterDerivative(theta, tuple(terms), tuple(jumps), noise, tuple(diffusions))
         return found
 
     @property

@@ -1,0 +1,147 @@
+"""White noise: no state of its own, but diffusion of what it drives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass as plain_dataclass
+from enum import StrEnum
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.faults import told_in_words
+from fpsolve.model.noise import Noise
+from fpsolve.model.parameters import SIZE, STRICT, parameter
+from fpsolve.model.plane import CoefficientMatrix, Jump, System, affine, written_coefficient
+
+
+class Interpretation(StrEnum):
+    """What ξ dt = s dW means where it multiplies the state.
+
+    STRATONOVICH: the limit of noise that remembers its value for ever shorter times.
+    ITO: the limit of independent kicks; ½ Σ A² less in the drift, A the matrix that s dW multiplies.
+    """
+
+    STRATONOVICH = "stratonovich"
+    ITO = "ito"
+
+
+@told_in_words
+@dataclass(frozen=True, config=STRICT)
+class White(Noise):
+    """White noise ξ dt = s dW, of the spectral density S = s² at all frequencies.
+
+    A system ẋ = (A₀ + ξ A₁) x is dx = A₀x dt + s A₁x ∘ dW, or in Itô's sense with s A₁x dW, which is the former with
+    A₀ − ½s²A₁² in place of A₀.
+
+    >>> White(s=0.5).spectral_density(0.0)
+    0.25
+
+    Args:
+        s: 1e-15 to 1e15, in the unit of ξ times time^(1/2).
+        interpretation: one of `Interpretation`, or its name.
+
+    Raises:
+        ParameterError: s is not a finite number in its range.
+    """
+
+    s: Annotated[
+        float,
+        parameter("intensity of white noise; S = s² at all frequencies", "s = 0.5", "$s$", "1/time^(1/2)", **SIZE),
+    ]
+    interpretation: Annotated[
+        Interpretation, parameter("sense of the stochastic integral", 'interpretation = "stratonovich"', strict=False)
+    ] = Interpretation.STRATONOVICH
+
+    kind: ClassVar[str] = "white"
+    is_white: ClassVar[bool] = True
+    has_states: ClassVar[bool] = True
+    states: ClassVar[Sequence[float]] = (0.0,)
+    rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)
+
+    @property
+    def standard_deviation(self) -> float:
+        return math.inf
+
+    @property
+    def correlation_time(self) -> float:
+        return 0.0
+
+    def spectral_density(self, omega: float) -> float:
+        """S(ω) = s²."""
+        return self.s**2
+
+    @property
+    def probabilities(self) -> FloatArray:
+        return np.ones(1)
+
+    @property
+    def reached(self) -> FloatArray:
+        return np.zeros(1)
+
+    def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
+        """The drift in the sense of Stratonovich, and s A of the term that the noise drives, as one matrix.
+
+        Raises:
+            ValueError: a coefficient is no a + bξ, or the noise moves the phase over the ray of a jump.
+        """
+        drift, driven = _split(system, system.terms)
+        diffusions = [_term(system, self.s * driven, _order(system))] if driven.any() else []
+        for jump, diffusion in ((jump, each) for jump in system.jumps for each in diffusions):
+            if jump.log_factor and abs(float(diffusion.h(jump.phase))) > 1e-12 * diffusion.h.amplitude:
+                raise ValueError(
+                    f"white noise moves the phase over the ray of a jump, {jump.phase:.6g}; ‖x‖ would change there "
+                    "infinitely often; let it drive a term that leaves the phase there alone, or use coloured noise"
+                )
+        if self.interpretation == Interpretation.ITO and diffusions:
+            drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))
+        return Drift(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions
+
+    def changed_motion(
+        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
+    ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
+        _, driven = _split(system, system.terms)
+        drift, changed = _split(system, terms)
+        by_s = 1.0 if name == "s" else 0.0
+        if self.interpretation == Interpretation.ITO:
+            square = changed @ driven + driven @ changed
+            drift.append(_term(system, -0.5 * self.s**2 * square - by_s * self.s * driven @ driven, 0))
+        return drift, [_term(system, by_s * driven + self.s * changed, 0)] if driven.any() else []
+
+
+@plain_dataclass(frozen=True)
+class Drift(System):
+    """What moves a system besides white noise."""
+
+    epsilon: float
+    terms: tuple[CoefficientMatrix, ...]
+    jumps: tuple[Jump, ...]
+
+
+def _split(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[list[CoefficientMatrix], FloatArray]:
+    """The terms without what ξ multiplies, and the sum of that, with the powers of ε. Raises `ValueError`."""
+    steady, driven = [], np.zeros((2, 2))
+    for term in terms:
+        line = affine(term.g)
+        if line is None:
+            raise ValueError(
+                f"white noise has no value, so that g = {written_coefficient(term.g).strip()} of it has no meaning; "
+                "g must be a + b*xi"
+            )
+        offset, slope = line
+        if offset:
+            steady.append(CoefficientMatrix(term.order, (offset * np.array(term.matrix)).tolist()))
+        driven += slope * system.epsilon**term.order * np.array(term.matrix)
+    return steady, driven
+
+
+def _order(system: System) -> int:
+    """The lowest order of what ξ multiplies."""
+    return min(term.order for term in system.terms if (affine(term.g) or (0.0, 0.0))[1])
+
+
+def _term(system: System, matrix: FloatArray, order: int) -> CoefficientMatrix:
+    return CoefficientMatrix(order, (matrix / system.epsilon**order).tolist())
