@@ -29,3 +29,26 @@ def moment_lyapunov(matrices, rates, p):
         total[block, block] += rates_of_monomials(matrix, p)
     assert total.shape == 2 * (count * (p + 1),)
     return float(np.max(np.linalg.eigvals(total).real))
+
+
+def white_noise_exponent(drift, noises, p, interpretation="stratonovich"):
+    """Λ(p) of dx = A x dt + Σ A_k x∘dW_k, or with "ito" of A x dt + Σ A_k x dW_k.
+
+    The monomials of degree p are moved by x → A x with the matrix K(A), so that E K obeys K(A) + ½ Σ K(A_k)²; that of
+    Itô has the drift A − ½ Σ A_k² of Stratonovich.
+    """
+    drift, noises = np.asarray(drift, dtype=float), [np.asarray(matrix, dtype=float) for matrix in noises]
+    if interpretation == "ito":
+        drift = drift - 0.5 * sum(matrix @ matrix for matrix in noises)
+    moved = [rates_of_monomials(matrix, p) for matrix in noises]
+    total = rates_of_monomials(drift, p) + 0.5 * sum(each @ each for each in moved)
+    return float(np.max(np.linalg.eigvals(total).real))
+
+
+def ornstein_uhlenbeck_exponent(steady, driven, alpha, deviation, p, polynomials):
+    """Λ(p) of ẋ = (A₀ + ξA₁) x, dξ = −αξ dt + …: monomials times so many normalised Hermite polynomials of ξ."""
+    ladder = np.diag(np.sqrt(np.arange(1.0, polynomials)), 1)
+    total = np.kron(rates_of_monomials(steady, p), np.eye(polynomials))
+    total += deviation * np.kron(rates_of_monomials(driven, p), ladder + ladder.T)
+    total -= np.kron(np.eye(p + 1), alpha * np.diag(np.arange(float(polynomials))))
+    return float(np.max(np.linalg.eigvals(total).real))

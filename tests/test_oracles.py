@@ -1,0 +1,159 @@
+"""Exponents of linear systems in the plane by oracles alone: at least two that share nothing give each number.
+
+ẍ + 2bẋ + (k + ξ)x = 0 but where matrices stand; J = [[0, −1], [1, 0]].
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize_scalar
+
+from tests.oracles import closed_forms, moment_hierarchy, phase_circle, phase_panels
+
+TURN, SADDLE, SHEAR = [[0.0, -1.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, -1.0]], [[-1.0, 0.0], [5.0, -1.0]]
+NEGATIVE, NOISY_DAMPING = [[0.0, 1.0], [-1.0, 0.1]], [[0.0, 0.0], [0.0, 0.5]]
+FLIP = [[-1.0, 1.0], [1.0, -1.0]]
+
+
+def oscillator(stiffness=1.0, damping=0.1):
+    return np.array([[0.0, 1.0], [-stiffness, -2 * damping]])
+
+
+def noisy_stiffness(size=0.5):
+    return [[0.0, 0.0], [-size, 0.0]]
+
+
+def agree(expected, *found, abs=2e-12):
+    assert [*found] == pytest.approx([expected] * len(found), abs=abs)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "expected"),
+    [(1.0, 0.110230251830114), (0.25, 0.218593277235239), (-1.0, 0.829060894212746), (0.0, 0.289308259834239)],
+)
+def test_undamped_oscillator(stiffness, expected):
+    drift, noise = oscillator(stiffness, 0.0), noisy_stiffness(1.0)
+    made = phase_circle.white(drift, [noise])
+    agree(expected, closed_forms.white_stiffness(stiffness, 1.0), phase_circle.lyapunov_exponent(made, 100))
+    agree(expected, phase_panels.lyapunov_exponent(drift, noise, 70), abs=1e-7)
+
+
+@pytest.mark.parametrize(("p", "expected"), [(2, 2 ** (1 / 3)), (4, 42 ** (1 / 3))])
+def test_free_particle(p, expected):
+    drift, noise = oscillator(0.0, 0.0), noisy_stiffness(1.0)
+    agree(expected, moment_hierarchy.white_noise_exponent(drift, [noise], p))
+    agree(expected, phase_circle.moment_exponent(phase_circle.white(drift, [noise]), p, 60), abs=1e-11)
+
+
+def test_damped_oscillator():
+    drift, noise = oscillator(), noisy_stiffness()
+    made, expected = phase_circle.white(drift, [noise]), -0.0688672519733493
+    agree(expected, closed_forms.white_stiffness(1.0, 0.5, 0.1), phase_circle.lyapunov_exponent(made, 60))
+    agree(expected, phase_panels.lyapunov_exponent(drift, noise, 70), abs=1e-9)
+    for p, moment in ((2, -0.0742396424254463), (4, -0.0145544380585)):
+        agree(moment, moment_hierarchy.white_noise_exponent(drift, [noise], p))
+        agree(moment, phase_circle.moment_exponent(made, p, 40))
+
+
+def test_where_its_stability_ends():
+    def of(exponent):
+        return brentq(lambda square: exponent(math.sqrt(square)), 0.1, 1.5, xtol=1e-15)
+
+    def circle(size):
+        return phase_circle.white(oscillator(), [noisy_stiffness(size)])
+
+    for p, expected in ((2, 0.4), (4, 0.259119496855)):
+        closed = of(lambda s, p=p: moment_hierarchy.white_noise_exponent(oscillator(), [noisy_stiffness(s)], p))
+        agree(expected, closed, of(lambda s, p=p: phase_circle.moment_exponent(circle(s), p, 24)))
+    closed = of(lambda s: closed_forms.white_stiffness(1.0, s, 0.1))
+    agree(0.882782300544, closed, of(lambda s: phase_circle.lyapunov_exponent(circle(s), 80)))
+
+
+def test_damped_oscillator_with_a_wall():
+    drift, noise, expected = oscillator(), noisy_stiffness(), -0.13970934720001
+    made = phase_circle.white(drift, [noise])
+    agree(expected, closed_forms.white_stiffness(1.0, 0.5, 0.1, 0.8), phase_circle.lyapunov_exponent(made, 60, 0.8))
+    agree(-0.2124371993354, phase_circle.moment_exponent(made, 2, 40, 0.8))
+    agree(-0.2124371993354, phase_panels.moment_exponent(drift, noise, 2, 60, 0.8), abs=1e-8)
+
+
+def test_noise_in_the_damping_with_a_wall():
+    """Noise that moves the phase neither where x = 0 nor where v = 0."""
+    stratonovich = phase_circle.white(NEGATIVE, [NOISY_DAMPING])
+    ito = phase_circle.white(NEGATIVE, [NOISY_DAMPING], "ito")
+    lower = np.array(NEGATIVE) - 0.5 * np.array(NOISY_DAMPING) @ NOISY_DAMPING
+    expected = ((NEGATIVE, stratonovich, 0.0103221483130), (lower, ito, -0.0523330808550))
+    for drift, made, value in expected:
+        agree(value, phase_circle.lyapunov_exponent(made, 40, 0.8))
+        agree(value, phase_panels.lyapunov_exponent(drift, NOISY_DAMPING, 40, 0.8, panels=2), abs=1e-10)
+    for p, value in ((1, 0.0582175109642), (2, 0.2147187990537)):
+        agree(value, phase_circle.moment_exponent(stratonovich, p, 30, 0.8))
+        agree(value, phase_panels.moment_exponent(NEGATIVE, NOISY_DAMPING, p, 40, 0.8, panels=2), abs=1e-10)
+
+
+def test_telegraph_noise():
+    def states(size, damping):
+        return [oscillator(1 + size, damping), oscillator(1 - size, damping)]
+
+    made = phase_circle.chain(states(0.5, 0.05), FLIP)
+    agree(-0.03297945668172, phase_circle.lyapunov_exponent(made, 30))
+    agree(-0.03297945668172, phase_panels.chain_lyapunov_exponent(states(0.5, 0.05), FLIP, 60))
+    hierarchy = moment_hierarchy.moment_lyapunov(states(0.5, 0.05), FLIP, 2)
+    agree(-0.0332610990213474, hierarchy, phase_circle.moment_exponent(made, 2, 30))
+    hierarchy = brentq(lambda a: moment_hierarchy.moment_lyapunov(states(a, 0.1), FLIP, 2), 0.5, 1.2, xtol=1e-15)
+    agree(0.81989159175, hierarchy)
+    agree(0, phase_circle.moment_exponent(phase_circle.chain(states(hierarchy, 0.1), FLIP), 2, 40))
+
+
+def test_ornstein_uhlenbeck_noise():
+    def of(s, count):
+        noise = 1.0, s / math.sqrt(2)
+        return moment_hierarchy.ornstein_uhlenbeck_exponent(oscillator(), noisy_stiffness(1.0), *noise, 2, count)
+
+    gaps = [abs(of(1.0, count) - 0.0940860185210208) for count in (4, 7, 10, 20)]
+    assert gaps == sorted(gaps, reverse=True)
+    assert gaps[-1] < 2e-15
+    expected = brentq(lambda s: of(s, 20), 0.5, 1.3, xtol=1e-15)
+    agree(0.9103699720234, expected)
+    for s, value in ((1.0, 0.0940860185210208), (expected, 0.0)):
+        made = phase_circle.ornstein_uhlenbeck(oscillator(), noisy_stiffness(1.0), 1.0, s / math.sqrt(2), 20)
+        agree(value, phase_circle.moment_exponent(made, 2, 24, start=value + 1e-3))
+
+
+def test_a_saddle_that_turns():
+    made = phase_circle.white(SADDLE, [TURN])
+    exponent, second, at_minus_one = closed_forms.saddle_and_turning()
+    agree(exponent, phase_circle.lyapunov_exponent(made, 30), phase_panels.lyapunov_exponent(SADDLE, TURN, 40))
+    agree(second, moment_hierarchy.white_noise_exponent(SADDLE, [TURN], 2), phase_circle.moment_exponent(made, 2, 30))
+    agree(at_minus_one, -0.2460954174313, phase_circle.moment_exponent(made, -1, 30))
+
+
+def test_shear_that_turns():
+    """I(0) = −min Λ(p)."""
+    made = phase_circle.white(SHEAR, [TURN])
+    agree(-0.352315956524213, phase_circle.lyapunov_exponent(made, 40))
+    agree(-0.352315956524213, phase_panels.lyapunov_exponent(SHEAR, TURN, 60), abs=1e-10)
+    hierarchy = moment_hierarchy.white_noise_exponent(SHEAR, [TURN], 2)
+    agree(0.4853222371891, hierarchy, phase_circle.moment_exponent(made, 2, 40))
+    by_series = minimize_scalar(lambda p: phase_circle.moment_exponent(made, p, 24), (0.4, 0.55, 0.7), tol=1e-7).fun
+    agree(-0.0947751140996, by_series)
+    at = 0.5411423275
+    agree(-0.0947751140996, phase_panels.moment_exponent(SHEAR, TURN, at, 48), abs=1e-9)
+
+
+def test_noise_of_ito_has_another_drift_where_its_matrix_is_not_nilpotent():
+    for noise, differs in ((noisy_stiffness(), False), (NOISY_DAMPING, True)):
+        one, other = (
+            moment_hierarchy.white_noise_exponent(oscillator(), [noise], 2, each) for each in ("stratonovich", "ito")
+        )
+        assert (abs(one - other) > 1e-3) is differs
+
+
+def test_two_white_noises():
+    """dx = ½cx dt + x∘dW₁ + Jx∘dW₂: ‖x‖^p alone, as Jx only turns; Λ(p) = ½cp + ½p²."""
+    noises = [np.eye(2), TURN]
+    for p in (2, 4):
+        expected = 0.15 * p + 0.5 * p**2
+        agree(expected, moment_hierarchy.white_noise_exponent(0.15 * np.eye(2), noises, p))
+        agree(expected, phase_circle.moment_exponent(phase_circle.white(0.15 * np.eye(2), noises), p, 8))
