@@ -2,8 +2,8 @@
 
 With x = a (cos φ, −sin φ) a matrix A moves functions a^p T(φ) by X = h ∂φ + p q, h = e′ᵀA e, q = eᵀA e. Then Λ(p) is
 the rightmost eigenvalue of X₀ + ½ Σ X_k² for dx = A₀x dt + Σ A_k x∘dW_k, of X_i in state i plus the rates of a chain,
-and of X₀ + ξX₁ + L_ξ. A wall at x = 0, that is φ = π/2, multiplies ‖x‖ by R: T = R^{ps} u, s rising from 0 to 1 around the
-half circle, which turns ∂φ into ∂φ + p ln R/π; u is smooth where the noise does not move the phase at the wall.
+and of X₀ + ξX₁ + L_ξ. A wall at x = 0, that is φ = π/2, multiplies ‖x‖ by R: T = R^{ps} u, s rising from 0 to 1 around
+the half circle, which turns ∂φ into ∂φ + p ln R/π; u is smooth where the noise does not move the phase at the wall.
 """
 
 import math

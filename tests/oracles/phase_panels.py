@@ -1,6 +1,6 @@
 """Λ(p) and λ of systems in the plane by collocation in Chebyshev points of panels of the half circle.
 
-Walls are a condition between panels. A panel ends where the noise does not move the phase, as at a wall: there the equation is of first order. The solution
+A panel ends where the noise does not move the phase, as at a wall: there the equation is of first order. The solution
 is smooth in every panel; at the joints T⁻ = R^p T⁺, and T′ is continuous where the equation is of second order.
 """
 
