@@ -288,6 +288,20 @@ class StateAxis(NoiseAxis):
         """diag(π) Q."""
         return self.measure[:, None] * self._rates
 
+    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
+        """With ∂π from πQ = 0: (∂π)Q = −π ∂Q, of the sum 0."""
+        none = np.zeros(self.size)
+        rates = np.array(change.rates) if change.rates else np.diag(none)
+        states = np.array(change.states) if change.states else none
+        unit = np.abs(self._rates).max()
+        equations, right = np.vstack([self._rates.T / unit, none + 1]), np.append(-self.measure @ rates / unit, 0.0)
+        weights = np.linalg.lstsq(equations, right, rcond=None)[0] if change.rates else none
+        if g is None:
+            return np.asarray(weights[:, None] * self._rates + self.measure[:, None] * rates)
+        step = STEP * np.abs(self.support).max() / max(np.abs(states).max(), 1e-300)
+        slope = (g(self.support + step * states) - g(self.support - step * states)) / (2 * step)
+        return np.diag(weights * g(self.support) + self.measure * slope)
+
     def samples(self) -> Samples:
         return Samples(self.support, self.measure, np.ones(self.size), self.values, np.ones(self.size))
 

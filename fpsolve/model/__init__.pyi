@@ -6,6 +6,7 @@ from .noises.non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .noises.non_gaussian import ReducedNoise as ReducedNoise
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .noises.sine_wiener import SineWiener as SineWiener
+from .noises.telegraph import Telegraph as Telegraph
 from .noises.white import Interpretation as Interpretation
 from .noises.white import White as White
 from .plane import CoefficientMatrix as CoefficientMatrix

@@ -26,6 +26,7 @@ NOISES: Mapping[str, str] = {
     "ornstein-uhlenbeck": "ornstein_uhlenbeck:OrnsteinUhlenbeck",
     "sine-wiener": "sine_wiener:SineWiener",
     "white": "white:White",
+    "telegraph": "telegraph:Telegraph",
     "markov-chain": "markov_chain:MarkovChain",
 }
 

@@ -25,19 +25,23 @@ from fpsolve.model.plane import CoefficientMatrix, System
 
 @dataclass(frozen=True)
 class NoiseDerivative:
-    """∂/∂θ of a diffusion.
+    """∂/∂θ of a diffusion, or of a chain.
 
     Attributes:
         log_diffusion: ∂ ln σ/∂θ, the same for all ξ/c.
         log_density: ∂ ln P_s(ξ)/∂θ at fixed ξ/c, but for a constant.
         end_exponent: ∂a/∂θ of P_s ~ (1 − ξ²/ξ_s²)^a at the ends of a bounded support.
         log_scale: ∂ ln c/∂θ of the length c that ξ is measured by; 0 where ξ itself is held.
+        states: ∂ξ_i/∂θ of a chain; empty where none moves.
+        rates: ∂Q/∂θ of a chain; empty where none changes.
     """
 
     log_diffusion: float = 0.0
     log_density: Coefficient = nothing
     end_exponent: float = 0.0
     log_scale: float = 0.0
+    states: tuple[float, ...] = ()
+    rates: tuple[tuple[float, ...], ...] = ()
 
 
 class Noise(Parametrised):

@@ -19,74 +19,19 @@ _BALANCED = 1e-12
 Row = Annotated[tuple[float, ...], Field(strict=False)]
 
 
-@dataclass(frozen=True)
-class MarkovChain(Noise):
-    """ξ(t) with values among some states, from one of which to another it jumps at given rates.
+class Chain(Noise):
+    """ξ(t) with values among some states, from one of which to another it jumps at given rates, whatever states them.
 
-    >>> MarkovChain.telegraph(amplitude=0.5, rate=1.0).correlation_time  # ξ = ±0.5, each state left at rate 1
-    0.5
-
-    Args:
-        states: the values of ξ, shape (n,), n ≥ 2.
-        rates: Q, shape (n, n): rates[i][j] ≥ 0 from state i to state j; the diagonal is minus the sum of its row, or 0,
-            which then stands for it.
-
-    Raises:
-        ValueError: the shapes or signs are not as stated, all states have one value, or some state cannot be reached
-            from another one.
+    Attributes:
+        states: the values of ξ, shape (n,).
+        rates: Q, shape (n, n), from state to state; the sum of every row is 0.
     """
 
     states: Sequence[float]
     rates: Sequence[Sequence[float]]
 
-    kind: ClassVar[str] = "markov-chain"
     has_states: ClassVar[bool] = True
     mixes_slowly: ClassVar[bool] = True
-    stated: ClassVar[Mapping[str, FieldInfo]] = {
-        "states": stated_field(Annotated[Row, parameter("the values of the noise", "states = [-0.5, 0.5]")]),
-        "rates": stated_field(
-            Annotated[
-                Annotated[tuple[Row, ...], Field(strict=False)],
-                parameter("rates from each state to each", "rates = [[-1.0, 1.0], [1.0, -1.0]]"),
-            ]
-        ),
-    }
-
-    def __post_init__(self) -> None:
-        try:
-            states, rates = real_array(self.states, "states"), real_array(self.rates, "rates")
-        except ValueError:
-            told = f"got the states {shown(self.states)} and rates {shown(self.rates)}"
-            raise ValueError(f"{told}; must be finite numbers that differ, with finite rates") from None
-        if states.ndim != 1 or states.size < 2 or rates.shape != 2 * states.shape:
-            raise ValueError(f"got {states.shape} states and {rates.shape} rates; must be (n,) and (n, n), n >= 2")
-        if np.ptp(states) == 0:
-            raise ValueError(
-                f"got the states {shown(self.states)}; must be finite numbers that differ, with finite rates"
-            )
-        sizes = {"states": np.abs(states).max(), "rates": np.abs(rates).max()}
-        for name, size in sizes.items():
-            if not SIZE["ge"] <= size <= SIZE["le"]:
-                raise ValueError(f"got {name} of sizes up to {size:g}; must be from {SIZE['ge']:g} to {SIZE['le']:g}")
-        from scipy.sparse.csgraph import connected_components
-
-        jumps = rates - np.diag(np.diagonal(rates))
-        leaving = jumps.sum(axis=1)
-        stated = -np.diagonal(rates)
-        if np.any(jumps < 0) or np.any((stated != 0) & (np.abs(stated - leaving) > _BALANCED * leaving.max())):
-            raise ValueError(
-                "rates from one state to another must be >= 0, and each diagonal entry 0 or minus the sum of its row"
-            )
-        if connected_components(jumps > 0, connection="strong")[0] > 1:
-            raise ValueError("every state must be reached from every other one; leave out those that are not")
-        object.__setattr__(self, "states", tuple(states.tolist()))
-        object.__setattr__(self, "rates", tuple(map(tuple, (jumps - np.diag(leaving)).tolist())))
-
-    @classmethod
-    def telegraph(cls, amplitude: float, rate: float) -> MarkovChain:
-        """ξ = ±amplitude, each state left at this rate."""
-        size, rate = real_number(amplitude, "amplitude"), real_number(rate, "rate")
-        return cls((-size, size), ((-rate, rate), (rate, -rate)))
 
     @property
     def probabilities(self) -> FloatArray:
@@ -129,3 +74,71 @@ class MarkovChain(Noise):
             1j * omega * np.eye(deviations.size) - np.array(self.rates) + np.outer(np.ones_like(weights), weights)
         )
         return float(2 * np.real((weights * deviations) @ np.linalg.solve(resolvent, deviations)))
+
+
+@dataclass(frozen=True)
+class MarkovChain(Chain):
+    """ξ(t) with values among some states, from one of which to another it jumps at given rates.
+
+    >>> MarkovChain.telegraph(amplitude=0.5, rate=1.0).correlation_time  # ξ = ±0.5, each state left at rate 1
+    0.5
+
+    Args:
+        states: the values of ξ, shape (n,), n ≥ 2.
+        rates: Q, shape (n, n): rates[i][j] ≥ 0 from state i to state j; the diagonal is minus the sum of its row, or 0,
+            which then stands for it.
+
+    Raises:
+        ValueError: the shapes or signs are not as stated, all states have one value, or some state cannot be reached
+            from another one.
+    """
+
+    states: Sequence[float]
+    rates: Sequence[Sequence[float]]
+
+    kind: ClassVar[str] = "markov-chain"
+    stated: ClassVar[Mapping[str, FieldInfo]] = {
+        "states": stated_field(Annotated[Row, parameter("the values of the noise", "states = [-0.5, 0.5]")]),
+        "rates": stated_field(
+            Annotated[
+                Annotated[tuple[Row, ...], Field(strict=False)],
+                parameter("rates from each state to each", "rates = [[-1.0, 1.0], [1.0, -1.0]]"),
+            ]
+        ),
+    }
+
+    def __post_init__(self) -> None:
+        told = f"got the states {shown(self.states)} and rates {shown(self.rates)}; must be"
+        try:
+            states, rates = real_array(self.states, "states"), real_array(self.rates, "rates")
+        except ValueError:
+            raise ValueError(f"{told} finite numbers that differ, with finite rates") from None
+        if states.ndim != 1 or states.size < 2 or rates.shape != 2 * states.shape:
+            raise ValueError(f"got {states.shape} states and {rates.shape} rates; must be (n,) and (n, n), n >= 2")
+        if np.ptp(states) == 0:
+            raise ValueError(
+                f"got the states {shown(self.states)}; must be finite numbers that differ, with finite rates"
+            )
+        sizes = {"states": np.abs(states).max(), "rates": np.abs(rates).max()}
+        for name, size in sizes.items():
+            if not SIZE["ge"] <= size <= SIZE["le"]:
+                raise ValueError(f"got {name} of sizes up to {size:g}; must be from {SIZE['ge']:g} to {SIZE['le']:g}")
+        from scipy.sparse.csgraph import connected_components
+
+        jumps = rates - np.diag(np.diagonal(rates))
+        leaving = jumps.sum(axis=1)
+        stated = -np.diagonal(rates)
+        if np.any(jumps < 0) or np.any((stated != 0) & (np.abs(stated - leaving) > _BALANCED * leaving.max())):
+            raise ValueError(
+                "rates from one state to another must be >= 0, and each diagonal entry 0 or minus the sum of its row"
+            )
+        if connected_components(jumps > 0, connection="strong")[0] > 1:
+            raise ValueError("every state must be reached from every other one; leave out those that are not")
+        object.__setattr__(self, "states", tuple(states.tolist()))
+        object.__setattr__(self, "rates", tuple(map(tuple, (jumps - np.diag(leaving)).tolist())))
+
+    @classmethod
+    def telegraph(cls, amplitude: float, rate: float) -> MarkovChain:
+        """ξ = ±amplitude, each state left at this rate."""
+        size, rate = real_number(amplitude, "amplitude"), real_number(rate, "rate")
+        return cls((-size, size), ((-rate, rate), (rate, -rate)))
