@@ -122,8 +122,12 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     ω ρ, or |dφ/dt| ρ where the noise moves the phase there, is the probability flux through an impact, where the
     log-amplitude jumps by ln R; it is taken on the side from where the impact is met.
     """
-    space, system = pair.space, pair.generator.problem.system
-    growth = _density(_of_zero(pair), "adjoint").mean(lambda phi, xi: growth_rate(system, xi)(phi))
+    space, problem = pair.space, pair.generator.problem
+    system, density = problem.motion, _density(_of_zero(pair), "adjoint")
+    growth = density.mean(lambda phi, xi: growth_rate(system, xi)(phi))
+    for each in problem.diffusions:  # ½ h q′, by which q ∘ dW has a mean
+        size = 0.5 * system.epsilon ** (2 * each.order)
+        growth += size * density.mean(lambda phi, xi, each=each: each.h(phi) * each.q.slope(phi) + 0.0 * xi)
     table = space.table(pair.left)
     for jump in system.jumps:
         at = space.phi.vertices_at(jump.phase)

@@ -456,7 +456,7 @@ class _Search:
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Discretisation:
     """A first discretisation, small, for a tilted density around some z; None for where slow noise carries it."""
-    noise, system, digits = problem.noise, problem.system, -math.log10(rtol)
+    noise, system, digits = problem.noise, problem.motion, -math.log10(rtol)
     frozen = frozen_noise(problem)
     if frozen is None:  # the noise has states
         return Discretisation(_phase(system, noise.reached, digits), (States(noise.reached.size),))

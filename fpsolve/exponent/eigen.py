@@ -334,8 +334,8 @@ def _rounding_of_entries(generator: Generator, pencil: Pencil, x: FloatArray, y:
     steepness = space.phi.modes**2 / np.diff(space.phi.lines)[space.phi.cells]
     slopes = _summed(space, x * np.repeat(steepness, space.xi.size))
     total = 0.0
-    for term in generator.problem.system.terms:
-        size = generator.problem.system.epsilon**term.order
+    for term in generator.problem.motion.terms:
+        size = generator.problem.motion.epsilon**term.order
         q, h = (size * (abs(each.mean) + each.amplitude) for each in (term.q, term.h))
         total += float(np.sum(left * ((p * q * right + h * slopes) @ abs(space.xi.matrix(term.g)))))
     return _EPS * total

@@ -137,7 +137,7 @@ class ExponentSolver:
         for name, kind, words in _KINDS:
             if not isinstance(getattr(self, name), kind) or getattr(self, name) is True:
                 raise TypeError(f"got {name} = {shown(getattr(self, name))}; must be {words}")
-        if not math.isfinite(self.problem.noise.standard_deviation):
+        if not (self.problem.noise.is_white or math.isfinite(self.problem.noise.standard_deviation)):
             raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))
         if not 0 < self.rtol <= sys.float_info.max:
             raise ValueError(f"rtol is {shown(self.rtol)}; it must be a positive number such as 1e-8")

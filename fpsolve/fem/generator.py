@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from fpsolve.arrays import finite, one
+from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import Factors, factorised
@@ -21,6 +21,8 @@ from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rat
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 KEPT_SPACES = 16
+SAMPLES = 721
+"""φ at which the growth by white noise is looked at."""
 MOST_FOR_A_BOUND = 300
 """Functions of ξ up to which the sharper bound of Λ is used; beyond, that of noise that rests at an end."""
 
@@ -96,7 +98,7 @@ class Generator:
 
     def terms(self) -> tuple[Term, ...]:
         """L(p) term by term."""
-        return tuple(Terms(self.problem.system, self.space(0.0)).whole())
+        return tuple(Terms(self.problem, self.space(0.0)).whole())
 
     def matrix(self, p: float, *, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
         """The matrix of dᵏL/dpᵏ in the space for p, from the terms of some orders in ε, the ξ-matrix of 1 first.
@@ -112,7 +114,7 @@ class Generator:
         """The matrix of ∂/∂θ dᵏL/dpᵏ, the functions of φ and ξ held; that of P_s, and so of `mass`, is in it."""
         xi = self.space(p).xi
         if by not in self._changes:
-            self._changes[by] = tuple(Terms(self.problem.system, self.space(0.0)).changed(by))
+            self._changes[by] = tuple(Terms(self.problem, self.space(0.0)).changed(by))
         sizes = [(term.of_p(p, derivative), term) for term in self._changes[by]]
         parts = [(size * term.phase, xi.matrix(term.noises[0])) for size, term in sizes if size]
         if by.noise is not None:
@@ -138,7 +140,8 @@ class Generator:
     @cached_property
     def loss(self) -> float:
         """About how many times its rounding elimination may harm T − 1: the size of the free transport over a rate."""
-        free = self.matrix(0.0, orders=slice(0, 1)).terms[0][0]
+        orders = ALL_ORDERS if self.problem.diffusions else slice(0, 1)
+        free = self.matrix(0.0, orders=orders).terms[0][0]
         return 30 * float(abs(free).sum(axis=0).max()) / self.unit_rate
 
     @cached_property
@@ -146,8 +149,9 @@ class Generator:
         """Whether ⟨P_s, L₀T⟩ = 0 for every T: no path is killed, and the order 0 only rotates uniformly."""
         if self.chosen.is_killed:
             return False
-        free = [term for term in self.problem.system.terms if term.order == 0]
-        return all(term.h.amplitude == 0 and term.q.vanishes for term in free)
+        free = [term for term in self.problem.motion.terms if term.order == 0]
+        is_weak = all(each.order for each in self.problem.diffusions)
+        return is_weak and all(term.h.amplitude == 0 and term.q.vanishes for term in free)
 
     def upper_bound(self, p: float) -> float:
         """A number right of Λ(p): the growth rate of E exp ∫ f(ξ) dt, f the supremum over φ of p q and of the jumps.
@@ -155,13 +159,15 @@ class Generator:
         The jumps are spread evenly over φ. Where states of a chain move the phase over a ray to and fro, each jump
         between them may bring a jump more.
         """
-        system, noise, space = self.problem.system, self.problem.noise, self.space(p)
+        system, noise, space = self.problem.motion, self.problem.noise, self.space(p)
 
         def fastest(xi: Any) -> Any:
             q, speed = growth_rate(system, xi), phase_speed(system, xi)
             gains = sum(max(0.0, p * jump.log_factor) for jump in system.jumps)
             return p * q.mean + abs(p) * q.amplitude + gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
 
+        if self.problem.diffusions:
+            return float(np.max(self._growth_of_one(p)))
         if space.xi.size > MOST_FOR_A_BOUND:
             growth = float(np.max(fastest(space.xi.support)))
         else:
@@ -171,3 +177,15 @@ class Generator:
             if noise.largest_jump_rate and crosses_both_ways(system, jump, space.xi.support):
                 growth += noise.largest_jump_rate * math.expm1(max(0.0, p * jump.log_factor))
         return growth
+
+    def _growth_of_one(self, p: float) -> FloatArray:
+        """e^{−pγ} L e^{pγ} 1 at some φ, γ′ = c such that jumps are spread evenly over φ: its supremum is above Λ(p)."""
+        system, phi = self.problem.motion, np.linspace(0, math.pi, SAMPLES)
+        q, speed = growth_rate(system, 0.0), phase_speed(system, 0.0)
+        c = sum(jump.log_factor * np.sign(speed(jump.phase)) for jump in system.jumps) / math.pi
+        growth = p * (q(phi) + c * speed(phi))
+        for each in self.problem.diffusions:
+            size = system.epsilon ** (2 * each.order)
+            rate, slope = each.q(phi) + c * each.h(phi), each.q.slope(phi) + c * each.h.slope(phi)
+            growth += 0.5 * size * (p * each.h(phi) * slope + (p * rate) ** 2)
+        return np.asarray(growth + 1e-3 * np.max(np.abs(growth)))

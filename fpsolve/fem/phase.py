@@ -7,14 +7,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, one
 from fpsolve.fem.axis import Axis
 from fpsolve.fem.mesh import vertices_at
 from fpsolve.fem.polynomials import legendre, orthonormal
-from fpsolve.model.plane import Harmonics
+from fpsolve.model.plane import CoefficientMatrix, Harmonics
 
+PENALTY = 2.0
+"""η of the interior penalty method times size/(degree + 1)²."""
 MAX_DENSE_UNKNOWNS = 600
 """Matrices of φ, and of ξ, are NumPy arrays for so many unknowns, and sparse beyond."""
 
@@ -31,6 +33,7 @@ class PhaseAxis(Axis):
         span: π or 2π.
         left_trace, right_trace: T(φⱼ⁻) and T(φⱼ⁺) at the vertices lines[:-1], shape (m, size); the left trace at the
             seam comes from the last cell.
+        jump: T(φⱼ⁺) − T(φⱼ⁻).
     """
 
     def __init__(self, lines: FloatArray, degrees: Any) -> None:
@@ -53,6 +56,7 @@ class PhaseAxis(Axis):
             self._scattered(np.arange(kept.shape[0]) + shift, self._table.ends[side] / np.sqrt(self._sizes)[:, None])
             for side, shift in ((0, 0), (1, 1))
         )
+        self.jump = self.right_trace - self.left_trace
 
     def vertices_at(self, phase: float) -> Any:
         """The indices of the φ-lines lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
@@ -65,6 +69,50 @@ class PhaseAxis(Axis):
     def convection(self, f: Harmonics) -> Any:
         """∫ f u′ v, cell by cell."""
         return self._combined(f, self._convections)
+
+    def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Any, Any, Any]:
+        """∫ w D_a D_b T, D = h ∂φ + p q of two matrices: the coefficients of p⁰, p¹ and p².
+
+        With D* w = −(h w)′ + p q w it is, cell by cell and at the vertices,
+
+            ∫ D_a* w D_b T − Σ h_a [w] {D_b T} + Σ h_b [T] {D_a* w} − Σ η h_a h_b [w] [T],
+
+        the interior penalty method, in which η grows like degree²/size of the smaller cell. What h and q do not change
+        at a vertex, as h = 0 at the ray of a jump, is not there.
+        """
+        grid, at = self._grid, self.lines[:-1]
+        size, weights = self._sizes[:, None], self._sizes[:, None] * self._local_weights
+
+        def cellwise(f: FloatArray, table: FloatArray, power: int) -> FloatArray:
+            return (f * weights / size ** (1 + power)) @ table
+
+        products, convections, stiffnesses = self._table.products, self._table.convections, self._table.stiffnesses
+        transposed = convections.reshape(-1, *self._pairs.shape[1:]).swapaxes(1, 2).reshape(convections.shape)
+        ha, qa, hb, qb, slope = a.h(grid), a.q(grid), b.h(grid), b.q(grid), a.h.slope(grid)
+        cells = (
+            -cellwise(ha * hb, stiffnesses, 2) - cellwise(slope * hb, convections, 1),
+            cellwise((qa * hb), convections, 1) - cellwise(ha * qb, transposed, 1) - cellwise(slope * qb, products, 0),
+            cellwise(qa * qb, products, 0),
+        )
+        ha, qa, hb, qb, slope = a.h(at), a.q(at), b.h(at), b.q(at), a.h.slope(at)
+        sharpness = (self.degrees + 1) ** 2 / self._sizes
+        penalty = PENALTY * np.maximum(sharpness, np.roll(sharpness, 1))
+        jump, mean, mean_slope = self.jump, 0.5 * (self.left_trace + self.right_trace), self._mean_slope
+        loads = (
+            -(jump.T @ by_rows(ha * hb, mean_slope) + mean_slope.T @ by_rows(ha * hb, jump))
+            - mean.T @ by_rows(hb * slope, jump)
+            - jump.T @ by_rows(penalty * ha * hb, jump),
+            mean.T @ by_rows(hb * qa, jump) - jump.T @ by_rows(ha * qb, mean),
+        )
+        first, second, last = (self._assembled(blocks) for blocks in cells)
+        return first + loads[0], second + loads[1], last
+
+    @cached_property
+    def _mean_slope(self) -> Any:
+        """½(T′(φⱼ⁺) + T′(φⱼ⁻)) at the vertices."""
+        count = np.arange(self._sizes.size)
+        slopes = self._table.end_slopes[:, None] / self._sizes[:, None] ** 1.5
+        return 0.5 * (self._scattered(count, slopes[0]) + self._scattered(count + 1, slopes[1]))
 
     @cached_property
     def identity(self) -> Any:
@@ -144,3 +192,8 @@ class PhaseAxis(Axis):
         matrix = np.zeros(shape)
         matrix[rows, columns] = entries
         return matrix
+
+
+def by_rows(factors: FloatArray, matrix: Any) -> Any:
+    """A matrix with its rows multiplied."""
+    return diags(factors) @ matrix if issparse(matrix) else factors[:, None] * matrix

@@ -33,13 +33,16 @@ class Orthonormal(NamedTuple):
         rule: of n points.
         products: values of all pairs of functions, shape (n, (degree + 1)²), the first function slowest.
         convections: values of a function times the slope of another, in the same order.
-        ends: values at 0 and at 1, shape (2, degree + 1).
+        stiffnesses: slopes of all pairs of functions, in the same order.
+        ends, end_slopes: values and slopes at 0 and at 1, shape (2, degree + 1).
     """
 
     rule: Rule
     products: FloatArray
     convections: FloatArray
+    stiffnesses: FloatArray
     ends: FloatArray
+    end_slopes: FloatArray
 
 
 @lru_cache(maxsize=64)
@@ -59,10 +62,12 @@ def orthonormal(degree: int) -> Orthonormal:
     """The polynomials up to a degree, 1 at least."""
     rule = gauss_legendre(degree + EXTRA_POINTS)
     values, sizes = legendre(rule.points, degree), np.sqrt(2 * np.arange(degree + 1) + 1)
-    slopes = 2 * sizes * legval(2 * rule.points - 1, np.polynomial.legendre.legder(np.eye(degree + 1))).T
+    derivatives = np.polynomial.legendre.legder(np.eye(degree + 1))
+    slopes, end_slopes = (2 * sizes * legval(2 * x - 1, derivatives).T for x in (rule.points, np.array([0.0, 1.0])))
     ends = legendre(np.array([0.0, 1.0]), degree)
-    pairs = [(values[:, :, None] * each[:, None, :]).reshape(len(values), -1) for each in (values, slopes)]
-    return Orthonormal(rule, pairs[0], pairs[1], ends)
+    factors = (values, values), (values, slopes), (slopes, slopes)
+    pairs = [(first[:, :, None] * last[:, None, :]).reshape(len(values), -1) for first, last in factors]
+    return Orthonormal(rule, *pairs, ends, end_slopes)
 
 
 @dataclass(frozen=True, eq=False)

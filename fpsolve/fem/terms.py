@@ -9,22 +9,24 @@ jump [w] = w(φ⁺) − w(φ⁻) of its two traces. θ = |v| is upwinding; for p
 is its size for the typical ξ, |Σ ε^n h| over what no noise drives + Σ ε^n |h| (mean of g²)^½ over the rest. A jump
 makes the load that of R^p T(φ⁺) − T(φ⁻), on w(φ⁻), as the phase runs forward, or of T(φ⁺) − R^p T(φ⁻), on w(φ⁺): an
 impact is exactly a point load, for which θ must be |v|.
+
+White noise by which dx has Bx ∘ dW adds ½ (h ∂φ + p q)² with h and q of B, see `PhaseAxis.diffusion`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import diags, issparse
 
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
+from fpsolve.fem.phase import by_rows
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Jump, System, is_driven, phase_speed, written_coefficient
-from fpsolve.model.problem import ParameterDerivative
+from fpsolve.model.problem import ParameterDerivative, Problem
 
 ALL_ORDERS = slice(None)
 
@@ -111,15 +113,16 @@ class Terms:
     """L(p) of a system, and ∂L(p)/∂θ, term by term; what is of φ alone is the same with any tilt.
 
     Args:
-        system: what is driven.
+        problem: whose motion it is, and what white noise adds to it.
         space: the trial and test functions.
         noise: the axis of the noise that drives it; the functions of others stand by.
     """
 
-    def __init__(self, system: System, space: TensorSpace, noise: int = 1) -> None:
-        self.system, self._count, self._noise = system, len(space.axes) - 1, noise
+    def __init__(self, problem: Problem, space: TensorSpace, noise: int = 1) -> None:
+        system = self.system = problem.motion
+        self._diffusions, self._count, self._noise = problem.diffusions, len(space.axes) - 1, noise
         self.phi, self.xi = space.phi, space.axes[noise]
-        self._vertices, self._jump = self.phi.lines[:-1], self.phi.right_trace - self.phi.left_trace
+        self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
         is_exact = np.full(self._vertices.size, self.xi.is_local)  # where θ = |v|
         for ray in system.jumps:
             is_exact[self.phi.vertices_at(ray.phase)] = True
@@ -128,7 +131,7 @@ class Terms:
         direction = np.where(is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0), 0.0)
         self._is_exact, self._two_way = is_exact, np.flatnonzero(is_exact & (direction == 0))
         # nothing is left of the other side: where ξ is large that would count
-        self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - _rows(0.5 * direction, self._jump)
+        self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - by_rows(0.5 * direction, self._jump)
 
     def _term(self, phase: Any, g: Coefficient | None, text: str, of_p: OfMoment = OfMoment(0), order: int = 0) -> Term:
         noises = tuple(g if axis == self._noise else one for axis in range(1, self._count + 1))
@@ -139,11 +142,13 @@ class Terms:
         yield self._term(self.phi.identity, None, "L_ξ, the generator of the noise")
         for term in self.system.terms:
             yield from self._driven(term)
+        for each in self._diffusions:
+            yield from self._diffused([(0.5, each, each)])
         # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
         text, jump = "upwind loads between cells", self._jump
         if not np.all(self._is_exact):
             typical = np.where(self._is_exact, 0.0, self.typical_speed())
-            yield self._term(-0.5 * jump.T @ _rows(typical, jump), one, text)
+            yield self._term(-0.5 * jump.T @ by_rows(typical, jump), one, text)
         for j in self._two_way:
             yield self._term(-0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(self._vertices[j])), text)
         for ray in self.system.jumps:
@@ -161,6 +166,8 @@ class Terms:
         text, jump, moved = "∂/∂θ", self._jump, Moved(self.system.epsilon, by.terms)
         for term in by.terms:
             yield from self._driven(term)
+        for own, change in zip(self._diffusions, by.diffusions, strict=bool(by.diffusions)):
+            yield from self._diffused([(0.5, own, change), (0.5, change, own)])
         for j in self._two_way:
             yield self._term(-0.5 * jump[[j]].T @ jump[[j]], self._faster(moved, float(self._vertices[j])), text)
         for ray, slope in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
@@ -177,12 +184,23 @@ class Terms:
         size = self.system.epsilon**term.order
         text = (f"{power_of_epsilon(term.order)} " if term.order else "") + written_coefficient(term.g)
         if not term.h.vanishes:
-            loads = self._trace.T @ _rows(term.h(self._vertices), self._jump)
+            loads = self._trace.T @ by_rows(term.h(self._vertices), self._jump)
             along = size * (self.phi.convection(term.h) + loads)
             yield self._term(along, term.g, f"{text}{_written(term.h)} ∂φ", order=term.order)
         if not term.q.vanishes:
             along = size * self.phi.mass(term.q)
             yield self._term(along, term.g, f"p {text}{_written(term.q)}", OfMoment(1), order=term.order)
+
+    def _diffused(self, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]) -> Iterator[Term]:
+        """Σ c (h_a ∂φ + p q_a)(h_b ∂φ + p q_b) of matrices a and b."""
+        order, epsilon, totals = min(a.order + b.order for _, a, b in pairs), self.system.epsilon, [0.0, 0.0, 0.0]
+        for c, a, b in pairs:
+            size = c * epsilon ** (a.order + b.order)
+            totals = [total + size * part for total, part in zip(totals, self.phi.diffusion(a, b), strict=True)]
+        parts = ", ".join(f"h = {_written(each.h)}, q = {_written(each.q)}" for each in pairs[0][1:2])
+        for power, total in enumerate(totals):
+            text = f"{('', 'p ', 'p² ')[power]}½ (h ∂φ + p q)² of white noise, {parts}"
+            yield self._term(total, one, text, OfMoment(power), order)
 
     def typical_speed(self) -> FloatArray:
         """θ at the φ-vertices for the typical ξ, shape (m,)."""
@@ -240,11 +258,6 @@ class Moved(System):
     epsilon: float
     terms: tuple[CoefficientMatrix, ...]
     jumps: tuple[Jump, ...] = ()
-
-
-def _rows(factors: FloatArray, matrix: Any) -> Any:
-    """A matrix with its rows multiplied."""
-    return diags(factors) @ matrix if issparse(matrix) else factors[:, None] * matrix
 
 
 def power_of_epsilon(order: int) -> str:

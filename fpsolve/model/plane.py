@@ -42,6 +42,10 @@ class Harmonics:
         twice = 2 * np.asarray(phi, dtype=float)
         return self.mean + self.cosine * np.cos(twice) + self.sine * np.sin(twice)
 
+    def slope(self, phi: ArrayLike) -> FloatArray:
+        """Its derivative by φ."""
+        return Harmonics(0.0, 2 * self.sine, -2 * self.cosine)(phi)
+
     @property
     def amplitude(self) -> Any:
         """Of the wave in 2φ."""

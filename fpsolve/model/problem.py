@@ -215,7 +215,7 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     Raises:
         NoSuchExponent: p is not among the `moments` of the noise, or there is such a ray.
     """
-    noise, system = problem.noise, problem.system
+    noise, system = problem.noise, problem.motion
     noise.check_existence(p)
     if not any(p * jump.log_factor > math.log(2.0) for jump in system.jumps):
         return

@@ -6,7 +6,7 @@ S of Eq. (16),
     Λ₂(p) = p [Σ q̄₂ + (ω/π) Σ ln R + ½|q̂|² S(2ω)] + p² [½ q̄² S(0) + ¼|q̂|² S(2ω)],
 
 as −⟨L₁ L₀⁻¹ L₁ 1⟩ = p ∫₀^∞ C(t) ⟨(h ∂φ + p q)(φ) q(φ + ωt)⟩ dt and h is the quarter-turned wave of q. For the paper's
-oscillator q̄ = |q̂| = ½, and this is Eq. (37). A `NonGaussianNoise` has the S of its Ornstein-Uhlenbeck reduction, as in
+oscillator q̄ = |q̂| = ½, and this is Eq. (37). White noise has S = s² at all ω. A `NonGaussianNoise` has the S of its Ornstein-Uhlenbeck reduction, as in
 the paper.
 """
 
@@ -125,7 +125,7 @@ def second_order(problem: Problem) -> SecondOrder:
     frame, omega = _rotating_frame(system)
     parts: list[float] = []
     driven = np.zeros((2, 2))
-    for term in system.terms:
+    for term in problem.motion.terms:
         offset, slope = affine(term.g) or (math.nan, math.nan)
         if term.order == 1 and offset == 0:
             driven += slope * np.array(term.matrix)
@@ -138,12 +138,20 @@ def second_order(problem: Problem) -> SecondOrder:
             )
     if abs(noise.mean) > 1e-12 * noise.standard_deviation:
         raise NoPerturbationTheory(f"perturbation theory is for noise of mean 0, but it has {noise.mean:g}")
-    q, strength = _growth(driven, frame), system.epsilon**2 * noise.spectral_density(2 * omega)
+    of_noise = [(_growth(driven, frame), *(noise.spectral_density(each) for each in (0.0, 2 * omega)))]
+    for each in problem.diffusions:
+        if each.order != 1:
+            raise NoPerturbationTheory(f"perturbation theory is for white noise of order 1, not {each.order}")
+        of_noise = [(_growth(each.matrix, frame), 1.0, 1.0)]
     half_turns, log_factors = omega / math.pi, [jump.second_order for jump in system.jumps]
     parts += [half_turns * log_factor for log_factor in log_factors]
-    parts.append(strength / 2 * q.amplitude**2)
-    at_rest = system.epsilon**2 * noise.spectral_density(0.0)
-    quadratic = float(at_rest / 2 * q.mean**2 + strength / 4 * q.amplitude**2)
+    parts += [system.epsilon**2 * at_twice / 2 * q.amplitude**2 for q, _, at_twice in of_noise]
+    quadratic = float(
+        sum(
+            system.epsilon**2 * (at_rest / 2 * q.mean**2 + at_twice / 4 * q.amplitude**2)
+            for q, at_rest, at_twice in of_noise
+        )
+    )
     return SecondOrder(tuple(map(float, parts)), quadratic, half_turns, float(sum(log_factors)))
 
 
@@ -201,24 +209,28 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
 
 
 def scale_of(problem: Problem) -> Scale:
-    """The scale of Λ(p): of perturbation theory, or where that does not apply of norms of the terms.
+    """The scale of Λ(p): of perturbation theory, or where that does not apply of the sizes of the terms.
 
-    Then constant terms count by the largest |q|, noise of strength c by c min(1, c τ), jumps once in a half-turn.
+    Then constant terms count by the largest |Re| of an eigenvalue of theirs, noise of strength c by c min(1, c τ),
+    white noise by the largest ½(h q′ + q²) and ½q², jumps once in a half-turn.
     """
     if theory := second_order_or_none(problem):
         return theory.scale
-    system, noise = problem.system, problem.noise
-    steady, driven = 0.0, 0.0
+    system, noise = problem.motion, problem.noise
+    steady, driven = np.zeros((2, 2)), 0.0
     for term in system.terms:
         size = system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
         if not is_driven(term.g):
-            steady += abs(float(term.g(0.0))) * size
+            steady += system.epsilon**term.order * float(term.g(0.0)) * np.array(term.matrix)
         else:
             typical = np.asarray(term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
             driven += size * float(np.sqrt(np.mean(typical**2)))
     jumps = sum(abs(jump.log_factor) for jump in system.jumps) * angular_frequency(system) / math.pi
     driven *= min(1.0, driven * noise.correlation_time)
-    return Scale(steady + jumps + driven, driven)
+    for each in problem.diffusions:
+        h, q = (system.epsilon**each.order * float(abs(f.mean) + f.amplitude) for f in (each.h, each.q))
+        driven += 0.5 * q * max(h, q)
+    return Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
 
 
 def _growth(matrix: Any, frame: FloatArray) -> Harmonics:

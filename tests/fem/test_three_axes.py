@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.exponent.eigen import rayleigh_iteration
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
@@ -25,8 +25,8 @@ def pencil(p, cells=4, degree=8, count=11):
     lines = np.linspace(np.pi / 2, 3 * np.pi / 2, cells + 1)
     phase = PhaseAxis(lines, np.full(cells, degree))
     space = TensorSpace([phase, *(PolynomialAxis(noise, count) for noise in NOISES)])
-    first = PlaneSystem([CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, STIFFNESS, identity)])
-    second = PlaneSystem([CoefficientMatrix(1, DAMPING, identity)])
+    first = Problem(PlaneSystem([CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, STIFFNESS, identity)]), NOISES[0])
+    second = Problem(PlaneSystem([CoefficientMatrix(1, DAMPING, identity)]), NOISES[1])
     terms = [*Terms(first, space, 1).whole(), *Terms(second, space, 2).whole()]
     return Pencil(p, space, TermSum(terms).matrix(space, p))
 
