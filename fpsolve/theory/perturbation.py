@@ -6,8 +6,8 @@ S of Eq. (16),
     Λ₂(p) = p [Σ q̄₂ + (ω/π) Σ ln R + ½|q̂|² S(2ω)] + p² [½ q̄² S(0) + ¼|q̂|² S(2ω)],
 
 as −⟨L₁ L₀⁻¹ L₁ 1⟩ = p ∫₀^∞ C(t) ⟨(h ∂φ + p q)(φ) q(φ + ωt)⟩ dt and h is the quarter-turned wave of q. For the paper's
-oscillator q̄ = |q̂| = ½, and this is Eq. (37). White noise has S = s² at all ω. A `NonGaussianNoise` has the S of its Ornstein-Uhlenbeck reduction, as in
-the paper.
+oscillator q̄ = |q̂| = ½, and this is Eq. (37). White noise has S = s² at all ω. A `NonGaussianNoise` has the S of its
+Ornstein-Uhlenbeck reduction, as in the paper.
 """
 
 from __future__ import annotations

@@ -58,6 +58,7 @@ class White(Noise):
 
     kind: ClassVar[str] = "white"
     is_white: ClassVar[bool] = True
+    mixes_slowly: ClassVar[bool] = True
     has_states: ClassVar[bool] = True
     states: ClassVar[Sequence[float]] = (0.0,)
     rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)
