@@ -1,7 +1,8 @@
 """∂Λ(p)/∂θ of random parameter sets against central differences of Λ(p).
 
-`python -m tests.random_sensitivities [first last]` prints for each set how far the two are apart, with the stated error
-and the doubt of the difference: derivatives at the default tolerance, differences at a tighter one.
+`python -m tests.random_sensitivities [first last [heavy]]` prints for each set how far the two are apart, with the
+stated error and the doubt of the difference: derivatives at the default tolerance, differences at a tighter one;
+"heavy" takes algebraic tails, r₀ > 1 exactly, and differences at a tolerance that these reach.
 """
 
 import sys
@@ -10,11 +11,13 @@ import numpy as np
 
 from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator
 from fpsolve.analysis.sensitivity import sensitivities
+from fpsolve.errors import NumericalFailure
 from fpsolve.exponent.solver import ExponentSolver
 
 RTOL = 1e-11
-STEP = 1e-4
+STEPS = 1e-4, 5e-4, 2.5e-3, 1.25e-2
 """Of differences, in shares of a parameter."""
+HEAVY_RTOL, HEAVY_STEPS = 1e-8, (2e-3, 5e-3)
 
 
 def problem_of(theta, law, is_exact):
@@ -46,40 +49,67 @@ def drawn(seed):
     return theta, law, bool(is_exact), float(rng.choice([-1, 1]) * rng.uniform(0.3, 5))
 
 
-def central(theta, key, value_at, step=STEP):
+def heavy_tailed(seed):
+    """A random problem with algebraic tails, and a p for which Λ is finite."""
+    rng = np.random.default_rng([seed, 1])
+    theta, _, _, _ = drawn(seed)
+    return theta | {"noise.r0": rng.uniform(1.02, 1.4)}, "delta", True, float(-rng.uniform(0.1, 1.0))
+
+
+def central(theta, key, value_at, step=STEPS[0]):
     """A central difference of fourth order."""
     h = step * max(abs(theta[key]), 0.1)
     values = [value_at(theta | {key: theta[key] + k * h}) for k in (-2, -1, 1, 2)]
     return (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h)
 
 
-def best_difference(theta, key, value_at):
-    """That of two neighbouring steps which differ least, and by how much these do."""
-    found = [central(theta, key, value_at, step) for step in (1e-4, 5e-4, 2.5e-3, 1.25e-2)]
-    doubts = np.abs(np.diff(found))
+def best_difference(theta, key, value_at, steps):
+    """That of two neighbouring steps which differ least, and by how much these and the errors of the values do.
+
+    `value_at` returns a value and its error.
+    """
+    errors = []
+
+    def value(at):
+        value, error = value_at(at)
+        errors.append(error)
+        return value
+
+    found = [central(theta, key, value, step) for step in steps]
+    lost = 1.5 * max(errors) / (np.array(steps) * max(abs(theta[key]), 0.1))
+    doubts = np.abs(np.diff(found)) + lost[:-1]
     k = int(np.argmin(doubts))
     return found[k + 1], float(doubts[k])
 
 
-def main(first: int = 1, last: int = 100) -> None:
+def main(first: int = 1, last: int = 100, kind: str = "light") -> None:
     """Print of each set the derivative that is farthest from its difference."""
-    beyond = 0
+    beyond, is_heavy = 0, kind == "heavy"
+    steps, rtol = (HEAVY_STEPS, HEAVY_RTOL) if is_heavy else (STEPS, RTOL)
     for seed in range(first, last + 1):
-        theta, law, is_exact, p = drawn(seed)
-        problem, _ = problem_of(theta, law, is_exact)
-        [found] = sensitivities(problem, p).moments
-        rows = []
-        for key, estimate in found.items():
+        theta, law, is_exact, p = heavy_tailed(seed) if is_heavy else drawn(seed)
+        treatment = "exact" if is_exact else "reduced"
+        try:
+            problem, _ = problem_of(theta, law, is_exact)
+            [found] = sensitivities(problem, p).moments
+            rows = []
+            for key, estimate in found.items():
 
-            def value_at(at, law=law, is_exact=is_exact, p=p):
-                return ExponentSolver(problem_of(at, law, is_exact)[0], rtol=RTOL).pair(p).value
+                def value_at(at, law=law, is_exact=is_exact, p=p):
+                    solution = ExponentSolver(problem_of(at, law, is_exact)[0], rtol=rtol).solution(p)
+                    return solution.pair.value, solution.error if is_heavy else solution.pair.rounding
 
-            expected, doubt = best_difference(theta, key, value_at)
-            off = abs(estimate.value - expected)
-            rows.append((off / (estimate.error_estimate + doubt), off, estimate.error_estimate, doubt, key))
+                expected, doubt = best_difference(theta, key, value_at, steps)
+                off = abs(estimate.value - expected)
+                rows.append((off / (estimate.error_estimate + doubt), off, estimate.error_estimate, doubt, key))
+        except NumericalFailure as failure:
+            print(f"{seed:4d} p = {p:6.3f} {treatment:7s} refused: {failure}", flush=True)
+            continue
+        if not rows:
+            print(f"{seed:4d} p = {p:6.3f} {treatment:7s} no derivatives: {found}", flush=True)
+            continue
         share, off, error, doubt, key = max(rows)
         beyond += share > 1
-        treatment = "exact" if is_exact else "reduced"
         print(
             f"{seed:4d} p = {p:6.3f} {treatment:7s} {share:6.3f}: "
             f"off {off:.1e}, error {error:.1e}, doubt {doubt:.1e}, {key}",
@@ -89,4 +119,4 @@ def main(first: int = 1, last: int = 100) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(*map(int, sys.argv[1:3]), *sys.argv[3:])
