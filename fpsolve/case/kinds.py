@@ -34,7 +34,7 @@ def half_of(half: Half, table: Any) -> Any:
     if not isinstance(table, dict):
         return table
     name, known = table.get("kind"), {key: value for key, value in table.items() if key != "kind"}
-    kind = _kind(half, name)
+    kind = _kind(half, table)
     foreign = set(known) - (set(known) if kind.takes_any else set(fields_of(kind)))
     foreign |= set(kind.words) & set(kind.stated) & set(known) if name is not None else set()
     faults = [
@@ -68,15 +68,19 @@ def _details(error: ValidationError) -> list[InitErrorDetails]:
     ]
 
 
-def _kind(half: Half, name: Any) -> type[Parametrised]:
+def _kind(half: Half, table: Any) -> type[Parametrised]:
+    """The class that a table names by its kind and, of those of one kind, by the keys that only one of them has."""
+    name = table.get("kind") if isinstance(table, dict) else None
     if name is not None and name not in (names := kind_names("systems" if half == "system" else "noises")):
         text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
         refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
     try:
-        return (system_kind if half == "system" else noise_kind)(name or USUAL[half])
+        kind = (system_kind if half == "system" else noise_kind)(name or USUAL[half])
     except ValueError as error:
         refuse([(("kind",), name, f"{error}; mend its package, or write another kind")])
         raise
+    known = set(table) if isinstance(table, dict) else set()
+    return max((kind, *kind.variants), key=lambda each: len(known & set(fields_of(each))))
 
 
 def kinds_of(data: Mapping[str, Any]) -> dict[Half, type[Parametrised]]:
@@ -85,7 +89,7 @@ def kinds_of(data: Mapping[str, Any]) -> dict[Half, type[Parametrised]]:
     for half in USUAL:
         table = data.get(half, data.get("oscillator") if half == "system" else None)
         try:
-            found[half] = _kind(half, table.get("kind") if isinstance(table, dict) else None)
+            found[half] = _kind(half, table)
         except ValidationError:
             continue
     return found

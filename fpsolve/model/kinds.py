@@ -41,6 +41,12 @@ def noise_kind(name: str) -> type[Noise]:
     return _kind(name, "noises", Noise)
 
 
+def kind_classes(room: Literal["systems", "noises"]) -> tuple[type[Any], ...]:
+    """The classes of all of our kinds, with their variants."""
+    kinds = map(system_kind, SYSTEMS) if room == "systems" else map(noise_kind, NOISES)
+    return tuple(each for kind in kinds for each in (kind, *kind.variants))
+
+
 def kind_names(room: Literal["systems", "noises"]) -> tuple[str, ...]:
     """The names of all kinds, those of other packages last."""
     ours = SYSTEMS if room == "systems" else NOISES

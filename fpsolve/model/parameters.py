@@ -103,6 +103,7 @@ class Parametrised:
         stated: what case files say of it besides its `fields`, such as the `words`, by its names.
         takes_any: whether any other key of such a table is a parameter.
         inert: names of parameters on which the linear problem does not depend.
+        variants: other classes of this kind, with other parameters; a table of a case file tells by its keys which.
     """
 
     kind: ClassVar[str] = ""
@@ -111,6 +112,7 @@ class Parametrised:
     stated: ClassVar[Mapping[str, FieldInfo]] = {}
     takes_any: ClassVar[bool] = False
     inert: ClassVar[Sequence[str]] = ()
+    variants: ClassVar[Sequence[type[Parametrised]]] = ()
 
     @classmethod
     def fields(cls) -> Mapping[str, FieldInfo]:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.model.exact import ExactLaw, ExactMotion
-from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
+from fpsolve.model.kinds import kind_classes
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import System
@@ -121,7 +121,7 @@ def exact_halves(stated: Parameters) -> tuple[ExactMotion, ExactLaw]:
     for name, word in noise.words.items():
         found = stated[f"{noise.section}.{name}"]
         if found != word:
-            words = [each.words[name] for each in map(noise_kind, NOISES) if _keys(each) == _keys(noise)]
+            words = [each.words[name] for each in kind_classes("noises") if _keys(each) == _keys(noise)]
             raise ValueError(f"got {noise.section}.{name} = {found[:40]!r}; must be {' or '.join(map(repr, words))}")
     for half in (system, noise):
         decimals = {name: text for name, text in _named(half, stated).items() if name not in half.words}
@@ -153,13 +153,14 @@ def inert_keys(stated: Parameters) -> set[str]:
 
 
 def _kinds(stated: Parameters) -> tuple[type[System], type[Noise]]:
-    """The first system and noise that have most of these keys, and of these noises the one whose words are stated."""
+    """The first system and noise that have most of these keys and fewest others, and whose words are stated."""
 
-    def fit(kind: type[Parametrised]) -> tuple[int, int]:
+    def fit(kind: type[Parametrised]) -> tuple[int, int, int]:
         words = [stated.get(f"{kind.section}.{name}") == word for name, word in kind.words.items()]
-        return len(_keys(kind) & set(stated)), sum(words)
+        keys, known = _keys(kind), len(_keys(kind) & set(stated))
+        return known, known and known - len(keys), sum(words)
 
-    return max(map(system_kind, SYSTEMS), key=fit), max(map(noise_kind, NOISES), key=fit)
+    return max(kind_classes("systems"), key=fit), max(kind_classes("noises"), key=fit)
 
 
 def _keys(kind: type[Parametrised]) -> set[str]:

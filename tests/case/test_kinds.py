@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from fpsolve.model.kinds import noise_kind, version_of
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.noises.telegraph import Telegraph
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.records import key_of
@@ -240,3 +242,53 @@ def test_a_chain_from_a_file(tmp_path: Path) -> None:
     assert case.oscillator == VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
     assert solved(path, tmp_path / "out")
     assert not list((tmp_path / "out/kinds").glob("*.pvd"))
+
+
+@pytest.mark.parametrize(
+    ("keys", "values"),
+    [
+        ("alpha = 0.5\nsigma = 0.5", {"alpha": 0.5, "sigma": 0.5}),
+        ("alpha = 0.5\nstandard_deviation = 0.5", {"alpha": 0.5, "standard_deviation": 0.5}),
+        ("tau0 = 2.0\nD0 = 0.5", {"D0": 0.5, "tau0": 2.0}),
+    ],
+)
+def test_ornstein_uhlenbeck_noise_is_stated_by_either_pair(
+    tmp_path: Path, keys: str, values: Mapping[str, float]
+) -> None:
+    """All of these are one law; its charts and sensitivities are in the keys that were stated."""
+    rest = '[chart]\nzero = ["lyapunov_exponent"]\n'
+    rest += f'x = {{ key = "noise.{next(iter(values))}", start = 0.1, stop = 2.0 }}\n'
+    rest += 'y = { key = "oscillator.c1", start = 0.1, stop = 0.9 }\n'
+    case = load_case(write(tmp_path, OSCILLATOR, f'[noise]\nkind = "ornstein-uhlenbeck"\n{keys}\n', MOMENTS, rest))
+    assert case.noise.values == values
+    assert case.noise.kind == "ornstein-uhlenbeck"
+    assert case.noise.alpha == 0.5  # type: ignore[attr-defined]
+    assert case.noise.sigma == pytest.approx(0.5)  # type: ignore[attr-defined]
+    assert case.noise.standard_deviation == pytest.approx(0.5)
+    assert set(case.problem.differentiable) >= {f"noise.{name}" for name in values}
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ("alpha = 0.5", "noise.sigma: missing; must be"),
+        ("D0 = 0.5", "noise.tau0: missing; must be"),
+        ("standard_deviation = 0.5", "noise.alpha: missing; must be"),
+        ("standard_deviation = 0.5\nalpha = 0.0", "noise.alpha: got 0.0; must be a finite number >= 1e-15"),
+    ],
+)
+def test_half_of_a_pair_names_the_other_half(tmp_path: Path, keys: str, words: str) -> None:
+    [text] = said(tmp_path, OSCILLATOR, f'[noise]\nkind = "ornstein-uhlenbeck"\n{keys}\n', MOMENTS)
+    assert words in text
+
+
+def test_a_chain_by_rates_with_and_without_their_diagonal(tmp_path: Path) -> None:
+    """Row i holds the rates at which state i is left; a telegraph is one of them."""
+    chain = '[noise]\nkind = "markov-chain"\nstates = [-0.5, 0.5]\nrates = [[DIAGONAL, 1.0], [1.0, DIAGONAL]]\n'
+    found = [load_case(write(tmp_path, OSCILLATOR, chain.replace("DIAGONAL", each), MOMENTS)).noise for each in
+             ("0.0", "-1.0")]  # fmt: skip
+    assert found[0] == found[1] == MarkovChain.telegraph(0.5, 1.0)
+    case = load_case(write(tmp_path, OSCILLATOR, '[noise]\nkind = "telegraph"\na = 0.5\nk = 1.0\n', MOMENTS))
+    assert case.noise == Telegraph(a=0.5, k=1.0)
+    [text] = said(tmp_path, OSCILLATOR, chain.replace("DIAGONAL", "1.0"), MOMENTS)
+    assert "each diagonal entry 0 or minus the sum of its row" in text

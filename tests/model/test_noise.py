@@ -11,7 +11,11 @@ from pydantic import ValidationError
 from scipy.integrate import quad
 
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.noises.ornstein_uhlenbeck import (
+    OrnsteinUhlenbeck,
+    OrnsteinUhlenbeckByDeviation,
+    OrnsteinUhlenbeckByIntensity,
+)
 
 DEPARTURES = [-5.0, -1.0, 0.0, 0.5, 0.9, 0.95, 1 - 1e-4, 1.0, 1 + 1e-4, 1.1, 1.3, 1.5]
 
@@ -135,3 +139,26 @@ def test_each_fault_has_a_sentence_with_its_unit():
         assert str(refused.value).splitlines() == [f"NonGaussianNoise: {sentence}" for sentence in said]
         assert refused.value.__context__ is None
         assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        lambda noise: OrnsteinUhlenbeckByIntensity(D0=0.5 * noise.spectral_density(0.0), tau0=1 / noise.alpha),
+        lambda noise: OrnsteinUhlenbeckByDeviation(alpha=noise.alpha, standard_deviation=noise.standard_deviation),
+    ],
+)
+def test_ornstein_uhlenbeck_noise_by_other_numbers(stated):
+    """The same law, and derivatives that are differences."""
+    from fpsolve import Problem, VibroImpactOscillator, sensitivities
+    from fpsolve.exponent.solver import ExponentSolver
+
+    noise = OrnsteinUhlenbeck(alpha=0.7, sigma=0.9)
+    other = stated(noise)
+    assert (other.alpha, other.sigma) == pytest.approx((0.7, 0.9), rel=1e-15)
+    problem = Problem(VibroImpactOscillator(omega=1.0, restitution=0.9, c1=0.1, epsilon=0.4), other)
+    [found] = sensitivities(problem, 1.5).moments
+    for name, value in other.values.items():
+        key, h = f"noise.{name}", 1e-4 * value
+        ahead, behind = (ExponentSolver(problem.at({key: value + d}), rtol=1e-11).pair(1.5).value for d in (h, -h))
+        assert found[key].value == pytest.approx((ahead - behind) / (2 * h), rel=1e-6)

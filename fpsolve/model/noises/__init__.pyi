@@ -2,6 +2,8 @@ from .markov_chain import MarkovChain as MarkovChain
 from .non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .non_gaussian import ReducedNoise as ReducedNoise
 from .ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
+from .ornstein_uhlenbeck import OrnsteinUhlenbeckByDeviation as OrnsteinUhlenbeckByDeviation
+from .ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity as OrnsteinUhlenbeckByIntensity
 from .sine_wiener import SineWiener as SineWiener
 from .telegraph import Telegraph as Telegraph
 from .white import Interpretation as Interpretation

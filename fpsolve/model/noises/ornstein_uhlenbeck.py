@@ -15,7 +15,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.model.exact import ExactLaw, gaussian_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.parameters import DERIVED, STRICT, parameter
+from fpsolve.model.parameters import DERIVED, SIZE, STRICT, parameter
 
 
 class LinearStep(NamedTuple):
@@ -123,8 +123,81 @@ class GaussianNoise(Noise):
 
 @told_in_words
 @dataclass(frozen=True, config=STRICT)
+class OrnsteinUhlenbeckByIntensity(GaussianNoise):
+    """Ornstein-Uhlenbeck noise of the intensity D₀ and the correlation time τ₀: α₀ = 1/τ₀, σ₀ = √(2D₀)/τ₀.
+
+    Args:
+        D0: D₀ = S(0)/2, 1e-15 to 1e15, in 1/time.
+        tau0: τ₀, 1e-15 to 1e15, in time.
+
+    Raises:
+        ParameterError: a parameter is not a finite number in its range.
+    """
+
+    D0: Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
+    tau0: Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
+
+    kind: ClassVar[str] = "ornstein-uhlenbeck"
+
+    @property
+    def alpha(self) -> float:  # type: ignore[override]
+        return 1 / self.tau0
+
+    @property
+    def sigma(self) -> float:  # type: ignore[override]
+        return math.sqrt(2 * self.D0) / self.tau0
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        D0, tau0 = (Fraction(decimals[name]) for name in ("D0", "tau0"))
+        return gaussian_law(1 / tau0, 2 * D0 / tau0**2)
+
+    def derivative(self, name: str) -> NoiseDerivative:
+        return self.by_logarithms(0.5 / self.D0, 0.0) if name == "D0" else self.by_logarithms(*2 * (-1 / self.tau0,))
+
+
+@told_in_words
+@dataclass(frozen=True, config=STRICT)
+class OrnsteinUhlenbeckByDeviation(GaussianNoise):
+    """Ornstein-Uhlenbeck noise of the relaxation rate α and a standard deviation s: σ₀ = s√(2α).
+
+    Args:
+        alpha: α, 1e-15 to 1e15, in 1/time.
+        standard_deviation: s, 1e-15 to 1e15, in the unit of ξ.
+
+    Raises:
+        ParameterError: a parameter is not a finite number in its range.
+    """
+
+    alpha: Annotated[float, parameter("relaxation rate", "alpha = 1.0", r"$\alpha$", "1/time", **SIZE)]
+    standard_deviation: float = parameter(  # type: ignore[assignment]
+        "standard deviation of the noise", "standard_deviation = 0.7", "$s$", "1/time", **SIZE
+    )
+
+    kind: ClassVar[str] = "ornstein-uhlenbeck"
+
+    @property
+    def sigma(self) -> float:  # type: ignore[override]
+        return self.standard_deviation * math.sqrt(2 * self.alpha)
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        alpha, deviation = (Fraction(decimals[name]) for name in ("alpha", "standard_deviation"))
+        return gaussian_law(alpha, 2 * alpha * deviation**2)
+
+    def derivative(self, name: str) -> NoiseDerivative:
+        """σ₀ ~ s√α."""
+        if name == "alpha":
+            return self.by_logarithms(0.5 / self.alpha, 1 / self.alpha)
+        return self.by_logarithms(1 / self.standard_deviation, 0.0)
+
+
+@told_in_words
+@dataclass(frozen=True, config=STRICT)
 class OrnsteinUhlenbeck(GaussianNoise):
     """Ornstein-Uhlenbeck noise dξ = −α₀ ξ dt + σ₀ dW, Eq. (15).
+
+    A case file may state it by other numbers too, see `variants`.
 
     Args:
         alpha: relaxation rate α₀, 1e-32 to 1e32, in 1/time.
@@ -138,6 +211,7 @@ class OrnsteinUhlenbeck(GaussianNoise):
     sigma: Annotated[float, parameter("intensity of its white noise", "", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)]
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
+    variants: ClassVar[Sequence[type[Noise]]] = (OrnsteinUhlenbeckByIntensity, OrnsteinUhlenbeckByDeviation)
 
     @classmethod
     def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
