@@ -7,7 +7,7 @@ S of Eq. (16),
 
 as −⟨L₁ L₀⁻¹ L₁ 1⟩ = p ∫₀^∞ C(t) ⟨(h ∂φ + p q)(φ) q(φ + ωt)⟩ dt and h is the quarter-turned wave of q. For the paper's
 oscillator q̄ = |q̂| = ½, and this is Eq. (37). White noise has S = s² at all ω. A `NonGaussianNoise` has the S of its
-Ornstein-Uhlenbeck reduction, as in the paper.
+Ornstein-Uhlenbeck reduction, as in the paper. The mean of a noise is put into the drift of order 0.
 """
 
 from __future__ import annotations
@@ -24,10 +24,8 @@ from fpsolve.errors import NoPerturbationTheory
 from fpsolve.messages import Code, Message
 from fpsolve.model.plane import (
     Harmonics,
-    System,
     affine,
     angular_frequency,
-    is_driven,
     matrix_at,
     squared_frequency,
     stretching,
@@ -119,25 +117,27 @@ def second_order(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) of a problem.
 
     Raises:
-        NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in a noise of mean 0.
+        NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in the noise.
     """
     system, noise = problem.system, problem.noise
-    frame, omega = _rotating_frame(system)
-    parts: list[float] = []
-    driven = np.zeros((2, 2))
+    steady, driven = matrix_at(system, 0.0, slice(0, 1)), np.zeros((2, 2))
+    for term in problem.motion.terms if has_mean(problem) else ():
+        steady += noise.mean * (affine(term.g) or (0.0, 0.0))[1] * system.epsilon**term.order * np.array(term.matrix)
+    frame, omega = _rotating_frame(steady)
+    parts = [float(_growth(steady, frame).mean)]
     for term in problem.motion.terms:
         offset, slope = affine(term.g) or (math.nan, math.nan)
         if term.order == 1 and offset == 0:
             driven += slope * np.array(term.matrix)
-        elif term.order != 1 and slope == 0:
+        elif term.order == slope == 0:
+            continue
+        elif term.order >= 2 and slope == 0:
             parts.append(offset * system.epsilon**term.order * _growth(term.matrix, frame).mean)
         elif not (term.order >= 2 and offset == 0):
             raise NoPerturbationTheory(
                 f"perturbation theory is for motions whose noise enters as epsilon xi; a term of order {term.order} "
                 f"with g = {written_coefficient(term.g).strip() or 1} is not of that form"
             )
-    if abs(noise.mean) > 1e-12 * noise.standard_deviation:
-        raise NoPerturbationTheory(f"perturbation theory is for noise of mean 0, but it has {noise.mean:g}")
     of_noise = [(_growth(driven, frame), *(noise.spectral_density(each) for each in (0.0, 2 * omega)))]
     for each in problem.diffusions:
         if each.order != 1:
@@ -161,6 +161,11 @@ def second_order_or_none(problem: Problem) -> SecondOrder | None:
         return second_order(problem)
     except NoPerturbationTheory:
         return None
+
+
+def has_mean(problem: Problem) -> bool:
+    """Whether the noise has a mean, beyond rounding."""
+    return abs(problem.noise.mean) > 1e-12 * problem.noise.standard_deviation
 
 
 def perturbed_moments(problem: Problem, p: FloatArray) -> FloatArray:
@@ -198,7 +203,9 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
         NoPerturbationTheory: as `second_order`; or the order 0 does not rotate uniformly in these coordinates.
     """
     second_order(problem)
-    frame, omega = _rotating_frame(problem.system)
+    if has_mean(problem):
+        raise NoPerturbationTheory(f"T₁ is for noise of mean 0, but it has {problem.noise.mean:g}")
+    frame, omega = _rotating_frame(matrix_at(problem.system, 0.0, slice(0, 1)))
     if not np.array_equal(frame, np.eye(2)):
         raise NoPerturbationTheory("T₁ is for a uniform rotation; choose coordinates in which the order 0 is one")
     q = stretching(matrix_at(problem.system, 1.0, slice(1, 2)))
@@ -211,8 +218,8 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
 def scale_of(problem: Problem) -> Scale:
     """The scale of Λ(p): of perturbation theory, or where that does not apply of the sizes of the terms.
 
-    Then constant terms count by the largest |Re| of an eigenvalue of theirs, noise of strength c by c min(1, c τ),
-    white noise by the largest ½(h q′ + q²) and ½q², jumps once in a half-turn.
+    Then constant terms, with the mean of the noise, count by the largest |Re| of an eigenvalue of theirs, noise of
+    strength c by c min(1, c τ), white noise by the largest ½(h q′ + q²) and ½q², jumps once in a half-turn.
     """
     if theory := second_order_or_none(problem):
         return theory.scale
@@ -220,8 +227,10 @@ def scale_of(problem: Problem) -> Scale:
     steady, driven = np.zeros((2, 2)), 0.0
     for term in system.terms:
         size = system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
-        if not is_driven(term.g):
-            steady += system.epsilon**term.order * float(term.g(0.0)) * np.array(term.matrix)
+        if line := affine(term.g):
+            at_mean = line[0] + (line[1] and line[1] * noise.mean)
+            steady += system.epsilon**term.order * at_mean * np.array(term.matrix)
+            driven += size * (line[1] and abs(line[1]) * noise.standard_deviation)
         else:
             typical = np.asarray(term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
             driven += size * float(np.sqrt(np.mean(typical**2)))
@@ -238,9 +247,8 @@ def _growth(matrix: Any, frame: FloatArray) -> Harmonics:
     return stretching(np.linalg.inv(frame) @ np.asarray(matrix) @ frame)
 
 
-def _rotating_frame(system: System) -> tuple[FloatArray, float]:
-    """P and ω for which P⁻¹A₀P is growth and a rotation by ω."""
-    a = matrix_at(system, 0.0, slice(0, 1))
+def _rotating_frame(a: FloatArray) -> tuple[FloatArray, float]:
+    """P and ω for which P⁻¹AP is growth and a rotation by ω."""
     half = 0.5 * (a[0, 0] + a[1, 1])
     square = float(squared_frequency(a))
     if not square > 0:
