@@ -19,6 +19,7 @@ from fpsolve.model.plane import System
 SYSTEMS: Mapping[str, str] = {
     "vibro-impact": "vibro_impact:VibroImpactOscillator",
     "plane": "plane_system:PlaneSystem",
+    "parametric": "parametric:ParametricOscillator",
 }
 NOISES: Mapping[str, str] = {
     "non-gaussian": "non_gaussian:NonGaussianNoise",

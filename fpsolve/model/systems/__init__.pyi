@@ -1,3 +1,4 @@
+from .parametric import ParametricOscillator as ParametricOscillator
 from .plane_system import PlaneSystem as PlaneSystem
 from .vibro_impact import ImpactLaw as ImpactLaw
 from .vibro_impact import VibroImpactOscillator as VibroImpactOscillator

@@ -1,0 +1,77 @@
+"""An oscillator whose stiffness is noise, with or without a wall."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, ClassVar
+
+from pydantic.dataclasses import dataclass
+
+from fpsolve.arrays import identity
+from fpsolve.model.faults import told_in_words
+from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.model.plane import CoefficientMatrix, Jump, System
+
+ANY_SIGN = {"ge": -1e15, "le": 1e15}
+
+
+@told_in_words
+@dataclass(frozen=True, config=STRICT)
+class ParametricOscillator(System):
+    """ẍ + 2·damping·ẋ + (stiffness + ξ) x = 0, and ẋ⁺ = −restitution·ẋ⁻ at a wall at x = 0.
+
+    The state is (x, ẋ). Without noise it decays at the rate of the damping where stiffness > damping².
+
+    >>> ParametricOscillator(stiffness=1.0, damping=0.1).terms[0].matrix
+    ((0.0, 1.0), (-1.0, -0.2))
+
+    Args:
+        stiffness: −1e15 to 1e15, in 1/time²; 0 for a free particle, negative for an inverted pendulum.
+        damping: −1e15 to 1e15, in 1/time.
+        restitution: R, 0 < R ≤ 1; 1 is no wall, or one that takes nothing.
+
+    Raises:
+        ParameterError: a parameter is not a finite number in its range.
+    """
+
+    stiffness: Annotated[
+        float, parameter("stiffness without noise", "stiffness = 1.0", "$k$", "1/time²", name="stiffness", **ANY_SIGN)
+    ]
+    damping: Annotated[
+        float,
+        parameter("damping; the force is twice it times the velocity", "damping = 0.1", "$b$", "1/time", **ANY_SIGN),
+    ]
+    restitution: Annotated[
+        float, parameter("coefficient of restitution at x = 0; 1 means no wall", "restitution = 0.8", "$R$", gt=0, le=1)
+    ] = 1.0
+
+    kind: ClassVar[str] = "parametric"
+    noise_unit: ClassVar[str] = "1/time²"
+    impact_parameter: ClassVar[str] = "restitution"
+    epsilon: ClassVar[float] = 1.0  # type: ignore[misc]
+
+    @property
+    def terms(self) -> Sequence[CoefficientMatrix]:  # type: ignore[override]
+        """The oscillator without noise, of order 0, and ξ times the displacement, of order 1."""
+        free = ((0.0, 1.0), (-self.stiffness, -2 * self.damping))
+        return CoefficientMatrix(0, free), CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), identity)
+
+    @property
+    def jumps(self) -> Sequence[Jump]:  # type: ignore[override]
+        """The wall, which the phase passes at speed 1."""
+        return (Jump(math.pi / 2, math.log(self.restitution)),)
+
+    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
+        match name:
+            case "stiffness":
+                return (CoefficientMatrix(0, ((0.0, 0.0), (-1.0, 0.0))),), ()
+            case "damping":
+                return (CoefficientMatrix(0, ((0.0, 0.0), (0.0, -2.0))),), ()
+        return (), (1 / self.restitution,)
+
+    def impact_value(self, log_factor: float) -> float:
+        return math.exp(log_factor) if log_factor < math.log(1e300) else math.inf
+
+    def impact_slope(self, log_factor: float) -> float:
+        return self.impact_value(log_factor)
