@@ -28,6 +28,7 @@ from tests.test_workflow import DRAWN, HOPELESS, LEAN, TABLES, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
 BARE = ["--set", "output.eigenfunctions=[]"]
+NO_FIGURE = "output.figure=false"
 WITH_FIGURE = ["--set", "output={ figure = true, eigenfunctions = [] }"]
 COMMANDS = [["check", "test.toml"], ["run", "test.toml", *WITH_FIGURE], ["mesh", "a.vtu"], ["--help"], ["--version"]]
 
@@ -467,7 +468,7 @@ def test_any_failure_to_write_is_said_in_one_sentence(case, capsys, monkeypatch,
 
 
 @pytest.mark.parametrize(
-    ("arguments", "unbuffered"), sampled(*product([["check", "test.toml"], ["--help"], ["--version"]], ["", "1"]))
+    ("arguments", "unbuffered"), sampled(*product([["--version"], ["--help"], ["check", "test.toml"]], ["", "1"]))
 )
 def test_a_closed_pipe_ends_a_command_quietly(case, arguments, unbuffered):
     read, write = os.pipe()
@@ -519,7 +520,7 @@ def test_mesh_writes_a_file_that_a_case_can_name(case, tmp_path, capsys):
 
 
 def test_exact_noise_says_that_the_theory_is_for_the_reduced_one(case, capsys):
-    assert main(["run", case, "--set", "noise.treatment=exact"]) == 0
+    assert main(["run", case, "--set", "noise.treatment=exact", *BARE]) == 0
     out = capsys.readouterr().out
     assert "Eq. (37)*" in out
     assert "* for the noise reduced by Eqs. (12)-(14)" in out
@@ -587,10 +588,8 @@ IMPOSSIBLE = [
 
 
 def test_an_exhausted_budget_exits_3_with_the_best_value(tmp_path, capsys):
-    sets = [word for text in IMPOSSIBLE for word in ("--set", text)]
-    assert (
-        main(["run", str(CASES / "minimal.toml"), "--set", "expect=[]", *sets, "--out", str(tmp_path)]) == NOT_CONVERGED
-    )
+    sets = [word for text in (*IMPOSSIBLE, "expect=[]", NO_FIGURE) for word in ("--set", text)]
+    assert main(["run", str(CASES / "minimal.toml"), *sets, "--out", str(tmp_path)]) == NOT_CONVERGED
     err = capsys.readouterr().err
     assert "not converged: minimal: Λ(2) did not converge: the next mesh has" in err
     assert "more than budget.unknowns = 1000; best value 3.429" in err
@@ -598,16 +597,8 @@ def test_an_exhausted_budget_exits_3_with_the_best_value(tmp_path, capsys):
 
 
 def test_theories_outside_their_range_are_noted(tmp_path, capsys):
-    sets = [
-        "--set",
-        "oscillator.epsilon=1.0",
-        "--set",
-        "noise.r0=0.7",
-        "--set",
-        "noise.D0=1.0",
-        "--set",
-        "moments.rtol=1e-6",
-    ]
+    stated = ("oscillator.epsilon=1.0", "noise.r0=0.7", "noise.D0=1.0", "moments.rtol=1e-6", NO_FIGURE)
+    sets = [f"--set={text}" for text in stated]
     assert main(["run", str(CASES / "minimal.toml"), *sets, "--out", str(tmp_path)]) == 0
     err = " ".join(capsys.readouterr().err.split())
     assert "note: minimal: the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = 0.3 > 0.1" in err
@@ -689,7 +680,7 @@ def test_quiet_tells_what_is_not_converged(case, capsys):
 
 
 def test_quiet_with_json_prints_json_alone(case, capsys):
-    assert main(["run", case, "--quiet", "--json", "--set", "oscillator.epsilon=1.0", *BARE]) == 0
+    assert main(["run", case, "--quiet", "--json", "--set", "oscillator.epsilon=1.0", "--set", LEAN]) == 0
     out, err = capsys.readouterr()
     assert json.loads(out)["done"] == 2
     assert err == ""

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from contextlib import nullcontext
 from importlib.metadata import version
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -69,6 +70,12 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     write(folder, DRAWN)
     return SimpleNamespace(results=fpsolve.run(str(folder / "test.toml"), folder), folder=folder / "test")
+
+
+@pytest.fixture
+def unpainted(monkeypatch):
+    """Figures whose files stay empty."""
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda _, path, **__: Path(path).touch())
 
 
 LEAN = "output={ quantities = ['lyapunov_exponent'] }"
@@ -163,6 +170,7 @@ def without_times(folder):
     return summary, moments, [line.rpartition(",")[0] for line in curves.splitlines()]
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_tables_are_the_same_twice(whole, tmp_path):
     """Of a case, and of the name of its file."""
     case = write(tmp_path, DRAWN)
@@ -184,7 +192,7 @@ MANY = 'vary."noise.D0"={start=0.1, stop=1.0, num=11}'
 
 
 def test_of_many_curves_only_the_first_density_is_written(tmp_path):
-    case, calls = write(tmp_path, TEXT.replace("eigenfunctions = [2.0]", ""), [MANY]), []
+    case, calls = write(tmp_path, TEXT.replace("eigenfunctions = [2.0]", ""), [MANY, "moments.p=[2.0]"]), []
     fpsolve.run(case, tmp_path / "out", progress=lambda: calls.append(1))
     assert len(calls) == 11
     assert {name for name in files(tmp_path / "out/test") if "vt" in name or "pv" in name} == {"density.vtu"}
@@ -214,6 +222,7 @@ def test_missing_stability_index_is_null_and_said(tmp_path):
 HOPELESS = "mesh={ phi_cells = 1, phi_degree = 2, xi_cells = 2, xi_degree = 3 }"
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
     """The strong-noise curve fails at p = 2 and −1; the weak one and p = 0 are kept."""
     text = DRAWN.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
@@ -357,6 +366,7 @@ def test_tables_are_whole_where_an_interruption_comes_as_they_are_written(case, 
     assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_run_goes_on_where_it_was_interrupted(whole, tmp_path, monkeypatch):
     """With the numbers of a run that nobody interrupts; files but records are made anew."""
     case = write(tmp_path, DRAWN)
@@ -525,7 +535,7 @@ def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
 
 def test_a_text_is_varied_in_every_file(tmp_path):
     """Of curves with either noise the theory is that of the reduced one."""
-    sets = ['vary={ noise.treatment = ["ou-reduction", "exact"] }', "output={ eigenfunctions = [2.0] }"]
+    sets = ['vary={ noise.treatment = ["ou-reduction", "exact"] }', "output={ figure = false, eigenfunctions = [2.0] }"]
     case = write(tmp_path, TEXT, sets)
     fpsolve.run(case, tmp_path / "out")
     folder = tmp_path / "out/test"
@@ -666,6 +676,7 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     assert not list((tmp_path / "out").rglob("*.vtu"))
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_sensitivities_are_written(tmp_path):
     """At nine p or all, and of the indices, each with its error; those of the Python function."""
     sets = ["moments.p={start=-2.0, stop=6.0, num=17}", "vary={}", "output.sensitivities=true"]

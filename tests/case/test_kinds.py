@@ -168,7 +168,7 @@ def test_a_noise_of_another_package(windy: None, tmp_path: Path) -> None:
     assert (kind, version_of(kind)) == (noise_kind("wind"), "windy 1.5")  # type: ignore[arg-type]
     assert case.parameters["noise.gust"].quantity.unit == "1/time"
     values = solved(write(tmp_path, OSCILLATOR, WIND, MOMENTS, ONLY, rest), tmp_path / "out")
-    same = write(tmp_path, OSCILLATOR, UHLENBECK, MOMENTS, ONLY)
+    same = write(tmp_path, OSCILLATOR, UHLENBECK, MOMENTS, ONLY, "figure = false\n")
     assert load_case(same).noise == OrnsteinUhlenbeck(alpha=0.5, sigma=0.5)
     [expected] = solved(same, tmp_path / "out2").values()
     assert next(iter(values.values())) == pytest.approx(expected, rel=1e-10)

@@ -226,11 +226,11 @@ def test_what_is_no_file_of_a_run_is_named_and_left_out(runs, tmp_path, change, 
     with pytest.raises(
         FpsolveError, match=rf"{bad} cannot be read as .* run: .*{reason}.*; run its case again"
     ) as raised:
-        fpsolve.open_results(runs / "product", bad)
+        fpsolve.open_results(runs / "noises", bad)
     assert "\n" not in str(raised.value)
     with pytest.warns(UserWarning, match=rf"left out: {bad} cannot be read"):
-        found = fpsolve.open_results(bad, runs / "product", errors="warn")
-    assert found.equals(fpsolve.open_results(runs / "product"))
+        found = fpsolve.open_results(bad, runs / "noises", errors="warn")
+    assert found.equals(fpsolve.open_results(runs / "noises"))
     with (
         pytest.warns(UserWarning, match="left out"),
         pytest.raises(FpsolveError, match=rf"none of {bad} is a file of a run"),

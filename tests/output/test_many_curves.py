@@ -30,6 +30,7 @@ PLANE = [
     "vary.noise.D0={start=0.02, stop=2.0, num=20, scale='log'}",
     over("oscillator.omega", "{moment=2.0}"),
 ]
+COARSE = [text.replace("num=20", "num=9") for text in PLANE]
 BOTH = "vary.noise.treatment=['exact', 'ou-reduction']"
 FIGURES = {
     "one": [],
@@ -183,7 +184,7 @@ def test_a_moment_over_a_parameter(drawn, tmp_path):
 
 def test_a_parameter_is_called_alike_in_all_figures(drawn, tmp_path):
     """In figures over it, beside their colours, and in plots of results.nc."""
-    case = drawn_case(tmp_path, PLANE)
+    case = drawn_case(tmp_path, COARSE)
     drawn_case(tmp_path, [intensities(9), over("noise.D0")])
     drawn_case(tmp_path, [intensities(9)])
     along, over_it, bar = (
@@ -245,7 +246,7 @@ LINE = [[0.5, 0.7, 0.9], [1.0, 1.4, 1.8]]
 )
 def test_the_line_of_a_chart_is_on_the_map(drawn, tmp_path, keys, more, said, points):
     chart(tmp_path, *keys, **more)
-    drawn_case(tmp_path, PLANE)
+    drawn_case(tmp_path, COARSE)
     assert words(drawn[0])[1:] == said
     found = [line.get_data() for line in drawn[0].axes[0].lines if np.size(line.get_xdata())]
     assert [np.array(each).tolist() for each in found] == points
@@ -254,7 +255,7 @@ def test_the_line_of_a_chart_is_on_the_map(drawn, tmp_path, keys, more, said, po
 @pytest.mark.parametrize("text", sampled('{"x": {"key": "noise.D0"}, "y": 3}', "", "{}", "[]", '{"x": 1}', keep=2))
 def test_a_chart_that_is_none_is_left(drawn, tmp_path, text):
     (tmp_path / "chart.json").write_text(text, encoding="utf-8")
-    drawn_case(tmp_path, PLANE)
+    drawn_case(tmp_path, COARSE)
     assert words(drawn[0]) == ["zero, interpolated between the values"]
 
 

@@ -26,6 +26,7 @@ SECTIONS = "[moments]\np = [-1.0, 1.0]\n[monte_carlo]\npaths = 6400\ntime = 40.0
 CASE = case_text(SECTIONS, epsilon=0.5)
 QUICK = ["--paths", "64", "--time", "20"]
 TWO = ["--set", 'vary."noise.D0"=[0.1, 0.2]']
+LONG = [*TWO, "--set=monte_carlo.time=100.0"]
 
 
 @pytest.fixture
@@ -213,8 +214,7 @@ def test_an_interrupt_before_anything_is_simulated_keeps_what_is_solved(case, ou
 
 def test_a_simulation_that_fails_keeps_the_curves_before_it(case, out, capsys, fails, drawn):
     fails(2, NotConverged("the simulation overflowed"))
-    long = [*TWO, "--set", "monte_carlo.time=100.0"]
-    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *long]) == 3
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *LONG]) == 3
     (series,) = drawn
     assert [item.simulated is not None for item in series] == [True, False]
     assert (out / "quick/monte_carlo.json").exists()
@@ -229,8 +229,7 @@ def kept(out, curve, planned):
 
 def test_an_interrupted_simulation_of_a_run_says_how_to_go_on(case, out, capsys, fails):
     fails(2)
-    long = [*TWO, "--set", "monte_carlo.time=100.0"]
-    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *long]) == 130
+    assert main(["run", str(case), "--out", str(out), "--monte-carlo", *LONG]) == 130
     assert capsys.readouterr().err.strip() == kept(out, 2, 2)
     assert {"summary.json", "monte_carlo.json", "figure.png"} <= {path.name for path in (out / "quick").iterdir()}
 
