@@ -524,7 +524,7 @@ def test_many_crossings_are_in_order():
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.lists(st.floats(-1, 1), min_size=10, max_size=10))
 def test_random_cubics(coefficients):
     """Points lie on the curve, and F changes its sign nowhere else; where it has no saddle ends are on the frame."""

@@ -31,7 +31,7 @@ from tests import random_heavy_tails
 from tests.conftest import sampled
 from tests.oracles import asinh_grid, killed_paths
 
-SETS = 4
+SETS = 3
 """Random sets; thirty of them take three minutes."""
 
 
@@ -66,9 +66,6 @@ def by_differences(case, p, value, phases=128):
             (problem(0.5, 1.0, 1.1, 0.1), -0.1, 0.004209),
             (problem(0.5, 1.0, 1.1, 0.2, restitution=0.8, c1=0.1), -0.5, None),
             (problem(0.5, 1.0, 1.1, 0.2), -0.5, 0.02688),
-            (problem(0.7, 0.8, 1.1, 0.15), -0.3, None),
-            (problem(1.0, 0.7, 1.15, 0.2, omega=1.5, restitution=0.7, c1=-0.2), -0.4, None),
-            (problem(0.6, 0.6, 1.25, 0.08, c1=0.3), -0.2, None),
         )
     ],
 )
@@ -124,7 +121,7 @@ def test_killed_paths_are_a_lower_bound():
 @pytest.mark.slow
 def test_convex_and_continuous_over_the_change_of_place():
     """The place near 0, λp + ½Λ″p², carries large |p|, the one far out, Kp², the rest; λ > 0 is not the slope at 0."""
-    case, p = problem(0.5, 1.0, 1.1, 0.5), np.linspace(-0.9, 0.0, 50)
+    case, p = problem(0.5, 1.0, 1.1, 0.5), np.linspace(-0.9, 0.0, 25)
     result = moment_lyapunov(case, p, rtol=1e-6)
     solver, value, error = result.solver, result.value, result.error_estimate
     far = np.array([is_far_out(solver.pair(each)) for each in p])
