@@ -16,7 +16,7 @@ from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.plane import CoefficientMatrix, Harmonics
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
+from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments, sampled
 from tests.oracles import fourier_hermite, perturbation
 
 STRONG_MESH = make_mesh(phi_cells=12, phi_degree=10, xi_cells=8, xi_degree=10, xi_min=-8, xi_max=12)
@@ -83,7 +83,7 @@ def test_strong_noise_finds_the_principal_eigenvalue(epsilon, p, value, rel):
     assert min(pair.sign_defects) < 1e-10
 
 
-@pytest.mark.parametrize("epsilon", [0.1, 0.3, 0.5])
+@pytest.mark.parametrize("epsilon", sampled(0.5, 0.1, 0.3))
 @pytest.mark.parametrize("c1", [-0.4, 0.3])
 def test_identity_at_p_minus_2(epsilon, c1):
     """Λ(−2) = −ε²c₁ + ε²σ²/(2α²) for any ε without impact."""
@@ -105,8 +105,8 @@ def test_without_noise_only_the_impacts_are_left(p, law):
     assert value == pytest.approx(p * 1.7 * oscillator.log_impact_factor / math.pi, rel=1e-10)
 
 
-@pytest.mark.parametrize("p", [-2.0, 1.0, 4.0])
-@pytest.mark.parametrize("restitution", [1.0, 0.8])
+@pytest.mark.parametrize("p", sampled(-2.0, 4.0, 1.0, keep=2))
+@pytest.mark.parametrize("restitution", sampled(0.8, 1.0))
 def test_decoupled_phase_is_exactly_quadratic(monkeypatch, restitution, p):
     """h ≡ 0: Λ = p(ε²c₁/2 + ω ln R/π) + p²ε²(2S(0) + S(2ω))/16 for any ε."""
     turning = CoefficientMatrix.h.func

@@ -156,7 +156,7 @@ def test_what_a_proof_says_of_the_generator(of, name, sign, rng):
     side, p = certificate[name], certificate["p"]
     nodes = side["nodes"]
     beyond = [nodes[-1] + 1e-9, nodes[-1] + 3, nodes[-1] + 30, nodes[0] - 0.1, nodes[0] - 5]
-    for z in (*rng.uniform(nodes[0], nodes[-1], size=10), *beyond):
+    for z in (*rng.uniform(nodes[0], nodes[-1], size=6), *beyond):
         phi, z = mpmath.mpf(rng.uniform(0, math.pi)), mpmath.mpf(z)
         end = min(max(z, mpmath.mpf(nodes[0])), mpmath.mpf(nodes[-1]))
         kappa = mpmath.mpf(side["tails"][int(z > 0)])

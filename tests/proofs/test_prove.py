@@ -27,7 +27,7 @@ def problem(*, reduced=False, impact="delta", **numbers):
     ("numbers", "p", "value", "half_width"),
     [
         (FIG1, 2.0, 0.013021271916, 8e-8),
-        (FIG1 | {"r0": 0.7}, 2.0, 0.007799597190, 4.6e-9),
+        pytest.param(FIG1 | {"r0": 0.7}, 2.0, 0.007799597190, 4.6e-9, marks=pytest.mark.slow),
         pytest.param(MIDDLE, 2.0, 0.02512405045, 6e-10, marks=pytest.mark.slow),
         pytest.param(MIDDLE, -1.0, 0.05373157261, 9.2e-9, marks=pytest.mark.slow),
         pytest.param(STRONG, 1.0, 0.23681957433, 4.2e-6, marks=pytest.mark.slow),

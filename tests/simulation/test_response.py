@@ -32,7 +32,7 @@ def weak():
     exponent, s_square, _ = averaged(oscillator)
     step = default_step(oscillator, NOISE)
     return oscillator, stationary_response(
-        oscillator, NOISE, exponent, s_square, paths=2048, time=100.0, step=step, seed=1
+        oscillator, NOISE, exponent, s_square, paths=1024, time=100.0, step=step, seed=1
     )
 
 
