@@ -223,6 +223,9 @@ class Code(Enum):
     NEWTON_UNSETTLED = "failure: Newton's method does not settle on it"
     TOO_SHARP = "failure: it turns too sharply, as where it meets another branch"
     TOO_LONG = "failure: it has more than {count} points"
+    ROW_SPENT = "failure: a row of the scan has used up its {most:.3g} s by the clock; use a larger {key}"
+    LINE_SPENT = "failure: budget.line_seconds = {most:g} is used up by the clock"
+    LINE_STOPPED = "note: the line {line} is not traced to its end, and may have more branches: {reason}"
 
     NO_PATH_VARIANCE = (
         "warning: no estimate of Λ(p) at p = {p:g}: ‖x‖^p has no variance, as for r0 > 1 the moment of order 2p is "

@@ -19,6 +19,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from types import ModuleType
 from typing import Any, Generic, TypeVar
@@ -32,6 +33,10 @@ PROCESSORS = "FPSOLVE_PROCESSORS"
 """The environment variable that limits how many processors a process and its children use."""
 AHEAD = 2
 """Tasks that are submitted for each worker, so that none waits for the next."""
+LOOK_SECONDS = 0.2
+"""How often the steps of tasks in other processes are looked at."""
+SLOTS = 1021
+"""For the counts of processes, whose numbers rarely agree but for multiples of it."""
 AHEAD_IN_ORDER = 64
 """The same where results are wanted in order, so that no worker waits while the caller is busy with one result."""
 START_SECONDS = 1.5
@@ -41,6 +46,38 @@ MOST_JOBS = 1000
 """Processes on this machine; each needs an open file."""
 _TURN = threading.Lock()
 _limits: list[int] = []
+_counters: list[Any] = []
+"""In a worker of this machine, where it counts the steps of its tasks."""
+
+
+class Steps:
+    """What a task calls for each of its steps; in another process it counts them there, for `Pool.map` to look at.
+
+    Args:
+        told: what it calls in this process.
+    """
+
+    def __init__(self, told: Callable[[], object]) -> None:
+        self._told = told
+
+    def __call__(self) -> bool:
+        """Whether somebody is told of a step."""
+        self._told()
+        return True
+
+    def __reduce__(self) -> tuple[Callable[[], Callable[[], bool]], tuple[()]]:
+        return _elsewhere, ()
+
+
+def _elsewhere() -> Callable[[], bool]:
+    return _count_step
+
+
+def _count_step() -> bool:
+    """The same in another process; on another machine nobody is told."""
+    for counter in _counters:
+        counter[os.getpid() % SLOTS] += 1
+    return bool(_counters)
 
 
 def processors() -> int:
@@ -95,6 +132,8 @@ class Pool:
         ahead: how many tasks are submitted at once.
         own_seconds: how long this process works before the executor is made; with inf it does all.
         is_elsewhere: whether other machines work.
+        counter: where workers count the steps of their tasks, see `Steps`; in a slot each, as a lock would stay locked
+            where one dies.
     """
 
     start: Callable[[], Executor]
@@ -102,6 +141,8 @@ class Pool:
     ahead: int = 1
     own_seconds: float = 0.0
     is_elsewhere: bool = False
+    counter: Any = None
+    _told: int = field(default=0, init=False, repr=False)
     _executor: Executor | None = field(default=None, init=False, repr=False)
 
     def __enter__(self) -> Pool:
@@ -111,11 +152,16 @@ class Pool:
         self._end()
 
     def run(
-        self, task: Callable[[Item], Result], items: Iterable[Item], ahead: int = 0
+        self,
+        task: Callable[[Item], Result],
+        items: Iterable[Item],
+        ahead: int = 0,
+        stepped: Callable[[int], object] | None = None,
     ) -> Iterator[Done[Item, Result]]:
         """The results as they come; an exception of a task is raised here, and ends the run.
 
         An item is taken when it can be given to a worker: there may be many, and they may follow from results.
+        `stepped` is called with how many `Steps` other processes have done, before their results are there.
         """
         source = enumerate(items)
         until = time.monotonic() + self.own_seconds
@@ -131,7 +177,7 @@ class Pool:
             if not waiting:
                 return
             while waiting:
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                for future in self._finished(waiting, stepped):
                     number, item = waiting.pop(future)
                     try:
                         yield Done(number, item, future.result())
@@ -155,17 +201,35 @@ class Pool:
                     yield Done(number, item, None, is_lost=True)
                     self._end()
 
-    def map(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        """The results in the order of the items. Raises `FpsolveError` where a worker dies."""
+    def map(
+        self,
+        task: Callable[[Item], Result],
+        items: Iterable[Item],
+        stepped: Callable[[int], object] | None = None,
+    ) -> Iterator[Result]:
+        """The results in the order of the items, see `run`. Raises `FpsolveError` where a worker dies."""
         early: dict[int, Any] = {}
         due = 0
-        for done in self.run(task, items, max(self.ahead, AHEAD_IN_ORDER)):
+        for done in self.run(task, items, max(self.ahead, AHEAD_IN_ORDER), stepped):
             if done.is_lost:
                 raise FpsolveError("a worker died, perhaps for lack of memory; use fewer workers, or a smaller budget")
             early[done.number] = done.result
             while due in early:
                 yield early.pop(due)
                 due += 1
+
+    def _finished(
+        self, waiting: Iterable[Future[Result]], stepped: Callable[[int], object] | None
+    ) -> set[Future[Result]]:
+        """Those that are done first; until then the steps of all are told."""
+        while True:
+            found = wait(waiting, LOOK_SECONDS if stepped and self.counter else None, FIRST_COMPLETED).done
+            count = sum(self.counter or ()) - self._told
+            if stepped and count:
+                stepped(count)
+            self._told += count
+            if found:
+                return found
 
     def _submit(self, task: Callable[[Item], Result], item: Item) -> Future[Result]:
         """Give a task to the executor; where that is broken the future says so."""
@@ -208,7 +272,9 @@ def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
     size = min(count or processors(), tasks)
     if size == 1:
         return serial()
-    return Pool(lambda: _processes(size), _kill, AHEAD * size, START_SECONDS if count is None else 0.0)
+    counter = multiprocessing.get_context("spawn").RawArray("Q", SLOTS)
+    start, own_seconds = partial(_processes, size, counter), START_SECONDS if count is None else 0.0
+    return Pool(start, _kill, AHEAD * size, own_seconds, counter=counter)
 
 
 def cluster(address: str) -> Pool:
@@ -285,14 +351,16 @@ def _in_turn(task: Callable[[Item], Result], item: Item) -> Result:
         return task(item)
 
 
-def _processes(count: int) -> Executor:
+def _processes(count: int, *counters: Any) -> Executor:
     """New processes, in which nothing of this one is copied, neither its locks nor its threads."""
-    return ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"), initializer=_begin_worker)
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker, initargs=counters)
 
 
-def _begin_worker() -> None:
+def _begin_worker(*counters: Any) -> None:
     """A worker has one processor, and ends when the process that started it does, however that ends."""
     limit_processors(1)
+    _counters[:] = counters
     parent = multiprocessing.parent_process()
 
     def end_with_parent() -> None:

@@ -2,11 +2,13 @@
 
 import math
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import time
 from concurrent.futures import Executor, Future
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -178,6 +180,34 @@ def test_little_work_is_done_here(monkeypatch):
         found = [number for number, _ in workers.map(whereabouts, range(30))]
     assert found[0] == os.getpid()
     assert len(set(found)) == 3
+
+
+def in_three_steps(item, told):
+    return [told() for _ in range(3)] + [item]
+
+
+def test_steps_of_tasks_are_told(monkeypatch):
+    """In this process at once; a worker counts them; on another machine nobody is told."""
+    told, steps = [], pool.Steps(lambda: told.append(1))
+    with serial() as workers:
+        assert next(workers.map(partial(in_three_steps, told=steps), "a")) == [True, True, True, "a"]
+    elsewhere = pickle.loads(pickle.dumps(steps))
+    assert in_three_steps("b", elsewhere) == [False, False, False, "b"]
+    counter = [0] * pool.SLOTS
+    monkeypatch.setattr(pool, "_counters", [counter])
+    assert in_three_steps("c", elsewhere) == [True, True, True, "c"]
+    assert sum(told) == sum(counter) == 3
+
+
+@pytest.mark.slow
+def test_steps_of_workers_are_told_before_their_results():
+    told, found = [], 0
+    with parallel(2) as workers:
+        for result in workers.map(partial(in_three_steps, told=pool.Steps(told.append)), range(20), told.append):
+            found += 1
+            assert all(result[:3])
+            assert sum(told) >= 3 * found
+    assert sum(told) == 60
 
 
 SCRIPT = """

@@ -99,11 +99,21 @@ class Trace:
         """Whether it passes a point, one way or the other."""
         return bool(np.any(self._gaps(at) < within))
 
+    def nearest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Its point nearest to another, and the direction there, of length 1 or 0."""
+        feet, k = self._feet(at), int(np.argmin(self._gaps(at)))
+        way = self.fine[k + 1] - self.fine[k]
+        return feet[k], np.asarray(way / max(float(np.linalg.norm(way)), 1e-300))
+
     def _gaps(self, at: FloatArray) -> FloatArray:
         """Distances of a point from the pieces."""
+        return np.asarray(np.linalg.norm(self._feet(at) - at, axis=1))
+
+    def _feet(self, at: FloatArray) -> FloatArray:
+        """The points of the pieces that are nearest to a point."""
         start, way = self.fine[:-1], np.diff(self.fine, axis=0)
         share = np.clip(np.sum((at - start) * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-300), 0, 1)
-        return np.asarray(np.linalg.norm(start + share[:, None] * way - at, axis=1))
+        return np.asarray(start + share[:, None] * way)
 
 
 def cubic(
@@ -128,13 +138,20 @@ def find_branches(
     near = 0.25 / ((scan.nodes.size - 1) * (FINE - 1))
     for seed in scan.seeds():
         rough = find_zero(scan, seed)
-        if rough is not None and any(trace.holds(rough, near) for trace in known):
+        if rough is not None and any(trace.holds(rough, near) or _shows(scan, trace, rough, near) for trace in known):
             continue
         start = find_zero(field, seed if rough is None else rough.at)
         if start is None or any(trace.holds(start) for trace in known):
             continue
         known.append(trace_branch(field, start, longest, stepped))
         yield known[-1]
+
+
+def _shows(scan: Scan, trace: Trace, rough: Sample, within: float) -> bool:
+    """Whether a zero of a scan, off as F is interpolated, shows a branch: it is next to one, on its normal."""
+    at, along = trace.nearest(rough.at)
+    seen = correct(scan, at, along) if along @ rough.tangent > 0 else None
+    return seen is not None and float(np.linalg.norm(seen.at - rough.at)) < within
 
 
 def find_zero(field: Field, at: FloatArray) -> Sample | None:

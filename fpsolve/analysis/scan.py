@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -64,12 +65,14 @@ class Scan:
         values: F, shape (n, n), u first; NaN where it does not exist.
         gradients: ∂F/∂(u, v), shape (n, n, 2).
         reasons: why F does not exist at some nodes, each once.
+        seconds: of the processor, that it took.
     """
 
     nodes: FloatArray
     values: FloatArray
     gradients: FloatArray
     reasons: tuple[Message, ...] = ()
+    seconds: float = 0.0
 
     def between(self, i: int, j: int, s: FloatArray, t: FloatArray) -> FloatArray:
         """F in the cell of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation.
@@ -138,15 +141,24 @@ class ScannedRow:
         values: F, shape (n,); NaN where it does not exist.
         gradients: ∂F/∂(u, v), shape (n, 2).
         reasons: why F does not exist at some nodes, each once.
+        seconds: of the processor.
+        told: the number of its nodes that progress was shown of.
     """
 
     values: FloatArray
     gradients: FloatArray
     reasons: tuple[Message, ...] = ()
+    seconds: float = 0.0
+    told: int = 0
 
 
-def scan_row(row: Row) -> ScannedRow:
-    """F on a row from one end to the other, so that each node is close to the one before."""
+def scan_row(row: Row, told: Callable[[], bool] = lambda: False) -> ScannedRow:
+    """F on a row from one end to the other, so that each node is close to the one before.
+
+    Args:
+        told: called after each node, such as `pool.Steps`; whether that shows progress.
+    """
+    started, shown = time.thread_time(), 0
     field, reasons = row.begin(), dict[Message, None]()
     values, gradients = np.full(row.count, np.nan), np.full((row.count, 2), np.nan)
     shares = np.linspace(0, 1, row.count)
@@ -156,21 +168,26 @@ def scan_row(row: Row) -> ScannedRow:
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
             reasons.setdefault(failure.message)
-    return ScannedRow(values, gradients, tuple(reasons))
+        shown += told()
+    return ScannedRow(values, gradients, tuple(reasons), time.thread_time() - started, shown)
 
 
 def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable[[], None] = lambda: None) -> Scan:
-    """The scan of all rows of a grid, from what is found on them, in their order; no more of that is taken."""
-    count = len(rows)
+    """The scan of all rows of a grid, from what is found on them, in their order; no more of that is taken.
+
+    `progress` is called for each node of which none was shown.
+    """
+    count, seconds = len(rows), 0.0
     values, gradients, reasons = np.empty((count, count)), np.empty((count, count, 2)), dict[Message, None]()
     for row in rows:
         result = next(found)
         place = (slice(None), row.number) if row.axis == 0 else row.number
         values[place], gradients[place] = result.values, result.gradients
         reasons.update(dict.fromkeys(result.reasons))
-        for _ in range(count):
+        seconds += result.seconds
+        for _ in range(count - result.told):
             progress()
-    return Scan(np.linspace(0, 1, count), values, gradients, tuple(reasons))
+    return Scan(np.linspace(0, 1, count), values, gradients, tuple(reasons), seconds)
 
 
 def _hermite(x: FloatArray, end: int) -> tuple[FloatArray, FloatArray]:

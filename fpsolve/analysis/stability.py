@@ -6,6 +6,7 @@ starts from that at the point before; the rows of a scan begin anew, so that oth
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,7 +20,7 @@ import numpy as np
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, find_zero, trace_branch
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.zero import Axis, Zero, ZeroField, check_axes, zero_of
+from fpsolve.analysis.zero import RTOL, Axis, Zero, ZeroField, check_axes, zero_of
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
@@ -28,6 +29,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem, of_problem, with_original
 from fpsolve.model.quantity import POINTS
+from fpsolve.pool import Steps
 
 if TYPE_CHECKING:
     import xarray
@@ -37,11 +39,15 @@ SCAN_RTOL = 1e-5
 """Of F on the grid of a scan."""
 NODES = 13
 """Of a scan, each way."""
+LINE_KEY, SCAN_SHARE = "budget.line_seconds", 0.5
+"""What limits the time of a line, and its share for the scan."""
 LARGEST = 0.1
 """Step that may be asked for, in sides of the frame."""
 ON_IT = 1e-4
 """Distance, in sides of the frame, in which a point of a line is one of a branch."""
 
+_ANEW: dict[str, Any] = {"traces": (), "seconds": 0.0, "obstacles": (), "complete": False}
+"""A line of which nothing is traced."""
 Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow]]
 """The builtin `map`, or that of an executor: results in the order of the tasks."""
 
@@ -81,7 +87,10 @@ class Boundary(Result):
         traces: its branches, in shares of the sides of the frame.
         scan: F on the grid in which they were looked for; None where they were started from points.
         step: the longest step between two points, in sides of the frame.
-        budget: for a solve.
+        budget: for a solve, and for the line.
+        seconds: of the processor, that the scan and the branches took.
+        obstacles: why branches that the scan shows may be missing.
+        complete: whether all branches that the scan shows are there.
     """
 
     zero: Zero
@@ -92,6 +101,9 @@ class Boundary(Result):
     scan: Scan | None = None
     step: float = LONGEST
     budget: Budget = field(default_factory=Budget)
+    seconds: float = 0.0
+    obstacles: tuple[Message, ...] = ()
+    complete: bool = False
 
     @property
     def branches(self) -> tuple[Branch, ...]:
@@ -110,8 +122,10 @@ class Boundary(Result):
 
     @property
     def zero_field(self) -> ZeroField:
-        """F over the unit square."""
-        return ZeroField(self.zero, self.problem, (self.x, self.y), self.budget)
+        """F over the unit square, with the time that is left for the line."""
+        most = self.budget.line_seconds
+        limit = () if most is None else (RTOL, most - self.seconds, Message(Code.LINE_SPENT, most=most))
+        return ZeroField(self.zero, self.problem, (self.x, self.y), self.budget, *limit)
 
     @property
     def quantity(self) -> ZeroField:
@@ -120,7 +134,9 @@ class Boundary(Result):
         return self.zero_field
 
     def remark(self) -> str:
-        """That there is no line, as a `Message`, or an empty text."""
+        """That there is no line, or not all of it, as a `Message`, or an empty text."""
+        if self.obstacles:
+            return Message(Code.LINE_STOPPED, line=self.zero.equation, reason=self.obstacles[0])
         if self.traces or self.scan is None:
             return ""
         exists = np.isfinite(self.scan.values)
@@ -134,7 +150,7 @@ class Boundary(Result):
     def refined(self, step: float) -> Boundary:
         """The same with shorter steps, in sides of the frame. Raises `ValueError`."""
         middles = (trace.points[len(trace.points) // 2].sample.at for trace in self.traces)
-        return replace(self, step=_checked_step(step), traces=())._from(middles)
+        return replace(self, step=_checked_step(step), **_ANEW)._from(middles)
 
     def extended(self, x: Axis | None = None, y: Axis | None = None) -> Boundary:
         """Its branches in another, such as a wider, frame of the same parameters; branches elsewhere are not sought.
@@ -142,7 +158,7 @@ class Boundary(Result):
         Raises:
             ValueError: an axis is not of the same parameter, or out of its range.
         """
-        other = replace(self, x=x or self.x, y=y or self.y, traces=(), scan=None)
+        other = replace(self, x=x or self.x, y=y or self.y, scan=None, **_ANEW)
         if (other.x.key, other.y.key) != (self.x.key, self.y.key):
             raise ValueError(f"a frame of {other.x.key}, {other.y.key}: use `started_from` for other parameters")
         check_axes(self.problem, other.x, other.y)
@@ -167,12 +183,17 @@ class Boundary(Result):
         if np.any((start < 0) | (start > 1)):
             point_there = ", ".join(f"{key} = {value:g}" for key, value in theta.items())
             raise ValueError(f"the point has {point_there}, which is not in the frame; choose a wider one")
-        return replace(self, x=x, y=y, problem=problem, traces=(), scan=None)._from([start])
+        return replace(self, x=x, y=y, problem=problem, scan=None, **_ANEW)._from([start])
 
     def rows(self) -> list[Row]:
         """The rows of its scan, tasks for `scan_row`, each of which begins anew; they pickle small."""
-        rough = partial(ZeroField, self.zero, self.problem, (self.x, self.y), self.budget, SCAN_RTOL)
-        count, axis = NODES if self.scan is None else self.scan.nodes.size, rough().easy_axis
+        count, most = NODES if self.scan is None else self.scan.nodes.size, self.budget.line_seconds
+        share = math.inf if most is None else SCAN_SHARE * most / count
+        seconds, key = min((self.budget.seconds, "budget.seconds"), (share, LINE_KEY))
+        spent = Message(Code.ROW_SPENT, most=seconds, key=key)
+        frame = self.zero, self.problem, (self.x, self.y)
+        rough = partial(ZeroField, *frame, self.budget, SCAN_RTOL, seconds, spent)
+        axis = rough().easy_axis
         return [Row(rough, count, number, axis) for number in range(count)]
 
     def solve(
@@ -181,20 +202,22 @@ class Boundary(Result):
         progress: Callable[[], None] = lambda: None,
         stepped: Callable[[], None] = lambda: None,
     ) -> Iterator[Boundary]:
-        """The scan, then one branch after the other: what there is so far, each time.
+        """The scan, then one branch after the other, and the whole line: what there is so far, each time.
 
         Args:
             rows: what `scan_row` gives for its `rows`, in order, of which no more are taken; None to scan them here.
-            progress: called once for each node of the scan, a row at a time.
+            progress: called once for each node of the scan.
             stepped: called once for each point of a branch.
         """
         tasks = self.rows()
-        scan = scanned(tasks, map(scan_row, tasks) if rows is None else rows, progress)
-        now = replace(self, scan=scan, traces=())
+        scan = scanned(tasks, map(partial(scan_row, told=Steps(progress)), tasks) if rows is None else rows, progress)
+        now = replace(self, scan=scan, **{**_ANEW, "seconds": scan.seconds})
         yield now
-        for trace in find_branches(self.zero_field, scan, self.step, stepped):
-            now = replace(now, traces=(*now.traces, self._special(trace)))
+        zero_field = now.zero_field
+        for trace in find_branches(zero_field, scan, self.step, stepped):
+            now = replace(now, traces=(*now.traces, self._special(zero_field, trace)))
             yield now
+        yield now._ended(zero_field)
 
     def grown(
         self, progress: Callable[[], None] = lambda: None, stepped: Callable[[], None] = lambda: None, map: Map = map
@@ -211,12 +234,19 @@ class Boundary(Result):
                 continue
             start = find_zero(zero_field, seed)
             if start is not None and not any(trace.holds(start) for trace in traces):
-                traces.append(self._special(trace_branch(zero_field, start, self.step)))
-        return replace(self, traces=tuple(traces))
+                traces.append(self._special(zero_field, trace_branch(zero_field, start, self.step)))
+        return replace(self, traces=tuple(traces))._ended(zero_field)
 
-    def _special(self, trace: Trace) -> Trace:
+    def _ended(self, zero_field: ZeroField) -> Boundary:
+        """As it is after the last of its branches."""
+        obstacles = [] if zero_field.stopped is None else [zero_field.stopped]
+        for reason in self.scan.reasons if self.scan else ():
+            obstacles += [reason] * (reason.code is Code.ROW_SPENT and reason.data["key"] == LINE_KEY)
+        seconds = self.seconds + zero_field.spent_seconds
+        return replace(self, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles)
+
+    def _special(self, zero_field: ZeroField, trace: Trace) -> Trace:
         """A branch with its folds, and the points that the axes ask for."""
-        zero_field = self.zero_field
         trace = with_folds(zero_field, trace, ("x", "y"))
         for number, axis in enumerate((self.x, self.y)):
             wanted = [(axis.share(value), f"at {axis.key} = {value:.12g}") for value in axis.at]
@@ -273,6 +303,7 @@ def boundary(
     step: float = LONGEST,
     nodes: int = NODES,
     budget: Budget | None = None,
+    progress: Callable[[], None] = lambda: None,
 ) -> Boundary:
     """The line λ = 0, Λ(p) = 0 or δ_p = v in a frame of two parameters.
 
@@ -284,7 +315,8 @@ def boundary(
         original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).
         step: the longest step between two points, in sides of the frame.
         nodes: of the grid in which branches are looked for, each way.
-        budget: for a solve.
+        budget: for a solve, and for the line: beyond its `line_seconds` what is traced is returned, with `obstacles`.
+        progress: called once for each node of the grid, and once for each point of a branch.
 
     Raises:
         ValueError: an axis is no parameter of the problem or out of its range, both are the same, or `zero`, `step` or
@@ -296,7 +328,7 @@ def boundary(
         raise ValueError(f"got nodes = {shown(nodes)}; must be a whole number from 2")
     empty = Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
     line = Boundary(zero_of(zero), x, y, problem, scan=empty, step=_checked_step(step), budget=budget or Budget())
-    *_, whole = line.solve()
+    *_, whole = line.solve(progress=progress, stepped=progress)
     return whole
 
 
@@ -309,9 +341,9 @@ def _checked_step(step: float) -> float:
 
 def crossed(lines: Sequence[Boundary]) -> list[Boundary]:
     """Lines in one frame, each with the points that it has in common with the others."""
-    new = defaultdict[tuple[int, int], list[Placed]](list)
+    new, each_field = defaultdict[tuple[int, int], list[Placed]](list), [line.zero_field for line in lines]
     for (i, first), (j, second) in combinations(enumerate(lines), 2):
-        fields = first.zero_field, second.zero_field
+        fields = each_field[i], each_field[j]
         for (a, trace), (b, crossing) in product(enumerate(first.traces), enumerate(second.traces)):
             for on_first, on_second in crossings(trace, crossing, fields):
                 for key, (place, point), other in (((i, a), on_first, second), ((j, b), on_second, first)):

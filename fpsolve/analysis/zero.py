@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 from fpsolve.analysis.scan import Sample
 from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
 from fpsolve.arrays import FloatArray, real_number, shown
-from fpsolve.errors import FpsolveError, NoSuchExponent
+from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Solution
@@ -27,6 +28,8 @@ from fpsolve.model.problem import Problem, refuse_infinite
 
 RTOL = 1e-10
 """Of F, relative to its scale."""
+QUARTER = 0.25
+"""Of the time that is left, for one p: λ takes three."""
 
 
 def axis_faults(
@@ -190,12 +193,27 @@ class ZeroField:
         axes: the parameters.
         budget: for a solve.
         rtol: of F, relative to its scale.
+        seconds: of the processor for all values together; each p may take a quarter of what is left.
+        spent: what is said where they do not suffice.
+
+    Attributes:
+        spent_seconds: of the processor, so far.
+        stopped: what was said, or None.
     """
 
     def __init__(
-        self, zero: Zero, problem: Problem, axes: tuple[Axis, Axis], budget: Budget, rtol: float = RTOL
+        self,
+        zero: Zero,
+        problem: Problem,
+        axes: tuple[Axis, Axis],
+        budget: Budget,
+        rtol: float = RTOL,
+        seconds: float = math.inf,
+        spent: Message | None = None,
     ) -> None:
         self._zero, self._problem, self._axes, self._rtol, self._budget = zero, problem, axes, rtol, budget
+        self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
+        self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
         self._starts: Mapping[float, Solution] = {}
         keys, system = [axis.key for axis in axes], problem.system
         loss = f"{system.section}.{system.impact_parameter}"
@@ -211,21 +229,41 @@ class ZeroField:
         return 1 if self._bounce is None else self._bounce
 
     def __call__(self, at: FloatArray) -> Sample:
-        """F at (u, v). Raises `FpsolveError` where there is none."""
+        """F at (u, v). Raises `FpsolveError` where there is none, or where the time does not suffice."""
+        left, started = self._seconds - self.spent_seconds, time.thread_time()
+        if left <= 0:
+            raise self._stop()
+        share = QUARTER * left
+        is_short = share < self._budget.seconds
+        try:
+            return self._at(at, replace(self._budget, seconds=share) if is_short else self._budget)
+        except NotConverged as failure:
+            if is_short and failure.message.tells_of(Code.SECONDS_SPENT):
+                raise self._stop() from failure
+            raise
+        finally:
+            self.spent_seconds += time.thread_time() - started
+
+    def _stop(self) -> NotConverged:
+        self.stopped = self._spent
+        return NotConverged(self.stopped)
+
+    def _at(self, at: FloatArray, budget: Budget) -> Sample:
+        """F at (u, v), within a budget."""
         values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}
         try:
             problem = self._problem.at(values)
         except ValueError as failure:
             raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
         if self._bounce is None:
-            return self._sample(at, problem)
+            return self._sample(at, problem, budget)
         known = self._solved.setdefault(float(at[1 - self._bounce]), {})
         log_factor = problem.system.jumps[0].log_factor
         if len(known) < 2 and log_factor not in known:
-            known[log_factor] = self._sample(at, problem)
+            known[log_factor] = self._sample(at, problem, budget)
         return known[log_factor] if log_factor in known else self._between(at, problem, log_factor, known, self._bounce)
 
-    def _sample(self, at: FloatArray, problem: Problem) -> Sample:
+    def _sample(self, at: FloatArray, problem: Problem, budget: Budget) -> Sample:
         """F from a solve.
 
         Raises:
@@ -233,7 +271,7 @@ class ZeroField:
         """
         p = self._zero.p
         refuse_infinite(problem, p)
-        solver = ExponentSolver(problem, rtol=self._rtol, budget=self._budget, starts=self._starts)
+        solver = ExponentSolver(problem, rtol=self._rtol, budget=budget, starts=self._starts)
         value, error = solver.ratio_alone(p)
         if value > 0 > p and problem.noise.has_algebraic_tails:
             near = solver.near.solution(p).pair

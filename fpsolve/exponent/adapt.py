@@ -74,12 +74,15 @@ SECONDS_PER_CUBE = 1e-10
 @told_in_words
 @pydantic_dataclass(frozen=True, config=STRICT)
 class Budget:
-    """What one Λ(p) may cost.
+    """What one Λ(p) may cost, and a line of a chart.
 
     Args:
         unknowns: of the largest system; memory grows with it, some 30 kB each, 1.8 GB in all for the 60,000.
         seconds: of the processor for one p; foreseen before every solve from the last one, and looked at before every
-            factorisation, so that it may take a third more.
+            factorisation, so that it may take a third more. The nodes of a row of a scan share it, and a p there may
+            take a quarter of what is left.
+        line_seconds: of the processor for a line of a chart, its scan, which may take half of them, and its branches;
+            None for any time.
 
     Raises:
         ParameterError: a number is out of its range.
@@ -87,6 +90,7 @@ class Budget:
 
     unknowns: Annotated[int, parameter("unknowns of the largest system", "unknowns = 60000", ge=100)] = 60_000
     seconds: Annotated[float, parameter("time for one p", "seconds = 60.0", gt=0)] = 60.0
+    line_seconds: Annotated[float | None, parameter("time for a line of a chart", "line_seconds = 600.0", gt=0)] = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,7 +48,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
         **head(case),
         "complete": chart.complete,
         "planned": len(zeros),
-        "done": len(chart.lines) if chart.complete else max(len(chart.lines) - 1, 0),
+        "done": sum(line.complete for line in chart.lines),
         "parameters": {key: value for key, value in case.curve({}).parameters.items() if key not in keys},
         **{
             side: {"key": axis.key, "start": axis.start, "stop": axis.stop, "scale": axis.scale, "at": list(axis.at)}
@@ -65,6 +65,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
                     {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
                     for branch in line.branches
                 ],
+                "obstacles": list(line.obstacles),
             }
             for line in chart.lines
         ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from fpsolve.case.sections import ChartSection
 from fpsolve.errors import FpsolveError, NoPerturbationTheory
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
+from fpsolve.pool import Steps
 from fpsolve.theory.perturbation import second_order
 
 CLOSED_FORM_NODES = 81
@@ -32,7 +34,7 @@ class Chart:
         closed_forms: for each entry of `zero` the branches of its closed form, Eqs. (38)-(39), each of shape (n, 2), in
             the parameters themselves.
         regions: once all lines are traced.
-        complete: whether they are.
+        complete: whether they are, none stopped by the budget.
     """
 
     lines: tuple[Boundary, ...]
@@ -42,16 +44,18 @@ class Chart:
 
     @property
     def failures(self) -> tuple[Message, ...]:
-        """Why lines end inside of the frame."""
-        return tuple(text for line in self.lines for trace in line.traces for text in trace.obstacles)
+        """Why lines end inside of the frame, or may lack branches."""
+        obstacles = [text for line in self.lines for trace in line.traces for text in trace.obstacles]
+        return (*obstacles, *(text for line in self.lines for text in line.obstacles))
 
     @property
     def remarks(self) -> tuple[Message, ...]:
         """What has no line, which lines end inside of the frame, and where no F exists, with the reasons."""
-        found = [line.remark() for line in (self.lines if self.complete else self.lines[:-1])]
+        found = [line.remark() for line in self.lines if line.complete or line.obstacles]
         for line in self.lines:
-            ends = dict.fromkeys(text for trace in line.traces for text in trace.obstacles)
-            holes = line.scan.reasons if line.scan is not None else ()
+            reasons = (text for trace in line.traces for text in trace.obstacles)
+            ends = dict.fromkeys(each for each in reasons if each not in line.obstacles)
+            holes = [each for each in line.scan.reasons if each not in line.obstacles] if line.scan else []
             found += [Message(Code.LINE_ENDS, line=line.zero.equation, reason=each) for each in ends]
             found += [Message(Code.HOLES, symbol=line.zero.symbol, reason=each) for each in holes]
         return tuple(message_of(each) for each in found if each)
@@ -88,13 +92,14 @@ def solve_chart(
     stepped: Callable[[], None] = lambda: None,
     map: Map = map,
 ) -> Iterator[Chart]:
-    """What there is so far, after each scan and each branch, and in the end the whole chart.
+    """What there is so far, after each scan, branch and line, and in the end the whole chart.
 
     Args:
         case: with a chart, see `refuse_no_chart`.
         progress: called once for each node of each scan, see `chart_work`.
         stepped: called once for each point that is traced.
         map: computes the rows of all scans, as the builtin does or in other processes, while branches are traced here.
+            It calls `progress` itself for the `Steps` of other processes, or they are told row by row.
     """
     frame = charted(case)
     x, y = frame.x.axis, frame.y.axis
@@ -102,13 +107,14 @@ def solve_chart(
     problem = curve.problem
     chart = Chart((), _closed_forms(problem, frame.zero, (x, y)))
     begun = [Boundary(zero, x, y, problem, budget=case.budget) for zero in frame.zero]
-    rows = iter(map(scan_row, [row for line in begun for row in line.rows()]))
+    rows = iter(map(partial(scan_row, told=Steps(progress)), [row for line in begun for row in line.rows()]))
     for each in begun:
         done = chart.lines
         for line in each.solve(rows, progress, stepped):
             chart = replace(chart, lines=(*done, line))
             yield chart
-    yield Chart(tuple(crossed(chart.lines)), chart.closed_forms, regions(chart.lines), complete=True)
+    lines = tuple(crossed(chart.lines))
+    yield Chart(lines, chart.closed_forms, regions(lines), complete=all(line.complete for line in lines))
 
 
 def _closed_forms(

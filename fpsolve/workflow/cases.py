@@ -213,8 +213,9 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
         writable(folder),
         pool or serial() as workers,
     ):
+        rows = partial(workers.map, stepped=progress)
         try:
-            for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map):
+            for chart in solve_chart(case, progress=progress, stepped=stepped, map=rows):
                 write_chart(case, chart, folder)
         finally:
             if chart.lines:

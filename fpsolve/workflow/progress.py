@@ -151,7 +151,7 @@ def seconds_left(task: Task) -> float | None:
     """Seconds to go, by the rate of the later half of the steps that this run has done; None until that is known."""
     total, known = task.fields["phase"].total, task.fields["known"]
     own, elapsed = task.completed - known, task.elapsed or 0.0
-    if total is None or task.stop_time is not None:
+    if total is None or task.stop_time is not None or task.completed >= total:
         return None
     if elapsed < KNOWN_SECONDS or own < max(KNOWN_STEPS, KNOWN_SHARE * (total - known)):
         return None

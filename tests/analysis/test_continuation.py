@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fpsolve.analysis.continuation import FRAME, LONGEST, SHORTEST, find_branches
+from fpsolve.analysis.continuation import FRAME, LONGEST, SHORTEST, find_branches, find_zero
 from fpsolve.analysis.scan import FINE, TOLERANCE, Row, Sample, scan_row, scanned
 from fpsolve.analysis.special_points import crossings, with_folds, with_points, with_values
 from fpsolve.errors import NotConverged
@@ -468,6 +468,28 @@ def test_each_point_is_told_as_it_is_found(of):
     told = []
     [branch] = find_branches(of, scan_of(of), stepped=lambda: told.append(1))
     assert len(told) == len(branch.points)
+
+
+def test_a_branch_is_not_sought_again_where_the_scan_is_off():
+    """F = f·(e^{−25u} + …), f = v² − 0.8u − 0.01: many zeros of its interpolation are far from the one branch f = 0.
+
+    Each took some solves to lead there again, together 442.
+    """
+    solved = []
+
+    def curve(u, v):
+        solved.append(1)
+        f, size = v**2 - 0.01 - 0.8 * u, math.exp(-25 * u)
+        return f * (size + 1e-3), -0.8 * (size + 1e-3) - 25 * f * size, 2 * v * (size + 1e-3)
+
+    of = field(curve)
+    scan, near = scan_of(of), 1e-3
+    solved.clear()
+    [branch] = find_branches(of, scan)
+    assert len(solved) < 2.5 * len(branch.points)
+    check(branch, of)
+    rough = [find_zero(scan, seed) for seed in scan.seeds()]
+    assert sum(each is not None and not branch.holds(each, near) for each in rough) > 50
 
 
 def met(one, other):

@@ -5,6 +5,7 @@ import pickle
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,14 +13,15 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.analysis.continuation import FRAME
-from fpsolve.analysis.scan import Scan, ScannedRow, scan_row
+from fpsolve.analysis.scan import Sample, Scan, ScannedRow, scan_row
 from fpsolve.analysis.sensitivity import sensitivities
 from fpsolve.analysis.stability import Boundary, boundary, crossed
 from fpsolve.analysis.zero import Axis, ZeroField, zero_of
-from fpsolve.errors import FpsolveError, NoSuchExponent
+from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem import generator
+from fpsolve.messages import Code, Message
 from fpsolve.model.noises.markov_chain import MarkovChain
 from tests.conftest import sampled
 
@@ -35,7 +37,7 @@ def oscillator(epsilon=0.1, **values):
 
 def line(zero=LAMBDA, x=OMEGA, y=C1, *, noise=NOISE, exact=False, **values):
     """A line in a frame, by default of ω and c₁, for noise that is reduced or not."""
-    known = {key: values.pop(key) for key in ("nodes", "step", "budget") if key in values}
+    known = {key: values.pop(key) for key in ("nodes", "step", "budget", "progress") if key in values}
     problem = Problem(oscillator(**values), noise if exact else noise.ou_reduction())
     return boundary(problem, zero, x, y, **(COARSE | known))
 
@@ -595,3 +597,73 @@ def test_f_is_solved_in_one_thread(monkeypatch):
         sensitivities(problem, 2.0)
     assert threads
     assert set(threads) == {1}
+
+
+def test_each_node_and_each_point_is_told_as_it_is_found(monkeypatch):
+    told, seen, sample = [], [], ZeroField._sample
+    monkeypatch.setattr(ZeroField, "_sample", lambda self, *given: (seen.append(len(told)), sample(self, *given))[1])
+    found = line(progress=lambda: told.append(1))
+    assert seen[:9] == list(range(9))
+    assert len(told) == 9 + sum(branch.x.size for branch in found.branches)
+
+
+class Worked:
+    """Solves that take seconds of a clock of their own, and not more than a third above their budget."""
+
+    def __init__(self, monkeypatch, cost):
+        self.now, self.cost = 0.0, cost
+        for name in ("zero", "scan"):
+            monkeypatch.setattr(f"fpsolve.analysis.{name}.time", SimpleNamespace(thread_time=lambda: self.now))
+        monkeypatch.setattr(ZeroField, "_sample", lambda _, at, problem, budget: self.sample(at, budget))
+
+    def sample(self, at, budget):
+        cost = self.cost(at)
+        self.now += min(cost, 4 / 3 * budget.seconds)
+        if cost > budget.seconds:
+            raise NotConverged(Message(Code.SECONDS_SPENT, seconds=cost, most=budget.seconds))
+        return Sample(at, at[0] + at[1] - 0.8, np.ones(2), 0.0, 1.0)
+
+
+@pytest.mark.parametrize(("most", "key"), [(None, "seconds"), (78.0, "line_seconds")])
+def test_the_nodes_of_a_row_share_its_time(monkeypatch, most, key):
+    """Nodes that cannot be solved, here three of each row, leave time for the others: 60 s, or 78 s · ½ / 13 = 3 s."""
+    work = Worked(monkeypatch, lambda at: 1e9 if 0.1 < at[1] < 0.3 else 0.02)
+    of = Boundary(zero_of(SECOND), OMEGA, C1, Problem(oscillator(), NOISE), budget=Budget(line_seconds=most))
+    share = 3.0 if most else 60.0
+    for row in of.rows():
+        started = work.now
+        found = scan_row(row)
+        assert np.isnan(found.values).tolist() == [False, False, True, True, *[False] * 9]
+        assert found.reasons == (Message(Code.ROW_SPENT, most=share, key=f"budget.{key}"),)
+        assert work.now - started < 4 / 3 * share
+
+
+@pytest.mark.parametrize("cost", [0.01, 15.0, 1e9])
+def test_a_line_ends_with_its_time(monkeypatch, cost):
+    """What is traced is kept, and said to be not all; before, a line took any time."""
+    work = Worked(monkeypatch, lambda _: 0.5)
+    of = Boundary(zero_of(SECOND), OMEGA, C1, Problem(oscillator(), NOISE), budget=Budget(line_seconds=600.0))
+    lines = of.solve()
+    assert not next(lines).complete
+    work.cost = lambda _: cost
+    *_, whole = lines
+    spent = Message(Code.LINE_SPENT, most=600.0)
+    assert whole.complete == (cost == 0.01)
+    assert whole.obstacles == (() if whole.complete else (spent,))
+    assert work.now < 4 / 3 * 600.0
+    assert whole.seconds == pytest.approx(work.now)
+    if cost == 0.01:
+        assert [point.label for point in whole.traces[0].points if point.label] == [FRAME, FRAME]
+    elif cost == 15.0:
+        assert len(whole.traces) == 1
+    else:
+        assert not whole.traces
+        assert whole.remark() == Message(Code.LINE_STOPPED, line="Λ(2) = 0", reason=spent)
+
+
+def test_real_lines_end_with_their_time():
+    found = line(step=0.02, nodes=7, budget=Budget(line_seconds=0.3))
+    assert not found.complete
+    assert found.obstacles
+    assert 0 < found.seconds < 0.6
+    assert line(budget=Budget(line_seconds=60.0)).complete

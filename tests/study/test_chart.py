@@ -183,7 +183,7 @@ def test_progress_and_rows_are_those_of_the_whole_chart(path):
     assert given == [3 * 13]
     assert len(nodes) == chart_work(case) == 3 * 13**2
     assert len(points) == sum(branch.x.size for line in whole.lines for branch in line.branches)  # none has a fold
-    assert [len(chart.lines) for chart in partial] == [1, 1, 2, 2, 3, 3]
+    assert [len(chart.lines) for chart in partial] == [1, 1, 1, 2, 2, 2, 3, 3, 3]
     assert not any(chart.remarks for chart in partial)  # "no line was found" where none is traced yet
 
 
