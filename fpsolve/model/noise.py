@@ -212,7 +212,7 @@ class Noise(Parametrised):
 
     @classmethod
     def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw | None:
-        """Eq. (7) or (15) in exact numbers, for parameters as decimals by name; None where no proof is known.
+        """The law in exact numbers, for parameters as decimals by name; None where no proof is known.
 
         Raises:
             NoSuchExponent: no bound can be proven for these parameters.

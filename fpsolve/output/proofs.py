@@ -41,7 +41,7 @@ def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_wh
     curves = []
     for proof in proofs:
         written = {key: _line(value) for key, value in proof.curve.parameters.items()}
-        written |= {key: text for key, text in proof.stated.items() if DECIMAL.fullmatch(text)}
+        written |= {key: text for key, text in proof.stated.parameters.items() if DECIMAL.fullmatch(text)}
         moments = ",\n".join(f"    {_moment(p, found)}" for p, found in proof.moments)
         parts = {
             "parameters": f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in written.items())}}}",

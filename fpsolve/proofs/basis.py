@@ -3,13 +3,17 @@
 Coefficients are arrays (modes, m) of complex balls, modes k = −K … K. Multiplied by a factor D(z) > 0 that clears the
 denominator of b, the mismatch Lu − μu is again a sum of e^{2ikφ} times polynomials of z, by exact formulas.
 
+For noise z = cos θ on a circle B_m = cos mθ, and for a chain B_m is 1 in state m and 0 in the others. There T = u: the
+mismatch falls so fast with more functions that its maximum serves.
+
 On cells of z these polynomials are bounded by Taylor's formula about the middles of the cells: for |t| ≤ h,
 |f − f(middle)| ≤ |f′(middle)| h + |f″(middle)| h²/2 + … up to a remainder of order `ORDER`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import factorial
 from typing import Any, ClassVar, Literal
@@ -17,11 +21,14 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.model.exact import BasisKind
 from fpsolve.proofs.balls import Balls, ball, balls, each, magnitudes, matrix_product, raised, roots
 from fpsolve.proofs.statement import Cylinder
 
 ORDER = 8
 """Of Taylor's formula."""
+FINE = 8
+"""Cells of a circle for each function."""
 
 
 def padded(u: Balls, waves: int = 0, degrees: int = 0) -> Balls:
@@ -60,6 +67,10 @@ class Core:
     scale: float
     gauge: float
 
+    def one(self, columns: int) -> Balls:
+        """The coefficients of 1, so many at most."""
+        return balls([1.0])
+
     def values(self, u: Balls) -> Balls:
         """u, by coefficients of the polynomials that `taylor` takes."""
         return u
@@ -78,13 +89,15 @@ class Core:
         beta = ball(self.gauge)
         first = added(self.slope(u), beta * u)
         second = added(self.slope(first), beta * first)
-        return added(self.cleared(second * (noise.nu / 2), noise), self.times_z(first) * (-noise.nu * noise.slope))
+        return added(
+            self.cleared(second * (noise.nu / 2), noise), self.times_z(first, noise) * (-noise.nu * noise.slope)
+        )
 
     def cleared(self, u: Balls, noise: Cylinder) -> Balls:
         """D u, D = 1 − z² for bounded noise, else 1."""
-        return added(u, -self.times_z(self.times_z(u))) if noise.is_bounded else u
+        return added(u, -self.times_z(self.times_z(u, noise), noise)) if noise.is_bounded else u
 
-    def times_z(self, u: Balls) -> Balls:
+    def times_z(self, u: Balls, noise: Cylinder) -> Balls:
         """z u, one degree more, from y He_m = He_{m+1} + m He_{m−1}."""
         found = padded(ball(self.centre) * u, degrees=1)
         root, scale = roots(u.shape[1] + 1), ball(self.scale)
@@ -130,6 +143,10 @@ class Whole:
     scale: ClassVar[float] = 1.0
     gauge: ClassVar[float] = 0.0
 
+    def one(self, columns: int) -> Balls:
+        """The coefficients of 1, so many at most."""
+        return balls([1.0])
+
     def values(self, u: Balls) -> Balls:
         """u in Chebyshev polynomials, of two degrees more; ∫T_n = ½ (T_{n+1}/(n + 1) − T_{n−1}/(n − 1))."""
         slope = self.slope(u)
@@ -158,19 +175,15 @@ class Whole:
         for n in range(inner.shape[1]):
             second[:, abs(n - 1)] += inner[:, n] * (n - 2) / 2
             second[:, n + 1] -= inner[:, n] * (n + 2) / 2
-        return added(second * (noise.nu / 2), self.times_z(inner) * (-noise.nu * noise.slope))
+        return added(second * (noise.nu / 2), self.times_z(inner, noise) * (-noise.nu * noise.slope))
 
     def cleared(self, u: Balls, noise: Cylinder) -> Balls:
         """u."""
         return u
 
-    def times_z(self, u: Balls) -> Balls:
-        """z u, from z T_n = ½ (T_{n+1} + T_{|n−1|})."""
-        found = padded(0 * u, degrees=1)
-        for n in range(u.shape[1]):
-            found[:, n + 1] += u[:, n] / 2
-            found[:, abs(n - 1)] += u[:, n] / 2
-        return found
+    def times_z(self, u: Balls, noise: Cylinder) -> Balls:
+        """z u."""
+        return times_cosine(u)
 
     def places(self, low: FloatArray, high: FloatArray) -> tuple[Balls, Balls]:
         """The ends of cells in θ, T_m(cos θ) = cos mθ."""
@@ -179,16 +192,123 @@ class Whole:
 
     def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
         """The same of sums of cos mθ, up to signs."""
-        degrees = np.arange(parts.shape[1])
-        angles = np.outer(degrees, middle)
-        waves = [np.cos(angles), np.sin(angles)]
-        powers = [each(ball, degrees) ** i for i in range(ORDER)]
-        rest = magnitudes(parts) @ (degrees.astype(float)[:, None] * half) ** ORDER / factorial(ORDER)
-        derivatives = (matrix_product(parts * powers[i], waves[i % 2]) for i in range(ORDER))
-        return derivatives, raised(rest, 16 + 2 * len(degrees))
+        return cosine_taylor(parts, middle, half)
 
 
-Basis = Core | Whole
+class Plain(ABC):
+    """What is in common where T = u."""
+
+    is_core: ClassVar[bool] = False
+    centre: ClassVar[float] = 0.0
+    scale: ClassVar[float] = 1.0
+    gauge: ClassVar[float] = 0.0
+
+    def values(self, u: Balls) -> Balls:
+        """u."""
+        return u
+
+    def cleared(self, u: Balls, noise: Cylinder) -> Balls:
+        """u, as D = 1."""
+        return u
+
+    @abstractmethod
+    def cover(self, columns: int) -> tuple[FloatArray, FloatArray]:
+        """The ends of cells of the noise that cover it, for so many functions."""
+
+
+@dataclass(frozen=True)
+class Circle(Plain):
+    """cos mθ of z = cos θ."""
+
+    kind: ClassVar[Literal["circle"]] = "circle"
+
+    def one(self, columns: int) -> Balls:
+        """The coefficients of 1, so many at most."""
+        return balls([1.0])
+
+    def cover(self, columns: int) -> tuple[FloatArray, FloatArray]:
+        """Cells of θ/π."""
+        count = FINE * (columns + 2)
+        ends = np.arange(count + 1) / count
+        return ends[:-1], ends[1:]
+
+    def diffused(self, u: Balls, noise: Cylinder) -> Balls:
+        """½ ν ∂θθ u."""
+        return u * (each(ball, np.arange(u.shape[1])) ** 2 * (-noise.nu / 2))
+
+    def times_z(self, u: Balls, noise: Cylinder) -> Balls:
+        """u cos θ."""
+        return times_cosine(u)
+
+    def places(self, low: FloatArray, high: FloatArray) -> tuple[Balls, Balls]:
+        """θ at the ends of cells."""
+        left, right = (balls(end) * ball(0).pi() for end in (low, high))
+        return left, right
+
+    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+        """As `Whole.taylor`."""
+        return cosine_taylor(parts, middle, half)
+
+
+@dataclass(frozen=True)
+class States(Plain):
+    """1 in state m of a chain, 0 in the others; a cell is a state."""
+
+    kind: ClassVar[Literal["states"]] = "states"
+
+    def one(self, columns: int) -> Balls:
+        """1 in all states."""
+        return balls(np.ones(columns))
+
+    def cover(self, columns: int) -> tuple[FloatArray, FloatArray]:
+        """The states."""
+        return np.arange(float(columns)), np.arange(float(columns))
+
+    def diffused(self, u: Balls, noise: Cylinder) -> Balls:
+        """Σ_n rates_mn u_n."""
+        from flint import acb
+
+        assert noise.rates is not None
+        parts = np.concatenate([each(lambda c: c.real, u), each(lambda c: c.imag, u)])
+        real, imag = np.split(matrix_product(parts, noise.rates.T), 2)
+        return real + acb(0, 1) * imag
+
+    def times_z(self, u: Balls, noise: Cylinder) -> Balls:
+        """u times the value of the state."""
+        return u * noise.states
+
+    def places(self, low: FloatArray, high: FloatArray) -> tuple[Balls, Balls]:
+        """The states."""
+        return balls(low), balls(high)
+
+    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+        """The values themselves."""
+        return iter([parts]), np.zeros(parts.shape)
+
+
+Basis = Core | Whole | Circle | States
+OTHERS: Mapping[BasisKind, Basis] = {"whole": Whole(), "circle": Circle(), "states": States()}
+"""Those that need no numbers."""
+
+
+def times_cosine(u: Balls) -> Balls:
+    """u cos θ of sums of T_m(cos θ) = cos mθ, from z T_n = ½ (T_{n+1} + T_{|n−1|})."""
+    found = padded(0 * u, degrees=1)
+    for n in range(u.shape[1]):
+        found[:, n + 1] += u[:, n] / 2
+        found[:, abs(n - 1)] += u[:, n] / 2
+    return found
+
+
+def cosine_taylor(parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+    """Derivatives of sums of cos mθ at the middles of cells, up to signs, and a bound of what remains."""
+    degrees = np.arange(parts.shape[1])
+    angles = np.outer(degrees, middle)
+    waves = [np.cos(angles), np.sin(angles)]
+    powers = [each(ball, degrees) ** i for i in range(ORDER)]
+    rest = magnitudes(parts) @ (degrees.astype(float)[:, None] * half) ** ORDER / factorial(ORDER)
+    derivatives = (matrix_product(parts * powers[i], waves[i % 2]) for i in range(ORDER))
+    return derivatives, raised(rest, 16 + 2 * len(degrees))
 
 
 def hermite_table(y: Any, root: Any) -> Any:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
 from fpsolve.proofs.balls import Balls, above, ball, balls, below, each, magnitudes, raised, rounded
-from fpsolve.proofs.basis import Basis, added, padded, turned
+from fpsolve.proofs.basis import Basis, Plain, added, padded, turned
 from fpsolve.proofs.statement import Cylinder
 
 UPPER, LOWER = 1, -1
@@ -167,20 +167,27 @@ class Trial:
     @cached_property
     def slope(self) -> Balls:
         """u_z."""
+        assert not isinstance(self.basis, Plain)
         return self.basis.slope(self._u)
 
     @cached_property
     def _turned(self) -> tuple[Balls, Balls]:
-        """(F₀ + z F₁ − μ) u and F₁ u; for λ what is left of q + κh + F f − μ, and what multiplies z in it."""
+        """(F₀ + z F₁ − μ) u and F₁ u; for λ what is left of q + κh + F f − μ, and what multiplies z in it.
+
+        White noise has ½ F₁² in the place of z F₁, and for λ ½ F₁ (q₁ + κh₁ + F₁ f).
+        """
         waves, mu, exponent = len(self.cosine) - 1, ball(self.mu), 0 * self.noise.nu if self.p is None else self.p
         still, driven = (turned(self.noise.bands(i, exponent, waves), self.values) for i in (0, 1))
         if self.p is None:
-            source = [self.noise.growth(i)[:, None] for i in (0, 1)]
-            source[0][1, 0] -= mu
+            one = self.basis.one(self.cosine.shape[1])
+            source = [np.outer(self.noise.growth(i), one) for i in (0, 1)]
+            source[0][1] -= mu * one
             still, driven = added(still, source[0]), added(driven, source[1])
         else:
             still = added(still, -mu * self.values)
-        return added(still, self.basis.times_z(driven)), driven
+        if self.noise.is_white:
+            return added(still, turned(self.noise.bands(1, exponent, waves + 1), driven) / 2), driven
+        return added(still, self.basis.times_z(driven, self.noise)), driven
 
     @cached_property
     def mismatch(self) -> Balls:
@@ -200,7 +207,7 @@ class Bounds:
 
     Attributes:
         mismatch: around Lu/u − μ; infinite where u > 0 is not certain.
-        inward: around B of `verify`; for λ around b.
+        inward: around B of `verify`; for λ around b. It is not asked for where T = u.
     """
 
     mismatch: Range
@@ -247,7 +254,7 @@ class Bounder:
     """
 
     def __init__(self, trial: Trial, phases: int) -> None:
-        self.trial, self._phases = trial, Phases(phases, len(trial.cosine))
+        self.trial, self._phases = trial, Phases(phases, len(trial.cosine) + trial.noise.is_white)
 
     def bounds(self, low: FloatArray, high: FloatArray) -> Bounds:
         """On cells [low, high]."""
@@ -255,6 +262,8 @@ class Bounder:
         cells = Cells(trial.basis, low, high)
         divisor = self._divisor(cells)
         mismatch = self._range(cells.modes(trial.mismatch), divisor)
+        if isinstance(trial.basis, Plain):
+            return Bounds(mismatch, mismatch)
         if trial.noise.is_bounded and trial.basis.is_core:
             mismatch = _divided(mismatch, low, high)
         bend = np.zeros((2, 1))

@@ -3,22 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from fpsolve.errors import FpsolveError, NoSuchExponent
+from fpsolve.model.exact import BasisKind
 from fpsolve.proofs.balls import ball, precision
-from fpsolve.proofs.basis import Basis, Core, Whole
-from fpsolve.proofs.statement import Parameters, check_decimal, exact_halves
+from fpsolve.proofs.basis import OTHERS, Basis, Core, Plain
+from fpsolve.proofs.records import ChainRecord, MotionRecord, Record
+from fpsolve.proofs.statement import Statement, check_decimal, exact_halves
 
 MOMENT = "moment"
 MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 8192, "values": 2**23, "work": 2 * 10**8}
 """Of what a certificate may hold, so that a file cannot ask for more memory than a machine has, nor for minutes."""
+
+
+OWNERS: Mapping[BasisKind, str] = {
+    "core": "only Gaussian noise and that of Eq. (7) have a core",
+    "whole": "only bounded noise has a whole support",
+    "circle": "only sine-Wiener noise has a circle",
+    "states": "only a chain has states",
+}
 
 
 class MalformedProof(FpsolveError):
@@ -29,16 +39,10 @@ Decimal = Annotated[str, AfterValidator(check_decimal)]
 Table = Annotated[list[Annotated[list[float], Field(min_length=1, max_length=MOST["columns"])]], Field(min_length=1)]
 
 
-class Record(BaseModel):
-    """A part of a proof; numbers are floats that are taken as exact."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
-
-
 class BasisRecord(Record):
-    """Which polynomials are used, `basis.Core` or `basis.Whole`."""
+    """Which functions of the noise are used, see `fpsolve.proofs.basis`."""
 
-    kind: Literal["core", "whole"]
+    kind: BasisKind
     centre: float = 0.0
     scale: Annotated[float, Field(gt=0)] = 1.0
     gauge: float = 0.0
@@ -46,7 +50,7 @@ class BasisRecord(Record):
     @property
     def basis(self) -> Basis:
         """The basis."""
-        return Core(self.centre, self.scale, self.gauge) if self.kind == "core" else Whole()
+        return Core(self.centre, self.scale, self.gauge) if self.kind == "core" else OTHERS[self.kind]
 
 
 class SideRecord(Record):
@@ -54,12 +58,13 @@ class SideRecord(Record):
 
     Attributes:
         delta: how far it is from mu.
-        nodes, values, tails: W of `verify`, linear between nodes, from left to right; its constants beyond.
+        nodes, values, tails: W of `verify`, linear between nodes, from left to right; its constants beyond. Without
+            nodes W is 0.
     """
 
     delta: Annotated[float, Field(ge=0)]
-    nodes: Annotated[list[float], Field(min_length=2, max_length=MOST["cells"])]
-    values: Annotated[list[float], Field(min_length=2, max_length=MOST["cells"])]
+    nodes: Annotated[list[float], Field(max_length=MOST["cells"])]
+    values: Annotated[list[float], Field(max_length=MOST["cells"])]
     tails: Annotated[list[float], Field(min_length=2, max_length=2)] | None
 
     @model_validator(mode="after")
@@ -76,6 +81,8 @@ class Certificate(Record):
         quantity: "moment" or "lyapunov_exponent".
         p: the moment as a decimal.
         parameters: as decimals, and two words, by the keys of a case file.
+        motion, chain: the system by its matrices, the noise by its rates, where the parameters do not tell them; then
+            those are mere labels. Absent elsewhere.
         cosine, sine: the trial function, as `bounds.Trial` has it.
         upper, lower: the two bounds; None where one is not proven.
         phases: how many cells of φ suffice.
@@ -84,6 +91,8 @@ class Certificate(Record):
     quantity: Literal["moment", "lyapunov_exponent"]
     p: Decimal | None = None
     parameters: Mapping[str, str]
+    motion: MotionRecord | None = None
+    chain: ChainRecord | None = None
     mu: float
     basis: BasisRecord
     cosine: Annotated[Table, Field(max_length=MOST["rows"])]
@@ -98,16 +107,20 @@ class Certificate(Record):
         if len(shapes) != 1 or len(self.cosine) != len(self.sine):
             raise ValueError("cosine and sine must be tables of one shape")
         sides = [each for each in (self.upper, self.lower) if each is not None]
-        is_core = self.basis.kind == "core"
+        basis = self.basis.basis
         if not sides:
             raise ValueError("neither bound is there")
-        if (self.quantity == MOMENT) == (self.p is None) or any((each.tails is None) == is_core for each in sides):
+        if (self.quantity == MOMENT) == (self.p is None) or any(
+            (each.tails is None) == basis.is_core for each in sides
+        ):
             raise ValueError("a moment has its p, and a core its tails; nothing else has")
+        if any(bool(each.nodes) == isinstance(basis, Plain) or len(each.nodes) == 1 for each in sides):
+            raise ValueError("a core and a whole support have two nodes at least; nothing else has any")
         return self
 
     @model_validator(mode="after")
     def _fits_into_memory(self) -> Self:
-        cells = max(len(side.nodes) for side in (self.upper, self.lower) if side is not None)
+        cells = max(len(self._cells(side)) for side in (self.upper, self.lower) if side is not None)
         values = cells * max(self.phases, 8 * len(self.cosine), 8 * len(self.cosine[0]))
         if values > MOST["values"]:
             raise ValueError("nodes, phases and coefficients are too many together")
@@ -115,22 +128,39 @@ class Certificate(Record):
             raise ValueError(f"asks for {self.work:.1e} operations; at most {MOST['work']:.0e} are done")
         return self
 
+    def _cells(self, side: SideRecord) -> Sequence[float]:
+        """Ends of the cells of the noise."""
+        basis = self.basis.basis
+        return basis.cover(len(self.cosine[0]))[0].tolist() if isinstance(basis, Plain) else side.nodes
+
     @property
     def work(self) -> int:
         """About how many operations it takes to verify, some 2e-7 s each."""
-        cells = sum(len(side.nodes) for side in (self.upper, self.lower) if side is not None)
+        cells = sum(len(self._cells(side)) for side in (self.upper, self.lower) if side is not None)
         rows, columns = len(self.cosine), len(self.cosine[0])
         return cells * (self.phases * (20 + rows) // 20 + 6 * rows * columns)
 
+    @property
+    def statement(self) -> Statement:
+        """What it is about."""
+        return Statement(self.parameters, self.motion, self.chain)
+
     @model_validator(mode="after")
-    def _is_of_an_oscillator(self) -> Self:
+    def _is_of_a_known_system(self) -> Self:
         try:
-            _, law = exact_halves(self.parameters)
+            _, law, _ = exact_halves(self.statement)
         except NoSuchExponent as failure:
             raise ValueError(str(failure)) from None
-        if self.basis.kind == "whole" and not law.is_bounded:
-            raise ValueError("only bounded noise has a whole support")
+        if self.basis.kind not in law.bases:
+            raise ValueError(OWNERS[self.basis.kind])
+        if law.states is not None and len(law.states) != len(self.cosine[0]):
+            raise ValueError("a chain has a column of coefficients for each state")
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_absent_parts(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        found: dict[str, Any] = written(self)
+        return {name: part for name, part in found.items() if part is not None or name not in ("motion", "chain")}
 
 
 @dataclass(frozen=True)
@@ -206,17 +236,24 @@ def _outward(bound: Any, direction: float) -> float:
     return found
 
 
-def trivial(stated: Parameters) -> Enclosure:
+def trivial(stated: Statement) -> Enclosure:
     """Λ(0) = 0, as T = 1."""
-    side = SideRecord(delta=0.0, nodes=[-0.5, 0.5], values=[0.0, 0.0], tails=[0.0, 0.0])
+    _, law, _ = exact_halves(stated)
+    kind, columns = law.bases[0], 1 if law.states is None else len(law.states)
+    if kind == "core":
+        side = SideRecord(delta=0.0, nodes=[-0.5, 0.5], values=[0.0, 0.0], tails=[0.0, 0.0])
+    else:
+        side = SideRecord(delta=0.0, nodes=[], values=[], tails=None)
     unit = Certificate(
         quantity="moment",
         p="0.0",
-        parameters=dict(stated),
+        parameters=dict(stated.parameters),
+        motion=stated.motion,
+        chain=stated.chain,
         mu=0.0,
-        basis=BasisRecord(kind="core"),
-        cosine=[[1.0]],
-        sine=[[0.0]],
+        basis=BasisRecord(kind=kind),
+        cosine=[[1.0] * columns],
+        sine=[[0.0] * columns],
         upper=side,
         lower=side,
         phases=4,

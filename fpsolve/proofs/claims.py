@@ -14,7 +14,8 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from fpsolve.proofs.certificate import MOMENT, Certificate, MalformedProof, Record, follows
+from fpsolve.proofs.certificate import MOMENT, Certificate, MalformedProof, follows
+from fpsolve.proofs.records import Record
 from fpsolve.proofs.statement import DECIMAL, inert_keys
 from fpsolve.proofs.verify import objection
 

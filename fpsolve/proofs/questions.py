@@ -15,7 +15,7 @@ from fpsolve.model.problem import Problem, of_problem
 from fpsolve.proofs.balls import precision
 from fpsolve.proofs.certificate import NOTHING, Enclosure, around, trivial
 from fpsolve.proofs.search import enclose
-from fpsolve.proofs.statement import Parameters, cylinder, parameters_of
+from fpsolve.proofs.statement import Statement, cylinder, statement_of
 from fpsolve.theory.perturbation import scale_of
 
 SHARE = 1e-7
@@ -52,7 +52,7 @@ NO_INDEX = IndexEnclosure(-math.inf, math.inf)
 
 @of_problem
 def prove(problem: Problem, p: float, *, width: float | None = None) -> Enclosure:
-    """Bounds on Λ(p) that hold with certainty, for the paper's oscillator and its noise with r₀ ≤ 1.
+    """Bounds on Λ(p) that hold with certainty, for noise of Eq. (7) with r₀ ≤ 1 or (15), sine-Wiener noise, and chains.
 
     They follow from a function T > 0 with λ₋ T ≤ L(p) T ≤ λ₊ T, Eq. (19), which is verified in ball arithmetic; neither
     the finite elements nor the eigenvalue iteration are trusted. See `fpsolve.proofs.verify` for the theorem.
@@ -63,8 +63,10 @@ def prove(problem: Problem, p: float, *, width: float | None = None) -> Enclosur
     True
 
     Args:
-        oscillator, noise: the motion and its noise, whose numbers are the decimals they are printed as; or one
-            `Problem` of both, in their place or as `problem`.
+        oscillator, noise: the motion and its noise, or one `Problem` of both, in their place or as `problem`. Bounds
+            hold for the decimals that parameters are printed as; for a system that is no `VibroImpactOscillator`, and
+            for a chain, for the exact binary values of matrices, ln R, states and rates, and for a phase of a jump
+            within 1e-12 of a multiple of π/4 for that multiple.
         p: order of the moment, in the same sense.
         width: wanted upper − lower, in 1/time; 1e-7 of the scale of Λ(p) if None.
 
@@ -73,23 +75,23 @@ def prove(problem: Problem, p: float, *, width: float | None = None) -> Enclosur
 
     Raises:
         NoSuchExponent: r₀ > 1 for Eq. (7) as it stands.
-        TypeError: another motion or noise.
-        ValueError: p is not finite, or the width not positive.
+        TypeError: another noise, a chain of too many states, or a coefficient that is not a + bξ.
+        ValueError: p is not finite, the width not positive, or the phase may pass the ray of a jump both ways.
         MissingFlint: python-flint is not installed.
     """
-    return prove_bounds(problem, parameters_of(problem), repr(float(p)), width)
+    return prove_bounds(problem, statement_of(problem), repr(float(p)), width)
 
 
 @of_problem
 def prove_lyapunov_exponent(problem: Problem, *, width: float | None = None) -> Enclosure:
     """Bounds on the largest Lyapunov exponent λ that hold for almost every path; as `prove`."""
-    return prove_bounds(problem, parameters_of(problem), None, width)
+    return prove_bounds(problem, statement_of(problem), None, width)
 
 
 @of_problem
 def prove_stability_index(problem: Problem) -> IndexEnclosure:
     """Bounds on the stability index δ_p, from the signs of Λ beside it; as `prove`."""
-    return prove_index(problem, parameters_of(problem))
+    return prove_index(problem, statement_of(problem))
 
 
 def check_width(width: float | None) -> None:
@@ -98,14 +100,14 @@ def check_width(width: float | None) -> None:
         raise ValueError(f"got width = {width}; must be a positive number, such as 1e-9")
 
 
-def refuse_unprovable(stated: Parameters) -> None:
+def refuse_unprovable(stated: Statement) -> None:
     """Refuse parameters for which no bound can be proven. Raises `NoSuchExponent`, `MissingFlint`."""
     with precision():
         cylinder(stated)
 
 
-def prove_bounds(problem: Problem, stated: Parameters, p: str | None, width: float | None) -> Enclosure:
-    """Bounds on Λ(p), or on λ where p is None, with parameters and p as decimals."""
+def prove_bounds(problem: Problem, stated: Statement, p: str | None, width: float | None) -> Enclosure:
+    """Bounds on Λ(p), or on λ where p is None, with p as a decimal."""
     order = math.nan if p is None else float(p)
     if p is not None and not math.isfinite(order):
         raise ValueError(f"got p = {p}; must be finite")
@@ -128,8 +130,8 @@ def prove_bounds(problem: Problem, stated: Parameters, p: str | None, width: flo
     return replace(found, wanted=wanted)
 
 
-def prove_index(problem: Problem, stated: Parameters) -> IndexEnclosure:
-    """Bounds on δ_p, with parameters as decimals; none where there is none, or where it is not found."""
+def prove_index(problem: Problem, stated: Statement) -> IndexEnclosure:
+    """Bounds on δ_p; none where there is none, or where it is not found."""
     refuse_unprovable(stated)
     try:
         found = estimated_index(problem)

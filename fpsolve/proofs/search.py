@@ -21,10 +21,10 @@ from scipy.special import roots_jacobi
 from fpsolve.arrays import FloatArray
 from fpsolve.fem.factors import sparse_lu
 from fpsolve.proofs.balls import above, ball, balls, below, precision
-from fpsolve.proofs.basis import Basis, Core, Whole, hermite_table
+from fpsolve.proofs.basis import OTHERS, Basis, Circle, Core, Plain, States, Whole, hermite_table
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, HeldBounds, Trial
 from fpsolve.proofs.certificate import NOTHING, BasisRecord, Certificate, Enclosure, SideRecord, enclosure_of
-from fpsolve.proofs.statement import Cylinder, Parameters, cylinder
+from fpsolve.proofs.statement import Cylinder, Statement, cylinder
 from fpsolve.proofs.verify import objection
 
 SECONDS = 60.0
@@ -43,6 +43,8 @@ SLACK = 1e-6
 """Of the mismatch, relative, so that another machine's rounding does not matter."""
 MOST = 1e6
 """More than W needs to be anywhere; for q = −1 it would grow beyond all bounds."""
+NUDGE = 1e-10
+"""Of a shift off an eigenvalue, relative."""
 RULE_REACH = 11.0
 """Standard deviations of the weight that the quadrature covers on either side."""
 
@@ -84,17 +86,16 @@ class Galerkin:
 
     def __init__(self, noise: Cylinder, basis: Basis, p: float | None, waves: int, degrees: int) -> None:
         self.noise, self.waves, self.degrees = noise, waves, degrees
-        z, weight = _quadrature(basis, noise, degrees)
-        values, slopes = _tabulated(basis, z, degrees)
-        full = slopes + basis.gauge * values
-        self._mass, self._position = (values * weight) @ values.T, (values * weight * z) @ values.T
-        diffusion = float(noise.nu) / 2 * (full * weight) @ full.T
+        mass, position, wandering = _axis(noise, basis, degrees)
         modes = sp.identity(2 * waves + 1)
         still, driven = (self._turning(i, 0.0 if p is None else p) for i in (0, 1))
-        self.mass, self.position = sp.kron(modes, self._mass, format="csc"), sp.kron(modes, self._position)
-        self.matrix = (
-            sp.kron(modes, -diffusion) + sp.kron(still, self._mass) + sp.kron(driven, self._position)
-        ).tocsc()
+        self.mass = sp.kron(modes, mass, format="csc")
+        self.position = sp.kron(driven / 2, mass) if noise.is_white else sp.kron(modes, position)  # in front of F₁
+        push = self.position @ sp.kron(driven, sp.identity(degrees))
+        self.matrix = (sp.kron(modes, wandering) + sp.kron(still, mass) + push).tocsc()
+        one = basis.one(degrees).astype(float)
+        self.one = np.zeros((2 * waves + 1, degrees))
+        self.one[waves, : len(one)] = one
 
     def _turning(self, i: int, p: float) -> sp.csr_matrix:
         """F_i on the modes −K … K."""
@@ -108,11 +109,13 @@ class Galerkin:
     @np.errstate(all="ignore")
     def pair(self, guess: float) -> Pair:
         """The eigenvalue nearest to a guess of Λ(p), by inverse iteration from a constant; NaN on overflow."""
-        u = np.zeros(self.matrix.shape[0], complex)
-        u[self.waves * self.degrees] = 1.0
+        u = self.one.ravel().astype(complex)
         adjoint, value = u, guess
         for _ in range(2):
-            factors = sparse_lu((self.matrix - value * self.mass).tocsc())
+            try:
+                factors = sparse_lu((self.matrix - value * self.mass).tocsc())
+            except ArithmeticError:  # the shift is the eigenvalue but for rounding
+                factors = sparse_lu((self.matrix - (value + NUDGE * (1 + abs(value))) * self.mass).tocsc())
             for _ in range(4):
                 u, adjoint = factors.solve(self.mass @ u), factors.solve(self.mass @ adjoint, "H")
                 u, adjoint = (vector / vector[np.argmax(np.abs(vector))] for vector in (u, adjoint))
@@ -123,15 +126,13 @@ class Galerkin:
 
     def drift(self) -> Pair:
         """λ, and f of mean 0 with L(0) f = λ − q − κh."""
-        source = [self.noise.growth(i).astype(complex) for i in (0, 1)]
-        load = np.zeros((2 * self.waves + 1, self.degrees), complex)
-        first = slice(self.waves - 1, self.waves + 2)
-        load[first] = np.outer(source[0], self._mass[0]) + np.outer(source[1], self._position[0])
-        unit = np.zeros(load.size)
-        unit[self.waves * self.degrees] = 1.0
-        column = sp.csc_matrix(self.mass @ unit).T
+        still, driven = np.zeros((2, *self.one.shape), complex)
+        for i, part in enumerate((still, driven)):
+            part[self.waves - 1 : self.waves + 2] = np.outer(self.noise.growth(i), self.one[self.waves]).astype(complex)
+        load = self.mass @ still.ravel() + self.position @ driven.ravel()
+        column = sp.csc_matrix(self.mass @ self.one.ravel()).T
         bordered = sp.bmat([[self.matrix, -column], [column.T, None]], format="csc")
-        found = sparse_lu(bordered).solve(np.append(-load.ravel(), 0.0))
+        found = sparse_lu(bordered).solve(np.append(-load, 0.0))
         return Pair(float(found[-1].real), self._table(found[:-1]), 0.0)
 
     def _table(self, u: FloatArray) -> FloatArray:
@@ -140,7 +141,24 @@ class Galerkin:
         return (table + table[::-1].conj()) / 2
 
 
-def _quadrature(basis: Basis, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray]:
+def _axis(noise: Cylinder, basis: Basis, degrees: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """⟨B_n, B_m⟩, ⟨z B_n, B_m⟩ and the noise's part of L, shape (degrees, degrees) each."""
+    if isinstance(basis, States):
+        assert noise.states is not None
+        assert noise.rates is not None
+        return np.eye(degrees), np.diag(noise.states.astype(float)), noise.rates.astype(float)
+    if isinstance(basis, Circle):
+        mass = np.diag(np.where(np.arange(degrees) > 0, 0.5, 1.0))
+        position = basis.times_z(balls(np.eye(degrees)), noise)[:, :degrees].astype(float) @ mass
+        return mass, position, -float(noise.nu) / 2 * np.arange(degrees) ** 2 * mass
+    z, weight = _quadrature(basis, noise, degrees)
+    values, slopes = _tabulated(basis, z, degrees)
+    full = slopes + basis.gauge * values
+    diffusion = float(noise.nu) / 2 * (full * weight) @ full.T
+    return (values * weight) @ values.T, (values * weight * z) @ values.T, -diffusion
+
+
+def _quadrature(basis: Core | Whole, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray]:
     """Gauss's z and weights that sum to 1."""
     a = float(noise.slope)
     if not basis.is_core:
@@ -156,7 +174,7 @@ def _quadrature(basis: Basis, noise: Cylinder, degrees: int) -> tuple[FloatArray
     return z, weight / weight.sum()
 
 
-def _tabulated(basis: Basis, z: FloatArray, degrees: int) -> tuple[FloatArray, FloatArray]:
+def _tabulated(basis: Core | Whole, z: FloatArray, degrees: int) -> tuple[FloatArray, FloatArray]:
     """B_m(z) and B_m′(z), (degrees, points) each."""
     if basis.is_core:
         root = np.sqrt(np.arange(degrees))
@@ -170,7 +188,7 @@ def _tabulated(basis: Basis, z: FloatArray, degrees: int) -> tuple[FloatArray, F
 
 
 @precision()
-def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0) -> Enclosure:
+def enclose(stated: Statement, p: str | None, width: float, guess: float = 0.0) -> Enclosure:
     """Bounds on Λ(p), or on λ where p is None, that are at most `width` apart, if that can be done.
 
     Args:
@@ -185,6 +203,8 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0)
         NoSuchExponent: the noise has algebraic tails, r₀ > 1.
     """
     noise, best, size, started = cylinder(stated), NOTHING, SMALLEST, thread_time()
+    if noise.states is not None:
+        size = size[0], len(noise.states)
     for basis in bases(noise, p):
         for found, waves, degrees in _enlarged(stated, noise, basis, p, guess, size, started):
             if best.certificate is None or _apart(found) < _apart(best.certificate):
@@ -195,7 +215,7 @@ def enclose(stated: Parameters, p: str | None, width: float, guess: float = 0.0)
 
 
 def _enlarged(
-    stated: Parameters,
+    stated: Statement,
     noise: Cylinder,
     basis: Basis,
     p: str | None,
@@ -226,9 +246,10 @@ def _enlarged(
         elif delta < math.inf:
             idle += 1
         cost = thread_time() - begun
+        edges = pair.edges if noise.states is None else (pair.edges[0], 0.0)
         waves, degrees = (
-            math.ceil(GROWTH * n) + 1 if edge > 0.1 * max(pair.edges) else n
-            for n, edge in zip((waves, degrees), pair.edges, strict=True)
+            math.ceil(GROWTH * n) + 1 if edge > 0.1 * max(edges) else n
+            for n, edge in zip((waves, degrees), edges, strict=True)
         )
 
 
@@ -240,11 +261,14 @@ def _apart(certificate: Certificate) -> float:
 def bases(noise: Cylinder, p: str | None) -> Iterator[Basis]:
     """What is worth trying, in this order: the whole support, or a core about where the noise is in the moment."""
     slope = float(noise.slope)
+    if noise.bases[0] in OTHERS:
+        yield OTHERS[noise.bases[0]]
+        return
     if noise.is_bounded and slope < WHOLE_BELOW:
         yield Whole()
         return
-    driven = 2 * float(noise.q[1][1].real)
-    gauge = 0.0 if p is None else float(p) * driven / (2 * float(noise.nu) * slope)  # by perturbation theory
+    driven = float(noise.growth(1)[1].real)
+    gauge = 0.0 if p is None else float(p) * driven / (float(noise.nu) * slope)  # by perturbation theory
     # z with b(z) = β
     yield _core(noise, 2 * gauge / (slope + math.hypot(slope, 2 * gauge)) if noise.is_bounded else gauge / slope)
     if noise.is_bounded and slope < 2 * WHOLE_BELOW:
@@ -270,7 +294,7 @@ def _solved(noise: Cylinder, basis: Basis, p: str | None, guess: float, waves: i
     return pair, basis
 
 
-def certificate_of(stated: Parameters, noise: Cylinder, basis: Basis, p: str | None, pair: Pair) -> Certificate | None:
+def certificate_of(stated: Statement, noise: Cylinder, basis: Basis, p: str | None, pair: Pair) -> Certificate | None:
     """The closest bounds that a trial gives, before they are verified; None where there are none."""
     trial = Trial(noise, None if p is None else ball(p), pair.value, basis, pair.cosine, pair.sine)
     phases = max(128, 16 * len(pair.cosine))
@@ -280,7 +304,9 @@ def certificate_of(stated: Parameters, noise: Cylinder, basis: Basis, p: str | N
     return Certificate(
         quantity="lyapunov_exponent" if p is None else "moment",
         p=p,
-        parameters=dict(stated),
+        parameters=dict(stated.parameters),
+        motion=stated.motion,
+        chain=stated.chain,
         mu=pair.value,
         basis=BasisRecord(kind=basis.kind, centre=basis.centre, scale=basis.scale, gauge=basis.gauge),
         cosine=pair.cosine.tolist(),
@@ -380,7 +406,15 @@ def _pull(value: float, inward: float, q: int) -> float:
 
 def _sides(trial: Trial, phases: int) -> tuple[SideRecord | None, SideRecord | None]:
     """The least δ of the upper and of the lower bound, to 1 %, each None where there is none."""
-    nodes, bounder = _nodes(trial), Bounder(trial, phases)
+    bounder = Bounder(trial, phases)
+    if isinstance(trial.basis, Plain):
+        bounds = bounder.bounds(*trial.basis.cover(trial.cosine.shape[1]))
+        if not np.all(bounds.is_positive):
+            return None, None
+        most = (max(float(np.max(bounds.above(q))), 1e-18) * (1 + SLACK) for q in (UPPER, LOWER))
+        upper, lower = (SideRecord(delta=delta, nodes=[], values=[], tails=None) for delta in most)
+        return upper, lower
+    nodes = _nodes(trial)
     bounds = bounder.bounds(nodes[:-1], nodes[1:])
     if not np.any(bounds.is_positive):
         return None, None

@@ -1,13 +1,18 @@
-"""What a proof is about: an oscillator and its noise by their decimals, and Eq. (19) in balls.
+"""What a proof is about: a system and its noise, by their decimals or by their matrices and rates, and L(p) in balls.
 
-The phase is gauged: T = R^{p s(φ)} u, where the sawtooth s rises by one from one impact to the next, makes u continuous
-with dφ/dt > 0 at the impacts. With z the noise in a unit of its own and κ = ln R/π, R^{-ps} L(p) R^{ps} is
+The motion ẋ = (A₀ + ξ A₁) x has in x = ‖x‖ (cos φ, −sin φ) the phase speed h₀ + ξ h₁, h = e′ᵀA e, and the growth rate
+q₀ + ξ q₁, q = eᵀA e, of ln ‖x‖. At a ray the speed has one sign σ for all ξ, and x⁺ = R x⁻. The phase is gauged:
+T = e^{p s(φ)} u, where the sawtooth s falls by σ ln R at each ray and rises by κ = Σ σ ln R/π per radian between them,
+makes u continuous. With z the noise in a unit of its own, e^{-ps} L(p) e^{ps} is
 
     L = ν (½ ∂zz − b(z) ∂z) + F₀ + z F₁,      F = h(φ) (∂φ + pκ) + p q(φ),
 
-h₀ = ω + ε² c₁ ½ sin 2φ, q₀ = ε² c₁ ½ (1 − cos 2φ), and h₁, q₁ the same functions times ε and the unit of the noise.
+h₁ and q₁ times that unit. For Eq. (18), h₀ = ω + ε² c₁ ½ sin 2φ, q₀ = ε² c₁ ½ (1 − cos 2φ), and h₁, q₁ are the same
+functions times ε, without ω.
 For the Ornstein-Uhlenbeck process, Eqs. (13)-(15), the unit is its standard deviation, ν = 2α₀ and b = z/2. For Eq. (7)
-with r₀ < 1 it is the end of the support, ν = (1 − r₀)/τ₀ and b = a z/(1 − z²) with a = 1/(1 − r₀).
+with r₀ < 1 it is the end of the support, ν = (1 − r₀)/τ₀ and b = a z/(1 − z²) with a = 1/(1 − r₀). For the sine-Wiener
+process it is the amplitude, z = cos θ and the noise has ½ σ² ∂θθ; for a chain it is 1 and the noise has the matrix of
+its rates, u a component for each state. White noise has L = F₀ + ½ F₁² in the sense of Stratonovich, its unit is s.
 """
 
 from __future__ import annotations
@@ -19,13 +24,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.model.exact import ExactLaw, ExactMotion
+from fpsolve.model.exact import BasisKind, ExactLaw, ExactMotion
 from fpsolve.model.kinds import kind_classes
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
-from fpsolve.proofs.balls import Balls, ball
+from fpsolve.proofs.balls import Balls, ball, each
+from fpsolve.proofs.records import ChainRecord, MotionRecord
 
 if TYPE_CHECKING:
     from flint import arb
@@ -37,16 +43,32 @@ Parameters = Mapping[str, str]
 
 
 @dataclass(frozen=True)
+class Statement:
+    """A system and a noise.
+
+    Attributes:
+        parameters: of the system if it has no motion here, and of the noise if it has no chain; else they are labels.
+        motion: the system by its matrices.
+        chain: the noise by its rates.
+    """
+
+    parameters: Parameters
+    motion: MotionRecord | None = None
+    chain: ChainRecord | None = None
+
+
+@dataclass(frozen=True)
 class Cylinder:
-    """Eq. (19) between impacts, gauged, in balls.
+    """L(p) between jumps, gauged, in balls.
 
     Attributes:
         h, q: phase speed and growth rate, h₀ and h₁, q₀ and q₁, each by its coefficients of e^{2idφ}, d = −1, 0, 1.
-        kappa: κ = ln R/π.
-        nu: ν.
-        slope: b′(0), ½ or a.
-        is_bounded: whether the noise is.
+        kappa: κ.
+        nu, slope: ν and b′(0).
         unit: of ξ, so that ξ = unit · z.
+        bases: what functions of z may be made of.
+        states, rates: of a chain, shapes (n,) and (n, n); None of other noise.
+        is_white: whether the noise is white, L = F₀ + ½ F₁².
     """
 
     h: tuple[Balls, Balls]
@@ -54,8 +76,16 @@ class Cylinder:
     kappa: arb
     nu: arb
     slope: arb
-    is_bounded: bool
     unit: arb
+    bases: tuple[BasisKind, ...]
+    states: Balls | None = None
+    rates: Balls | None = None
+    is_white: bool = False
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether b = b′(0) z/(1 − z²), |z| < 1."""
+        return "whole" in self.bases
 
     def drift(self, z: Any) -> Any:
         """b(z)."""
@@ -90,54 +120,83 @@ def linear_values(problem: Problem) -> Mapping[str, float | str]:
     return {key: value for key, value in problem.values.items() if key not in inert}
 
 
-def parameters_of(problem: Problem) -> Parameters:
-    """The shortest decimals that are read as the numbers of a problem.
+def statement_of(problem: Problem, stated: Parameters | None = None) -> Statement:
+    """A problem by its decimals, else by its matrices and rates as floats.
+
+    Args:
+        stated: its parameters as decimals; None for the shortest that are read as its numbers.
 
     Raises:
         NoSuchExponent: no bound can be proven for these parameters.
         TypeError: no proof is known for such a system with such a noise.
+        ValueError: the phase may pass the ray of a jump both ways.
     """
-    stated = {key: str(value) for key, value in linear_values(problem).items()}
-    if _exact(problem.system, problem.noise, stated) is None:
-        system, noise = (type(half).__name__ for half in problem.halves)
-        raise TypeError(
-            f"got {system} with {noise}; proofs are for a VibroImpactOscillator with OrnsteinUhlenbeck or "
-            "NonGaussianNoise"
-        )
-    return stated
+    if stated is None:
+        stated = {key: str(value) for key, value in linear_values(problem).items()}
+    system, noise = problem.system, problem.noise
+    chain = ChainRecord.of(noise) if noise.exact_law(_named(noise, stated)) is None else None
+    motion = MotionRecord.of(system) if system.exact_motion(_named(system, stated)) is None else None
+    found = Statement(stated, motion, chain)
+    exact_halves(found)
+    return found
 
 
-def exact_halves(stated: Parameters) -> tuple[ExactMotion, ExactLaw]:
-    """What is stated, in exact numbers.
+def exact_halves(stated: Statement) -> tuple[ExactMotion, ExactLaw, list[int]]:
+    """What is stated, in exact numbers and in the sense of Stratonovich, with σ of each jump.
 
     Raises:
         NoSuchExponent: no bound can be proven for these parameters.
-        ValueError: these are no parameters of a system and a noise for which a proof is known, or out of range.
+        ValueError: these are no parameters of a system and a noise for which a proof is known, or out of range; or the
+            phase may pass the ray of a jump both ways.
     """
-    system, noise = _kinds(stated)
-    expected = _keys(system) | _keys(noise)
-    if set(stated) != expected:
+    system, noise = _kinds(stated.parameters)
+    expected = set[str]()
+    for half, record in ((system, stated.motion), (noise, stated.chain)):
+        section = System.section if half is system else Noise.section
+        expected |= _keys(half) if record is None else {key for key in stated.parameters if _section(key) == section}
+    if set(stated.parameters) != expected:
         raise ValueError(f"parameters must be {', '.join(sorted(expected))}")
+    motion = _exact_motion(system, stated.parameters) if stated.motion is None else stated.motion.exact
+    law = _exact_law(noise, stated.parameters) if stated.chain is None else stated.chain.exact
+    motion = law.in_stratonovich(motion)
+    directions = [law.passing(*motion.speeds(jump)) for jump in motion.jumps]
+    for jump, direction in zip(motion.jumps, directions, strict=True):
+        if not direction:
+            ray = ", ".join(f"{float(each):g}" for each in jump.ray)
+            raise ValueError(
+                f"got a jump at the ray of ({ray}), which the phase does not pass one way only; proofs are for jumps "
+                "at rays where its speed has one sign for every value of the noise"
+            )
+    return motion, law, directions
+
+
+def _exact_motion(system: type[System], stated: Parameters) -> ExactMotion:
+    named = _checked(system, stated)
+    motion = system.exact_motion(named)
+    if motion is None:
+        raise ValueError(f"no proof is known for {system.__name__} by its parameters")
+    return motion
+
+
+def _exact_law(noise: type[Noise], stated: Parameters) -> ExactLaw:
     for name, word in noise.words.items():
         found = stated[f"{noise.section}.{name}"]
         if found != word:
             words = [each.words[name] for each in kind_classes("noises") if _keys(each) == _keys(noise)]
             raise ValueError(f"got {noise.section}.{name} = {found[:40]!r}; must be {' or '.join(map(repr, words))}")
-    for half in (system, noise):
-        decimals = {name: text for name, text in _named(half, stated).items() if name not in half.words}
-        numbers = [name for name in decimals if half.fields()[name].annotation is float]
-        half(**decimals | {name: float(check_decimal(decimals[name])) for name in numbers})
-    exact = _exact(system, noise, stated)
-    if exact is None:
-        raise ValueError(f"no proof is known for {system.__name__} with {noise.__name__}")
-    return exact
+    law = noise.exact_law(_checked(noise, stated))
+    if law is None:
+        raise ValueError(f"no proof is known for {noise.__name__} by its parameters")
+    return law
 
 
-def _exact(
-    system: System | type[System], noise: Noise | type[Noise], stated: Parameters
-) -> tuple[ExactMotion, ExactLaw] | None:
-    motion, law = system.exact_motion(_named(system, stated)), noise.exact_law(_named(noise, stated))
-    return None if motion is None or law is None else (motion, law)
+def _checked(half: type[Parametrised], stated: Parameters) -> Parameters:
+    """What is stated for a system or a noise, if its numbers are in range."""
+    named = _named(half, stated)
+    decimals = {name: text for name, text in named.items() if name not in half.words}
+    numbers = [name for name in decimals if half.fields()[name].annotation is float]
+    half(**decimals | {name: float(check_decimal(decimals[name])) for name in numbers})
+    return named
 
 
 def check_decimal(text: str) -> str:
@@ -168,26 +227,42 @@ def _keys(kind: type[Parametrised]) -> set[str]:
     return {f"{kind.section}.{name}" for name in (*kind.fields(), *kind.words) if name not in kind.inert}
 
 
+def _section(key: str) -> str:
+    return key.partition(".")[0]
+
+
 def _named(half: Parametrised | type[Parametrised], stated: Parameters) -> Mapping[str, str]:
     """What is stated for a system or a noise, by names without their section."""
-    return {key.partition(".")[2]: text for key, text in stated.items() if key.partition(".")[0] == half.section}
+    return {key.partition(".")[2]: text for key, text in stated.items() if _section(key) == half.section}
 
 
-def cylinder(stated: Parameters) -> Cylinder:
-    """Eq. (19) for parameters.
+def cylinder(stated: Statement) -> Cylinder:
+    """L(p) for a statement.
 
     Raises:
         NoSuchExponent: no bound can be proven for these parameters.
     """
-    motion, law = exact_halves(stated)
-    unit, zero = ball(law.squared_unit).sqrt(), ball(0)
-    omega, still, driven = ball(motion.omega), ball(motion.damping) / 2, ball(motion.drive) * unit / 2
+    motion, law, directions = exact_halves(stated)
+    unit, kappa = ball(law.squared_unit).sqrt(), ball(0)
+    for jump, direction in zip(motion.jumps, directions, strict=True):
+        kappa += direction * (ball(jump.log_factor) + ball(jump.factor).log()) / kappa.pi()
+    still, driven = _polar(each(ball, motion.still)), _polar(each(ball, motion.driven) * unit)
     return Cylinder(
-        h=(_wave(omega, zero, still), _wave(zero, zero, driven)),
-        q=(_wave(still, -still, zero), _wave(driven, -driven, zero)),
-        kappa=(ball(motion.log_factor) + ball(motion.factor).log()) / zero.pi(),
+        h=(still[0], driven[0]),
+        q=(still[1], driven[1]),
+        kappa=kappa,
         nu=ball(law.nu),
         slope=ball(law.slope),
-        is_bounded=law.is_bounded,
         unit=unit,
+        bases=law.bases,
+        states=None if law.states is None else each(ball, law.states),
+        is_white=bool(law.white),
+        rates=None if law.rates is None else each(ball, law.rates),
     )
+
+
+def _polar(a: Balls) -> tuple[Balls, Balls]:
+    """h and q of a matrix of real balls."""
+    (first, second), (third, fourth) = a / 2
+    turning = _wave(second - third, -second - third, fourth - first)
+    return turning, _wave(first + fourth, first - fourth, -second - third)

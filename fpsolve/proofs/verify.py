@@ -48,6 +48,11 @@ which holds beyond an end if it holds there and νκ b′ ≥ max(q n_z) there: 
 z ≥ 0, and with it the slope of the right side grows by (κ + qβ) Δb′ ≥ 0. The left end is mirrored onto the right one,
 z → −z, β → −β, W → −W.
 
+*Noise on a circle, and chains.* T = R^{ps} u without ψ, and Lu ≤ (μ + δ) u, Lu ≥ (μ − δ) u are verified, or the same of
+the drift of ln‖x‖ + f. For z = cos θ, dθ = √ν dW, T is an even function of θ, so that the theorem holds with θ in the
+place of ξ. For a chain T has a component for each state, the noise's part of LT is its matrix of rates, and Dynkin's
+formula stands in the place of Itô's; all coefficients are bounded.
+
 The drift of ln‖x‖ + f ± ψ is bounded in the same way, with e = q (its drift − μ), without W² and with B = b, β = 0 and
 r = f_z.
 
@@ -62,6 +67,7 @@ from itertools import pairwise
 import numpy as np
 
 from fpsolve.proofs.balls import ball, precision
+from fpsolve.proofs.basis import Plain
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, Trial
 from fpsolve.proofs.certificate import MOMENT, Certificate, SideRecord
 from fpsolve.proofs.statement import Cylinder, cylinder
@@ -74,18 +80,20 @@ def objection(certificate: Certificate) -> str:
     if certificate.p is not None and Fraction(certificate.p) == 0:  # Λ(0) = 0, as T = 1
         return "" if all(q * Fraction(certificate.mu) + Fraction(side.delta) >= 0 for q, side in sides) else "Λ(0) = 0"
     trial = Trial(
-        noise=cylinder(certificate.parameters),
+        noise=cylinder(certificate.statement),
         p=None if certificate.p is None else ball(certificate.p),
         mu=certificate.mu,
         basis=certificate.basis.basis,
         cosine=np.array(certificate.cosine),
         sine=np.array(certificate.sine),
     )
+    bounder = Bounder(trial, certificate.phases)
+    if isinstance(trial.basis, Plain):
+        return _plain_objection(bounder, trial.basis, certificate)
     for _, side in sides:
         misplaced = _misplaced(certificate, trial.noise, side)
         if misplaced:
             return misplaced
-    bounder = Bounder(trial, certificate.phases)
     cells = sorted({cell for _, side in sides for cell in pairwise(side.nodes)})
     low, high = np.array(cells).T
     bounds, places = bounder.bounds(low, high), {cell: j for j, cell in enumerate(cells)}
@@ -94,6 +102,17 @@ def objection(certificate: Certificate) -> str:
     return "".join(
         _objection_within(bounds, places, trial, q, side) or _objection_beyond(bounder, q, side) for q, side in sides
     )
+
+
+def _plain_objection(bounder: Bounder, basis: Plain, certificate: Certificate) -> str:
+    """Why LT ≤ (μ + δ) T or LT ≥ (μ − δ) T need not hold for T = u."""
+    bounds = bounder.bounds(*basis.cover(len(certificate.cosine[0])))
+    if not np.all(bounds.is_positive):
+        return "u > 0 is not certain"
+    for q, side in ((UPPER, certificate.upper), (LOWER, certificate.lower)):
+        if side is not None and not np.max(bounds.above(q)) <= side.delta:
+            return f"{'upper' if q > 0 else 'lower'} bound: the mismatch is greater than its delta; "
+    return ""
 
 
 def _misplaced(certificate: Certificate, noise: Cylinder, side: SideRecord) -> str:

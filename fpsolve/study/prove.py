@@ -24,7 +24,7 @@ from fpsolve.proofs.questions import (
     prove_index,
     refuse_unprovable,
 )
-from fpsolve.proofs.statement import DECIMAL, Parameters, linear_values, parameters_of
+from fpsolve.proofs.statement import DECIMAL, Statement, linear_values, statement_of
 
 ORDERS = "moments.p"
 Literals = Mapping[float, str]
@@ -37,14 +37,14 @@ class CurveProof:
     """What is proven of one parameter set.
 
     Attributes:
-        stated: its parameters as decimals, as far as what is proven depends on them.
+        stated: what is proven of.
         moments: p as a decimal, and bounds on Λ(p) or None where that was not tried.
         exponent: bounds on λ; None where they are not asked for, or were not tried.
         index: bounds on δ_p; the same.
     """
 
     curve: Curve
-    stated: Parameters
+    stated: Statement
     moments: tuple[tuple[str, Enclosure | None], ...]
     exponent: Enclosure | None = None
     index: IndexEnclosure | None = None
@@ -98,12 +98,13 @@ class Plan:
             return [str(Decimal(p)) for p in self.case.p.tolist()]
         return [decimal_of(p, self._literals[ORDERS]) for p in self.case.p.tolist()]
 
-    def stated(self, curve: Curve) -> Parameters:
-        """The parameters of the linear motion as the decimals that the case states."""
-        return {
+    def stated(self, curve: Curve) -> Statement:
+        """The linear motion with its parameters as the decimals that the case states. Raises as `statement_of`."""
+        decimals = {
             key: value if isinstance(value, str) else decimal_of(value, self._literals[key])
             for key, value in linear_values(curve.problem).items()
         }
+        return statement_of(curve.problem, decimals)
 
     def questions(self) -> Iterator[Question]:
         for curve in self.case.curves():
@@ -139,9 +140,8 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
     for curve in case.curves():
         place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
         try:
-            parameters_of(curve.problem)
             refuse_unprovable(plan.stated(curve))
-        except TypeError as failure:
+        except (TypeError, ValueError) as failure:
             raise FpsolveError(f"{place}: {failure}") from None
         except NoSuchExponent as failure:
             raise NoSuchExponent(Message(Code.PLACED, place=place, reason=failure.message)) from None

@@ -9,7 +9,7 @@ import pytest
 from fpsolve.proofs.balls import above, ball, below, precision, rounded
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Cells, Phases, Trial
 from fpsolve.proofs.certificate import BasisRecord
-from fpsolve.proofs.statement import cylinder
+from fpsolve.proofs.statement import Statement, cylinder
 from tests.proofs.by_definition import EXACT
 from tests.proofs.mutations import powers, samples
 
@@ -30,7 +30,7 @@ def trial(name, p=P, seed=2):
     cosine, sine = (0.2 * size * rng.normal(size=(4, 6)) for _ in range(2))
     cosine[0, 0] = 1.0
     basis = basis if p else basis | {"gauge": 0.0}
-    of = Trial(cylinder(stated), p and ball(str(p)), 0.2, BasisRecord(**basis).basis, cosine, sine)
+    of = Trial(cylinder(Statement(stated)), p and ball(str(p)), 0.2, BasisRecord(**basis).basis, cosine, sine)
     about = {"p": p and str(p), "parameters": stated, "mu": 0.2, "basis": basis, "cosine": cosine, "sine": sine}
     points = others.uniform(0, math.pi, 200), others.uniform(*ends, 200)
     return of, {"quantity": "moment" if p else "lyapunov_exponent", **about}, *points

@@ -21,7 +21,7 @@ from fpsolve.proofs import prove, prove_lyapunov_exponent
 from fpsolve.proofs.balls import precision
 from fpsolve.proofs.claims import Bound, MomentBound
 from fpsolve.proofs.search import Galerkin, bases, certificate_of
-from fpsolve.proofs.statement import cylinder
+from fpsolve.proofs.statement import Statement, cylinder
 from tests.conftest import sampled
 from tests.oracles import certificate_checker as checker
 from tests.oracles import certificate_condition as condition
@@ -123,10 +123,11 @@ def test_both_checkers_refuse_mutations_that_do_not_follow(name, step):
 def test_w_levels_a_rough_trial_function(p, rng):
     """Few harmonics and degrees: |Lu/u − μ| is far greater than either δ; and neither W serves the other bound."""
     with precision():
-        noise = cylinder(PLAIN)
+        stated = Statement(PLAIN)
+        noise = cylinder(stated)
         basis = next(bases(noise, p))
         pair = Galerkin(noise, basis, float(p), 2, 3).pair(truth(PLAIN, float(p)))
-        rough = certificate_of(PLAIN, noise, basis, p, pair)
+        rough = certificate_of(stated, noise, basis, p, pair)
     certificate = rough.model_dump(mode="json")
     entry = {"p": float(p), "lower": -1, "upper": 1, "certificate": certificate}
     assert checker.check(entry) == ""

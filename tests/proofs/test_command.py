@@ -179,7 +179,7 @@ def stated(case, *overrides):
     """The decimals of all p and of D0 and ω of the first curve."""
     plan = Plan(load_case(case, overrides), None)
     asked = [each.args for each in islice(plan.questions(), plan.each)]
-    parameters = asked[0][1]
+    parameters = asked[0][1].parameters
     numbers = [each[2] for each in asked if len(each) == 4 and each[2] is not None]
     return numbers, *(parameters[key] for key in ("noise.D0", "oscillator.omega"))
 

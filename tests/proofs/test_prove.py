@@ -151,12 +151,6 @@ def test_numbers_that_are_none_are_refused(p, width):
         prove(problem(**FIG1), p, width=width)
 
 
-def test_other_systems_are_refused():
-    rotation = fpsolve.PlaneSystem([fpsolve.model.CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))])
-    with pytest.raises(TypeError, match="VibroImpactOscillator"):
-        prove(rotation, fpsolve.OrnsteinUhlenbeck(1.0, 1.0), 1.0)
-
-
 @pytest.mark.parametrize("seed", [103, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (102, 104, 105))])
 def test_random_problems(seed):
     """A hundred others: `python -m tests.random_proofs`."""

@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.exact import ExactLaw, gaussian_law
+from fpsolve.model.exact import ExactLaw, bounded_law, gaussian_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, LinearStep, linear_step
@@ -297,7 +297,7 @@ class NonGaussianNoise(TreatedNoise):
             raise NoSuchExponent(Message(Code.NO_BOUND, key=key, value=decimals["r0"], remedy=Remedy.REDUCTION))
         if r0 == 1:
             return ReducedNoise.exact_law(decimals)
-        return ExactLaw((1 - r0) / tau0, 1 / (1 - r0), 2 * D0 / (tau0 * (1 - r0)), is_bounded=True)
+        return bounded_law((1 - r0) / tau0, 1 / (1 - r0), 2 * D0 / (tau0 * (1 - r0)))
 
 
 @told_in_words

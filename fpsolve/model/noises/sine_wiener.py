@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from fractions import Fraction
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
@@ -10,6 +12,7 @@ from numpy.typing import ArrayLike
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
+from fpsolve.model.exact import ExactLaw
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import SIZE, STRICT, parameter
@@ -112,6 +115,10 @@ class SineWiener(Noise):
     @property
     def largest_step(self) -> float:
         return 0.1 / self.sigma**2
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        return ExactLaw(("circle",), Fraction(decimals["amplitude"]) ** 2, Fraction(decimals["sigma"]) ** 2)
 
     def derivative(self, name: str) -> NoiseDerivative:
         """∂/∂A stretches ξ, and ∂/∂σ is that of σ alone."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
+from fpsolve.model.exact import ExactLaw, chain_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.model.noises.markov_chain import Chain
@@ -49,6 +51,11 @@ class Telegraph(Chain):
     @property
     def probabilities(self) -> FloatArray:
         return np.array([0.5, 0.5])
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        a, k = Fraction(decimals["a"]), Fraction(decimals["k"])
+        return chain_law(np.array([-a, a]), np.array([[-k, k], [k, -k]]))
 
     def derivative(self, name: str) -> NoiseDerivative:
         return NoiseDerivative(states=(-1.0, 1.0)) if name == "a" else NoiseDerivative(rates=FLIP)

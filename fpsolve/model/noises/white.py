@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass as plain_dataclass
 from enum import StrEnum
+from fractions import Fraction
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
+from fpsolve.model.exact import ExactLaw, white_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import SIZE, STRICT, parameter
@@ -100,6 +102,10 @@ class White(Noise):
         if self.interpretation == Interpretation.ITO and diffusions:
             drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))
         return Drift(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        return white_law(Fraction(decimals["s"]) ** 2, decimals["interpretation"])
 
     def changed_motion(
         self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""

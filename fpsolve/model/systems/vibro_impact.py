@@ -16,7 +16,7 @@ from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.messages import Code, Message
-from fpsolve.model.exact import ExactMotion
+from fpsolve.model.exact import ExactJump, ExactMotion
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
@@ -175,7 +175,9 @@ class VibroImpactOscillator(System):
         loss, square = epsilon**2 * (1 - restitution), epsilon**2
         is_delta = decimals["impact"] == ImpactLaw.DELTA
         factor, log_factor = (Fraction(1), -loss) if is_delta else (1 - loss, Fraction(0))
-        return ExactMotion(omega, square * c1, epsilon, factor, log_factor)
+        jump = ExactJump(np.array([0, -1], dtype=object), factor, log_factor)
+        still, driven = np.array([[[0, omega], [-omega, square * c1]], [[0, 0], [0, epsilon]]], dtype=object)
+        return ExactMotion(still, driven, (jump,))
 
     def impact_value(self, log_factor: float) -> float:
         """The r for which this law, with this ε, has a given ln R; it may be no coefficient of restitution."""
