@@ -33,6 +33,7 @@ from fpsolve.model.faults import ParameterError
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.sine_wiener import SineWiener
 from fpsolve.model.plane import CoefficientMatrix, Jump
+from tests.solving import case_text
 
 LIMIT = 60
 """Seconds after which a call hangs."""
@@ -138,22 +139,7 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "write_mesh": (written_mesh, {"path": "mesh.vtu"}),
 }
 POSITIONAL = {"open_results": ["places"]}
-CASE = """title = "odd"
-[oscillator]
-epsilon = 0.1
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.1
-tau0 = 0.5
-r0 = 0.95
-[moments]
-p = [1.0]
-[output]
-quantities = ["moment"]
-figure = false
-"""
+CASE = case_text('[moments]\np = [1.0]\n[output]\nquantities = ["moment"]\nfigure = false\n', "odd", {"D0": 0.1})
 
 
 class Hang(BaseException):

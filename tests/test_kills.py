@@ -12,23 +12,10 @@ import pytest
 
 from fpsolve.pool import processors
 from tests.conftest import heed_signals
+from tests.solving import case_text
 
-CASE = """
-title = "Killed"
-[oscillator]
-epsilon = 0.3
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 1.0
-tau0 = 0.5
-r0 = 0.95
-[moments]
-p = [-1.0, 2.0]
-[vary]
-"noise.D0" = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
-"""
+VARIED = '[vary]\n"noise.D0" = { start = 0.5, stop = 1.6, num = 12 }\n'
+CASE = case_text(f"[moments]\np = [-1.0, 2.0]\n{VARIED}", "Killed", {"D0": 1.0}, epsilon=0.3)
 ROUNDS = 1
 """Of four kills; fifteen take three minutes."""
 CODE = "from fpsolve.cli import main; print('begun', flush=True); raise SystemExit(main())"
