@@ -24,29 +24,21 @@ from fpsolve.study import solve
 from fpsolve.workflow import run_case
 from fpsolve.workflow.sets import SOLVED_RECORDS
 from tests.conftest import heed_signals, sampled
+from tests.solving import case_text
 
-CASE = """
-title = "A sweep"
-[oscillator]
-epsilon = 0.5
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.5
-tau0 = 0.5
-r0 = 0.95
+SIZE = 6
+"""Sets each way."""
+SECTIONS = f"""
 [moments]
 p = {{ start = -2.0, stop = 4.0, num = 4 }}
 [vary]
-"noise.D0" = {{ start = 0.1, stop = 1.0, num = {size}, scale = "log" }}
-"oscillator.omega" = {{ start = 0.5, stop = 3.0, num = {size} }}
+"noise.D0" = {{ start = 0.1, stop = 1.0, num = {SIZE}, scale = "log" }}
+"oscillator.omega" = {{ start = 0.5, stop = 3.0, num = {SIZE} }}
 [output]
 figure = false
 quantities = ["moment", "lyapunov_exponent", "stability_index", "variance_rate", "critical_impact_factor"]
 """
-SIZE = 6
-"""Sets each way."""
+CASE = case_text(SECTIONS, "A sweep", epsilon=0.5)
 MAIN = "from fpsolve.cli import main; raise SystemExit(main())"
 PASSING = {"started", "wall_seconds", "command", "host"}
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals and limits of POSIX")
@@ -54,11 +46,17 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals and limits of P
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A folder with a case, which is solved there in `whole`, by this process alone."""
+    """A folder with a case."""
     folder = tmp_path_factory.mktemp("sweeps")
-    (folder / "sweep.toml").write_text(CASE.format(size=SIZE), encoding="utf-8")
-    run(folder, "whole", "--jobs", "1")
+    (folder / "sweep.toml").write_text(CASE, encoding="utf-8")
     return folder
+
+
+def whole(folder):
+    """Where this process alone has solved the case."""
+    if not (folder / "whole").exists():
+        run(folder, "whole", "--jobs", "1")
+    return folder / "whole"
 
 
 def started(folder, out, *options, before=heed_signals):
@@ -81,11 +79,11 @@ def lines(folder, out):
     return [line for path in paths for line in path.read_bytes().splitlines(keepends=True)]
 
 
-def assert_same_results(folder, out, whole="whole"):
+def assert_same_results(folder, out):
     """results.nc bit for bit, but for seconds and times; and the curves of summary.json."""
     with (
         xr.open_dataset(folder / out / "sweep/results.nc") as one,
-        xr.open_dataset(folder / whole / "sweep/results.nc") as two,
+        xr.open_dataset(whole(folder) / "sweep/results.nc") as two,
     ):
         assert one.drop_vars("seconds").equals(two.drop_vars("seconds"))
         for name in set(one.data_vars) - {"seconds"}:
@@ -95,8 +93,8 @@ def assert_same_results(folder, out, whole="whole"):
         assert kept[0] == kept[1]
         assert one.attrs["complete"] == 1
     curves = [
-        json.loads((folder / each / "sweep/summary.json").read_text(encoding="utf-8"))["curves"]
-        for each in (out, whole)
+        json.loads((each / "sweep/summary.json").read_text(encoding="utf-8"))["curves"]
+        for each in (folder / out, whole(folder))
     ]
     assert [{**curve, "seconds": 0} for curve in curves[0]] == [{**curve, "seconds": 0} for curve in curves[1]]
 
@@ -169,7 +167,7 @@ def test_a_full_disk(place):
 
 @pytest.mark.slow
 def test_torn_and_damaged_records_are_solved_again(place):
-    shutil.copytree(place / "whole", place / "torn")
+    shutil.copytree(whole(place), place / "torn")
     [path] = (place / "torn/sweep" / SOLVED_RECORDS).glob("*")
     content = path.read_bytes().splitlines(keepends=True)
     content[3] = content[3].replace(b"0.", b"1.", 1) if b"0." in content[3] else content[3][1:]
@@ -194,7 +192,7 @@ def test_what_is_no_file_holds_no_records(tmp_path):
 
 @pytest.mark.slow
 def test_a_changed_parameter_solves_only_what_it_changes(place):
-    shutil.copytree(place / "whole", place / "changed")
+    shutil.copytree(whole(place), place / "changed")
     omega, D0 = "[0.5, 0.7]", f'{{ start = 0.1, stop = 1.0, num = {SIZE}, scale = "log" }}'
     sets = f'vary={{ "noise.D0" = {D0}, "oscillator.omega" = {omega} }}'
     run(place, "changed", "--jobs", "1", "--set", sets)
