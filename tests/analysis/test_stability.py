@@ -94,14 +94,15 @@ def test_weak_noise_has_the_lines_of_the_paper(zero, omega):
 
 @pytest.mark.parametrize(
     ("omega", "epsilon", "d0", "tau0", "r0"),
-    [
+    sampled(
+        (1.0, 1.5, 0.4, 0.3, 1.3),
+        (3.0, 1.0, 1.0, 0.2, 0.8),
         (1.0, 0.1, 1.0, 0.5, 1.0),
         (1.0, 0.5, 0.3, 2.0, 0.95),
-        (3.0, 1.0, 1.0, 0.2, 0.8),
         (0.5, 1.0, 0.5, 1.0, 0.5),
-        (1.0, 1.5, 0.4, 0.3, 1.3),
         (2.0, 1.0, 2.0, 0.5, 0.0),
-    ],
+        keep=2,
+    ),
 )
 @pytest.mark.parametrize("key", sampled("noise.D0", "oscillator.omega"))
 def test_without_impacts_the_line_of_index_minus_two_is_exact(omega, epsilon, d0, tau0, r0, key):
@@ -361,13 +362,14 @@ def test_moment_stability_ends_at_the_paper_s_index(index):
 
 @pytest.mark.parametrize(
     ("key", "values", "sign"),
-    [
+    sampled(
+        ("oscillator.restitution", (0.6, 1.0), 1),
+        ("noise.tau0", (0.2, 2.0), -1),
         ("noise.D0", (0.3, 3.0), 1),
         ("noise.r0", (0.5, 1.2), 1),
-        ("noise.tau0", (0.2, 2.0), -1),
         ("oscillator.omega", (0.5, 3.0), -1),
-        ("oscillator.restitution", (0.6, 1.0), 1),
-    ],
+        keep=2,
+    ),
 )
 @pytest.mark.parametrize("zero", sampled(LAMBDA, SECOND))
 def test_what_the_paper_says_of_each_parameter(zero, key, values, sign):
