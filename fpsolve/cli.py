@@ -246,6 +246,14 @@ def simulate(
 def check(
     cases: Cases,
     *,
+    hierarchy: Annotated[
+        bool,
+        Parameter(
+            help="Compare Λ of the even p of [moments] with the moment hierarchy instead, an eigenvalue without phase; "
+            "for white noise and chains without walls.",
+            negative="",
+        ),
+    ] = False,
     jobs: Jobs = None,
     scheduler: Scheduler = "",
     quiet: Quiet = False,
@@ -256,12 +264,15 @@ def check(
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
     from fpsolve.output.terminal import agreement, print_comparisons, print_remarks
+    from fpsolve.study.hierarchy import refuse_no_hierarchy
     from fpsolve.workflow.cases import check_case
 
     code, loaded = 0, load(cases, overrides)
+    for case in loaded if hierarchy else ():
+        refuse_no_hierarchy(case)
     pool = pool_of(jobs, scheduler, loaded)
     for case in loaded:
-        outcome = check_case(case, pool=pool, watch=_watch(is_quiet=quiet))
+        outcome = check_case(case, by_hierarchy=hierarchy, pool=pool, watch=_watch(is_quiet=quiet))
         if quiet:
             print(f"{case.name}: {agreement(outcome.comparisons)}")
             print_remarks(case, outcome.results, "", [Severity.FAILURE])

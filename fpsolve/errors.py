@@ -30,6 +30,10 @@ class NoPerturbationTheory(FpsolveError):
     """Second-order perturbation theory does not apply to this motion or this noise."""
 
 
+class NoHierarchy(FpsolveError):
+    """The equations of the moments do not close for this problem, or for this p."""
+
+
 class MeshError(FpsolveError):
     """A mesh that cannot carry the problem: not a tensor grid, or no line at an impact."""
 

@@ -138,8 +138,7 @@ def second_order(problem: Problem) -> SecondOrder:
                 f"perturbation theory is for motions whose noise enters as epsilon xi; a term of order {term.order} "
                 f"with g = {written_coefficient(term.g).strip() or 1} is not of that form"
             )
-    of_noise: list[tuple[Harmonics, float, float]]
-    of_noise = [(_growth(driven, frame), *(noise.spectral_density(each) for each in (0.0, 2 * omega)))]
+    of_noise = [(_growth(driven, frame), noise.spectral_density(0.0), noise.spectral_density(2 * omega))]
     for each in problem.diffusions:
         if each.order != 1:
             raise NoPerturbationTheory(f"perturbation theory is for white noise of order 1, not {each.order}")

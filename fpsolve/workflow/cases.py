@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from fpsolve.case.case import Case, load_case
+from fpsolve.case.case import Case, Curve, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
@@ -19,9 +19,10 @@ from fpsolve.output.vtk import write_response
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
+from fpsolve.study.hierarchy import compare_with_hierarchy, even_moments
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
-from fpsolve.study.solve import Numerics, Order, batches, compare, expected, lost, result_alone, solve_batch
+from fpsolve.study.solve import Numerics, Order, Wanted, batches, compare, expected, lost, result_alone, solve_batch
 from fpsolve.workflow.folders import (
     AGAIN,
     ANEW,
@@ -223,22 +224,30 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
     return chart
 
 
-def check_case(case: Case, *, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:
-    """Solve what a case expects, and return it with the `comparisons`; nothing is written."""
+def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:
+    """Solve what a case expects, and return it with the `comparisons`; nothing is written.
+
+    With `by_hierarchy` that is Λ of its even p, by the moment hierarchy.
+    """
     found: list[CurveResult] = []
+
+    def wanted(curve: Curve) -> Wanted:
+        return Wanted(even_moments(case), ()) if by_hierarchy else expected(case, curve)
+
     with (
         saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
         pool or serial() as workers,
     ):
         task = partial(solve_batch, numerics=Numerics.of(case), keep=result_alone)
-        for done in workers.run(task, batches(case, lambda curve: Order(curve, expected(case, curve)))):
+        for done in workers.run(task, batches(case, lambda curve: Order(curve, wanted(curve)))):
             results = [lost(order.curve) for order in done.item] if done.result is None else done.result
             for result in filter(None, results):
                 found.append(result)
                 progress(failed=result.status.fails)
     found.sort(key=lambda result: result.curve.number)
-    return Outcome(found, comparisons=tuple(compare(case, found)))
+    comparisons = compare_with_hierarchy(case, found) if by_hierarchy else compare(case, found)
+    return Outcome(found, comparisons=tuple(comparisons))
 
 
 def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Sweep:

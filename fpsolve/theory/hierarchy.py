@@ -1,0 +1,75 @@
+"""Λ(p) for even p without a phase: the moments of order p of the state obey a closed set of linear equations.
+
+Without walls the functions √(p over k) x^(p−k) v^k are moved by ẋ = Ax with a matrix K(A) of size p + 1, which is the
+symmetric power of A: linear in A, and skew-symmetric for a rotation. White noises Bx ∘ dW add ½K(B)². Of a chain there
+is such a block in each state, and its rates couple them. Λ(p) is the largest real part of an eigenvalue, as ‖x‖^p is
+between two of the moments.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import NoHierarchy
+from fpsolve.model.plane import matrix_at
+from fpsolve.model.problem import Problem
+
+MOST = 2000
+"""Equations at most."""
+
+
+def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
+    """Λ(p), and its error by rounding.
+
+    Raises:
+        NoHierarchy: the equations do not close for this problem and this p, or are too many.
+    """
+    noise, order = problem.noise, int(p)
+    if not (p > 0 and p % 2 == 0):
+        raise NoHierarchy(f"got p = {p:g}; the moments close for even p > 0 only; choose p = 2, 4, …")
+    refuse_open_hierarchy(problem)
+    states: Any = noise.reached  # ξ = 0 of white noise
+    if states.size * (order + 1) > MOST:
+        raise NoHierarchy(
+            f"got p = {p:g}; its {states.size * (order + 1)} equations are more than {MOST}; use a smaller p"
+        )
+    rates = np.array(noise.rates)  # type: ignore[attr-defined]
+    total = np.kron(rates.T, np.eye(order + 1))
+    diffused = [
+        _moved(problem.system.epsilon**each.order * np.array(each.matrix), order) for each in problem.diffusions
+    ]
+    for i, matrix in enumerate(matrix_at(problem.motion, states)):
+        here = slice(i * (order + 1), (i + 1) * (order + 1))
+        total[here, here] += _moved(matrix, order) + sum(0.5 * each @ each for each in diffused)
+    values, left, right = scipy.linalg.eig(total, left=True)
+    at = int(np.argmax(values.real))
+    condition = 1 / max(abs(np.vdot(left[:, at], right[:, at])), sys.float_info.epsilon)
+    return float(values[at].real), 10 * sys.float_info.epsilon * float(np.linalg.norm(total)) * float(condition)
+
+
+def refuse_open_hierarchy(problem: Problem) -> None:
+    """Refuse a problem whose moments do not close. Raises `NoHierarchy`."""
+    noise = problem.noise
+    if not noise.has_states:
+        raise NoHierarchy(
+            f"the moments close for white noise and for chains, but not for {noise.kind} noise, each of which needs "
+            "higher powers of it; compare with `fpsolve simulate`"
+        )
+    if any(jump.log_factor for jump in problem.system.jumps):
+        raise NoHierarchy(
+            "the moments do not close where a wall changes the state, as that takes place at one phase; compare with "
+            "`fpsolve simulate`, or without the wall"
+        )
+
+
+def _moved(matrix: FloatArray, order: int) -> FloatArray:
+    """K(A), shape (order + 1, order + 1)."""
+    k = np.arange(order + 1)
+    ladder = np.sqrt(k[1:] * (order + 1 - k[1:]))
+    own = (order - k) * matrix[0, 0] + k * matrix[1, 1]
+    return np.asarray(np.diag(own) + np.diag(matrix[0, 1] * ladder, 1) + np.diag(matrix[1, 0] * ladder, -1))
