@@ -1,0 +1,43 @@
+"""The cases of other systems than the paper's: what they expect comes from the oracles, see tests/test_oracles.py."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.study.chart import solve_chart
+from fpsolve.study.solve import Numerics, compare, expected, solve_curve
+
+CASES = sorted((Path(__file__).parents[2] / "cases/systems").glob("*.toml"))
+DIGITS = 2e-13
+"""To which the expected values are known."""
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_every_case_meets_its_expectations_within_the_stated_error(path):
+    case = load_case(path)
+    results = [solve_curve(curve, expected(case, curve), Numerics.of(case)).result for curve in case.curves()]
+    comparisons = compare(case, results)
+    assert len(comparisons) == len(case.expect)
+    assert [item for item in comparisons if not item.met] == []
+    assert not any(result.failures for result in results)
+    for item in comparisons:
+        [result] = [each for each in results if each.curve.varied == item.varied]
+        if item.expectation.p is None:
+            error = result.estimates[item.expectation.quantity].error_estimate
+        else:
+            [error] = result.moments.error_estimate[result.moments.p == item.expectation.p]
+        assert abs(item.value - item.expectation.value) <= error + DIGITS
+
+
+@pytest.mark.slow
+def test_the_chart_of_white_noise():
+    """The mean square is neutral on s² = 4b."""
+    path = next(path for path in CASES if path.stem == "white_noise_chart")
+    *_, chart = solve_chart(load_case(path, ["chart.zero=[{ moment = 2.0 }]"]))
+    [line] = chart.lines
+    assert chart.complete
+    assert not chart.failures
+    for branch in line.branches:
+        np.testing.assert_allclose(branch.x**2, 4 * branch.y, rtol=1e-6)
