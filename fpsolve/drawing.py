@@ -170,6 +170,17 @@ def in_lines(figure: Any, pieces: Sequence[str], mark: str, size: float, room: f
     return f"{mark.rstrip()}\n".join(like)
 
 
+def is_math(text: str) -> bool:
+    """Whether matplotlib can draw a text with dollars."""
+    from matplotlib.mathtext import MathTextParser
+
+    try:
+        MathTextParser("path").parse(text)
+    except ValueError:
+        return False
+    return True
+
+
 def title_of(attributes: Mapping[str, Any]) -> str:
     r"""A variable on an axis, from its attributes: "largest Lyapunov exponent $\lambda$ (1/time)"."""
     unit = "" if attributes["units"] == "1" else f"({attributes['units']})"

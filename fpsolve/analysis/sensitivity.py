@@ -245,9 +245,9 @@ def solve_sensitivities(
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
     solves = dict(zip(RECORDS, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
-    noise, values = solver.problem.noise, solver.problem.values
-    keys = [key for name in noise.one_sided if (key := f"{noise.section}.{name}") in along]
-    one_sided = [Message(Code.ONE_SIDED, key=key, value=values[key]) for key in keys]
+    problem, values = solver.problem, solver.problem.values
+    keys = [f"{problem.system.noise_section}.{name}" for name in problem.noise.one_sided]
+    one_sided = [Message(Code.ONE_SIDED, key=key, value=values[key]) for key in keys if key in along]
     return Sensitivities(
         theta={key: by.theta for key, by in along.items()},
         quantities={key: parameters[key].quantity for key in along},

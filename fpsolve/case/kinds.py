@@ -1,31 +1,34 @@
 """[system] and [noise] of a case: objects of the kinds that they name, and their parameters.
 
-[oscillator] is [system] with kind = "vibro-impact"; [noise] without a kind is that of Eqs. (7)-(8), reduced or not.
+[oscillator] is [system] with kind = "vibro-impact", [system] without a kind one of equations where it states some;
+[noise] without a kind is that of Eqs. (7)-(8), reduced or not. [noise.axial] is a noise that [system] calls so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from functools import lru_cache
 from typing import Any, Literal
 
-from pydantic import ValidationError, create_model
+from pydantic import ValidationError, ValidationInfo, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
-from fpsolve.case.messages import nearest, refuse, shown_with_kind
-from fpsolve.model.faults import fields_of
+from fpsolve.case.messages import UNBOUNDED, Refusal, nearest, refuse, shown_with_kind
+from fpsolve.model.faults import TableError, fields_of
 from fpsolve.model.kinds import kind_names, noise_kind, system_kind
-from fpsolve.model.parameters import STRICT, Parametrised, parameter
+from fpsolve.model.parameters import STRICT, Parametrised
 from fpsolve.model.problem import Problem
 
 Half = Literal["system", "noise"]
 USUAL: Mapping[Half, str] = {"system": "vibro-impact", "noise": "ou-reduction"}
 """The kinds of sections that name none."""
+EQUATIONS, STATING = "equations", ("variables", "drift")
+"""The kind of a [system] that names none, but states one of these."""
 
 
-def half_of(half: Half, table: Any) -> Any:
+def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
     """The system or the noise that a table describes; one that is made already is left.
 
     Raises:
@@ -33,9 +36,41 @@ def half_of(half: Half, table: Any) -> Any:
     """
     if not isinstance(table, dict):
         return table
+    if half == "system":
+        return _made(half, table)
+    names, system = names_of(table), info.data.get("system")
+    if system is not None:
+        refuse(_misnamed(names, system.noise_section))
+    if not names:
+        return _made(half, table)
+    for name in names:
+        try:
+            made = _made(half, table[name])
+        except ValidationError as error:
+            refuse([], [each | {"loc": (name, *each["loc"])} for each in _details(error)])
+    return made
+
+
+def names_of(table: Any) -> list[str]:
+    """The names of the noises of a [noise], as of [noise.axial]; none where it is a noise itself."""
+    return [*table] if isinstance(table, dict) and all(isinstance(each, dict) for each in table.values()) else []
+
+
+def _misnamed(names: list[str], section: str) -> Iterator[Refusal]:
+    """Noises that the system does not name; the one that it names, if it is missing."""
+    wanted = section.partition(".")[2]
+    for name in names:
+        if name != wanted:
+            text = f"is not the noise of the system, which is {section};{nearest(name, [wanted])}"
+            yield (name,), name, f"{text} rename or remove it, or name it in noises of [system]"
+    if wanted and not names:
+        yield (), None, f"is not the noise of the system, which is {section}; write [{section}], or name this in noises"
+
+
+def _made(half: Half, table: Mapping[str, Any]) -> Parametrised:
     name, known = table.get("kind"), {key: value for key, value in table.items() if key != "kind"}
     kind = _kind(half, table)
-    foreign = set(known) - (set(known) if kind.takes_any else set(fields_of(kind)))
+    foreign = {key for key in known if key not in fields_of(kind) and not kind.takes(key, known)}
     foreign |= set(kind.words) & set(kind.stated) & set(known) if name is not None else set()
     faults = [
         InitErrorDetails(type="unexpected_keyword_argument", loc=(key,), input=known.pop(key))
@@ -54,6 +89,9 @@ def half_of(half: Half, table: Any) -> Any:
             made = kind.from_table(known)
         except ValidationError as error:
             faults += _details(error)
+        except TableError as error:
+            if not faults:
+                refuse([(error.path, None, error.text)])
         except (ValueError, TypeError) as error:
             if not faults:
                 raise ValueError(str(error)) from None
@@ -71,6 +109,8 @@ def _details(error: ValidationError) -> list[InitErrorDetails]:
 def _kind(half: Half, table: Any) -> type[Parametrised]:
     """The class that a table names by its kind and, of those of one kind, by the keys that only one of them has."""
     name = table.get("kind") if isinstance(table, dict) else None
+    if name is None and half == "system" and isinstance(table, dict) and any(key in table for key in STATING):
+        name = EQUATIONS
     if name is not None and name not in (names := kind_names("systems" if half == "system" else "noises")):
         text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
         refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
@@ -88,6 +128,8 @@ def kinds_of(data: Mapping[str, Any]) -> dict[Half, type[Parametrised]]:
     found = dict[Half, type[Parametrised]]()
     for half in USUAL:
         table = data.get(half, data.get("oscillator") if half == "system" else None)
+        for name in names_of(table) if half == "noise" else ():
+            table = table[name]
         try:
             found[half] = _kind(half, table)
         except ValidationError:
@@ -105,9 +147,20 @@ def sections_of(fields: Mapping[str, FieldInfo], data: Mapping[str, Any]) -> dic
         if name in kinds:
             found[section] = described = copy(field)
             described.annotation = kinds[name]
+            if name == "noise" and (names := names_of(data.get(section))):
+                inner = copy(described)
+                described.annotation = _table_of(dict.fromkeys(names, inner))
+            elif name == "system" and isinstance(table := data.get(section), dict):
+                named = known if isinstance(known := table.get("parameters"), dict) else ()
+                described.annotation = _table_of({**dict.fromkeys(named, UNBOUNDED), **fields_of(kinds[name])})
             if section == "system" or (isinstance(data.get(section), dict) and "kind" in data[section]):
                 described.description, described.examples = f"{name} of a kind", [f"[{section}]"]
     return found
+
+
+def _table_of(fields: Mapping[str, FieldInfo]) -> Any:
+    """A type of tables with some keys."""
+    return type("Table", (), {"stated": fields})
 
 
 def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[str, FieldInfo] | None:
@@ -118,15 +171,14 @@ def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[
         context: with the kinds that the tables name.
     """
     found = dict[str, FieldInfo]()
-    unbounded = parameter("a parameter", "")
-    unbounded.annotation = float
     for half in USUAL:
         made = valid.get(half)
         kind = context.get("kinds", {}).get(half) or (None if made is None else type(made))
         if kind is None or (made is None and not kind.fields()):
             return None
         names = made.values if made is not None else {**kind.fields(), **kind.words}
-        found |= {f"{kind.section}.{name}": fields_of(kind).get(name, unbounded) for name in names}
+        section = valid["system"].noise_section if half == "noise" and "system" in valid else kind.section
+        found |= {f"{section}.{name}": fields_of(kind).get(name, UNBOUNDED) for name in names}
     return found
 
 
@@ -140,12 +192,12 @@ def varying(problem: Problem) -> Callable[[Mapping[str, float | str]], Problem]:
 
     @lru_cache(maxsize=1024)
     def half(section: str, values: tuple[tuple[str, float | str], ...]) -> Any:
-        return next(each for each in problem.at(dict(values)).halves if each.section == section)
+        return problem.at(dict(values)).sections[section]
 
     def at(varied: Mapping[str, float | str]) -> Problem:
-        of_half = {each.section: list[tuple[str, float | str]]() for each in problem.halves}
+        of_half = {section: list[tuple[str, float | str]]() for section in problem.sections}
         for key, value in varied.items():
-            of_half[key.partition(".")[0]].append((key, value))
+            of_half[key.rpartition(".")[0]].append((key, value))
         system, noise = (half(section, tuple(values)) for section, values in of_half.items())
         return Problem(system, noise)
 

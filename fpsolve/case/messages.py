@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from fpsolve.messages import is_control
 from fpsolve.model.faults import accepted, choices, fields_of
-from fpsolve.model.parameters import example_of, meaning_of
+from fpsolve.model.parameters import example_of, meaning_of, parameter
 
 _OWN, _RANGE = "own sentence", "range"
 LIST = "<list>"
@@ -25,6 +25,10 @@ DEPENDENT = "cannot be judged, as the kinds of the system and the noise are not 
 """Of a section; which kinds are wrong is another fault."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 _KINDS = {bool: "a boolean", str: "a string", list: "a list", dict: "a table", int: "a number", float: "a number"}
+
+UNBOUNDED = parameter("a parameter", "")
+UNBOUNDED.annotation = float
+"""The range of a parameter of which no more is known than that it is one."""
 
 Path = tuple[str | int, ...]
 Refusal = tuple[Path, Any, str]
@@ -104,7 +108,8 @@ def too_long(detail: Mapping[str, Any]) -> str:
     """What to say of a list with too many entries; nothing of other faults."""
     if detail["type"] != "too_long":
         return ""
-    return f"lists {len(detail['input'])} numbers; must be at most {detail['ctx']['max_length']}; list fewer"
+    noun = "entries" if any(type(each) is str for each in detail["input"]) else "numbers"
+    return f"lists {len(detail['input'])} {noun}; must be at most {detail['ctx']['max_length']}; list fewer"
 
 
 def explain(
@@ -157,7 +162,7 @@ def _sentence(
         beside = ", ".join(key for key in known if "." not in key)
         return f"unknown key;{nearest(str(path[-1]), known)} known keys: {beside}; rename or remove it"
     is_varied = path[0] == "vary" and len(path) > 1
-    field = varied.get(str(path[1]), FieldInfo()) if is_varied else _beside(path, fields)[1]
+    field = varied.get(str(path[1]), UNBOUNDED) if is_varied else _beside(path, fields)[1]
     must, example = f"must be {accepted(field)} ({meaning_of(field)})", example_of(field)
     if is_varied:
         example = example_of(fields["vary"])

@@ -122,10 +122,10 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
 
 def _misfit(mesh: CylinderMesh, valid: Known) -> str:
     """Why the mesh does not serve some noise, or nothing; those of one law in noise units are judged once."""
-    judged, base = set[tuple[object, ...]](), valid["noise"]
-    for varied in valid["vary"].among([f"{base.section}.{name}" for name in base.values]):
-        noise = base.at({key.partition(".")[2]: value for key, value in varied.items()})
-        shaping = {f"{noise.section}.{name}": noise.values[name] for name in (*noise.shaped_by, *noise.words)}
+    judged, base, section = set[tuple[object, ...]](), valid["noise"], valid["system"].noise_section
+    for varied in valid["vary"].among([f"{section}.{name}" for name in base.values]):
+        noise = base.at({key.rpartition(".")[2]: value for key, value in varied.items()})
+        shaping = {f"{section}.{name}": noise.values[name] for name in (*noise.shaped_by, *noise.words)}
         if (shape := tuple(shaping.items())) in judged:
             continue
         judged.add(shape)
@@ -248,7 +248,7 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
             noise = problem.at(corner).noise
             if noise.has_algebraic_tails and noise.tails_beyond is not None:
                 limit, most, remedy = noise.tails_beyond
-                key = f"{noise.section}.{limit}"
+                key = f"{problem.system.noise_section}.{limit}"
                 stops = {name: axis.stop for name, axis in zip("xy", axes, strict=True) if axis.key == key}
                 highest = max(float(problem.values[key]), *stops.values())
                 text = (
@@ -269,7 +269,7 @@ def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo])
     known = problem.differentiable
     if axis.key not in known:
         inert = [name for half in problem.halves for name in half.inert]
-        is_inert = any(axis.key == f"{half.section}.{name}" for half in problem.halves for name in half.inert)
+        is_inert = any(axis.key == f"{key}.{name}" for key, half in problem.sections.items() for name in half.inert)
         told = f"; {' and '.join(inert)} are not in the linear theory" if is_inert else ""
         text = f'got "{axis.key}";{nearest(axis.key, known)} must be one of {", ".join(known)}{told}'
         yield ("key",), axis.key, f"{text}; choose one of them"

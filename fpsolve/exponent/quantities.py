@@ -30,6 +30,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from fpsolve.arrays import shown
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
@@ -38,6 +39,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model import quantity
+from fpsolve.model.plane import crosses_both_ways, is_steady
 from fpsolve.model.problem import ParameterDerivative, Problem, of_problem
 from fpsolve.model.quantity import MOMENT as MOMENT
 from fpsolve.model.quantity import Quantity as Quantity
@@ -51,21 +53,22 @@ DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
 QuantityName = Literal[DrawnName, "variance_rate", "impact_rate", "critical_impact_factor", "critical_restitution"]
 
 
-def impact_rate(solver: ExponentSolver) -> Estimate | Absent:
+def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
     """N = ∂λ/∂ ln R, the mean number of impacts per unit time; it does not depend on R.
 
     Its error is the difference from that of a finer discretisation, for algebraic tails of a wider one.
 
     Args:
-        solver: of a problem with impacts on one ray; of others there is none.
+        solver: of a problem with impacts.
+        jump: the place of a ray among the jumps of the system; None for the only one, if there is one alone.
 
     Raises:
         NotConverged: it is not resolved.
+        ValueError: there is no such jump.
     """
-    count = len(solver.problem.system.jumps)
-    if count != 1:
-        return Absent(Message(Code.NOT_ONE_RAY, count=count or None))
-    value, better = map(_flux, solver.at_zero)
+    if isinstance(number := _ray(solver, jump), Absent):
+        return number
+    value, better = (_flux(pair, number) for pair in solver.at_zero)
     generator = solver.at_zero[1].generator
     usual = generator.unit_rate / math.pi
     rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.loss * usual
@@ -73,13 +76,17 @@ def impact_rate(solver: ExponentSolver) -> Estimate | Absent:
     return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.near.remedy)
 
 
-def critical_impact_factor(solver: ExponentSolver) -> Estimate | Absent:
+def critical_impact_factor(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
     """R_c = R exp(−λ/N), with which λ = 0: more loss makes almost every path decay. It is > 1 if they do without loss.
+
+    Args:
+        solver, jump: as `impact_rate`; other jumps stay as they are.
 
     Raises:
         NotConverged: λ or N is not resolved.
+        ValueError: there is no such jump.
     """
-    log = _critical_log_factor(solver)
+    log = _critical_log_factor(solver, jump)
     if isinstance(log, Absent):
         return log
     if abs(log.value) > LARGEST_LOG:
@@ -90,23 +97,31 @@ def critical_impact_factor(solver: ExponentSolver) -> Estimate | Absent:
     return checked(found, solver.near.remedy)
 
 
-def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
-    """r_c, the coefficient of restitution with which λ = 0, by the impact law of the oscillator; or why there is none.
+def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
+    """r_c, the coefficient of restitution with which λ = 0, by the impact law of the system; or why there is none.
+
+    Args:
+        solver, jump: as `impact_rate`, the phase passing the ray one way; r is R itself where the system has no law.
 
     Raises:
         NotConverged: λ or N is not resolved.
+        ValueError: there is no such jump.
     """
-    system = solver.problem.system
-    if not system.impact_parameter:
+    system, noise = solver.problem.system, solver.problem.noise
+    if isinstance(number := _ray(solver, jump), Absent):
+        return number
+    if not is_steady(system, ray := system.jumps[number]) and crosses_both_ways(system, ray, noise.reached):
         return Absent(Message(Code.NO_RESTITUTION))
-    log = _critical_log_factor(solver)
+    log = _critical_log_factor(solver, number)
     if isinstance(log, Absent):
         return log
     if log.value > 0:
         # λ is affine in ln R, and 0 at ln R_c
-        lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[0].log_factor)
+        lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[number].log_factor)
         return Absent(Message(Code.ALWAYS_STABLE, value=lossless))
     value = system.impact_value(log.value)
+    if math.isnan(value):
+        return Absent(Message(Code.NO_RESTITUTION))
     if value <= 0:
         return Absent(Message(Code.ALWAYS_UNSTABLE, value=value))
     slope = system.impact_slope(log.value)
@@ -114,21 +129,32 @@ def critical_restitution(solver: ExponentSolver) -> Estimate | Absent:
     return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.near.remedy)
 
 
-def _flux(pair: PrincipalPair) -> float:
-    """⟨T*, ∂L′(0)/∂ ln R 1⟩ of a pair at p = 0."""
-    (jump,) = pair.generator.problem.system.jumps
-    load = pair.generator.changed(ParameterDerivative(jump.log_factor, jumps=(1.0,)), 0.0, derivative=1)
+def _ray(solver: ExponentSolver, jump: int | None) -> int | Absent:
+    """The place of a jump among those of a system. Raises `ValueError` where there is none such."""
+    count = len(solver.problem.system.jumps)
+    if jump is None:
+        return 0 if count == 1 else Absent(Message(Code.NOT_ONE_RAY, count=count or None))
+    if isinstance(jump, bool) or not isinstance(jump, int) or not 0 <= jump < count:
+        raise ValueError(f"got jump = {shown(jump)}; must be a whole number from 0 to {count - 1}, or None")
+    return jump
+
+
+def _flux(pair: PrincipalPair, number: int) -> float:
+    """⟨T*, ∂L′(0)/∂ ln R 1⟩ of a pair at p = 0, R that of one of the jumps."""
+    jumps = pair.generator.problem.system.jumps
+    changes = tuple(float(i == number) for i in range(len(jumps)))
+    load = pair.generator.changed(ParameterDerivative(jumps[number].log_factor, jumps=changes), 0.0, derivative=1)
     return float(pair.left @ (load @ pair.right) / (pair.left @ pair.space.weighed(pair.right)))
 
 
-def _critical_log_factor(solver: ExponentSolver) -> Estimate | Absent:
+def _critical_log_factor(solver: ExponentSolver, jump: int | None) -> Estimate | Absent:
     """ln R_c = ln R − λ/N."""
-    rate = impact_rate(solver)
+    rate = impact_rate(solver, jump)
     if isinstance(rate, Absent):
         return rate
     if rate.value <= rate.error_estimate:
         return Absent(Message(Code.RARE_IMPACTS, most=rate.value + rate.error_estimate))
-    exponent, own = solver.lyapunov_exponent(), solver.problem.system.jumps[0].log_factor
+    exponent, own = solver.lyapunov_exponent(), solver.problem.system.jumps[jump or 0].log_factor
     change = exponent.value / rate.value
     size = abs(own) + max(abs(change), exponent.scale / rate.value)
     error = (exponent.error_estimate + abs(change) * rate.error_estimate) / (rate.value - rate.error_estimate)
@@ -204,7 +230,7 @@ def _index(
 
 def _restitution_by_theory(problem: Problem) -> float:
     theory, system = second_order_or_none(problem), problem.system
-    return system.impact_value(theory.critical_log_factor) if theory and system.impact_parameter else math.nan
+    return system.impact_value(theory.critical_log_factor) if theory and len(system.jumps) == 1 else math.nan
 
 
 LYAPUNOV_EXPONENT = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())

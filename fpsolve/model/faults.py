@@ -36,6 +36,23 @@ class ParameterError(ValidationError):
         return ValueError, (self.text,)  # what pydantic keeps of the arguments does not pickle
 
 
+class TableError(ValueError):
+    """What is wrong with the table of a system or a noise, and where in it.
+
+    Attributes:
+        text: what is wrong.
+        path: keys and places, such as ("drift", 1).
+    """
+
+    def __init__(self, text: str, *path: str | int) -> None:
+        place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+        super().__init__(f"{place}: {text}" if place else text)
+        self.text, self.path = text, path
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return TableError, (self.text, *self.path)
+
+
 def told_in_words(kind: type[Kind]) -> type[Kind]:
     """A pydantic dataclass that raises `ParameterError`."""
     changed: Any = kind

@@ -20,6 +20,7 @@ SYSTEMS: Mapping[str, str] = {
     "vibro-impact": "vibro_impact:VibroImpactOscillator",
     "plane": "plane_system:PlaneSystem",
     "parametric": "parametric:ParametricOscillator",
+    "equations": "equations:EquationSystem",
 }
 NOISES: Mapping[str, str] = {
     "non-gaussian": "non_gaussian:NonGaussianNoise",

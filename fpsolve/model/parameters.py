@@ -90,7 +90,7 @@ class Parameter(NamedTuple):
     @property
     def field(self) -> FieldInfo | None:
         """The range that it may have; None where that is not stated."""
-        return self.kind.fields().get(self.quantity.name.partition(".")[2])
+        return self.kind.fields().get(self.quantity.name.rpartition(".")[2])
 
 
 class Parametrised:
@@ -118,6 +118,11 @@ class Parametrised:
     def fields(cls) -> Mapping[str, FieldInfo]:
         """The ranges and meanings of the parameters by their names."""
         return getattr(cls, "__pydantic_fields__", {})
+
+    @classmethod
+    def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
+        """Whether a table of a case file may have a key besides the `fields` and what is `stated`."""
+        return cls.takes_any
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> Parametrised:

@@ -230,12 +230,12 @@ class System(Parametrised):
         terms: the terms of the motion, one at least.
         jumps: the rays at which the state is stretched.
         noise_unit: the unit of ξ.
+        noise_section: the section of a case file that states the noise, with which the keys of its parameters begin.
         impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
     """
 
     section: ClassVar[str] = "system"
     noise_unit: ClassVar[str] = "unknown"
-    impact_parameter: ClassVar[str] = ""
     epsilon: float
     terms: Sequence[CoefficientMatrix]
     jumps: Sequence[Jump]
@@ -265,13 +265,22 @@ class System(Parametrised):
         """The numbers that the simulation moves paths by, see `Motion`; None for kinds that are not simulated."""
         return None
 
+    @property
+    def noise_section(self) -> str:
+        return "noise"
+
+    @property
+    def impact_parameter(self) -> str:
+        return ""
+
     def impact_value(self, log_factor: float) -> float:
-        """The value of the `impact_parameter` for which the jump has a given ln R; it may be out of range."""
-        raise NotImplementedError
+        """The coefficient of restitution of a wall with a given ln R, by its law; it may be out of range. Here R."""
+        with np.errstate(over="ignore"):
+            return float(np.exp(log_factor))
 
     def impact_slope(self, log_factor: float) -> float:
         """Its derivative by ln R at a given ln R."""
-        raise NotImplementedError
+        return math.exp(log_factor)
 
 
 def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:

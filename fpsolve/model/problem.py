@@ -89,23 +89,30 @@ class Problem:
         return self.system, self.noise
 
     @property
+    def sections(self) -> Mapping[str, Parametrised]:
+        """The system and the noise by what the keys of their parameters begin with, such as "noise.axial"."""
+        return {self.system.section: self.system, self.system.noise_section: self.noise}
+
+    @property
     def values(self) -> Mapping[str, float | str]:
         """The values of all parameters, numbers and words, by their keys."""
-        return {f"{half.section}.{name}": value for half in self.halves for name, value in half.values.items()}
+        return {
+            f"{section}.{name}": value for section, half in self.sections.items() for name, value in half.values.items()
+        }
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """All parameters by their keys, with symbol, words, unit and range."""
         return {
-            f"{half.section}.{name}": Parameter(value, half.quantity_of(name), type(half))
-            for half in self.halves
+            (key := f"{section}.{name}"): Parameter(value, _keyed(half.quantity_of(name), key), type(half))
+            for section, half in self.sections.items()
             for name, value in half.values.items()
         }
 
     @property
     def differentiable(self) -> list[str]:
         """The keys of the parameters by which Λ can be differentiated."""
-        return [f"{half.section}.{name}" for half in self.halves for name in half.differentiable]
+        return [f"{section}.{name}" for section, half in self.sections.items() for name in half.differentiable]
 
     @property
     def remarks(self) -> list[Message]:
@@ -116,14 +123,14 @@ class Problem:
         """The problem with other values of some parameters, by their keys. Raises `ValueError`."""
         if not isinstance(values, Mapping):
             raise TypeError(f'got {shown(values)}; must be values by their keys, such as {{"noise.D0": 2.0}}')
-        known = {half.section: half for half in self.halves}
+        known = self.sections
         new = dict[str, dict[str, float | str]]()
         for key, value in values.items():
-            section, _, name = key.partition(".")
+            section, _, name = key.rpartition(".")
             if section not in known:
                 raise ValueError(f"got {key}; the parameters are {', '.join(self.values)}")
             new.setdefault(section, {})[name] = value
-        system, noise = (half.at(new[half.section]) if half.section in new else half for half in self.halves)
+        system, noise = (half.at(new[section]) if section in new else half for section, half in known.items())
         return Problem(system, noise)  # type: ignore[arg-type]
 
     def derivative(self, key: str) -> ParameterDerivative:
@@ -139,16 +146,16 @@ class Problem:
     def _derivatives(self, keys: Sequence[str]) -> Mapping[str, ParameterDerivative]:
         values, found = self.values, {}
         for key in keys:
-            section, _, name = key.partition(".")
+            section, _, name = key.rpartition(".")
             theta = float(values[key])
             terms: Sequence[CoefficientMatrix] = ()
             jumps: Sequence[float] = ()
             noise = None
-            if section != self.noise.section:
+            if section != self.system.noise_section:
                 terms, jumps = self.system.derivative(name)
             elif not self.noise.is_white:
                 noise = self.noise.derivative(name)
-            own = name if section == self.noise.section else ""
+            own = name if section == self.system.noise_section else ""
             terms, diffusions = self.noise.changed_motion(self.system, terms, own)
             found[key] = ParameterDerivative(theta, tuple(terms), tuple(jumps), noise, tuple(diffusions))
         return found
@@ -157,6 +164,11 @@ class Problem:
     def noise_quantity(self) -> Quantity:
         """ξ, whose unit the system decides."""
         return replace(NOISE, unit=self.system.noise_unit)
+
+
+def _keyed(quantity: Quantity, key: str) -> Quantity:
+    """What a parameter is, by its key in a problem."""
+    return quantity if quantity.name == key else replace(quantity, name=key, symbol=key)
 
 
 def parameter_words(parameters: Mapping[str, Parameter], keys: Collection[str]) -> str:
@@ -169,7 +181,7 @@ def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str
     sections = dict[str, list[str]]()
     for key, parameter in parameters.items():
         if key not in besides:
-            section, _, name = key.partition(".")
+            section, _, name = key.rpartition(".")
             sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}".replace(" ", "\xa0"))
     lines = [wrap(f"{section}: {', '.join(words)}", LINE) for section, words in sections.items()]
     return [line.replace("\xa0", " ") for each in lines for line in each]

@@ -89,7 +89,7 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
 
 def varied_columns(case: Case) -> list[Column]:
     """A column for each varied key, without its section."""
-    return [Column(key.partition(".")[2]) for key in case.vary.keys]
+    return [Column(key.rpartition(".")[2]) for key in case.vary.keys]
 
 
 def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
@@ -344,7 +344,7 @@ def _moment_grid(case: Case, result: CurveResult) -> Grid:
 def print_chart(case: Case, chart: Chart) -> None:
     """The special points of every line, and what the regions are."""
     screen = Screen.of()
-    names = [axis.key.partition(".")[2] for axis in (charted(case).x, charted(case).y)]
+    names = [axis.key.rpartition(".")[2] for axis in (charted(case).x, charted(case).y)]
     columns = [Column("line"), Column("branch", 1), Column("points", 2), *map(Column, names)]
     grid = Grid(case.headline, [*columns, Column("special point", is_text=True)])
     for line in chart.lines:

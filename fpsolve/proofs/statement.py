@@ -116,7 +116,7 @@ def _wave(mean: arb, cosine: arb, sine: arb) -> Balls:
 
 def linear_values(problem: Problem) -> Mapping[str, float | str]:
     """The values of the parameters on which the linear problem depends, by their keys."""
-    inert = {f"{half.section}.{name}" for half in problem.halves for name in half.inert}
+    inert = {f"{section}.{name}" for section, half in problem.sections.items() for name in half.inert}
     return {key: value for key, value in problem.values.items() if key not in inert}
 
 
@@ -149,15 +149,16 @@ def exact_halves(stated: Statement) -> tuple[ExactMotion, ExactLaw, list[int]]:
         ValueError: these are no parameters of a system and a noise for which a proof is known, or out of range; or the
             phase may pass the ray of a jump both ways.
     """
-    system, noise = _kinds(stated.parameters)
+    parameters = _plain(stated.parameters)
+    system, noise = _kinds(parameters)
     expected = set[str]()
     for half, record in ((system, stated.motion), (noise, stated.chain)):
         section = System.section if half is system else Noise.section
-        expected |= _keys(half) if record is None else {key for key in stated.parameters if _section(key) == section}
-    if set(stated.parameters) != expected:
+        expected |= _keys(half) if record is None else {key for key in parameters if _section(key) == section}
+    if set(parameters) != expected:
         raise ValueError(f"parameters must be {', '.join(sorted(expected))}")
-    motion = _exact_motion(system, stated.parameters) if stated.motion is None else stated.motion.exact
-    law = _exact_law(noise, stated.parameters) if stated.chain is None else stated.chain.exact
+    motion = _exact_motion(system, parameters) if stated.motion is None else stated.motion.exact
+    law = _exact_law(noise, parameters) if stated.chain is None else stated.chain.exact
     motion = law.in_stratonovich(motion)
     directions = [law.passing(*motion.speeds(jump)) for jump in motion.jumps]
     for jump, direction in zip(motion.jumps, directions, strict=True):
@@ -208,7 +209,7 @@ def check_decimal(text: str) -> str:
 
 def inert_keys(stated: Parameters) -> set[str]:
     """The keys of other parameters of such a system and such a noise, on which no exponent depends."""
-    return {f"{half.section}.{name}" for half in _kinds(stated) for name in half.inert}
+    return {f"{half.section}.{name}" for half in _kinds(_plain(stated)) for name in half.inert}
 
 
 def _kinds(stated: Parameters) -> tuple[type[System], type[Noise]]:
@@ -233,7 +234,12 @@ def _section(key: str) -> str:
 
 def _named(half: Parametrised | type[Parametrised], stated: Parameters) -> Mapping[str, str]:
     """What is stated for a system or a noise, by names without their section."""
-    return {key.partition(".")[2]: text for key, text in stated.items() if _section(key) == half.section}
+    return {key.rpartition(".")[2]: text for key, text in stated.items() if _section(key) == half.section}
+
+
+def _plain(stated: Parameters) -> Parameters:
+    """The same, where a noise has a name, such as "noise.axial.alpha", without it."""
+    return {f"{_section(key)}.{key.rpartition('.')[2]}": text for key, text in stated.items()}
 
 
 def cylinder(stated: Statement) -> Cylinder:

@@ -1,3 +1,5 @@
+from .equations import EquationSystem as EquationSystem
+from .equations import Wall as Wall
 from .parametric import ParametricOscillator as ParametricOscillator
 from .plane_system import PlaneSystem as PlaneSystem
 from .vibro_impact import ImpactLaw as ImpactLaw

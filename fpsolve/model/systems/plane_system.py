@@ -18,6 +18,7 @@ from fpsolve.arrays import FloatArray, identity, one, real_number, shown
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
 from fpsolve.model.quantity import Quantity
+from fpsolve.model.systems.equations import EquationSystem, Wall
 
 Parts = Sequence[CoefficientMatrix] | tuple[Sequence[CoefficientMatrix], Sequence[Jump]]
 """The terms of a system, or these and its jumps."""
@@ -204,6 +205,43 @@ class PlaneSystem(System):
                 f"got values of {sorted(named)}; must be of {sorted(names)}, the names that the terms carry"
             )
         return cls.of(Scaled(tuple(terms), tuple(jumps)), epsilon=epsilon, **named)
+
+    @staticmethod
+    def of_equations(
+        variables: Sequence[str],
+        drift: Sequence[str],
+        parameters: Mapping[str, float] | None = None,
+        *,
+        noises: Mapping[str, str] | None = None,
+        walls: Sequence[Mapping[str, float | str]] = (),
+    ) -> EquationSystem:
+        """The system of two rates that are written as text, with exact derivatives by each of its parameters.
+
+        >>> rates = "v", "-omega**2 * x - 2*zeta*omega * v - xi * x"  # ẍ + 2ζω ẋ + (ω² + ξ) x = 0
+        >>> wall = {"at": "x = 0", "restitution": 0.8}
+        >>> PlaneSystem.of_equations(("x", "v"), rates, {"omega": 2.0, "zeta": 0.1}, walls=[wall]).terms[0].matrix
+        ((0.0, 1.0), (-4.0, -0.4))
+
+        Args:
+            variables: the names of the two.
+            drift: their rates: linear in the variables and affine in the noise, of numbers, names, + - * / **, pi,
+                exp() and sqrt().
+            parameters: values by names. One called epsilon is ε, in whose powers all coefficients must be polynomials.
+            noises: what the noise is called in the rates, and which section of keys it has; {"xi": "noise"} if None.
+            walls: where the state is reflected, v⁺ = −R v⁻ at x = 0, R = `restitution` a number or an expression; there
+                ẋ must be c v, c > 0.
+
+        Raises:
+            ValueError: with the place and the term that is not what it must be.
+        """
+        places = [Wall(each.get("at", ""), each.get("restitution", "")) for each in walls]  # type: ignore[arg-type]
+        return EquationSystem(
+            tuple(variables),  # type: ignore[arg-type]
+            tuple(drift),  # type: ignore[arg-type]
+            tuple((parameters or {}).items()),
+            tuple((noises or {"xi": "noise"}).items()),
+            tuple(places),
+        )
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> PlaneSystem:

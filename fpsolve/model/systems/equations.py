@@ -1,0 +1,427 @@
+"""A linear system in the plane written as equations: ẋ = v, v̇ = −ω²x − 2ζωv − ξx, with walls."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
+from pydantic.fields import FieldInfo
+
+from fpsolve.arrays import FloatArray, identity, one, real_number, shown
+from fpsolve.messages import is_control
+from fpsolve.model.expressions import ExpressionError, Form, constant, log_of, name_fault, names_in, summands
+from fpsolve.model.faults import TableError
+from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
+from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
+from fpsolve.model.quantity import Quantity
+
+EPSILON = "epsilon"
+_LAW = 1e-12
+"""How near to 1 a wall's R is for a coefficient of restitution of 1."""
+_NEWTON = 60
+
+
+def _printed(text: str) -> str:
+    if any(map(is_control, text)):
+        raise ValueError(f"got {shown(text)}; must have no control characters; leave them out")
+    return text
+
+
+def _symbol(text: str) -> str:
+    from fpsolve.drawing import is_math
+
+    symbol = _printed(text).strip().strip("$")
+    if not is_math(f"${symbol}$"):
+        raise ValueError(f"got {shown(text)}; must be a symbol that matplotlib can draw; write, for example, \\\\zeta")
+    return symbol
+
+
+Line = Annotated[str, Field(min_length=1, max_length=80), AfterValidator(_printed)]
+
+
+class StatedParameter(BaseModel):
+    """A parameter in a case file: a number, or a table with one."""
+
+    model_config = STRICT
+
+    value: Annotated[float, parameter("the value of a parameter", "omega = 1.0")]
+    symbol: Annotated[
+        Line, AfterValidator(_symbol), parameter("its symbol in LaTeX, without dollars", 'symbol = "\\\\zeta"')
+    ] = ""
+    unit: Annotated[Line, parameter("its unit, 1 for none", 'unit = "rad/time"')] = "unknown"
+    words: Annotated[Line, parameter("what it is, on an axis", 'words = "damping ratio"')] = ""
+
+
+class StatedWall(BaseModel):
+    """A wall in a case file."""
+
+    model_config = STRICT
+
+    at: Annotated[str, parameter("where the wall is", 'at = "x = 0"')]
+    restitution: Annotated[Any, parameter("R of v+ = -R v-, a number or an expression", "restitution = 0.8")]
+
+
+def _as_table(value: Any) -> Any:
+    return value if isinstance(value, dict | StatedParameter) else {"value": value}
+
+
+Pair = Annotated[tuple[str, str], Field(strict=False)]
+
+
+@dataclass(frozen=True)
+class Wall:
+    """v⁺ = −R v⁻ where a variable is 0, v the other one.
+
+    Args:
+        at: "x = 0".
+        restitution: R > 0, a number, or an expression in the parameters.
+    """
+
+    at: str
+    restitution: float | str
+
+
+@dataclass(frozen=True)
+class EquationSystem(System):
+    """Two rates, each linear in two variables and affine in the noise, written as text; see `PlaneSystem.of_equations`.
+
+    Σ εⁿ (A + ξ B) x has one matrix for each power n of a parameter called epsilon, constant and with the noise. Without
+    such a parameter ε = 1, what is constant has the order 0 and the noise the order 1.
+
+    Args:
+        variables: the names of the two.
+        drift: their rates.
+        named: the values of the parameters by their names.
+        noises: what the noise is called in the rates, and the section that states it, one pair.
+        walls: where the state is reflected.
+        quantities: what parameters are, by their names, as far as that is stated.
+
+    Raises:
+        TableError: one of these is not what it must be, with its place.
+    """
+
+    variables: tuple[str, str]
+    drift: tuple[str, str]
+    named: tuple[tuple[str, float], ...] = ()
+    noises: tuple[tuple[str, str], ...] = (("xi", "noise"),)
+    walls: tuple[Wall, ...] = ()
+    quantities: tuple[tuple[str, Quantity], ...] = field(default=(), repr=False, compare=False)
+
+    kind: ClassVar[str] = "equations"
+    stated: ClassVar[Mapping[str, FieldInfo]] = {
+        "variables": stated_field(
+            Annotated[Pair, parameter("the names of the two variables", 'variables = ["x", "v"]')]
+        ),
+        "drift": stated_field(
+            Annotated[Pair, parameter("the rates of the two variables", 'drift = ["v", "-omega**2 * x - xi * x"]')]
+        ),
+        "parameters": stated_field(
+            Annotated[
+                dict[str, Annotated[StatedParameter, BeforeValidator(_as_table)]],
+                parameter("the parameters by their names", "parameters = { omega = 1.0 }"),
+            ],
+            {},
+        ),
+        "noises": stated_field(
+            Annotated[dict[str, str], parameter("what noises are called in drift", 'noises = { xi = "noise" }')],
+            {"xi": "noise"},
+        ),
+        "walls": stated_field(
+            Annotated[
+                Annotated[tuple[StatedWall, ...], Field(strict=False)],
+                parameter("where the state is reflected", 'walls = [{ at = "x = 0", restitution = 0.8 }]'),
+            ],
+            (),
+        ),
+    }
+
+    def __post_init__(self) -> None:
+        for key in ("variables", "drift"):
+            pair = tuple(each) if isinstance(each := getattr(self, key), list | tuple) else (each,)
+            if len(pair) != 2 or not all(isinstance(text, str) for text in pair):
+                raise TableError(f"got {shown(each)}; must be a list of two texts", key)
+            object.__setattr__(self, key, pair)
+        for name, path in self._given_names():
+            fault = name_fault(name) if isinstance(name, str) else "must be a text"
+            if not fault and (name in self.stated or name == "kind"):
+                fault = "is a key of [system]; rename it"
+            if not fault and name == EPSILON and path[0] != "parameters":
+                fault = "is the name of the small parameter; rename it"
+            if fault:
+                raise TableError(f"got the name {shown(name)}; it {fault}", *path)
+        known = set[str]()
+        for name, path in self._given_names():
+            if name in known:
+                raise TableError(f"got the name {name} twice; all names must differ; rename one of them", *path)
+            known.add(name)
+        for name, value in self.named:
+            try:
+                real_number(value, name)
+            except ValueError:
+                raise TableError(f"got {shown(value)}; must be a finite number", "parameters", name) from None
+            if name == EPSILON and not value > 0:
+                raise TableError(f"got {value:g}; must be > 0; epsilon = 1 is the unscaled system", "parameters", name)
+        if len(self.noises) != 1:
+            must = "must be one, as several noises at once are not known yet"
+            raise TableError(f"got {len(self.noises)} noises; {must}; keep one of them", "noises")
+        for name, section in self.noises:
+            if not re.fullmatch(r"noise(\.[A-Za-z0-9_-]+)?", section if isinstance(section, str) else ""):
+                must = 'must be the name of a section, "noise" or, for example, "noise.axial"'
+                raise TableError(f"got {shown(section)}; {must}; rename it", "noises", name)
+            if not any(name in names_in(text) for text in self._texts()):
+                raise TableError(f"{name} is in no rate; write it into drift, or remove it", "noises", name)
+        if not self.terms:
+            raise TableError("no rate has a term; write terms with the variables", "drift")
+        jumps = self.jumps
+        if len({jump.phase for jump in jumps}) < len(jumps):
+            raise TableError("two walls are at one place; remove one of them", "walls")
+
+    def _given_names(self) -> Iterator[tuple[Any, tuple[str | int, ...]]]:
+        """All names with their places."""
+        yield from ((name, ("variables", i)) for i, name in enumerate(self.variables))
+        yield from ((name, ("parameters", str(name))) for name, _ in self.named)
+        yield from ((name, ("noises", str(name))) for name, _ in self.noises)
+
+    def _texts(self) -> Iterator[str]:
+        """The rates, each of which can be read. Raises `TableError`."""
+        for i, text in enumerate(self.drift):
+            try:
+                names_in(text)
+            except ExpressionError as error:
+                raise TableError(str(error), "drift", i) from None
+            yield text
+
+    @classmethod
+    def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
+        """Besides what is `stated`, keys of parameters, whose values these replace, as `--set` writes them."""
+        known = table.get("parameters")
+        return isinstance(known, dict) and key in known
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> EquationSystem:
+        parameters: Mapping[str, StatedParameter] = table.get("parameters", {})
+        quantities = tuple((name, _quantity(name, each)) for name, each in parameters.items())
+        named = {name: each.value for name, each in parameters.items()}
+        for name in (parameters.keys() & table.keys()) - cls.stated.keys():
+            try:
+                named[name] = real_number(table[name], name)
+            except ValueError:
+                raise TableError(
+                    f"got {shown(table[name])}; must be a finite number; write {name} = 1.0", name
+                ) from None
+        return cls(
+            variables=table["variables"],
+            drift=table["drift"],
+            named=tuple(named.items()),
+            noises=tuple(table.get("noises", {"xi": "noise"}).items()),
+            walls=tuple(Wall(each.at, each.restitution) for each in table.get("walls", ())),
+            quantities=quantities,
+        )
+
+    @property
+    def epsilon(self) -> float:  # type: ignore[override]
+        """The parameter of this name; 1 where there is none."""
+        return dict(self.named).get(EPSILON, 1.0)
+
+    @property
+    def noise_section(self) -> str:
+        return self.noises[0][1]
+
+    @property
+    def values(self) -> Mapping[str, float | str]:
+        return dict(self.named)
+
+    def quantity_of(self, name: str) -> Quantity:
+        return dict(self.quantities).get(name) or _quantity(name, StatedParameter(value=0.0))
+
+    def at(self, values: Mapping[str, float | str]) -> Self:
+        known = self.values
+        for name in values:
+            if name not in known:
+                raise ValueError(f"got {name}; the parameters are {', '.join(known) or 'none'}")
+        return replace(self, named=tuple({**known, **values}.items()))  # type: ignore[arg-type]
+
+    @cached_property
+    def _rates(self) -> tuple[Form, Form]:
+        return self._rates_by("")
+
+    def _rates_by(self, by: str) -> tuple[Form, Form]:
+        """The rates, with their derivatives by a parameter. Raises `TableError`."""
+        names = {name: constant(value, float(name == by)) for name, value in self.named}
+        if EPSILON in names:
+            names[EPSILON] = Form({("", "", 1): (1.0, 0.0)})
+        names = {
+            **{name: Form({(name, "", 0): (1.0, 0.0)}) for name in self.variables},
+            **{name: Form({("", name, 0): (1.0, 0.0)}) for name, _ in self.noises},
+            **names,
+        }
+        rates = list[Form]()
+        for i, (variable, text) in enumerate(zip(self.variables, self.drift, strict=True)):
+            total, place = Form({}), f"{variable}'s rate"
+            try:
+                for written, form in summands(text, names, place) if text.strip() != "0" else ():
+                    if not all(state for state, _, _ in form.parts):
+                        told = f"the term {written} of {place} is not linear in {', '.join(self.variables)}"
+                        raise ExpressionError(f"{told}; multiply it by one of these, or leave it out")
+                    total = total.plus(form)
+            except ExpressionError as error:
+                raise TableError(str(error), "drift", i) from None
+            rates.append(total)
+        return rates[0], rates[1]
+
+    def _terms_of(self, rates: tuple[Form, Form], at: int) -> tuple[CoefficientMatrix, ...]:
+        """The terms of rates, of their values for `at` = 0, of their derivatives for 1."""
+        has_orders = EPSILON in dict(self.named)
+        matrices = dict[tuple[int, str], FloatArray]()
+        for i, form in enumerate(rates):
+            for (state, noise, power), series in form.parts.items():
+                order = power if has_orders else int(bool(noise))
+                matrix = matrices.setdefault((order, noise), np.zeros((2, 2)))
+                matrix[i, self.variables.index(state)] += series[at]
+        return tuple(
+            CoefficientMatrix(order, matrix.tolist(), identity if noise else one)
+            for (order, noise), matrix in sorted(matrices.items(), key=lambda item: item[0])
+            if at == 0 or matrix.any()
+        )
+
+    @cached_property
+    def terms(self) -> tuple[CoefficientMatrix, ...]:  # type: ignore[override]
+        return self._terms_of(self._rates, 0)
+
+    @cached_property
+    def jumps(self) -> tuple[Jump, ...]:  # type: ignore[override]
+        """Where the phase passes the rays of the walls: x = 0 is φ = π/2, v = 0 is φ = 0."""
+        found = list[Jump]()
+        for number, wall in enumerate(self.walls):
+            place = self._place(number)
+            log_factor, leading = self._log_factor(number)[0], None
+            if EPSILON in names_in(str(wall.restitution)):
+                try:
+                    zeroth, first, second = self._log_factor(number, EPSILON, 0.0, order=2)
+                    leading = zeroth + first * self.epsilon + second * self.epsilon**2
+                except TableError:  # no power series
+                    leading = None
+            found.append(Jump(math.pi / 2 if place == 0 else 0.0, log_factor, leading))
+        return tuple(found)
+
+    def _place(self, number: int) -> int:
+        """Which of the variables is 0 at a wall. Raises `TableError`."""
+        x, v = self.variables
+        at = self.walls[number].at
+        match = re.fullmatch(r"\s*(\w+)\s*=\s*0(?:\.0*)?\s*", at) if isinstance(at, str) else None
+        if match is None or match[1] not in self.variables:
+            must = f'must be "{x} = 0" or "{v} = 0"; jumps on other rays are for PlaneSystem in Python'
+            raise TableError(f'got {shown(at)}; {must}; write, for example, at = "{x} = 0"', "walls", number, "at")
+        i = self.variables.index(match[1])
+        variable, other = self.variables[i], self.variables[1 - i]
+        parts = self._rates[i].parts
+        speed = sum(series[0] * self.epsilon**power for (_, _, power), series in parts.items())
+        is_alone = {(state, noise) for state, noise, _ in parts} == {(other, "")}
+        if not (is_alone and speed > 0):
+            must = f"there {variable}'s rate must be c*{other} with c > 0 and nothing else"
+            told = f"but it is {' '.join(self.drift[i].split())}{f', c = {speed:g}' if is_alone else ''}"
+            remedy = "choose variables for which it is, or remove the wall"
+            raise TableError(f'got "{variable} = 0"; {must}, {told}; {remedy}', "walls", number, "at")
+        return i
+
+    def _log_factor(self, number: int, by: str = "", value: float | None = None, order: int = 1) -> tuple[float, ...]:
+        """Taylor coefficients of ln R of a wall by a parameter, at a value of it. Raises `TableError`."""
+        restitution = self.walls[number].restitution
+        named = dict(self.named) if value is None else {**dict(self.named), by: value}
+        try:
+            if isinstance(restitution, bool) or not isinstance(restitution, str | float | int):
+                must = "must be a number > 0, or an expression in the parameters"
+                raise ExpressionError(f"got {shown(restitution)}; {must}; write, for example, restitution = 0.8")
+            names = {
+                name: constant(each, *(float(name == by and k == 0) for k in range(order)))
+                for name, each in named.items()
+            }
+            return log_of(str(restitution), names, "the restitution")
+        except ExpressionError as error:
+            raise TableError(str(error), "walls", number, "restitution") from None
+
+    @cached_property
+    def _derivatives(self) -> Mapping[str, tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]]:
+        """∂/∂θ of the terms and of ln R by the parameters, without those for which one is infinite."""
+        found = dict[str, tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]]()
+        for name, _ in self.named:
+            try:
+                terms = by_epsilon(self) if name == EPSILON else self._terms_of(self._rates_by(name), 1)
+                slopes = tuple(self._log_factor(number, name)[1] for number in range(len(self.walls)))
+            except TableError:
+                continue
+            found[name] = terms, slopes if any(slopes) else ()
+        return found
+
+    @property
+    def differentiable(self) -> Sequence[str]:
+        return tuple(self._derivatives)
+
+    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
+        """∂/∂θ of the terms and of ln R, exact but for rounding. Raises `ValueError` where it is infinite."""
+        if name not in self._derivatives:
+            raise ValueError(f"the derivative of the system by {name} is not finite; choose another value of {name}")
+        return self._derivatives[name]
+
+    @property
+    def impact_parameter(self) -> str:
+        if len(self.walls) != 1:
+            return ""
+        own = names_in(str(self.walls[0].restitution)) - {EPSILON}
+        others = frozenset[str]().union(*map(names_in, self.drift))
+        return next(iter(own)) if len(own) == 1 and not own & others else ""
+
+    @property
+    def _law(self) -> str:
+        """The parameter that is the coefficient of restitution: R = 1 for 1, and more for more; empty where R is."""
+        name = self.impact_parameter
+        if not name:
+            return ""
+        try:
+            at_one, slope = self._log_factor(0, name, 1.0)
+        except TableError:
+            return ""
+        return name if abs(at_one) <= _LAW and slope > 0 else ""
+
+    def impact_value(self, log_factor: float) -> float:
+        """The coefficient of restitution for which ln R has a given value, by Newton's method; NaN if not found."""
+        if not (name := self._law):
+            return super().impact_value(log_factor)
+        value, step = 1.0, math.inf
+        for _ in range(_NEWTON):
+            try:
+                known, slope = self._log_factor(0, name, value)
+            except TableError:  # R is not positive there
+                step /= 2
+                value -= step
+                continue
+            if not slope:
+                break
+            step = (log_factor - known) / slope
+            if abs(step) <= 4e-16 * max(1.0, abs(value)):
+                return value
+            value += step
+        return value if abs(step) <= _LAW * max(1.0, abs(value)) else math.nan
+
+    def impact_slope(self, log_factor: float) -> float:
+        if not (name := self._law):
+            return super().impact_slope(log_factor)
+        return 1 / self._log_factor(0, name, self.impact_value(log_factor))[1]
+
+
+def _quantity(name: str, stated: StatedParameter) -> Quantity:
+    """What a parameter is."""
+    key = f"{EquationSystem.section}.{name}"
+    plain = Quantity(key, key, "small parameter", r"$\varepsilon$") if name == EPSILON else unknown_parameter(key)
+    return replace(
+        plain,
+        words=stated.words or plain.words,
+        latex=f"${stated.symbol}$" if stated.symbol else plain.latex,
+        unit=plain.unit if stated.unit == "unknown" else stated.unit,
+    )
