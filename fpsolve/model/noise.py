@@ -164,6 +164,10 @@ class Noise(Parametrised):
         """Independent values of ξ from the stationary law, shape (size,)."""
         raise NotImplementedError
 
+    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """What the paths of a simulation start from: ξ from the stationary law, or the numbers of states."""
+        return self.sample(size, rng)
+
     def step(self, h: float, bias: float = 0.0) -> Any:
         """One step of length h of dξ = (f(ξ) + σ² b) dt + σ dW, b the bias, for the simulation.
 

@@ -261,8 +261,13 @@ class System(Parametrised):
         """The motion in exact numbers, for parameters as decimals by name; None where no proof is known."""
         return None
 
+    @property
+    def is_nonlinear(self) -> bool:
+        """Whether there is more to it than its terms, see `motion`."""
+        return False
+
     def motion(self, *, smooth: bool = False) -> Any:
-        """The numbers that the simulation moves paths by, see `Motion`; None for kinds that are not simulated."""
+        """The numbers of its nonlinear motion, see `Motion`; None for kinds that have none."""
         return None
 
     @property

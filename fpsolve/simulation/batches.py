@@ -15,7 +15,9 @@ from numpy.random import SeedSequence, default_rng
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.pool import processors
+from fpsolve.simulation.coefficients import Coefficients
 from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
+from fpsolve.simulation.motions import DrivenMotion, SwitchedMotion
 from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator, starting_state
 
 _PORTION_SECONDS = 0.1
@@ -32,7 +34,7 @@ class Plan:
     """What all batches of a simulation share.
 
     Attributes:
-        noise: the process.
+        known: the matrices of the problem, and its noise.
         motion, noise_step, step: the motion, one step of the noise, and its length.
         p: orders of the moments, shape (n,).
         paths: in one batch.
@@ -42,8 +44,8 @@ class Plan:
         levels: the direct estimator has windows of 2⁰ … 2^(levels − 1) slices.
     """
 
-    noise: Noise
-    motion: Any
+    known: Coefficients
+    motion: DrivenMotion | SwitchedMotion
     noise_step: Any
     step: float
     p: FloatArray
@@ -53,6 +55,11 @@ class Plan:
     settling: int
     wanted: int
     levels: int
+
+    @property
+    def noise(self) -> Noise:
+        """The process."""
+        return self.known.noise
 
     @property
     def length(self) -> float:
@@ -155,18 +162,18 @@ class Population(_Paths):
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
         super().__init__(plan, seed)
         self.p, self.bias, self.expected = p, 0.0, 0.0
-        self._is_biased = p != 0 and plan.noise.may_tilt and not plan.noise.has_algebraic_tails
+        self._is_biased = p != 0 and plan.noise.basis == "polynomials" and plan.noise.may_tilt
         if is_far and self._is_biased:
-            self.bias = p * plan.motion.strength * plan.noise.relaxation_time
+            self.bias = p * plan.known.strength * plan.noise.relaxation_time
         self.tallies = np.zeros(1, TALLIES)
         self._log_weights, self._ancestors = np.zeros(plan.paths), np.arange(plan.paths)
         self._log_z = np.zeros(2)  # of the weights that have been reset, and of all at the last slice
-        exponent = abs(p) * plan.motion.strength * plan.noise.standard_deviation * plan.step
+        exponent = abs(p) * plan.known.spread(plan.step)
         self._interval = max(1, min(plan.slice_steps // 16, int(_EXPONENT / max(exponent, 1e-300))))
 
     def _move(self, steps: int) -> None:
         plan = self.plan
-        bonus = 0.5 * (plan.noise.diffusion * self.bias) ** 2 * plan.step
+        bonus = 0.5 * (plan.noise.diffusion * self.bias) ** 2 * plan.step if self._is_biased else 0.0
         advance_population(
             plan.motion, plan.noise.step(plan.step, self.bias), plan.step, *self.state, self._log_weights,
             self._ancestors, (self.p, self.bias, bonus), steps, self._interval, self._log_z, self.rng,

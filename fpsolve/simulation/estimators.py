@@ -30,6 +30,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE, P
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
+from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.kernels import TALLIES
 from fpsolve.simulation.setup import (
     BATCHES,
@@ -159,8 +160,8 @@ def simulate(
     none, and KeyboardInterrupt is raised.
 
     Args:
-        oscillator, noise: the motion, whose c₂ and c₃ are not used, and its noise; or one `Problem` of both, in their
-            place or as `problem`.
+        oscillator, noise: any linear motion in the plane, an oscillator without its c₂ and c₃, and its noise; or one
+            `Problem` of both, in their place or as `problem`.
         p: orders of the moments, one or several.
         estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
         paths: how many; a multiple of 32 is used.
@@ -170,7 +171,7 @@ def simulate(
         progress: called 100 times in all.
 
     Raises:
-        FpsolveError: the motion is no `VibroImpactOscillator`, or the noise not that of the paper.
+        FpsolveError: the noise states no step of its paths, or multiplies a term by a function that is no a + bξ.
         ValueError: an argument is out of its range, or the step is too large; the text names the largest good one.
         NoSuchExponent: some Λ(p) is infinite.
         NotConverged: the numbers overflowed.
@@ -178,15 +179,16 @@ def simulate(
     """
     oscillator, noise = simulated_parts(problem)
     time, step = (None if each is None else real_number(each, name) for name, each in (("time", time), ("step", step)))
-    check_settings(noise, p, estimator, paths, seed)
+    check_settings(problem, p, estimator, paths, seed)
     for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
         raise ValueError(f"{name}: {sentence}")
     h = default_step(oscillator, noise) if step is None else step
     settling = transient(oscillator, noise)
     wanted = TRANSIENTS if time is None else max(2, round(time / settling))
+    known = coefficients(oscillator, noise)
     plan = Plan(
-        noise=noise,
-        motion=oscillator.at(dict.fromkeys(oscillator.inert, 0.0)).motion(),
+        known=known,
+        motion=known.motion(h),
         noise_step=noise.step(h),
         step=h,
         p=np.atleast_1d(np.array(p, dtype=float)),

@@ -13,10 +13,11 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
+from fpsolve.errors import FpsolveError
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import IMPACT_RATE
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
-from fpsolve.simulation.kernels import advance_and_count
+from fpsolve.simulation.bounces import advance_and_count
 from fpsolve.simulation.setup import BATCHES, simulated_parts, starting_state
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ class _Batch:
     ) -> None:
         self.laws, self.steps, self.rng = laws, steps, rng
         self.x, self.u, self.xi = state
-        self.spare = np.zeros((2, self.x.size))
+        self.push = np.zeros(self.x.size)
         self.plane, self.radial = np.zeros((BINS, 2 * BINS)), np.zeros(BINS)
         self.sums = np.zeros(len(MEANS))
         self.impacts, self.reach = 0, 0.0
@@ -141,7 +142,7 @@ class _Batch:
         if stop.is_set():
             return
         self.impacts += advance_and_count(
-            *self.laws, self.x, self.u, self.xi, self.spare, self.steps, looks, self.reach, self.plane, self.radial,
+            *self.laws, self.x, self.u, self.xi, self.push, self.steps, looks, self.reach, self.plane, self.radial,
             self.sums, self.rng,
         )  # fmt: skip
 
@@ -172,13 +173,19 @@ def stationary_response(
         FpsolveError: as `simulate`.
         KeyboardInterrupt: before the response was stationary.
     """
+    oscillator: Any
     oscillator, noise = simulated_parts(problem)
+    if (motion := oscillator.motion()) is None or noise.has_states:
+        raise FpsolveError(
+            "the nonlinear response is that of a VibroImpactOscillator under coloured noise, but this is a "
+            f"{type(oscillator).__name__} under {type(noise).__name__}; simulate its moments"
+        )
     steps = max(1, round(math.pi / (oscillator.omega * step * _LOOKS)))
     damping = oscillator.epsilon**2 * (oscillator.c2 + 3 * oscillator.omega**2 * oscillator.c3) / 8
     between = steps * step
     memory = max(1 / exponent, 2 * variance_rate / exponent**2)
     settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
-    laws, size = (oscillator.motion(), noise.step(step), step), math.ceil(paths / BATCHES)
+    laws, size = (motion, noise.step(step), step), math.ceil(paths / BATCHES)
     amplitude = math.sqrt(exponent / damping)
     rngs = [np.random.default_rng(each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
     batches = [_Batch(laws, steps, starting_state(noise, size, rng, amplitude), rng) for rng in rngs]

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray, real_numbers, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
-from fpsolve.model.problem import Problem
+from fpsolve.model.plane import System, affine, written_coefficient
+from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.simulation.coefficients import coefficients
 
 Estimator = Literal["direct", "population"]
 BATCHES = 32
@@ -25,32 +27,35 @@ _LONGEST = 1_000_000
 """Steps in a transient, and transients in all; with more, a simulation would not end."""
 
 
-def simulated_parts(problem: Problem) -> tuple[Any, Noise]:
-    """The motion and the noise of a problem, if they can be simulated.
+def simulated_parts(problem: Problem) -> tuple[System, Noise]:
+    """The system and the noise of a problem, if they can be simulated.
 
     Raises:
         FpsolveError: they cannot.
     """
     system, noise = problem.system, problem.noise
-    if noise.is_simulated and system.motion() is not None:
-        return system, noise
-    raise FpsolveError(
-        "simulation is for a VibroImpactOscillator under noise that states a step of its paths, but this is a "
-        f"{type(system).__name__} under {type(noise).__name__}; use the finite elements"
-    )
+    if not noise.is_simulated:
+        need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
+        raise FpsolveError(f"simulation is for {need}; use the finite elements")
+    bent = [term.g for term in system.terms if affine(term.g) is None]
+    if bent and not noise.has_states:
+        found = f"but one has g = {written_coefficient(bent[0]).strip()}"
+        need = f"terms that are a + b*xi under a {type(noise).__name__}, {found}"
+        raise FpsolveError(f"simulation is for {need}; use the finite elements")
+    return system, noise
 
 
-def check_settings(noise: Noise, p: float | Sequence[float], estimator: Estimator, paths: int, seed: int) -> None:
+def check_settings(problem: Problem, p: float | Sequence[float], estimator: Estimator, paths: int, seed: int) -> None:
     """Refuse what lengths and steps have no part in, see `obstacles`.
 
     Raises:
         ValueError: the variance of the noise or an order is not finite, or a setting is out of its range.
         NoSuchExponent: some Λ(p) is infinite.
     """
-    if not math.isfinite(noise.standard_deviation):
+    if not (problem.noise.is_white or math.isfinite(problem.noise.standard_deviation)):
         raise ValueError("got a noise of infinite variance; must be finite, as for r0 < 5/3")
     for order in real_numbers(p, "p", may_be_empty=True):
-        noise.check_existence(order)
+        refuse_infinite(problem, order)
     is_whole = all(isinstance(each, int | np.integer) for each in (paths, seed))
     if estimator not in get_args(Estimator) or not is_whole or not BATCHES <= paths <= MAX_PATHS or seed < 0:
         raise ValueError(
@@ -59,38 +64,50 @@ def check_settings(noise: Noise, p: float | Sequence[float], estimator: Estimato
         )
 
 
-def largest_step(oscillator: Any, noise: Noise) -> tuple[float, str]:
+def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
     """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
 
-    ω h ≤ ½, ε² |c₁| h ≤ ⅛, ε std(ξ) h ≤ ⅛, and the `largest_step` of the noise.
+    For A₀ = ω((0, 1), (−1, 0)) + D and A₁ these are ω h ≤ ½, ‖D‖ h ≤ ⅛, ‖A₁‖ std(ξ) h ≤ ⅛, or under white noise
+    ‖A₁‖² h ≤ ⅛, and the `largest_step` of the noise. Under a chain, where a step is exact, it is 1/(2π) half-turns.
     """
-    damping = oscillator.epsilon**2 * abs(oscillator.c1)  # may underflow
+    known = coefficients(oscillator, noise)
+    if noise.has_states and not noise.is_white:
+        return 0.5 * known.half_turn / math.pi, "the frequency"
+    turn = 0.5 * (known.steady[0, 1] - known.steady[1, 0])
+    rest = float(np.linalg.norm(known.steady - turn * np.array([[0.0, 1.0], [-1.0, 0.0]]), 2))  # may underflow
+    driven = float(np.linalg.norm(known.driven, 2))
     limits = {
-        "the frequency": 0.5 / oscillator.omega,
-        "the damping": 0.125 / damping if damping else math.inf,
-        "the strength of the noise": 0.125 / (oscillator.epsilon * noise.standard_deviation),
+        "the frequency": 0.5 / abs(turn) if turn else math.inf,
+        "the damping": 0.125 / rest if rest else math.inf,
+        "the strength of the noise": math.inf,
         "the correlation time of the noise": noise.largest_step,
     }
+    if driven:
+        limits["the strength of the noise"] = 0.125 / (
+            driven**2 if noise.is_white else driven * noise.standard_deviation
+        )
     reason = min(limits, key=lambda name: limits[name])
     return limits[reason], reason
 
 
-def transient(oscillator: Any, noise: Noise) -> float:
+def transient(oscillator: System, noise: Noise) -> float:
     """The time after which ln E‖x‖^p grows like Λ(p) t: whole half-turns π/ω, at least two and eight correlation times.
 
     In whole half-turns the oscillation cancels that the start from the stationary law leaves in weak noise.
     """
-    half_turn = math.pi / oscillator.omega
+    half_turn = coefficients(oscillator, noise).half_turn
     return half_turn * max(2, math.ceil(8 * noise.relaxation_time / half_turn))
 
 
-def default_step(oscillator: Any, noise: Noise) -> float:
+def default_step(oscillator: System, noise: Noise) -> float:
     """Half the largest step, or less, so that a half-turn π/ω is a whole number of steps."""
-    half_turn = math.pi / oscillator.omega
+    half_turn = coefficients(oscillator, noise).half_turn
     return half_turn / math.ceil(half_turn / (0.5 * largest_step(oscillator, noise)[0]))
 
 
-def obstacles(oscillator: Any, noise: Noise, *, time: float | None = None, step: float | None = None) -> dict[str, str]:
+def obstacles(
+    oscillator: System, noise: Noise, *, time: float | None = None, step: float | None = None
+) -> dict[str, str]:
     """Why a simulation with this length and this step would not be right: a sentence for each of "time" and "step"."""
     found = {}
     largest, reason = largest_step(oscillator, noise)
@@ -124,6 +141,9 @@ def obstacles(oscillator: Any, noise: Noise, *, time: float | None = None, step:
 def starting_state(
     noise: Noise, paths: int, rng: np.random.Generator, amplitude: float = 1.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """x, u and ξ of paths of one amplitude, with uniform phases in front of the wall and stationary noise."""
+    """x, u and ξ, or the number of its state, of paths of one amplitude, with uniform phases and stationary noise.
+
+    The phases are in front of the wall, where they stand for all.
+    """
     phase = rng.uniform(0, math.pi, paths)
-    return amplitude * np.sin(phase), amplitude * np.cos(phase), noise.sample(paths, rng)
+    return amplitude * np.sin(phase), amplitude * np.cos(phase), noise.start(paths, rng)

@@ -24,7 +24,7 @@ def simulation_work(case: Case) -> int:
 
 def simulation_steps(curve: Curve) -> int:
     """How often the simulation of a curve does."""
-    return PROGRESS_STEPS * (3 if _is_nonlinear(curve) else 1)
+    return PROGRESS_STEPS * (3 if curve.problem.system.is_nonlinear else 1)
 
 
 def refuse_obstacles(case: Case) -> None:
@@ -99,7 +99,7 @@ def simulate_curve(
     )  # fmt: skip
     note = simulated_tail_note(curve.problem) if any(each.p for each in result.estimates) else None
     noted = result.warnings if note is None else (*result.warnings, note)
-    if not _is_nonlinear(curve) or result.interrupted:
+    if not curve.problem.system.is_nonlinear or result.interrupted:
         return SimulatedCurve(curve, result, None, noted, result.interrupted)
     value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
     try:
@@ -119,7 +119,3 @@ def simulate_curve(
     if response.interrupted:
         noted = (*noted, Message(Code.RESPONSE_STOPPED, time=response.time))
     return SimulatedCurve(curve, result, response, noted, response.interrupted)
-
-
-def _is_nonlinear(curve: Curve) -> bool:
-    return curve.oscillator.c2 > 0 or curve.oscillator.c3 > 0

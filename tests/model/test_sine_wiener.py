@@ -13,7 +13,7 @@ from fpsolve.analysis.zero import Axis
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.model import CoefficientMatrix, Problem, SineWiener, noise_kind
-from fpsolve.simulation.kernels import draw
+from fpsolve.simulation.motions import draw
 from tests.conftest import sampled
 from tests.oracles.harmonics import moment_exponent, white_noise_exponent
 

@@ -11,11 +11,11 @@ import fpsolve
 DRAW = """
 import numpy as np
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.simulation import kernels
+from fpsolve.simulation import motions
 start, mean, end, push = np.full(4, 3.0), np.empty(4), np.empty(4), np.zeros(4)
 step = OrnsteinUhlenbeck(alpha=1.0, sigma=1e-12).step(1.0)
-kernels.draw(step, start, mean, end, push, np.random.default_rng(0))
-print(kernels.__file__, end[0])
+motions.draw(step, start, mean, end, push, np.random.default_rng(0))
+print(motions.__file__, end[0])
 """
 
 

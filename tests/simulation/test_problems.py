@@ -9,6 +9,7 @@ import pytest
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
+from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
@@ -25,7 +26,7 @@ PLANE = PlaneSystem([CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))), Coefficien
 
 
 @dataclass(frozen=True)
-class WhiteNoise(Noise):
+class NoPaths(Noise):
     """Something that looks like a noise."""
 
     level: float = 1.0
@@ -64,19 +65,26 @@ def test_response_of_a_problem_is_that_of_its_halves():
 @pytest.mark.parametrize(
     ("problem", "name"),
     [
-        (Problem(PLANE, NOISE), "PlaneSystem under NonGaussianNoise"),
-        (Problem(OSCILLATOR, WhiteNoise()), "VibroImpactOscillator under WhiteNoise"),
+        (Problem(OSCILLATOR, NoPaths()), "noise that states a step of its paths, but this is a NoPaths"),
+        (
+            Problem(PlaneSystem([CoefficientMatrix(0, DAMPING, np.sin)]), NOISE),
+            "terms that are a + b*xi under a NonGaussianNoise, but one has g = sin(ξ)",
+        ),
     ],
 )
 def test_other_problems_are_refused(problem, name):
-    sentence = (
-        "simulation is for a VibroImpactOscillator under noise that states a step of its paths, but this is a "
-        f"{name}; use the finite elements"
-    )
     for call in (lambda: moments(problem, [1.0]), lambda: response(problem)):
         with pytest.raises(FpsolveError) as caught:
             call()
-        assert str(caught.value) == sentence
+        assert str(caught.value) == f"simulation is for {name}; use the finite elements"
+
+
+@pytest.mark.parametrize("noise", [NOISE, MarkovChain.telegraph(0.5, 1.0)])
+def test_only_an_oscillator_has_a_nonlinear_response(noise):
+    problem = Problem(PLANE if noise is NOISE else OSCILLATOR, noise)
+    names = f"{type(problem.system).__name__} under {type(noise).__name__}"
+    with pytest.raises(FpsolveError, match=f"is that of a VibroImpactOscillator under .*, but this is a {names}; sim"):
+        response(problem)
 
 
 def test_progress_is_reported():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -17,6 +17,18 @@ from fpsolve.model.parameters import SIZE, parameter, stated_field
 
 _BALANCED = 1e-12
 Row = Annotated[tuple[float, ...], Field(strict=False)]
+
+
+class ChainStep(NamedTuple):
+    """The law of the jumps, which come after exponential times: no step is made.
+
+    Attributes:
+        leaving: the rate at which each state is left, shape (n,).
+        reached: the probability that a state is followed by one of the first j + 1, shape (n, n).
+    """
+
+    leaving: FloatArray
+    reached: FloatArray
 
 
 class Chain(Noise):
@@ -74,6 +86,29 @@ class Chain(Noise):
             1j * omega * np.eye(deviations.size) - np.array(self.rates) + np.outer(np.ones_like(weights), weights)
         )
         return float(2 * np.real((weights * deviations) @ np.linalg.solve(resolvent, deviations)))
+
+    @property
+    def relaxation_time(self) -> float:
+        """The time in which the chain forgets its state: −1/Re of the second eigenvalue of Q."""
+        return -1 / float(np.sort(np.linalg.eigvals(np.array(self.rates)).real)[-2])
+
+    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
+        return rng.choice(len(self.states), size, p=self.probabilities).astype(float)
+
+    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+        return np.array(self.states)[self.start(size, rng).astype(int)]
+
+    def step(self, h: float, bias: float = 0.0) -> ChainStep:
+        """The jumps in any time, without a bias."""
+        jumps = np.array(self.rates) * (1 - np.eye(len(self.states)))
+        leaving = jumps.sum(axis=1)
+        reached = np.cumsum(jumps / leaving[:, None], axis=1)
+        return ChainStep(leaving, np.where(reached >= reached[:, -1:], 1.0, reached))
+
+    @property
+    def largest_step(self) -> float:
+        """∞: no step is made."""
+        return math.inf
 
 
 @dataclass(frozen=True)

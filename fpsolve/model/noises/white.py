@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass as plain_dataclass
 from enum import StrEnum
 from fractions import Fraction
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -29,6 +29,26 @@ class Interpretation(StrEnum):
 
     STRATONOVICH = "stratonovich"
     ITO = "ito"
+
+
+class WhiteStep(NamedTuple):
+    """dW/dt in a step: its mean ΔW/h and the slope of the line with the same ∫W dt, both exactly.
+
+    Attributes:
+        mean, rise: their standard deviations 1/√h, and √3/√h of half the difference of the ends of the line.
+    """
+
+    mean: float
+    rise: float
+
+    @staticmethod
+    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+        """One step, see `Noise.step`; its beginning is drawn anew, too."""
+        for i in range(xi.size):
+            xi_mean[i] = step.mean * rng.standard_normal()
+        for i in range(xi.size):
+            xi_end[i] = step.rise * rng.standard_normal()
+            xi[i] = -xi_end[i]
 
 
 @told_in_words
@@ -84,6 +104,21 @@ class White(Noise):
     @property
     def reached(self) -> FloatArray:
         return np.zeros(1)
+
+    relaxation_time = correlation_time
+
+    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """0: it has no value."""
+        return np.zeros(size)
+
+    def step(self, h: float, bias: float = 0.0) -> WhiteStep:
+        """That of dW, without a bias; s is with the matrix that it drives."""
+        return WhiteStep(1 / math.sqrt(h), math.sqrt(3 / h))
+
+    @property
+    def largest_step(self) -> float:
+        """∞: it is drawn exactly."""
+        return math.inf
 
     def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
         """The drift in the sense of Stratonovich, and s A of the term that the noise drives, as one matrix.

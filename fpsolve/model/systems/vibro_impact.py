@@ -142,6 +142,11 @@ class VibroImpactOscillator(System):
         left = 1 - self._loss
         return () if left > 0 else (Message(Code.IMPOSSIBLE_BOUNCE, left=left, factor=self.impact_factor()),)
 
+    @property
+    def is_nonlinear(self) -> bool:
+        """Whether c₂ or c₃ is not 0."""
+        return self.c2 > 0 or self.c3 > 0
+
     def motion(self, *, smooth: bool = False) -> Motion:
         """The coefficients of the system (3), or with `smooth` of Eq. (6) in y, whose modulus is x by Eq. (4)."""
         square, R = self.epsilon**2, self.impact_factor()
