@@ -122,12 +122,13 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     ω ρ, or |dφ/dt| ρ where the noise moves the phase there, is the probability flux through an impact, where the
     log-amplitude jumps by ln R; it is taken on the side from where the impact is met.
     """
-    space, problem = pair.space, pair.generator.problem
-    system, density = problem.motion, _density(_of_zero(pair), "adjoint")
-    growth = density.mean(lambda phi, xi: growth_rate(system, xi)(phi))
+    space, problem, at = _of_zero(pair).space, pair.generator.problem, pair.space.xi.samples()
+    system, phi = problem.motion, space.phi.points[:, None]
+    rate = growth_rate(system, at.xi)(phi)
     for each in problem.diffusions:  # ½ h q′, by which q ∘ dW has a mean
-        size = 0.5 * system.epsilon ** (2 * each.order)
-        growth += size * density.mean(lambda phi, xi, each=each: each.h(phi) * each.q.slope(phi) + 0.0 * xi)
+        rate = rate + 0.5 * system.epsilon ** (2 * each.order) * each.h(phi) * each.q.slope(phi)
+    density = space.evaluate(pair.left, space.phi.values, at.values) * at.weight / at.factor
+    growth = space.turns * float(space.phi.weights @ (rate * density) @ at.measure)
     table = space.table(pair.left)
     for jump in system.jumps:
         at = space.phi.vertices_at(jump.phase)
@@ -158,11 +159,15 @@ def _checked(pair: PrincipalPair, density: Density, name: str) -> Density:
 
 def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Density:
     """One of the `Fields`, normalised, repeated from a half circle to the full one."""
-    space, at, turns = pair.space, pair.space.xi.samples(), pair.space.turns
-    values = np.tile(getattr(fields(pair, space.phi.values, at), name), (turns, 1))
-    phi = np.mod(np.concatenate([space.phi.points + k * space.phi.span for k in range(turns)]), 2 * np.pi)
+    space, at, turns, frame = pair.space, pair.space.xi.samples(), pair.space.turns, pair.generator.problem.frame
+    points, weights = space.phi.points, space.phi.weights
+    if frame is not None:
+        points = frame.own_phase(points)
+        weights = weights / frame.density(points)
+    values = np.tile(getattr(fields(pair, points, space.phi.values, at), name), (turns, 1))
+    phi = np.mod(np.concatenate([points + k * space.phi.span for k in range(turns)]), 2 * np.pi)
     order = np.argsort(phi)
-    phi, values, phi_weights = phi[order], values[order], np.tile(space.phi.weights, turns)[order]
+    phi, values, phi_weights = phi[order], values[order], np.tile(weights, turns)[order]
     total, problem = phi_weights @ values @ at.measure, pair.generator.problem
     words = "tilted" if name == "product" else "adjoint" if pair.p else "stationary"
     about = f"{words} density at p = {pair.p:g}", problem.noise_quantity, problem.values

@@ -486,7 +486,7 @@ def first_far(problem: Problem, place: Place, rtol: float) -> Discretisation:
     fall = abs(np.subtract(*_log_density(problem.noise, np.array([place.lower, place.upper]))))
     cells = max(FEWEST_CELLS, math.ceil(fall / FALL_PER_CELL))
     lines = place.lower * np.exp(math.log(place.upper / place.lower) * np.linspace(0, 1, cells + 1))
-    phase = _phase(problem.system, unit * lines[[0, -1]], digits, 1)
+    phase = _phase(problem.motion, unit * lines[[0, -1]], digits, 1)
     return Discretisation(phase, (Cells(lines, round(2 + digits / 2), is_killed=True),))
 
 

@@ -58,18 +58,27 @@ class Fields(NamedTuple):
     product: FloatArray
 
 
-def fields(pair: PrincipalPair, at_phi: Any, at_xi: Samples) -> Fields:
-    """T, T* and T T* from the values of the φ-elements at points and samples of the functions of ξ.
+def fields(pair: PrincipalPair, phi: FloatArray, at_phi: Any, at_xi: Samples) -> Fields:
+    """T, T* and T T* at φ from the values of the φ-elements there and samples of the functions of ξ.
 
     T has mean 1 over P_s(ξ)/2π; with a tilt beyond `MOST_TILT`, which leaves T there to rounding, over P_s exp(2s z).
     """
-    space, xi, mean = pair.space, pair.space.xi, 1.0
-    if 0 < abs(xi.tilt) <= MOST_TILT:
-        own, over_phi = xi.samples().factor, space.phi.constant @ space.table(pair.right) / space.phi.span
+    space, xi, frame = pair.space, pair.space.xi, pair.generator.problem.frame
+    mean, stretch, density = 1.0, np.ones(1), np.ones(1)
+    if frame is not None or 0 < abs(xi.tilt) <= MOST_TILT:
+        own = xi.samples().factor if 0 < abs(xi.tilt) <= MOST_TILT else np.ones(xi.measure.size)
+        over_phi = space.phi.constant @ space.table(pair.right) / space.phi.span
+        if frame is not None:  # the mean over φ of |y|^p T_y
+            psi, weights = space.phi.finer_rule(frame.parts)
+            at = frame.own_phase(psi)
+            weights = weights / frame.density(at) * frame.length(at) ** pair.p
+            over_phi = weights @ (space.phi.at(psi) @ space.table(pair.right)) / space.phi.span
+            stretch, density = frame.length(phi) ** pair.p, frame.density(phi)
         mean = float(xi.measure / own @ (xi.values @ over_phi) / np.sum(xi.measure / own**2))
     right, left = (space.evaluate(v, at_phi, at_xi.values) for v in (pair.right, pair.left))
-    factor = at_xi.factor / mean
-    return Fields(right * factor, left * at_xi.weight / factor, right * left * at_xi.weight)
+    factor = at_xi.factor / mean * stretch[:, None]
+    of_phi = at_xi.weight * density[:, None]
+    return Fields(right * factor, left * of_phi / factor, right * left * of_phi)
 
 
 def xi_marginal(pair: PrincipalPair, at_xi: Samples) -> FloatArray:
@@ -113,7 +122,9 @@ class Nodes:
         # P_s is shown by quadrilaterals as high as a noise unit, or higher in algebraic tails
         has_tails, inner = pair.generator.problem.noise.has_algebraic_tails, np.minimum(abs(lines[:-1]), abs(lines[1:]))
         tall = math.ceil(np.max(np.diff(lines) / np.maximum(1.0, inner / 6 if has_tails else 1.0)) - 1e-9)
-        starts = np.sort(np.mod(space.phi.lines[:-1], space.phi.span))
+        frame = pair.generator.problem.frame
+        lines_of_phi = space.phi.lines if frame is None else frame.own_phase(space.phi.lines)
+        starts = np.sort(np.mod(lines_of_phi[:-1], space.phi.span))
         starts = np.concatenate([starts + k * space.phi.span for k in range(space.phi.turns)])
         breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
         phi = _nodes(breaks, order, finer * _parts(degrees[0], order))
@@ -136,15 +147,17 @@ class Nodes:
 
     def fields(self, pair: PrincipalPair) -> Fields:
         """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
-        return fields(pair, self.phase_table(pair), self.samples(pair))
+        return fields(pair, self.phi.ravel(), self.phase_table(pair), self.samples(pair))
 
     def phase_table(self, pair: PrincipalPair) -> FloatArray:
         """Values of the φ-elements at the nodes, shape (φ-nodes, φ-unknowns)."""
-        phi = pair.space.phi
+        axis, frame, phi = pair.space.phi, pair.generator.problem.frame, self.phi
         # contracted a little, as they then tell from which side a line of the mesh is seen
-        inside = self.phi + 1e-6 * (self.phi.mean(axis=1, keepdims=True) - self.phi)
-        turned = phi.span * np.floor((inside - phi.lines[0]) / phi.span)
-        return phi.at((self.phi - turned).ravel(), (inside - turned).ravel())
+        inside = phi + 1e-6 * (phi.mean(axis=1, keepdims=True) - phi)
+        if frame is not None:
+            phi, inside = frame.phase(phi), frame.phase(inside)
+        turned = axis.span * np.floor((inside - axis.lines[0]) / axis.span)
+        return axis.at((phi - turned).ravel(), (inside - turned).ravel())
 
     def samples(self, pair: PrincipalPair) -> Samples:
         """The functions of ξ at the nodes."""

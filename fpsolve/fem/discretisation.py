@@ -18,6 +18,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
 from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
+from fpsolve.model.frame import Frame
 from fpsolve.model.noise import Noise
 
 HALVING = 2 * math.log(2)
@@ -283,15 +284,16 @@ class Discretisation:
     noises: tuple[NoisePart, ...]
 
     @classmethod
-    def on(cls, mesh: CylinderMesh, noise: Noise) -> Discretisation:
-        """The elements of a mesh, which is cut off at the end of the noise's support.
+    def on(cls, mesh: CylinderMesh, noise: Noise, frame: Frame | None = None) -> Discretisation:
+        """The elements of a mesh, which is cut off at the end of the noise's support, in the coordinates of a frame.
 
         Raises:
             MeshError: the mesh has lines where the noise has states, or none where it has a line.
         """
         if noise.has_states == bool(mesh.z_lines.size):
             raise MeshError("noise with states needs a mesh without z_lines, and noise on a line one with them")
-        phase = PhaseCells(mesh.phi_lines, np.full(mesh.phi_lines.size - 1, mesh.phi_degree))
+        lines = mesh.phi_lines if frame is None else frame.phase(mesh.phi_lines)
+        phase = PhaseCells(lines, np.full(mesh.phi_lines.size - 1, mesh.phi_degree))
         if noise.has_states:
             return cls(phase, (States(noise.reached.size),))
         mesh = mesh.within(noise.half_width / noise.standard_deviation)

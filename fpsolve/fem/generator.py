@@ -59,13 +59,13 @@ class Generator:
 
     def __init__(self, problem: Problem, chosen: Discretisation | CylinderMesh) -> None:
         if isinstance(chosen, CylinderMesh):
-            chosen = Discretisation.on(chosen, problem.noise)
+            chosen = Discretisation.on(chosen, problem.noise, problem.frame)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
         self.phi = PhaseAxis(chosen.phase.lines, chosen.phase.degrees)
         self._spaces: dict[float, TensorSpace] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
-        for jump in problem.system.jumps:
+        for jump in problem.motion.jumps:
             self.phi.vertices_at(jump.phase)
         self.space(0.0)  # refuses a mesh that cannot be used
 
@@ -75,7 +75,8 @@ class Generator:
 
     def __str__(self) -> str:
         lines = [f"  {power_of_epsilon(term.order):<2}  {term.text}" for term in self.terms()]
-        return "\n".join(["L(p), Eq. (19), the sum of", *lines])
+        words = "" if self.problem.frame is None else ", where the order 0 is a uniform rotation,"
+        return "\n".join([f"L(p), Eq. (19){words} the sum of", *lines])
 
     def space(self, p: float) -> TensorSpace:
         """Trial and test functions; the tilt of those of ξ moves with p."""
@@ -135,7 +136,7 @@ class Generator:
     @property
     def unit_rate(self) -> float:
         """The system's own unit of rates, ω."""
-        return angular_frequency(self.problem.system)
+        return angular_frequency(self.problem.motion)
 
     @cached_property
     def loss(self) -> float:

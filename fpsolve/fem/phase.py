@@ -132,6 +132,13 @@ class PhaseAxis(Axis):
         kept = np.arange(values.shape[1]) <= self.degrees[cell, None]
         return self._matrix(values[kept], np.nonzero(kept)[0], self._number[cell][kept], (phi.size, self.size))
 
+    def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:
+        """Points and weights of the rule where every cell is cut into so many parts, shapes (parts n,)."""
+        sizes = np.repeat(self._sizes / parts, parts)
+        starts = (self.lines[:-1, None] + self._sizes[:, None] * np.arange(parts) / parts).ravel()
+        points = starts[:, None] + sizes[:, None] * self._table.rule.points
+        return points.ravel(), (sizes[:, None] * self._local_weights).ravel()
+
     @cached_property
     def values(self) -> Any:
         """The basis functions at the points of the rule, shape (n, size)."""

@@ -67,7 +67,7 @@ def orthonormal(degree: int) -> Orthonormal:
     ends = legendre(np.array([0.0, 1.0]), degree)
     factors = (values, values), (values, slopes), (slopes, slopes)
     pairs = [(first[:, :, None] * last[:, None, :]).reshape(len(values), -1) for first, last in factors]
-    return Orthonormal(rule, *pairs, ends, end_slopes)
+    return Orthonormal(rule, pairs[0], pairs[1], pairs[2], ends, end_slopes)
 
 
 @dataclass(frozen=True, eq=False)

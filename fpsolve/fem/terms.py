@@ -25,7 +25,15 @@ import numpy as np
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.phase import by_rows
-from fpsolve.model.plane import CoefficientMatrix, Harmonics, Jump, System, is_driven, phase_speed, written_coefficient
+from fpsolve.model.plane import (
+    CoefficientMatrix,
+    Harmonics,
+    Jump,
+    LinearMotion,
+    is_driven,
+    phase_speed,
+    written_coefficient,
+)
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 ALL_ORDERS = slice(None)
@@ -163,11 +171,11 @@ class Terms:
 
         Where θ is the size of the speed for the typical ξ it is held: [T] = 0 there but for the error of the elements.
         """
-        text, jump, moved = "∂/∂θ", self._jump, Moved(self.system.epsilon, by.terms)
+        text, jump, moved = "∂/∂θ", self._jump, LinearMotion(self.system.epsilon, by.terms)
         for term in by.terms:
             yield from self._driven(term)
-        for own, change in zip(self._diffusions, by.diffusions, strict=bool(by.diffusions)):
-            yield from self._diffused([(0.5, own, change), (0.5, change, own)])
+        for own, other in zip(self._diffusions, by.diffusions, strict=bool(by.diffusions)):
+            yield from self._diffused([(0.5, own, other), (0.5, other, own)])
         for j in self._two_way:
             yield self._term(-0.5 * jump[[j]].T @ jump[[j]], self._faster(moved, float(self._vertices[j])), text)
         for ray, slope in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
@@ -233,7 +241,7 @@ class Terms:
         """|dφ/dt| at φ."""
         return lambda xi: np.abs(phase_speed(self.system, xi)(phi))
 
-    def _faster(self, moved: Moved, phi: float) -> Coefficient:
+    def _faster(self, moved: LinearMotion, phi: float) -> Coefficient:
         """∂|dφ/dt|/∂θ at φ."""
         return lambda xi: np.sign(phase_speed(self.system, xi)(phi)) * phase_speed(moved, xi)(phi)
 
@@ -245,19 +253,10 @@ class Terms:
             return abs(float(speed[0])), one
         return 1.0, lambda xi: np.maximum(sign * at(xi), 0)
 
-    def _more_flux(self, moved: Moved, ray: Jump, sign: int) -> Coefficient:
+    def _more_flux(self, moved: LinearMotion, ray: Jump, sign: int) -> Coefficient:
         """Its ∂/∂θ."""
         at = self._speed(ray.phase)
         return lambda xi: np.where(sign * at(xi) > 0, sign * phase_speed(moved, xi)(ray.phase), 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Moved(System):
-    """∂/∂θ of a motion, as a motion."""
-
-    epsilon: float
-    terms: tuple[CoefficientMatrix, ...]
-    jumps: tuple[Jump, ...] = ()
 
 
 def power_of_epsilon(order: int) -> str:

@@ -288,6 +288,15 @@ class System(Parametrised):
         return math.exp(log_factor)
 
 
+@dataclass(frozen=True)
+class LinearMotion(System):
+    """Terms and jumps alone: what is left of a system beside white noise, or in other coordinates, or its ∂/∂θ."""
+
+    epsilon: float
+    terms: tuple[CoefficientMatrix, ...]
+    jumps: tuple[Jump, ...] = ()
+
+
 def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:
     """∂/∂ε of Σ ε^n g(ξ) A x, as terms."""
     return tuple(

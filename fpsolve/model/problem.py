@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray, real_numbers, shown
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message
+from fpsolve.model.frame import Frame, normal_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import Parameter, Parametrised
 from fpsolve.model.plane import CoefficientMatrix, System, crosses_both_ways
@@ -29,7 +30,7 @@ LINE = 90
 
 @dataclass(frozen=True)
 class ParameterDerivative:
-    """∂/∂θ of a problem, all at fixed φ and ξ.
+    """∂/∂θ of a problem, all at fixed φ and ξ, in the coordinates of its `frame`, which are held as well.
 
     Attributes:
         theta: the value of θ.
@@ -73,15 +74,25 @@ class Problem:
     def _moved(self) -> tuple[System, Sequence[CoefficientMatrix]]:
         return self.noise.motion(self.system)
 
-    @property
-    def motion(self) -> System:
-        """The system as its noise moves it along a path: itself, or what is left of it beside white noise."""
-        return self._moved[0]
+    @cached_property
+    def frame(self) -> Frame | None:
+        """The coordinates that it is solved in where these are not x itself."""
+        drift, diffusions = self._moved
+        return normal_frame(
+            drift.terms, diffusions, drift.epsilon, self.noise.standard_deviation, self.noise.correlation_time
+        )
 
-    @property
+    @cached_property
+    def motion(self) -> System:
+        """The system along a path of ξ, in the coordinates of `frame`: what is left of it beside white noise."""
+        drift, _ = self._moved
+        return drift if self.frame is None else self.frame.motion(drift)
+
+    @cached_property
     def diffusions(self) -> Sequence[CoefficientMatrix]:
-        """ε^order B of every Bx ∘ dW by which white noise moves the state."""
-        return self._moved[1]
+        """ε^order B of every Bx ∘ dW by which white noise moves the state, in the same coordinates."""
+        _, diffusions = self._moved
+        return diffusions if self.frame is None else [self.frame.term(each) for each in diffusions]
 
     @property
     def halves(self) -> tuple[Parametrised, Parametrised]:
@@ -157,6 +168,8 @@ class Problem:
                 noise = self.noise.derivative(name)
             own = name if section == self.system.noise_section else ""
             terms, diffusions = self.noise.changed_motion(self.system, terms, own)
+            if self.frame is not None:
+                terms, diffusions = ([self.frame.term(each) for each in part] for part in (terms, diffusions))
             found[key] = ParameterDerivative(theta, tuple(terms), tuple(jumps), noise, tuple(diffusions))
         return found
 

@@ -119,13 +119,13 @@ def second_order(problem: Problem) -> SecondOrder:
     Raises:
         NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in the noise.
     """
-    system, noise = problem.system, problem.noise
+    system, noise = problem.motion, problem.noise
     steady, driven = matrix_at(system, 0.0, slice(0, 1)), np.zeros((2, 2))
-    for term in problem.motion.terms if has_mean(problem) else ():
+    for term in system.terms if has_mean(problem) else ():
         steady += noise.mean * (affine(term.g) or (0.0, 0.0))[1] * system.epsilon**term.order * np.array(term.matrix)
     frame, omega = _rotating_frame(steady)
     parts = [float(_growth(steady, frame).mean)]
-    for term in problem.motion.terms:
+    for term in system.terms:
         offset, slope = affine(term.g) or (math.nan, math.nan)
         if term.order == 1 and offset == 0:
             driven += slope * np.array(term.matrix)

@@ -57,7 +57,7 @@ def test_values_and_weights_belong_to_their_phase(solver, name):
     density = {"adjoint": adjoint_density, "product": tilted_density}[name](pair)
     phi, span = pair.space.phi, pair.space.phi.span
     at_phi = phi.at(phi.lines[0] + (density.phi - phi.lines[0]) % span)
-    expected = getattr(fields(pair, at_phi, pair.space.xi.samples()), name)
+    expected = getattr(fields(pair, density.phi, at_phi, pair.space.xi.samples()), name)
     expected = expected / (density.phi_weights @ expected @ density.xi_weights)
     np.testing.assert_allclose(density.values, expected, atol=1e-11 * expected.max())
     assert density.phi_weights @ density.phi == pytest.approx(2 * np.pi**2)

@@ -87,7 +87,7 @@ def test_values_are_those_of_the_fields(pair, field):
     inside = surface.phi[:, 1:-1].ravel()
     turn = np.mod(inside - space.phi.lines[0], space.phi.span) + space.phi.lines[0]
     at_xi = space.xi.at(surface.xi / EXACT.standard_deviation)
-    wanted = getattr(fields(pair, space.phi.at(turn), at_xi), FIELDS[field][0])
+    wanted = getattr(fields(pair, turn, space.phi.at(turn), at_xi), FIELDS[field][0])
     found = surface.values.reshape(*surface.phi.shape, -1)[:, 1:-1].reshape(wanted.shape)
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12 * np.abs(wanted).max())
     assert (surface.phi.min(), surface.phi.max()) == (0, pytest.approx(2 * np.pi))

@@ -100,7 +100,7 @@ def test_eigenfunction_tends_to_1_plus_epsilon_T1(p):
         oscillator = VibroImpactOscillator(omega=1.3, restitution=0.8, c1=0.1, epsilon=epsilon)
         space = (pair := ExponentSolver(Problem(oscillator, OU)).pair(p)).space
         t1 = perturbation.first_order_eigenfunction(oscillator, OU, p, phi[:, None], xi)
-        values = fields(pair, space.phi.at(phi), space.xi.at(xi / OU.standard_deviation)).right
+        values = fields(pair, phi, space.phi.at(phi), space.xi.at(xi / OU.standard_deviation)).right
         errors.append(np.max(np.abs(values - 1 - epsilon * t1)))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(orders, 2, atol=0.15)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass as plain_dataclass
 from enum import StrEnum
 from fractions import Fraction
 from typing import Annotated, ClassVar, NamedTuple
@@ -17,7 +16,7 @@ from fpsolve.model.exact import ExactLaw, white_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import SIZE, STRICT, parameter
-from fpsolve.model.plane import CoefficientMatrix, Jump, System, affine, written_coefficient
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, written_coefficient
 
 
 class Interpretation(StrEnum):
@@ -136,7 +135,7 @@ class White(Noise):
                 )
         if self.interpretation == Interpretation.ITO and diffusions:
             drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))
-        return Drift(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions
+        return LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions
 
     @classmethod
     def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
@@ -152,15 +151,6 @@ class White(Noise):
             square = changed @ driven + driven @ changed
             drift.append(_term(system, -0.5 * self.s**2 * square - by_s * self.s * driven @ driven, 0))
         return drift, [_term(system, by_s * driven + self.s * changed, 0)] if driven.any() else []
-
-
-@plain_dataclass(frozen=True)
-class Drift(System):
-    """What moves a system besides white noise."""
-
-    epsilon: float
-    terms: tuple[CoefficientMatrix, ...]
-    jumps: tuple[Jump, ...]
 
 
 def _split(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[list[CoefficientMatrix], FloatArray]:

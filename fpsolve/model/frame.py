@@ -1,0 +1,143 @@
+"""Coordinates y = S⁻¹x in which the motion without noise is growth and a uniform rotation.
+
+A linear change of coordinates leaves Λ(p) alone, as ‖x‖ and ‖y‖ are within constant factors, and the phase ψ of y needs
+fewer functions than φ of x: with x″ + ω²x = 0 the phase of (x, ẋ) runs between the speeds 1 and ω². With x = a e(φ),
+e = (cos φ, −sin φ), and ρ(φ) = |S⁻¹e(φ)|,
+
+    ‖x‖^p T(φ) = ‖y‖^p T_y(ψ),  so that  T(φ) = ρ^p T_y(ψ(φ)),  dψ/dφ = 1/(det S ρ²).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, is_driven, squared_frequency
+
+
+MOST_PARTS = 1000
+
+
+@dataclass(frozen=True)
+class Frame:
+    """S, a lower triangular matrix with a positive diagonal: x₁ = 0 where y₁ = 0, and ψ grows with φ.
+
+    Attributes:
+        matrix: S.
+    """
+
+    matrix: tuple[tuple[float, float], tuple[float, float]]
+
+    @cached_property
+    def _array(self) -> FloatArray:
+        return np.array(self.matrix)
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        return np.asarray(np.linalg.inv(self._array))
+
+    def term(self, term: CoefficientMatrix) -> CoefficientMatrix:
+        """The same term for y, S⁻¹AS."""
+        return replace(term, matrix=(self._inverse @ np.array(term.matrix) @ self._array).tolist())
+
+    def motion(self, system: System) -> System:
+        """The same system for y, the terms of order 0 that no noise drives as one."""
+        free = [term for term in system.terms if is_free(term)]
+        others = [self.term(term) for term in system.terms if not is_free(term)]
+        a = self._inverse @ _sum(free) @ self._array
+        growth, speed = 0.5 * (a[0, 0] + a[1, 1]), 0.5 * (a[0, 1] - a[1, 0])
+        rotation = CoefficientMatrix(0, ((growth, speed), (-speed, growth)))  # exactly one
+        jumps = [replace(jump, phase=float(self.phase(np.array(jump.phase)))) for jump in system.jumps]
+        return LinearMotion(system.epsilon, (rotation, *others), tuple(jumps))
+
+    @property
+    def parts(self) -> int:
+        """Into how many parts a cell of ψ is cut where dφ/dψ is integrated: more, the more φ and ψ differ."""
+        return min(math.ceil(float(np.linalg.cond(self._array))), MOST_PARTS)
+
+    def phase(self, phi: FloatArray) -> FloatArray:
+        """ψ(φ), which is φ at odd multiples of π/2."""
+        return _turned(self._inverse, phi)
+
+    def own_phase(self, psi: FloatArray) -> FloatArray:
+        """φ(ψ)."""
+        return _turned(self._array, psi)
+
+    def length(self, phi: FloatArray) -> FloatArray:
+        """ρ(φ), how long y is for a unit vector x."""
+        return np.asarray(np.linalg.norm(self._inverse @ _unit(phi), axis=0))
+
+    def density(self, phi: FloatArray) -> FloatArray:
+        """dψ/dφ."""
+        return np.asarray(np.linalg.det(self._inverse) / self.length(phi) ** 2)
+
+
+def is_free(term: CoefficientMatrix) -> bool:
+    """Whether a term is of order 0, and no noise drives it."""
+    return term.order == 0 and not is_driven(term.g)
+
+
+def normal_frame(
+    drift: Sequence[CoefficientMatrix],
+    diffusions: Sequence[CoefficientMatrix],
+    epsilon: float,
+    deviation: float,
+    memory: float,
+) -> Frame | None:
+    """The frame in which the order 0 of a drift is growth and a uniform rotation; None where it does not rotate.
+
+    It is also None where the phase of x runs more evenly, as where noise is much stronger than what turns the state.
+
+    Args:
+        drift, diffusions: what moves the state along a path of ξ, and by white noise.
+        epsilon: ε.
+        deviation, memory: the standard deviation of ξ and about how long it remembers its value.
+    """
+    a = _sum([term for term in drift if is_free(term)])
+    square = float(squared_frequency(a))
+    if not square > 0 or (a[0, 1] == -a[1, 0] and a[0, 0] == a[1, 1]):
+        return None
+    side = math.copysign(1.0, a[0, 1])
+    lower = side * (0.5 * (a[1, 1] - a[0, 0]))
+    scale = abs(a[0, 1])
+    frame = Frame(((1.0, 0.0), (lower / scale, math.sqrt(square) / scale)))
+
+    def unevenness(terms: Sequence[CoefficientMatrix], whites: Sequence[CoefficientMatrix]) -> float:
+        """The amplitudes of the waves of dφ/dt over its mean."""
+        total, driven, mean = 0.0, 0.0, 0.0
+        for term in terms:
+            size = epsilon**term.order
+            if is_driven(term.g):
+                driven += size * deviation * float(abs(term.h.mean) + term.h.amplitude)
+            else:
+                total += size * abs(float(term.g(0.0))) * float(term.h.amplitude)
+                mean += size * float(term.g(0.0)) * float(term.h.mean)
+        total += driven * min(1.0, driven * memory)
+        total += sum((epsilon**each.order * float(abs(each.h.mean) + each.h.amplitude)) ** 2 for each in whites)
+        return total / max(abs(mean), 1e-300)
+
+    here = unevenness([frame.term(each) for each in drift], [frame.term(each) for each in diffusions])
+    return frame if here < unevenness(drift, diffusions) else None
+
+
+def _sum(free: Sequence[CoefficientMatrix]) -> FloatArray:
+    """The matrix of terms that no noise drives."""
+    return np.asarray(sum((float(term.g(0.0)) * np.array(term.matrix) for term in free), np.zeros((2, 2))))
+
+
+def _unit(phi: FloatArray) -> FloatArray:
+    """e(φ), shape (2, n)."""
+    return np.stack([np.cos(phi), -np.sin(phi)])
+
+
+def _turned(matrix: FloatArray, phi: Any) -> FloatArray:
+    """The phase of a matrix times e(φ), in the same half turn."""
+    half_turns = math.pi * np.round(np.asarray(phi) / math.pi)
+    x = matrix @ _unit(np.ravel(phi - half_turns))
+    return np.asarray(np.arctan2(-x[1], x[0]).reshape(np.shape(phi)) + half_turns)
