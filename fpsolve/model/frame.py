@@ -20,7 +20,6 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, is_driven, squared_frequency
 
-
 MOST_PARTS = 1000
 
 
