@@ -180,7 +180,7 @@ def test_any_parameters_in_their_ranges_give_a_case_or_messages(
         assert all(0 < length < math.inf for length in lengths)
 
 
-@pytest.mark.parametrize("parts", sampled(300, 600, 3000))
+@pytest.mark.parametrize("parts", sampled(300, 3000))
 @pytest.mark.parametrize("start", ["vary", "a", "mesh.file"])
 def test_very_long_dotted_key(tmp_path: Path, start: str, parts: int) -> None:
     long = f"{start}{'.a' * parts} = 1"

@@ -162,7 +162,6 @@ def assert_picture(file):
     ("arguments", "picture"),
     sampled(
         (["--cylinder", "--field", "tilted_density"], "eigenfunctions-tilted_density-cylinder.png"),
-        ([], "eigenfunctions.png"),
         (["--field", "T_adjoint"], "eigenfunctions-T_adjoint.png"),
         (["--cylinder", "--p", "2", "--output", "cylinder.png"], "cylinder.png"),
     ),
