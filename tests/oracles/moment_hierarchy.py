@@ -52,3 +52,13 @@ def ornstein_uhlenbeck_exponent(steady, driven, alpha, deviation, p, polynomials
     total += deviation * np.kron(rates_of_monomials(driven, p), ladder + ladder.T)
     total -= np.kron(np.eye(p + 1), alpha * np.diag(np.arange(float(polynomials))))
     return float(np.max(np.linalg.eigvals(total).real))
+
+
+def sine_wiener_exponent(steady, driven, amplitude, sigma, p, harmonics):
+    """Λ(p) of ẋ = (A₀ + a sin θ A₁) x, dθ = σ dW: monomials times exp(ikθ), |k| ≤ harmonics."""
+    k = np.arange(-harmonics, harmonics + 1)
+    sine = (np.eye(k.size, k=-1) - np.eye(k.size, k=1)) / 2j
+    total = np.kron(rates_of_monomials(steady, p), np.eye(k.size)).astype(complex)
+    total += amplitude * np.kron(rates_of_monomials(driven, p), sine)
+    total -= np.kron(np.eye(p + 1), 0.5 * sigma**2 * np.diag(k.astype(float) ** 2))
+    return float(np.max(np.linalg.eigvals(total).real))

@@ -1,0 +1,13 @@
+"""Λ(2) of random systems under every kind of noise within the stated error of the oracles."""
+
+import pytest
+
+from tests.conftest import sampled
+from tests.random_systems import compared
+
+
+@pytest.mark.parametrize("seed", sampled(*range(7, 13), *range(1, 7), *range(13, 20), keep=6))
+def test_random_systems(seed):
+    """Many more: `python -m tests.random_systems`."""
+    _, value, expected, error, doubt = compared(seed)
+    assert abs(value - expected) <= error + doubt
