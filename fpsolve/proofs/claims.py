@@ -37,6 +37,11 @@ class Bound(Record):
     certificate: Certificate | None
 
     @property
+    def bounds(self) -> Sequence[Bound]:
+        """Itself."""
+        return [self]
+
+    @property
     def sign(self) -> int:
         """That of the number as claimed, 0 where it is open."""
         return int(self.lower is not None and self.lower > 0) - int(self.upper is not None and self.upper < 0)
@@ -74,6 +79,11 @@ class IndexBound(Record):
     upper: Decimal | None
     moments: list[MomentBound]
 
+    @property
+    def bounds(self) -> Sequence[Bound]:
+        """Those from which it follows."""
+        return self.moments
+
     def objections(self, parameters: Stated) -> Iterator[str]:
         """Why the bounds need not hold."""
         if not self.moments and (self.lower, self.upper) == (None, None):
@@ -108,6 +118,10 @@ class CurveClaims(Record):
 
     def objections(self) -> Iterator[str]:
         """What does not follow, after the place where it stands."""
+        bounds = [each for claim in self.claims.values() for each in claim.bounds]
+        stated = [each.certificate.statement for each in bounds if each.certificate is not None]
+        if any((each.motion, each.chain) != (stated[0].motion, stated[0].chain) for each in stated):
+            yield "its certificates are of several systems"
         for place, claim in self.claims.items():
             yield from (f"{place}: {text}" for text in claim.objections(self.parameters))
         signs = [(str(each.p), each.sign) for each in self.moments]
@@ -125,8 +139,7 @@ class Claims(Record):
 
     @model_validator(mode="after")
     def _is_done_in_time(self) -> Self:
-        found = [claim for curve in self.curves for claim in curve.claims.values()]
-        bounds = [each for claim in found for each in (claim.moments if isinstance(claim, IndexBound) else [claim])]
+        bounds = [each for curve in self.curves for claim in curve.claims.values() for each in claim.bounds]
         work = sum(each.certificate.work for each in bounds if each.certificate is not None)
         if work > MOST_WORK:
             raise ValueError(

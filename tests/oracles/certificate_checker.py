@@ -1,8 +1,9 @@
 """Check a certificate: do its numbers prove that Λ(p), or λ, lies between the two bounds of its entry?
 
-Between two impacts the state's logarithm ρ, its phase φ and the noise have the tilted generator L(p) = L_ξ + (ω
-+ (εξ + ε²c₁)h₁)∂φ + p(εξ + ε²c₁)q₁, Eqs. (17)-(19).  An impact multiplies the state by R; writing T = R^{ps}T̃
-with a sawtooth s that rises by 1 from one impact to the next makes T̃ smooth and ∂φ to ∂φ + p ln(R)/π.
+Between two jumps the state's logarithm ρ, its phase φ and the noise have the tilted generator L(p) = L_ξ + (h₀ +
+ξh₁)∂φ + p(q₀ + ξq₁), Eqs. (17)-(19) of the paper's oscillator.  A jump multiplies the state by R, at a ray that the
+phase passes forward or backward; writing T = e^{ps}T̃ with a sawtooth s that falls by ln R where a ray is passed
+forward, rises by it where backward, and makes up for it in between, makes T̃ smooth and ∂φ to ∂φ + pκ.
 
 **Theorem.**  The two bounds have proofs of their own, each with its δ, nodes, W and tails; μ and u are the same.
 Let q be 1 for the upper bound, −1 for the lower, and T = e^{βz + qψ(z)} u(φ, z) > 0 with ψ′ = W, which is
@@ -30,6 +31,11 @@ with n = LβT/T − μ at z_J for κ = 0.  This is ≤ δ if qn ≤ δ + ν(κ(b
 h₁(∂φ + p ln(R)/π) + pq₁ is the part of L that z multiplies.  Left of z_0 everything is mirrored: z, β, W, u_z and F₁
 change their signs.
 
+**Other noise.**  For z = cos θ with θ a Brownian motion, for a chain, and for white noise, where L has no noise but a
+second-order term ½(h₁(∂φ + pκ) + pq₁)², T̃ = u is taken as it is, and (μ − δ)u ≤ Lu ≤ (μ + δ)u is checked.  White noise
+does not move the phase at a ray, which it then passes one way; Itô's and Dynkin's formulas hold as coefficients are
+bounded and T is smooth.
+
 For p = 0 nothing is to be shown: T = 1 and Λ = 0.
 
 **Ends of bounded noise.**  ±1 is reached when r0 < 0 (a < 1).  Near them the noise is a Bessel process of
@@ -47,6 +53,7 @@ from fractions import Fraction
 import numpy as np
 
 from tests.oracles import certificate_condition as condition
+from tests.oracles import certificate_plain as plain
 from tests.oracles import certificate_series as cs
 from tests.oracles import certificate_statement as cf
 
@@ -68,6 +75,9 @@ def check(entry):
         trial = cf.read_trial(model, certificate)
         with np.errstate(all="ignore"):  # what overflows or is no number fails every comparison
             for name in ("upper", "lower"):
+                if model.plain:
+                    plain.check(model, trial, certificate, name)
+                    continue
                 side = cf.read_side(model, trial, certificate, name)
                 if side.tails is not None:
                     _check_tail(model, trial, side, 1)
@@ -106,11 +116,11 @@ def _check_tail(model, trial, side, toward):
         slope = slope * (1 + z**2) / (1 - z**2) ** 2
     divisor, steep = (trial.basis.at(a, end) for a in (trial.divisor, trial.steep))
     u = divisor if model.moment else trial.basis.at(trial.function, end)
-    v, turned = cf.transport(model, u, divisor)
+    still, driven = cf.transport(model, u, divisor)
     gauge = cs.exact(trial.gauge)
     constant_part = nu * gauge * (gauge / 2 - b) - cs.exact(model.mu)
-    n = v * cs.exact(model.omega) + turned * (cs.exact(model.mean) + z * model.unit) + divisor * constant_part
-    growth = turned * model.unit - divisor * (nu * gauge * slope)
+    n = still + driven * z + divisor * constant_part
+    growth = driven - divisor * (nu * gauge * slope)
     square = kappa**2 * side.sign / 2 if model.moment else 0
     room = cs.exact(side.delta) + nu * (kappa * (b * toward - beta) - square)
     _require_positive(divisor, f"{name}: u is not positive.")

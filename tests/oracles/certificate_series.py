@@ -86,20 +86,12 @@ def _neighbours(a):
     return shifted(doubled, 1, 1), shifted(doubled, -1, 1)
 
 
-def times_h1(a):
-    """½ sin 2φ times a series."""
+def times_wave(a, wave):
+    """(mean + cosine cos 2φ + sine sin 2φ) times a series."""
     below, above = _neighbours(a)
-    out = np.stack([above[1] - below[1], below[0] - above[0]])
-    out[1, 0] = out[1, 0] * 0
-    return out * exact(0.25)
-
-
-def times_q1(a):
-    """½ (1 − cos 2φ) times a series."""
-    below, above = _neighbours(a)
-    out = below + above
-    out[1, 0] = out[1, 0] * 0
-    return a * exact(0.5) - out * exact(0.25)
+    cosine, sine = below + above, np.stack([above[1] - below[1], below[0] - above[0]])
+    cosine[1, 0], sine[1, 0] = cosine[1, 0] * 0, sine[1, 0] * 0
+    return a * wave[0] + (cosine * wave[1] + sine * wave[2]) * exact(0.5)
 
 
 class Hermite:

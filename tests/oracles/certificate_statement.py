@@ -1,7 +1,9 @@
-"""What a certificate states: the constants of the oscillator and its noise, and the series that a proof is about.
+"""What a certificate states: a system and its noise, and the series that a proof is about.
 
 Parameters are exact decimals, all other numbers are floats taken as they are, so every coefficient of the
-series follows in intervals.
+series follows in intervals. A system is ẋ = (A₀ + ξA₁)x, that of the paper by its parameters, others as sums of terms
+ε^order (offset + slope ξ) A. Where coordinates P are stated, phase and size are those of P⁻¹x. At a phase φ of x =
+‖x‖ (cos φ, −sin φ) a matrix A turns it by h = e′ᵀAe and stretches it by q = eᵀAe, waves in 2φ.
 """
 
 from decimal import Decimal
@@ -17,19 +19,52 @@ class Refused(Exception):
     """The claim does not follow; the message says why."""
 
 
-class Model(NamedTuple):
-    """Constants: of the phase, of the noise (b = slope·z, over 1 − z² if bounded), and what is bounded."""
+class Polar(NamedTuple):
+    """h and q of a matrix, each its mean and the factors of cos 2φ and sin 2φ, in intervals."""
 
-    omega: Fraction
-    mean: Fraction  # ε²c₁
-    unit: object  # ε times the unit of the noise, an interval
-    kappa: object  # ln R/π, an interval
-    nu: Fraction
-    slope: Fraction  # b′(0)
-    bounded: bool
+    turning: tuple
+    stretching: tuple
+
+
+class Noise(NamedTuple):
+    """A noise in units of its own: of what kind, ν, b′(0) (b = slope·z, over 1 − z² if bounded), the unit squared."""
+
+    kind: str  # "line", "bounded", "circle" for z = cos θ with ½ν∂θθ, "chain", "white"
+    nu: Fraction = Fraction(1)
+    slope: Fraction = Fraction(0)
+    square: Fraction = Fraction(1)
+    states: tuple = ()
+    rates: tuple = ()
+    ito: bool = False
+
+
+class Model(NamedTuple):
+    """Constants: of the phase, of the noise, and what is bounded."""
+
+    still: Polar
+    driven: Polar  # times the unit of the noise
+    kappa: object  # how fast the sawtooth of ln R rises with the phase, an interval
+    noise: Noise
     moment: bool
     p: Fraction
     mu: float
+
+    @property
+    def nu(self):
+        return self.noise.nu
+
+    @property
+    def slope(self):
+        return self.noise.slope
+
+    @property
+    def bounded(self):
+        return self.noise.kind == "bounded"
+
+    @property
+    def plain(self):
+        """Whether T is the trial function itself."""
+        return self.noise.kind in ("circle", "chain", "white")
 
 
 class Trial(NamedTuple):
@@ -78,29 +113,100 @@ def binary(values):
     return array
 
 
+WORDS = ("oscillator.impact", "noise.treatment", "noise.interpretation")
+
+
 def model_of(certificate):
     """The constants of a certificate."""
     quantity = certificate["quantity"]
     require(quantity in ("moment", "lyapunov_exponent"), f"No quantity is called {quantity!r}.")
-    words = ("oscillator.impact", "noise.treatment")
-    given = {k: v if k in words else decimal(v) for k, v in certificate["parameters"].items()}
-    omega, eps = given["oscillator.omega"], given["oscillator.epsilon"]
-    require(omega > 0, "omega must be positive: the phase must cross each impact forward.")
-    nu, slope, bounded, square = _noise(given)
-    require(Fraction(1, 10**80) < nu < 10**80, "The rate of the noise is out of range.")
-    loss = eps**2 * (1 - given["oscillator.restitution"])
+    given = {k: v if k in WORDS else decimal(v) for k, v in certificate["parameters"].items()}
+    noise = _noise(given) if certificate.get("chain") is None else _chain(certificate["chain"])
+    require(Fraction(1, 10**80) < noise.nu < 10**80, "The rate of the noise is out of range.")
+    still, driven, jumps = _oscillator(given) if certificate.get("motion") is None else _motion(certificate["motion"])
+    if noise.ito:
+        still = [[still[i][j] - noise.square * _times(driven, driven)[i][j] / 2 for j in (0, 1)] for i in (0, 1)]
+    kappa = cs.exact(0)
+    for ray, log_factor in jumps:
+        speeds = [ray[1] * x - ray[0] * y for x, y in (_moved(a, ray) for a in (still, driven))]
+        kappa = kappa + log_factor * _direction(*speeds, noise)
+    unit = cs.IV.sqrt(cs.exact(noise.square))
     return Model(
-        omega=omega,
-        mean=eps**2 * given["oscillator.c1"],
-        unit=cs.exact(eps) * cs.IV.sqrt(cs.exact(square)),
-        kappa=_log_factor(given["oscillator.impact"], loss) / cs.IV.pi,
-        nu=nu,
-        slope=slope,
-        bounded=bounded,
+        still=_polar(still, cs.exact(1)),
+        driven=_polar(driven, unit),
+        kappa=kappa / cs.IV.pi,
+        noise=noise,
         moment=quantity == "moment",
         p=decimal(certificate["p"]) if quantity == "moment" else Fraction(0),
         mu=float(binary(certificate["mu"])),
     )
+
+
+def _polar(a, size):
+    """h and q of a matrix times an interval, from e = (cos φ, −sin φ) and e′ = (−sin φ, −cos φ)."""
+    halves = (a[0][1] - a[1][0], -a[0][1] - a[1][0], a[1][1] - a[0][0]), (a[0][0] + a[1][1], a[0][0] - a[1][1])
+    turning, stretching = halves[0], (*halves[1], -a[0][1] - a[1][0])
+    return Polar(*(tuple(cs.exact(x / 2) * size for x in wave) for wave in (turning, stretching)))
+
+
+def _moved(a, x):
+    return tuple(row[0] * x[0] + row[1] * x[1] for row in a)
+
+
+def _times(a, b):
+    columns = [_moved(a, (b[0][j], b[1][j])) for j in (0, 1)]
+    return [[columns[j][i] for j in (0, 1)] for i in (0, 1)]
+
+
+def _direction(still, driven, noise):
+    """Whether the phase passes a ray forward (1) or backward (−1), where its speed is still + driven ξ."""
+    if noise.kind in ("line", "white"):
+        speeds = [still] if driven == 0 else [Fraction(0)]
+    elif noise.kind == "chain":
+        speeds = [still + driven * x for x in noise.states]
+    else:
+        speeds = [still] if driven**2 * noise.square < still**2 else [Fraction(0)]
+    require(all(x > 0 for x in speeds) or all(x < 0 for x in speeds), "The phase must cross each jump one way.")
+    return 1 if speeds[0] > 0 else -1
+
+
+def _oscillator(given):
+    """A₀, A₁ and the jump of the paper's oscillator in (x, v/ω)."""
+    omega, eps = given["oscillator.omega"], given["oscillator.epsilon"]
+    require(omega > 0, "omega must be positive: the phase must cross each impact forward.")
+    loss = eps**2 * (1 - given["oscillator.restitution"])
+    still, driven = [[Fraction(0), omega], [-omega, eps**2 * given["oscillator.c1"]]], [[Fraction(0)] * 2, [0, eps]]
+    return still, driven, [((Fraction(0), Fraction(1)), _log_factor(given["oscillator.impact"], loss))]
+
+
+def _motion(stated):
+    """A₀, A₁ and the jumps of a system that is stated by floats."""
+    require(stated["numbers"] == "binary", "The numbers of a system are binary.")
+    require(set(stated) == {"numbers", "epsilon", "terms", "jumps", "coordinates"}, "A system has other keys.")
+    eps, sums = Fraction(float(binary(stated["epsilon"]))), [[[Fraction(0)] * 2 for _ in (0, 1)] for _ in (0, 1)]
+    require(eps > 0, "epsilon must be positive.")
+    for term in stated["terms"]:
+        order, a = term["order"], _fractions(term["matrix"], (2, 2))
+        require(isinstance(order, int) and not isinstance(order, bool) and 0 <= order < 100, "An order is none.")
+        for total, part in zip(sums, ("offset", "slope"), strict=True):
+            for i, j in np.ndindex(2, 2):
+                total[i][j] += eps**order * Fraction(float(binary(term[part]))) * a[i][j]
+    (a, b), (c, d) = change = _fractions(stated["coordinates"], (2, 2))
+    require(a * d != b * c, "The coordinates have no inverse.")
+    back = [[x / (a * d - b * c) for x in row] for row in ([d, -b], [-c, a])]
+    jumps = []
+    for jump in stated["jumps"]:
+        ray = _fractions(jump["ray"], (2,))
+        require(any(ray), "A ray has no direction.")
+        jumps.append((_moved(back, ray), cs.exact(float(binary(jump["log_factor"])))))
+    return *(_times(_times(back, total), change) for total in sums), jumps
+
+
+def _fractions(numbers, shape):
+    """Floats as they stand."""
+    floats = binary(numbers)
+    require(floats.shape == shape, "A matrix or a ray has another shape.")
+    return np.vectorize(Fraction, otypes=[object])(floats).tolist()
 
 
 def _log_factor(impact, loss):
@@ -110,21 +216,46 @@ def _log_factor(impact, loss):
     return cs.exact(-loss) if impact == "delta" else cs.IV.log(cs.exact(1 - loss))
 
 
+def _chain(stated):
+    """A chain that is stated by floats; its diagonal follows from the rates."""
+    require(stated["numbers"] == "binary", "The numbers of a chain are binary.")
+    require(set(stated) == {"numbers", "states", "rates"}, "A chain has other keys.")
+    n = len(stated["states"])
+    return _chain_of(_fractions(stated["states"], (n,)), _fractions(stated["rates"], (n, n)))
+
+
+def _chain_of(states, rates):
+    rows = []
+    for i, row in enumerate(rates):
+        others = [0 if i == j else rate for j, rate in enumerate(row)]
+        require(min(others) >= 0, "A rate is negative.")
+        rows.append(tuple(rate if i != j else -sum(others) for j, rate in enumerate(others)))
+    return Noise("chain", states=tuple(states), rates=tuple(rows))
+
+
 def _noise(given):
-    """ν, b′(0), whether the noise is bounded, and the square of its unit."""
-    if "noise.treatment" not in given:
-        alpha, sigma = given["noise.alpha"], given["noise.sigma"]
-        require(alpha > 0 and sigma > 0, "alpha and sigma must be positive.")
-        return 2 * alpha, Fraction(1, 2), False, sigma**2 / (2 * alpha)
-    d0, tau, r0 = given["noise.D0"], given["noise.tau0"], given["noise.r0"]
-    treatment = given["noise.treatment"]
-    require(d0 > 0 and tau > 0, "D0 and tau0 must be positive.")
+    """The noise by its parameters."""
+    names = {name.partition(".")[2] for name in given if name.startswith("noise.")}
+    value = {name: given[f"noise.{name}"] for name in names}
+    require(all(x > 0 for name, x in value.items() if f"noise.{name}" not in WORDS and name != "r0"), "All are > 0.")
+    if names == {"a", "k"}:
+        return _chain_of((-value["a"], value["a"]), ((0, value["k"]), (value["k"], 0)))
+    if names == {"s", "interpretation"}:
+        require(value["interpretation"] in ("ito", "stratonovich"), "No such interpretation.")
+        ito, nothing = value["interpretation"] == "ito", (Fraction(0),)
+        return Noise("white", square=value["s"] ** 2, states=nothing, rates=(nothing,), ito=ito)
+    if names == {"amplitude", "sigma"}:
+        return Noise("circle", value["sigma"] ** 2, Fraction(0), value["amplitude"] ** 2)
+    if names == {"alpha", "sigma"}:
+        alpha = value["alpha"]
+        return Noise("line", 2 * alpha, Fraction(1, 2), value["sigma"] ** 2 / (2 * alpha))
+    d0, tau, r0, treatment = (value[name] for name in ("D0", "tau0", "r0", "treatment"))
     if treatment == "exact" and r0 < 1:
-        return (1 - r0) / tau, 1 / (1 - r0), True, 2 * d0 / (tau * (1 - r0))
+        return Noise("bounded", (1 - r0) / tau, 1 / (1 - r0), 2 * d0 / (tau * (1 - r0)))
     require(treatment == "ou-reduction" or (treatment == "exact" and r0 == 1), f"No {treatment} noise with r0 {r0}.")
     require(r0 < Fraction(5, 3), "The reduction to OU noise needs r0 < 5/3.")
     tau1 = 2 * (2 - r0) / (5 - 3 * r0) * tau
-    return 2 / tau1, Fraction(1, 2), False, d0 * tau1 / tau**2
+    return Noise("line", 2 / tau1, Fraction(1, 2), d0 * tau1 / tau**2)
 
 
 def deltas(certificate):
@@ -134,25 +265,33 @@ def deltas(certificate):
     return found
 
 
+BASES = {"line": ("core",), "bounded": ("core", "whole"), "circle": ("circle",)}
+
+
 def read_trial(model, certificate):
     """The trial function with what follows from it."""
     about = certificate["basis"]
-    require(about["kind"] in ("whole", "core"), f"No basis is called {about['kind']!r}.")
-    whole = about["kind"] == "whole"
+    kind, allowed = about["kind"], BASES.get(model.noise.kind, ("states",))
+    require(kind in allowed or (kind == "whole" and "core" in allowed), f"Such noise has no basis called {kind!r}.")
     floats = np.stack([binary(certificate["cosine"]), binary(certificate["sine"])])
-    require(floats.ndim == 3 and 2 <= floats.shape[2] <= 150, "The coefficients are no table of 2 to 150 degrees.")
-    if whole:
+    least = 1 if model.plain else 2
+    require(floats.ndim == 3 and least <= floats.shape[2] <= 150, "The coefficients are no table of 2 to 150 degrees.")
+    if kind == "whole":
         require(model.bounded, "Only bounded noise has a whole interval.")
         gauge = float(binary(about.get("gauge", 0.0)))
         basis = cs.Chebyshev()
-    else:
+    elif kind == "core":
         centre, scale, gauge = (float(binary(about[name])) for name in ("centre", "scale", "gauge"))
         require(scale > 0, "The scale must be positive.")
         basis = cs.Hermite(centre, scale)
-    require(gauge == 0 or (model.moment and not whole), "A gauge needs a moment and a core.")
-    harmonics, degrees = floats.shape[1] + 2, floats.shape[2] + 6
-    given = cs.intervals(floats, harmonics, degrees)
-    return (_whole if whole else _core)(model, basis, gauge, given)
+    else:
+        states = len(model.noise.states)
+        require(kind == "circle" or floats.shape[2] == states, "A chain has a column for each state.")
+        room = floats.shape[2] + (2 if kind == "circle" else 0)
+        return _plain(model, cs.intervals(floats, floats.shape[1] + 2, room))
+    require(gauge == 0 or (model.moment and kind == "core"), "A gauge needs a moment and a core.")
+    given = cs.intervals(floats, floats.shape[1] + 2, floats.shape[2] + 6)
+    return (_whole if kind == "whole" else _core)(model, basis, gauge, given)
 
 
 def read_side(model, trial, certificate, name):
@@ -176,27 +315,44 @@ def read_side(model, trial, certificate, name):
 
 
 def transport(model, function, divisor):
-    """v = (∂φ + pκ)u and w = h₁v + p q₁u; for λ these of f, with 1 in the place of pu."""
+    """h(∂φ + pκ)u + p q u of the steady part and of what z multiplies; for λ these of f, with 1 in the place of pu."""
     carrier = divisor * (cs.exact(model.p) if model.moment else 1)
     v = cs.phase_slope(function) + carrier * model.kappa
-    return v, cs.times_h1(v) + cs.times_q1(carrier)
+    parts = model.still, model.driven
+    return [cs.times_wave(v, part.turning) + cs.times_wave(carrier, part.stretching) for part in parts]
 
 
 def _divisor(model, function):
     """u, or the constant 1 for λ."""
     one = function * 0
-    one[(0,) * one.ndim] = cs.IV.mpf(1)
+    one[(0, 0, slice(None)) if model.noise.states else (0,) * one.ndim] = cs.IV.mpf(1)
     return function if model.moment else one
 
 
 def _between(model, basis, function, steep, second, gauge):
     """Lβu − μu without the drift −νb(∂z + β) of the noise, and u or 1."""
     divisor = _divisor(model, function)
-    v, w = transport(model, function, divisor)
+    still, driven = transport(model, function, divisor)
     beta, half = cs.exact(gauge), cs.exact(model.nu / 2)
     diffusion = (second + steep * (beta * 2) + function * beta**2) * half
-    pushed = w * cs.exact(model.mean) + basis.times_z(w) * model.unit
-    return diffusion + v * cs.exact(model.omega) + pushed - divisor * cs.exact(model.mu), divisor
+    return diffusion + still + basis.times_z(driven) - divisor * cs.exact(model.mu), divisor
+
+
+def _plain(model, u):
+    """The trial function on a circle, Σ u_km cos mθ, in the states of a chain, or of the phase alone."""
+    divisor, noise = _divisor(model, u), model.noise
+    still, driven = transport(model, u, divisor)
+    residual = still - divisor * cs.exact(model.mu)
+    if noise.kind == "circle":
+        squares = np.array([cs.exact(noise.nu * m**2 / 2) for m in range(u.shape[-1])], dtype=object)
+        residual = residual + cs.Chebyshev().times_z(driven) - u * squares
+    elif noise.kind == "chain":
+        rates = np.array([[cs.exact(x) for x in row] for row in noise.rates], dtype=object)
+        residual = residual + driven * np.array([cs.exact(x) for x in noise.states], dtype=object) + u @ rates.T
+    else:
+        again = transport(model, driven, driven if model.moment else driven * 0)[1]
+        residual = residual + again * cs.exact(0.5)
+    return Trial(None, 0.0, residual, None, divisor, u)
 
 
 def _core(model, basis, gauge, u):

@@ -179,7 +179,7 @@ def powers(basis: dict[str, Any], degrees: int, z: np.ndarray) -> np.ndarray:
 def samples(certificate: dict[str, Any], z: np.ndarray, phi: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
     """u, u_z, Lβu − μu (of λ: the drift less μ) at phases × z from Eqs. (17)-(19) in floats, and b at z."""
     model = model_of(certificate)
-    omega, mean, unit, kappa = (float(each) for each in (model.omega, model.mean, model.unit.a, model.kappa.a))
+    kappa = float(model.kappa.a)
     cosine, sine = (np.array([[float(v) for v in row] for row in certificate[name]]) for name in ("cosine", "sine"))
     b0, b1, b2 = powers(certificate["basis"], cosine.shape[1], z)
     phi = np.linspace(0, np.pi, 8 * len(cosine) + 48, endpoint=False) if phi is None else phi
@@ -191,8 +191,11 @@ def samples(certificate: dict[str, Any], z: np.ndarray, phi: np.ndarray | None =
     beta = float(certificate["basis"].get("gauge", 0))
     carrier = u * float(model.p) if model.moment else np.ones_like(u)
     v = along @ b0 + kappa * carrier
-    h1, q1 = (np.sin(2 * phi) / 2)[:, None], ((1 - np.cos(2 * phi)) / 2)[:, None]
+    polar = np.stack([1 + 0 * phi, np.cos(2 * phi), np.sin(2 * phi)], axis=-1)
+    (h0, q0), (h1, q1) = (
+        [polar @ np.array([[float(c.a)] for c in wave]) for wave in part] for part in (model.still, model.driven)
+    )
     b = float(model.slope) * z / (1 - z**2 if model.bounded else 1)
     noise = float(model.nu) * (second / 2 + beta * steep + beta**2 / 2 * u - b * (steep + beta * u))
-    mismatch = noise + omega * v + (mean + unit * z) * (h1 * v + q1 * carrier) - model.mu * (u if model.moment else 1)
+    mismatch = noise + h0 * v + q0 * carrier + z * (h1 * v + q1 * carrier) - model.mu * (u if model.moment else 1)
     return u, steep, mismatch, b
