@@ -238,8 +238,11 @@ def _named(half: Parametrised | type[Parametrised], stated: Parameters) -> Mappi
 
 
 def _plain(stated: Parameters) -> Parameters:
-    """The same, where a noise has a name, such as "noise.axial.alpha", without it."""
-    return {f"{_section(key)}.{key.rpartition('.')[2]}": text for key, text in stated.items()}
+    """The same without the name of a noise, as of "noise.axial.alpha". Raises `ValueError` where there are two."""
+    found = {f"{_section(key)}.{key.rpartition('.')[2]}": text for key, text in stated.items()}
+    if len(found) < len(stated):
+        raise ValueError(f"parameters {', '.join(sorted(stated))} are of several noises")
+    return found
 
 
 def cylinder(stated: Statement) -> Cylinder:

@@ -120,10 +120,13 @@ def model_of(certificate):
     """The constants of a certificate."""
     quantity = certificate["quantity"]
     require(quantity in ("moment", "lyapunov_exponent"), f"No quantity is called {quantity!r}.")
-    given = {k: v if k in WORDS else decimal(v) for k, v in certificate["parameters"].items()}
+    given = _given(certificate["parameters"])
     noise = _noise(given) if certificate.get("chain") is None else _chain(certificate["chain"])
     require(Fraction(1, 10**80) < noise.nu < 10**80, "The rate of the noise is out of range.")
-    still, driven, jumps = _oscillator(given) if certificate.get("motion") is None else _motion(certificate["motion"])
+    if certificate.get("motion") is not None:
+        still, driven, jumps = _motion(certificate["motion"])
+    else:
+        still, driven, jumps = (_parametric if "system.stiffness" in given else _oscillator)(given)
     if noise.ito:
         still = [[still[i][j] - noise.square * _times(driven, driven)[i][j] / 2 for j in (0, 1)] for i in (0, 1)]
     kappa = cs.exact(0)
@@ -140,6 +143,16 @@ def model_of(certificate):
         p=decimal(certificate["p"]) if quantity == "moment" else Fraction(0),
         mu=float(binary(certificate["mu"])),
     )
+
+
+def _given(parameters):
+    """Parameters by their keys, without the name of the noise; words, and exact decimals."""
+    found = {}
+    for key, value in parameters.items():
+        plain = f"{key.partition('.')[0]}.{key.rpartition('.')[2]}"
+        require(plain not in found, "Two parameters have one name.")
+        found[plain] = value if plain in WORDS else decimal(value)
+    return found
 
 
 def _polar(a, size):
@@ -177,6 +190,16 @@ def _oscillator(given):
     loss = eps**2 * (1 - given["oscillator.restitution"])
     still, driven = [[Fraction(0), omega], [-omega, eps**2 * given["oscillator.c1"]]], [[Fraction(0)] * 2, [0, eps]]
     return still, driven, [((Fraction(0), Fraction(1)), _log_factor(given["oscillator.impact"], loss))]
+
+
+def _parametric(given):
+    """The same of ẍ + 2·damping·ẋ + (stiffness + ξ)x = 0 in (x, ẋ)."""
+    names = {name for name in given if name.startswith("system.")}
+    require(names == {f"system.{name}" for name in ("stiffness", "damping", "restitution")}, "Other parameters.")
+    require(given["system.restitution"] > 0, "The wall leaves no positive factor.")
+    still = [[Fraction(0), Fraction(1)], [-given["system.stiffness"], -2 * given["system.damping"]]]
+    wall = (Fraction(0), Fraction(1)), cs.IV.log(cs.exact(given["system.restitution"]))
+    return still, [[Fraction(0)] * 2, [Fraction(-1), Fraction(0)]], [wall]
 
 
 def _motion(stated):

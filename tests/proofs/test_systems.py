@@ -9,7 +9,7 @@ from scipy.special import i0, i1
 import fpsolve
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent
-from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, SineWiener, Telegraph, White
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
 from fpsolve.proofs import objection, prove, prove_lyapunov_exponent
 from fpsolve.proofs.certificate import Certificate
 from tests.conftest import sampled
@@ -50,6 +50,8 @@ SADDLE = plane(((1.0, 0.0), (0.0, -1.0)), TURN)
 SHEAR = plane(((-1.0, 0.0), (5.0, -1.0)), TURN)
 KNOWN = {
     "white": (spring(), White(s=0.5), 2.0, -0.0742396424254463),
+    "parametric": (ParametricOscillator(1.0, 0.1), White(s=0.5), 2.0, -0.0742396424254463),
+    "parametric, wall": (ParametricOscillator(1.0, 0.1, 0.8), White(s=0.5), None, -0.13970934720001),
     "white, fourth": (spring(), White(s=0.5), 4.0, -0.0145544380585),
     "white, paths": (spring(), White(s=0.5), None, -0.0688672519733493),
     "white, wall": (spring(0.1, 1.0, wall(0.8)), White(s=0.5), 2.0, -0.212437199),

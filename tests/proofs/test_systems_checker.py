@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import fpsolve
-from fpsolve.model import Jump, MarkovChain, SineWiener, Telegraph, White
+from fpsolve.model import Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
 from fpsolve.proofs import prove, prove_lyapunov_exponent
 from fpsolve.proofs.claims import Bound, MomentBound
 from tests.conftest import sampled
 from tests.oracles import certificate_checker as checker
 from tests.oracles.certificate_statement import WORDS, Refused, model_of
 from tests.proofs import mutations
-from tests.proofs.test_systems import SADDLE, driven_velocity, spring, wall
+from tests.proofs.test_systems import SADDLE, STIFFNESS, driven_velocity, spring, wall
 
 CHAIN = MarkovChain((-0.4, 0.1, 0.5), ((0, 1.0, 0.5), (0.3, 0, 0.7), (0.2, 0.9, 0)))
 OSCILLATOR = fpsolve.VibroImpactOscillator(1.2, 0.8, 0.1, 0.4, impact="restitution")
@@ -28,6 +28,7 @@ PROOFS = {
     "paths, white": (SADDLE, White(1.0), None, 1e-6),
     "paths, chain": (spring(0.05, 1.5, wall(0.85)), CHAIN, None, 1e-6),
     "circle with two rays": (spring(0.1, 1.0, wall(0.9), Jump(0.4, 0.1)), SineWiener(0.3, 1.0), -1.0, 1e-6),
+    "parametric, by its decimals": (ParametricOscillator(1.0, 0.1, 0.8), White(0.5), 3.0, 1e-7),
     "the paper's oscillator, telegraph": (OSCILLATOR, Telegraph(0.5, 1.0), 2.5, 1e-8),
     "Gaussian noise with a wall": (spring(0.1, 2.0, wall(0.8)), fpsolve.OrnsteinUhlenbeck(1.0, 0.2), 2.0, 1e-6),
     "paths, Gaussian noise": (spring(0.1, 2.0, wall(0.8)), fpsolve.OrnsteinUhlenbeck(1.0, 0.2), None, 1e-5),
@@ -87,10 +88,18 @@ def violated(certificate):
     return bool(mismatch.max() > 1.001 * above + 1e-13 or -mismatch.min() > 1.001 * below + 1e-13)
 
 
+def named(parameters):
+    """Parameters by their keys, without the name of the noise."""
+    return {f"{key.partition('.')[0]}.{key.rpartition('.')[2]}": value for key, value in parameters.items()}
+
+
 def matrices(certificate):
     """A₀ and A₁ of a certificate in the coordinates in which it speaks, in floats, in the sense of Stratonovich."""
-    stated, v = certificate.get("motion"), certificate["parameters"]
-    if stated is None:
+    stated, v = certificate.get("motion"), named(certificate["parameters"])
+    if "system.stiffness" in v and stated is None:
+        still = np.array([[0, 1], [-float(v["system.stiffness"]), -2 * float(v["system.damping"])]])
+        driven = np.array(STIFFNESS)
+    elif stated is None:
         omega, eps, c1 = (float(v[f"oscillator.{name}"]) for name in ("omega", "epsilon", "c1"))
         still, driven = np.array([[0, omega], [-omega, eps**2 * c1]]), np.array([[0, 0], [0, eps]])
     else:
@@ -109,7 +118,7 @@ def matrices(certificate):
 def sampled_plainly(certificate):
     """u and Lu − μu, or 1 and what is left of the drift, at points, from the motion in x."""
     still, driven = matrices(certificate)
-    v, kappa = certificate["parameters"], float(model_of(certificate).kappa.a)
+    v, kappa = named(certificate["parameters"]), float(model_of(certificate).kappa.a)
     p = None if certificate["p"] is None else float(certificate["p"])
     cosine, sine = np.array(certificate["cosine"]), np.array(certificate["sine"])
     phi = np.linspace(0, math.pi, 1000, endpoint=False)
@@ -188,7 +197,7 @@ def mutated(entry):
         new["p"], new["certificate"]["p"] = 1.01 * entry["p"], repr(1.01 * entry["p"])
         yield "p", new
     for key in certificate["parameters"]:
-        if key not in WORDS and not key.startswith("system."):
+        if key not in WORDS and ("motion" not in certificate or not key.startswith("system.")):
             yield changed("parameters", key, by=larger)
     if "noise.interpretation" in certificate["parameters"]:
         other = {"ito": "stratonovich", "stratonovich": "ito"}

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import identity
+from fpsolve.model.exact import ExactJump, ExactMotion
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System
@@ -69,6 +72,12 @@ class ParametricOscillator(System):
             case "damping":
                 return (CoefficientMatrix(0, ((0.0, 0.0), (0.0, -2.0))),), ()
         return (), (1 / self.restitution,)
+
+    @classmethod
+    def exact_motion(cls, decimals: Mapping[str, str]) -> ExactMotion:
+        stiffness, damping, factor = (Fraction(decimals[name]) for name in ("stiffness", "damping", "restitution"))
+        still, driven = np.array([[[0, 1], [-stiffness, -2 * damping]], [[0, 0], [-1, 0]]], dtype=object)
+        return ExactMotion(still, driven, (ExactJump(np.array([0, -1], dtype=object), factor, Fraction(0)),))
 
     def impact_value(self, log_factor: float) -> float:
         return math.exp(log_factor) if log_factor < math.log(1e300) else math.inf
