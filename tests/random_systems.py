@@ -18,11 +18,11 @@ from tests.oracles import moment_hierarchy, phase_circle
 
 KINDS = ("white", "ito", "telegraph", "chain", "ornstein-uhlenbeck", "sine-wiener")
 WALLED = ("white", "ito", "telegraph", "chain")
-SIZES = 40, 80
+SIZES = 24, 48
 
 
 def drawn(seed):
-    """A random system and its noise, what they are, and Λ(2) by an oracle with 40 and with 80 functions."""
+    """A random system and its noise, what they are, and Λ(2) by two sizes of an oracle."""
     rng = np.random.default_rng(seed)
     kind, restitution = KINDS[seed % len(KINDS)], 1.0
     steady, driven = rng.uniform(-1, 1, (2, 2, 2))
@@ -47,7 +47,7 @@ def drawn(seed):
     else:
         noise = SineWiener(amplitude=size, sigma=math.sqrt(2 * rate))
         law = steady, driven, size, noise.sigma
-        moments = [moment_hierarchy.sine_wiener_exponent(*law, 2, count) for count in SIZES]
+        moments = [moment_hierarchy.sine_wiener_exponent(*law, 2, count // 2) for count in SIZES]
     terms = [CoefficientMatrix(0, steady), CoefficientMatrix(1, driven, identity)]
     if restitution == 1:
         return Problem(PlaneSystem(terms), noise), kind, moments
