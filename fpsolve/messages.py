@@ -72,6 +72,15 @@ class Code(Enum):
         "{phase:.6g}, where ‖x‖^p grows by a factor > {factor:.3g} each time; choose a p nearer to 0, or a ray on "
         "which no noise acts"
     )
+    INVARIANT_RAY = (
+        "failure: Λ({p:g}) is not known: the phase never leaves the ray at {phase:.6g}, whatever the noise does"
+        "{has_jumps:?, and how often it passes a jump depends on the start; leave jumps out¦, so that for p < 0 it "
+        "depends on the start; choose p > 0}"
+    )
+    NO_EIGENFUNCTION = (
+        "failure: there is no positive eigenfunction at p = {p:g}: the phase never leaves the ray at {phase:.6g}, "
+        "whatever the noise does; Λ(p) for p > 0 is the largest of that on the ray and of the distance from it"
+    )
     INFINITE_VARIANCE = (
         "failure: the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"
     )

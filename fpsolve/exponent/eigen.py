@@ -135,7 +135,7 @@ def principal_pair(
     # states may hardly mix, or the phase not leave a ray: then other pairs have a positive T, or T*, too
     if generator.problem.noise.mixes_slowly and generator.size <= SURVEYED_UNKNOWNS:
         rightmost = spectrum(pair.generator, pair.p, 1)[0]
-        if abs(rightmost - pair.value) > 1e-6 * max(abs(rightmost), generator.unit_rate):
+        if rightmost.real - pair.value > 1e-6 * max(abs(rightmost), generator.unit_rate):
             told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost.real, value=pair.value)
             raise NotConverged(told, pair, Remedy.PHASE)
     return pair

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from itertools import repeat
@@ -18,7 +18,6 @@ from fpsolve.arrays import FloatArray, real_array, real_numbers
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget, misplaced
-from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, checked
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, missed
 from fpsolve.fem.mesh import CylinderMesh
@@ -100,7 +99,8 @@ class MomentLyapunovFunction(Result):
             if self.is_converged or _nodes_needed(count, last, self.interpolation_error, self._allowed) > most:
                 break
         self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
-        if obstacle := broken_convexity(self._pairs, np.abs(self.nodes) * self._errors):
+        value, slope = (np.array([getattr(pair, name) for pair in self._pairs]) for name in ("value", "derivative"))
+        if obstacle := broken_convexity(self.nodes, value, slope, np.abs(self.nodes) * self._errors):
             raise NotConverged(obstacle, remedy=self.solver.near.refinement)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
@@ -234,12 +234,11 @@ def _nodes(count: int, interval: tuple[float, float], among: FloatArray | None) 
     return np.interp(nodes, interval, (-1.0, 1.0)), nodes
 
 
-def broken_convexity(pairs: Sequence[PrincipalPair], errors: FloatArray) -> Message | None:
+def broken_convexity(p: FloatArray, value: FloatArray, slope: FloatArray, errors: FloatArray) -> Message | None:
     """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex."""
-    if not pairs:
+    if not p.size:
         return None
-    p, value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("p", "value", "derivative"))
-    value[p == 0] = 0.0  # but for rounding
+    value = np.where(p == 0, 0.0, value)  # but for rounding
     above = np.append(value, 0.0)[None] - (value[:, None] + slope[:, None] * (np.append(p, 0.0)[None] - p[:, None]))
     slack = 10 * (errors[:, None] + np.append(errors, 0.0)[None]) + 1e-6 * np.abs(np.append(value, 0.0)[None])
     i, j = np.unravel_index(np.argmin(above + slack), above.shape)
@@ -261,7 +260,7 @@ def nonzero_root(
     if grows_far_out(solver.problem):
         return Absent(Message(Code.NO_INDEX))
     noise = solver.problem.noise
-    low, high = (float(end) for end in np.clip(interval, *noise.moments))
+    low, high = (float(end) for end in np.clip(interval, *solver.problem.moments))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)
         guess = -ratio / slope
@@ -278,7 +277,7 @@ def nonzero_root(
             found = Estimate(p, error / slope + abs(new - p), scale=1.0, quantity=STABILITY_INDEX)
             return checked(found, solver.near.remedy)
         if low == high:
-            low, high = np.clip(interval, *noise.moments)
+            low, high = np.clip(interval, *solver.problem.moments)
             return Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=noise.is_bounded))
         if not low < new < high:
             new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
@@ -360,7 +359,8 @@ def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
 def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov:
     """Λ(0) = 0 needs no solve; where its eigenpair failed, Λ′ and residual are NaN."""
     result = solver.moments(p, progress=progress)
-    obstacle = None if result.failures else broken_convexity(result.pairs, result.error_estimate)
+    columns = result.p, result.value, result.derivative, result.error_estimate
+    obstacle = None if result.failures else broken_convexity(*columns)
     if obstacle:
         return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.near.refinement)),))
     failures = tuple(failure for failure in result.failures if failure.p != 0)
@@ -369,5 +369,5 @@ def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], No
     failed = {failure.p for failure in failures}
     place = [float(each) for each in p if each not in failed].index(0.0)
     row = {"p": 0.0, "value": 0.0, "derivative": np.nan, "error_estimate": 0.0, "residual": np.nan}
-    columns: dict[str, Any] = {name: np.insert(getattr(result, name), place, number) for name, number in row.items()}
-    return replace(result, failures=failures, **columns)
+    with_zero: dict[str, Any] = {name: np.insert(getattr(result, name), place, number) for name, number in row.items()}
+    return replace(result, failures=failures, **with_zero)

@@ -145,6 +145,8 @@ class ExponentSolver:
     @cached_property
     def near(self) -> NearPlace:
         """Λ(p) around the place nearest to ξ = 0, for all noise but that of algebraic tails the only one."""
+        if self.classes:  # near p = 0
+            return max(self.classes, key=lambda each: each.lyapunov_exponent().value).near
         own: Any = {"rtol": self.rtol, "budget": self.budget, "tolerance": self.tolerance}
         return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **own)
 
@@ -161,7 +163,16 @@ class ExponentSolver:
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
+        if self.classes:
+            raise NotConverged(Message(Code.NO_EIGENFUNCTION, p=p, phase=self.problem.invariant_ray))
         return self.solution(p).pair
+
+    @cached_property
+    def classes(self) -> tuple[ExponentSolver, ...]:
+        """Those of the `classes` of a problem whose phase never leaves a ray; nothing for others."""
+        return tuple(
+            ExponentSolver(each, self.mesh, rtol=self.rtol, budget=self.budget) for each in self.problem.classes
+        )
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, that of rtol if none is given.
@@ -172,6 +183,8 @@ class ExponentSolver:
         """
         point = real_number(p, "p")
         refuse_infinite(self.problem, point)
+        if self.classes:
+            return max((each.solution(point, tolerance) for each in self.classes), key=lambda each: each.pair.value)
         return self.place.solution(point, tolerance)
 
     @cached_property
@@ -267,7 +280,12 @@ class ExponentSolver:
         value, error = self.ratio_alone(p, tolerance)
         if abs(p) < TINY_P:
             return value, 0.5 * second_derivative(self.near.solution(p * 0.5, tolerance).pair), error
-        return value, (self.near.solution(p, tolerance).pair.derivative - value) / p, error
+        return value, (self._nearest(p, tolerance).pair.derivative - value) / p, error
+
+    def _nearest(self, p: float, tolerance: Tolerance | None) -> Solution:
+        if self.classes:
+            return self.solution(p, tolerance)
+        return self.near.solution(p, tolerance)
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
         """Λ(p)/p and its error.
@@ -275,7 +293,7 @@ class ExponentSolver:
         Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss; its error is that at p = ±`SMALL_P`.
         """
         if abs(p) >= TINY_P:
-            solution = self.near.solution(p, tolerance)
+            solution = self._nearest(p, tolerance)
             return solution.pair.value / p, solution.error / abs(p)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.near.solution(point, tolerance).pair for point in points]

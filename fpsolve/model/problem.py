@@ -11,6 +11,7 @@ from inspect import signature
 from textwrap import wrap
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_numbers, shown
@@ -19,7 +20,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.frame import Frame, normal_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import Parameter, Parametrised
-from fpsolve.model.plane import CoefficientMatrix, System, crosses_both_ways
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, crosses_both_ways, turning
 from fpsolve.model.quantity import NOISE, Quantity
 
 P = ParamSpec("P")
@@ -93,6 +94,56 @@ class Problem:
         """ε^order B of every Bx ∘ dW by which white noise moves the state, in the same coordinates."""
         _, diffusions = self._moved
         return diffusions if self.frame is None else [self.frame.term(each) for each in diffusions]
+
+    @cached_property
+    def invariant_ray(self) -> float | None:
+        """φ of a ray that the phase never leaves, nor reaches, whatever the noise does; None where there is none."""
+        drift, diffusions = self._moved
+        lines = [affine(term.g) for term in drift.terms]
+        matrices = [np.array(each.matrix) for each in diffusions]
+        if None in lines:
+            matrices += [np.array(term.matrix) for term in drift.terms]
+        else:
+            for share in zip(*(line for line in lines if line), strict=True):
+                sized = zip(share, drift.terms, strict=True)
+                matrices.append(sum(c * drift.epsilon**term.order * np.array(term.matrix) for c, term in sized))
+        speeds = [speed for speed in map(turning, matrices) if abs(speed.mean) + speed.amplitude > 0]
+        if not speeds:
+            return 0.0
+        first = speeds[0]
+        if abs(first.mean) > first.amplitude * (1 + 1e-12):
+            return None
+        middle = math.atan2(first.sine, first.cosine)
+        away = math.acos(min(max(-first.mean / first.amplitude, -1.0), 1.0))
+        for phi in (0.5 * (middle + away), 0.5 * (middle - away)):
+            if all(abs(float(speed(phi))) <= 1e-12 * (abs(speed.mean) + speed.amplitude) for speed in speeds):
+                return phi % math.pi
+        return None
+
+    @cached_property
+    def classes(self) -> tuple[Problem, ...]:
+        """For a system with an `invariant_ray` those of ‖x‖ on it, and of the distance from it; else nothing.
+
+        Both obey ȧ = q(ξ) a alone: with e on the ray q = eᵀAe, and tr A − q. They are given as x′ = (q(ξ) + J) x, as a
+        uniform rotation leaves ‖x‖ alone.
+        """
+        if (phi := self.invariant_ray) is None:
+            return ()
+        found = []
+        for side in (1.0, -1.0):
+            terms = [CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))]
+            for term in self.system.terms:
+                rate = float(term.q(phi)) if side > 0 else float(np.trace(np.array(term.matrix)) - term.q(phi))
+                terms.append(CoefficientMatrix(term.order, ((rate, 0.0), (0.0, rate)), term.g))
+            found.append(Problem(LinearMotion(self.system.epsilon, tuple(terms)), self.noise))
+        is_one = all(not term.h.mean and not term.h.amplitude for term in self.system.terms)
+        return tuple(found[:1] if is_one else found)
+
+    @property
+    def moments(self) -> tuple[float, float]:
+        """The p for which Λ(p) is finite and known, as a closed interval."""
+        low, high = self.noise.moments
+        return (max(low, 0.0), high) if len(self.classes) > 1 else (low, high)
 
     @property
     def halves(self) -> tuple[Parametrised, Parametrised]:
@@ -238,10 +289,15 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     R^p > e.
 
     Raises:
-        NoSuchExponent: p is not among the `moments` of the noise, or there is such a ray.
+        NoSuchExponent: p is not among the `moments` of the problem, or there is such a ray.
     """
     noise, system = problem.noise, problem.motion
     noise.check_existence(p)
+    if problem.classes:
+        if p < problem.moments[0] or any(jump.log_factor for jump in system.jumps):
+            has_jumps = any(jump.log_factor for jump in system.jumps)
+            raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_ray, has_jumps=has_jumps))
+        return
     if not any(p * jump.log_factor > math.log(2.0) for jump in system.jumps):
         return
     xi, most = noise.reached, math.e if noise.has_states else 2.0

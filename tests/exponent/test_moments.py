@@ -53,7 +53,7 @@ def test_what_is_raised_is_the_result_with_its_failures():
 
 
 def test_a_curve_that_is_not_convex_is_a_failure_of_all(monkeypatch):
-    monkeypatch.setattr(function, "broken_convexity", lambda pairs, errors: "not convex")
+    monkeypatch.setattr(function, "broken_convexity", lambda *columns: "not convex")
     found = solve_moments(ExponentSolver(Problem(FIG1, WEAK_NOISE)), [1.0, 2.0])
     np.testing.assert_array_equal(found.p, [1.0, 2.0])
     assert [(failure.p, failure.reason) for failure in found.failures] == [(None, "not convex; use a smaller rtol")]
