@@ -1,7 +1,8 @@
 """Whether a bound follows from a certificate.
 
-**Theorem.** Let T > 0 be continuous on the cylinder but for T(φ⁻) = R^p T(φ⁺) at impacts, once differentiable in φ
-between them, twice in ξ but for finitely many ξ, where T_ξ is continuous, or jumps by a smooth function of φ (a kink),
+**Theorem.** Let T > 0 be continuous on the cylinder but at rays, where T before a jump is R^p T after it, so that
+T(φ⁻) = R^p T(φ⁺) where the phase passes forward and T(φ⁺) = R^p T(φ⁻) where backward, once differentiable in φ
+elsewhere, twice in ξ but for finitely many ξ, where T_ξ is continuous, or jumps by a smooth function of φ (a kink),
 and let λ₋ T ≤ L(p) T ≤ λ₊ T elsewhere. The ξ that are left out take no time.
 
 *Upper bound.* Let T ≥ c > 0 and its kinks in ξ be concave. By Itô's and Tanaka's formulas M = e^{−λ₊ t} ‖x‖^p T(φ, ξ)
@@ -48,10 +49,12 @@ which holds beyond an end if it holds there and νκ b′ ≥ max(q n_z) there: 
 z ≥ 0, and with it the slope of the right side grows by (κ + qβ) Δb′ ≥ 0. The left end is mirrored onto the right one,
 z → −z, β → −β, W → −W.
 
-*Noise on a circle, and chains.* T = R^{ps} u without ψ, and Lu ≤ (μ + δ) u, Lu ≥ (μ − δ) u are verified, or the same of
-the drift of ln‖x‖ + f. For z = cos θ, dθ = √ν dW, T is an even function of θ, so that the theorem holds with θ in the
-place of ξ. For a chain T has a component for each state, the noise's part of LT is its matrix of rates, and Dynkin's
-formula stands in the place of Itô's; all coefficients are bounded.
+*Other noise* has T = R^{ps} u without ψ, and Lu ≤ (μ + δ) u, Lu ≥ (μ − δ) u are verified, or the same of the drift of
+ln‖x‖ + f. For z = cos θ, dθ = √ν dW, T is an even function of θ, so that the theorem holds with θ in the place of ξ.
+For a chain T has a component for each state, the noise's part of LT is its matrix of rates, and Dynkin's formula stands
+in the place of Itô's. Under white noise T is one function of the phase, and L = F₀ + ½ F₁². As h₁ = 0 at every ray,
+the phase passes there by its drift alone, one way, and next to a ray it moves as it does elsewhere. As dφ has bounded
+coefficients, n jumps in [0, t] have a probability below C e^{−cn²}, so that sup‖x‖^p has a finite mean.
 
 The drift of ln‖x‖ + f ± ψ is bounded in the same way, with e = q (its drift − μ), without W² and with B = b, β = 0 and
 r = f_z.

@@ -269,6 +269,8 @@ def _noise(given):
         return Noise("white", square=value["s"] ** 2, states=nothing, rates=(nothing,), ito=ito)
     if names == {"amplitude", "sigma"}:
         return Noise("circle", value["sigma"] ** 2, Fraction(0), value["amplitude"] ** 2)
+    if names == {"alpha", "standard_deviation"}:
+        return Noise("line", 2 * value["alpha"], Fraction(1, 2), value["standard_deviation"] ** 2)
     if names == {"alpha", "sigma"}:
         alpha = value["alpha"]
         return Noise("line", 2 * alpha, Fraction(1, 2), value["sigma"] ** 2 / (2 * alpha))

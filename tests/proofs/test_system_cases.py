@@ -1,0 +1,87 @@
+"""Proofs of cases whose systems are matrices or equations: what files state, and that it is checked as one."""
+
+import json
+
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.cli import BAD_INPUT, main
+from fpsolve.proofs.claims import claims_from
+from fpsolve.workflow.proofs import check_proof, prove_case
+from tests.oracles import certificate_checker as checker
+
+EQUATIONS = """
+[system]
+variables = ["x", "v"]
+drift = ["v", "-omega**2 * x - 2*zeta*omega * v - load * x"]
+parameters = { omega = 1.0, zeta = 0.05 }
+noises = { load = "noise.axial" }
+walls = [{ at = "x = 0", restitution = 0.8 }]
+[noise.axial]
+kind = "NOISE"
+[moments]
+p = [0.0, 2.0]
+[output]
+quantities = ["moment", "lyapunov_exponent"]
+"""
+TELEGRAPH = EQUATIONS.replace("NOISE", 'telegraph"\na = 0.5\nk = 1.0 #')
+CHAIN = EQUATIONS.replace("NOISE", 'markov-chain"\nstates = [-0.5, 0.5]\nrates = [[0.0, 1.0], [1.0, 0.0]] #')
+GAUSSIAN = EQUATIONS.replace("NOISE", 'ornstein-uhlenbeck"\nalpha = 1.0\nstandard_deviation = 0.1 #')
+
+
+def proof_of(text, folder):
+    """What proof.json holds, and where it is."""
+    path = folder / "beam.toml"
+    path.write_text(f'title = "beam"\n{text}', encoding="utf-8")
+    prove_case(load_case(path), folder, width=1e-3)
+    return json.loads((folder / "beam/proof.json").read_text(encoding="utf-8")), folder / "beam/proof.json"
+
+
+@pytest.mark.parametrize(
+    "text", [TELEGRAPH, CHAIN, pytest.param(GAUSSIAN, marks=pytest.mark.slow)], ids=["telegraph", "chain", "Gaussian"]
+)
+def test_equations(text, tmp_path):
+    """Λ(2), λ and Λ(0) = 0, which both checkers accept."""
+    data, path = proof_of(text, tmp_path)
+    (curve,) = data["curves"]
+    assert curve["parameters"]["system.zeta"] == 0.05
+    assert curve["verdicts"] == ["almost every path decays", "the moment of order 2 decays"]
+    assert check_proof(path).objections == ()
+    entries = [*curve["moments"], {**curve["lyapunov_exponent"], "p": None}]
+    assert [checker.check(checker.read(json.dumps(entry))) for entry in entries] == 3 * [""]
+
+
+def test_certificates_of_a_curve_are_of_one_system(tmp_path):
+    """Their parameters are labels, which others may have, too; and one curve has one system."""
+    data, _ = proof_of(CHAIN, tmp_path)
+    (curve,) = data["curves"]
+    other = json.loads(json.dumps(data).replace("[-1.0, -0.1]", "[-1.0, -0.2]"))["curves"][0]
+    curve["moments"][0] = other["moments"][0]
+    assert list(claims_from(json.dumps(data)).objections()) == ["curves.0.its certificates are of several systems"]
+
+
+TURNED = """
+title = "beam"
+[system]
+kind = "plane"
+terms = [
+    { matrix = [[0.0, 1.0], [-1.0, 0.0]] },
+    { matrix = [[0.0, 0.0], [-1.0, 0.0]], noise = true, order = 1 },
+]
+jumps = [{ phase = 0.0, log_factor = -0.1 }]
+[noise]
+kind = "ornstein-uhlenbeck"
+alpha = 1.0
+sigma = 0.2
+[moments]
+p = [2.0]
+"""
+
+
+def test_a_ray_that_the_phase_passes_both_ways_is_refused(tmp_path, capsys):
+    path = tmp_path / "beam.toml"
+    path.write_text(TURNED, encoding="utf-8")
+    assert main(["prove", str(path), "--out", str(tmp_path)]) == BAD_INPUT
+    told = " ".join(capsys.readouterr().err.split())
+    assert "got a jump at the ray of (1, 0), which the phase does not pass one way only; proofs are for jumps" in told
+    assert not (tmp_path / "beam").exists()
