@@ -28,7 +28,8 @@ def drawn(seed):
     steady, driven = rng.uniform(-1, 1, (2, 2, 2))
     size, rate = np.exp(rng.uniform(-1, 0.7, 2))
     if seed % 4 == 0 and kind in WALLED:  # at a wall that the phase passes forward, whatever the noise does
-        steady[0, 1], driven[0, 1], restitution = abs(steady[0, 1]) + 0.2, 0.0, rng.uniform(0.6, 0.95)
+        steady[0, 1], driven[0, 1], restitution = abs(steady[0, 1]) + 0.5, 0.0, rng.uniform(0.6, 0.95)
+        steady[1, 0] -= 4.0 if kind in ("telegraph", "chain") else 0.0  # it turns in all states, or T is not smooth
     if kind in ("white", "ito"):
         sense = "ito" if kind == "ito" else "stratonovich"
         noise, system = White(s=size, interpretation=sense), (steady, [size * driven])
@@ -43,7 +44,7 @@ def drawn(seed):
     elif kind == "ornstein-uhlenbeck":
         noise = OrnsteinUhlenbeck(alpha=rate, sigma=size * math.sqrt(2 * rate))
         law = steady, driven, rate, size
-        moments = [moment_hierarchy.ornstein_uhlenbeck_exponent(*law, 2, count) for count in SIZES]
+        moments = [moment_hierarchy.ornstein_uhlenbeck_exponent(*law, 2, 2 * count) for count in SIZES]
     else:
         noise = SineWiener(amplitude=size, sigma=math.sqrt(2 * rate))
         law = steady, driven, size, noise.sigma

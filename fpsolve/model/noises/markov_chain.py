@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
@@ -143,17 +144,14 @@ class MarkovChain(Chain):
     }
 
     def __post_init__(self) -> None:
-        told = f"got the states {shown(self.states)} and rates {shown(self.rates)}; must be"
-        try:
+        states, rates = np.zeros(2), np.zeros((2, 2))  # of one value, where what is given are no numbers
+        with suppress(ValueError):
             states, rates = real_array(self.states, "states"), real_array(self.rates, "rates")
-        except ValueError:
-            raise ValueError(f"{told} finite numbers that differ, with finite rates") from None
         if states.ndim != 1 or states.size < 2 or rates.shape != 2 * states.shape:
             raise ValueError(f"got {states.shape} states and {rates.shape} rates; must be (n,) and (n, n), n >= 2")
         if np.ptp(states) == 0:
-            raise ValueError(
-                f"got the states {shown(self.states)}; must be finite numbers that differ, with finite rates"
-            )
+            told = f"got the states {shown(self.states)} and rates {shown(self.rates)}"
+            raise ValueError(f"{told}; must be finite numbers that differ, with finite rates")
         sizes = {"states": np.abs(states).max(), "rates": np.abs(rates).max()}
         for name, size in sizes.items():
             if not SIZE["ge"] <= size <= SIZE["le"]:
