@@ -112,6 +112,16 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
         fpsolve.PlaneSystem,
         {"terms": [CoefficientMatrix(0, ROTATION)], "jumps": [Jump(1.5, -0.1)], "epsilon": 0.1},
     ),
+    "PlaneSystem.of_equations": (
+        fpsolve.PlaneSystem.of_equations,
+        {
+            "variables": ("x", "v"),
+            "drift": ("v", "-k*x - xi*x"),
+            "parameters": {"k": 1.0},
+            "noises": {"xi": "noise"},
+            "walls": [{"at": "x = 0", "restitution": 0.8}],
+        },
+    ),
     "Problem": (fpsolve.Problem, {"system": OSCILLATOR, "noise": NOISE}),
     "Problem.at": (fpsolve.Problem(OSCILLATOR, NOISE).at, {"values": {"noise.sigma": 1.0}}),
     "Budget": (Budget, {"unknowns": 2000, "seconds": 2.0}),

@@ -226,7 +226,9 @@ def test_it_pickles_and_is_a_key():
         ({"noises": {"xi": 3}}, "noises.xi: got 3; must be the name of a section"),
         ({"walls": [{"at": None, "restitution": 1.0}]}, "walls[0].at: got None; must be "),
         ({"walls": [{"at": "x = 0", "restitution": None}]}, "walls[0].restitution: got None; must be a number > 0"),
-        ({"walls": [{"at": "x = 0"}]}, "walls[0].restitution: is empty"),
+        ({"walls": [{"at": "x = 0"}]}, "walls[0]: got {'at': 'x = 0'}; must have the keys at and restitution alone"),
+        ({"walls": "x = 0"}, "walls[0]: got 'x = 0'; must have the keys"),
+        ({"parameters": [1.0]}, "parameters: got [1.0]; must be a mapping from names"),
     ],
 )
 def test_odd_arguments(changed, words):

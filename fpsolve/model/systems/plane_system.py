@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray, identity, one, real_number, shown
+from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
 from fpsolve.model.quantity import Quantity
@@ -234,14 +235,19 @@ class PlaneSystem(System):
         Raises:
             ValueError: with the place and the term that is not what it must be.
         """
-        places = [Wall(each.get("at", ""), each.get("restitution", "")) for each in walls]  # type: ignore[arg-type]
-        return EquationSystem(
-            tuple(variables),  # type: ignore[arg-type]
-            tuple(drift),  # type: ignore[arg-type]
-            tuple((parameters or {}).items()),
-            tuple((noises or {"xi": "noise"}).items()),
-            tuple(places),
-        )
+        known = {
+            "parameters": {} if parameters is None else parameters,
+            "noises": {"xi": "noise"} if noises is None else noises,
+        }
+        for key, given in known.items():
+            if not isinstance(given, Mapping):
+                raise TableError(f"got {shown(given)}; must be a mapping from names", key)
+        for number, wall in enumerate(walls if isinstance(walls, list | tuple) else (walls,)):
+            if not isinstance(wall, Mapping) or set(wall) != {"at", "restitution"}:
+                raise TableError(f"got {shown(wall)}; must have the keys at and restitution alone", "walls", number)
+        named, noise = (tuple(each.items()) for each in known.values())
+        places = tuple(Wall(**wall) for wall in walls)  # type: ignore[arg-type]
+        return EquationSystem(variables, drift, named, noise, places)  # type: ignore[arg-type]
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> PlaneSystem:
