@@ -299,7 +299,7 @@ def chart(
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
 
     A line takes any time, or [budget] line_seconds of the processor: then what is traced is kept, with exit code 3. In
-    the scan [budget] seconds are for a row of 13 nodes, where a p may take a quarter of what is left.
+    the scan [budget] seconds are for a row of 13 nodes, each of which may take half of what is left.
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +17,7 @@ from fpsolve.analysis.scan import Sample
 from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.adapt import Budget, Countdown
 from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
@@ -28,8 +28,8 @@ from fpsolve.model.problem import Problem, refuse_infinite
 
 RTOL = 1e-10
 """Of F, relative to its scale."""
-QUARTER = 0.25
-"""Of the time that is left, for one p: λ takes three."""
+HALF = 0.5
+"""Of the time that is left, for one value."""
 
 
 def axis_faults(
@@ -193,7 +193,7 @@ class ZeroField:
         axes: the parameters.
         budget: for a solve.
         rtol: of F, relative to its scale.
-        seconds: of the processor for all values together; each p may take a quarter of what is left.
+        seconds: of the processor for all values together; each may take half of what is left.
         spent: what is said where they do not suffice.
 
     Attributes:
@@ -233,10 +233,10 @@ class ZeroField:
         left, started = self._seconds - self.spent_seconds, time.thread_time()
         if left <= 0:
             raise self._stop()
-        share = QUARTER * left
+        share = HALF * left
         is_short = share < self._budget.seconds
         try:
-            return self._at(at, replace(self._budget, seconds=share) if is_short else self._budget)
+            return self._at(at, Countdown(share) if is_short else None)
         except NotConverged as failure:
             if is_short and failure.message.tells_of(Code.SECONDS_SPENT):
                 raise self._stop() from failure
@@ -248,22 +248,22 @@ class ZeroField:
         self.stopped = self._spent
         return NotConverged(self.stopped)
 
-    def _at(self, at: FloatArray, budget: Budget) -> Sample:
-        """F at (u, v), within a budget."""
+    def _at(self, at: FloatArray, countdown: Countdown | None) -> Sample:
+        """F at (u, v); without a countdown each p has its own."""
         values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}
         try:
             problem = self._problem.at(values)
         except ValueError as failure:
             raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
         if self._bounce is None:
-            return self._sample(at, problem, budget)
+            return self._sample(at, problem, countdown)
         known = self._solved.setdefault(float(at[1 - self._bounce]), {})
         log_factor = problem.system.jumps[0].log_factor
         if len(known) < 2 and log_factor not in known:
-            known[log_factor] = self._sample(at, problem, budget)
+            known[log_factor] = self._sample(at, problem, countdown)
         return known[log_factor] if log_factor in known else self._between(at, problem, log_factor, known, self._bounce)
 
-    def _sample(self, at: FloatArray, problem: Problem, budget: Budget) -> Sample:
+    def _sample(self, at: FloatArray, problem: Problem, countdown: Countdown | None) -> Sample:
         """F from a solve.
 
         Raises:
@@ -271,7 +271,8 @@ class ZeroField:
         """
         p = self._zero.p
         refuse_infinite(problem, p)
-        solver = ExponentSolver(problem, rtol=self._rtol, budget=budget, starts=self._starts)
+        own: Any = {"rtol": self._rtol, "budget": self._budget, "countdown": countdown}
+        solver = ExponentSolver(problem, starts=self._starts, **own)
         value, error = solver.ratio_alone(p)
         if value > 0 > p and problem.noise.has_algebraic_tails:
             near = solver.near.solution(p).pair

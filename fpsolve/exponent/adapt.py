@@ -79,8 +79,8 @@ class Budget:
     Args:
         unknowns: of the largest system; memory grows with it, some 30 kB each, 1.8 GB in all for the 60,000.
         seconds: of the processor for one p; foreseen before every solve from the last one, and looked at before every
-            factorisation, so that it may take a third more. The nodes of a row of a scan share it, and a p there may
-            take a quarter of what is left.
+            factorisation, so that it may take a third more. The nodes of a row of a scan share it, and each may take
+            half of what is left.
         line_seconds: of the processor for a line of a chart, its scan, which may take half of them, and its branches;
             None for any time.
 
@@ -91,6 +91,24 @@ class Budget:
     unknowns: Annotated[int, parameter("unknowns of the largest system", "unknowns = 60000", ge=100)] = 60_000
     seconds: Annotated[float, parameter("time for one p", "seconds = 60.0", gt=0)] = 60.0
     line_seconds: Annotated[float | None, parameter("time for a line of a chart", "line_seconds = 600.0", gt=0)] = None
+
+
+@dataclass(frozen=True)
+class Countdown:
+    """Time of the processor that runs from when this is made, for all solves that it is given to.
+
+    Attributes:
+        seconds: how many there are.
+        started: by `time.thread_time`.
+    """
+
+    seconds: float
+    started: float = field(default_factory=lambda: time.thread_time())
+
+    @property
+    def elapsed(self) -> float:
+        """How many are gone."""
+        return time.thread_time() - self.started
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +122,7 @@ class NearPlace:
         budget: what the choice of a discretisation may cost.
         tolerance: the usual one.
         starts: solutions of a problem with parameters close by, by their p.
+        countdown: that all p share; each has the seconds of the budget if None.
 
     Attributes:
         known: what was solved, by p.
@@ -119,16 +138,17 @@ class NearPlace:
     budget: Budget
     tolerance: Tolerance
     starts: Mapping[float, Solution] = field(default_factory=dict)
+    countdown: Countdown | None = None
     known: dict[float, Solution] = field(init=False, default_factory=dict)
     _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
 
-    def solution(self, p: float, tolerance: Tolerance | None = None, started: float | None = None) -> Solution:
+    def solution(self, p: float, tolerance: Tolerance | None = None, countdown: Countdown | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
 
         Args:
             p: the moment.
             tolerance: the largest error allowed.
-            started: when work on this p began, by `time.thread_time`; now if not given.
+            countdown: for all work on this p; if None that of all p, or a new one.
 
         Raises:
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
@@ -139,8 +159,7 @@ class NearPlace:
         if p not in self.known or (self.mesh is None and not self.meets(self.known[p], allowed)):
             try:
                 with one_thread():
-                    begun = time.thread_time() if started is None else started
-                    self.known[p] = _Search(self, p, allowed, begun).found()
+                    self.known[p] = _Search(self, p, allowed, countdown or self.begun()).found()
             except NotConverged as failure:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure
@@ -158,6 +177,10 @@ class NearPlace:
             except ArithmeticError as failure:
                 raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
         return self.known[p]
+
+    def begun(self) -> Countdown:
+        """The countdown of all p, or a new one for one p."""
+        return self.countdown or Countdown(self.budget.seconds)
 
     @property
     def remedy(self) -> Remedy:
@@ -205,10 +228,12 @@ class NearPlace:
         except NotConverged as failure:
             raise NotConverged(Message(Code.NEAR_ZERO, p=q, reason=failure.message), failure.partial) from failure
 
-    def loose(self, p: float, places: Sequence[Place], started: float | None = None) -> Solution:
+    def loose(self, p: float, places: Sequence[Place], countdown: Countdown | None = None) -> Solution:
         """That at p, to compare with other places: where one outdoes it, its eigenvalue is no exact one."""
         best = max((place.rate for place in places), default=0.0)
-        return self.solution(p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)), started)
+        return self.solution(
+            p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)), countdown
+        )
 
     def searched(self, search: _Search, start: Solution | None) -> Solution:
         """A solution within a tolerance from a first discretisation, or from a solution that does not suffice.
@@ -263,9 +288,9 @@ class FarPlaces(NearPlace):
 
     small_p, is_far = 0.0, True
 
-    def solution(self, p: float, tolerance: Tolerance | None = None, started: float | None = None) -> Solution:
+    def solution(self, p: float, tolerance: Tolerance | None = None, countdown: Countdown | None = None) -> Solution:
         try:
-            return super().solution(p, tolerance, started)
+            return super().solution(p, tolerance, countdown)
         except NotConverged as failure:
             raise NotConverged(Message(Code.FAR_OUT, reason=failure.message), failure.partial) from failure
 
@@ -299,13 +324,13 @@ class AllPlaces:
         """That of the larger eigenvalue. Raises `NotConverged`."""
         if p == 0:
             return self.near.solution(p, tolerance)
-        started, elsewhere = time.thread_time(), outlook(self.near.problem, p)
+        countdown, elsewhere = self.near.begun(), outlook(self.near.problem, p)
         elsewhere.refuse(p, elsewhere.highest)
-        near = self.near.loose(p, elsewhere.places, started)
+        near = self.near.loose(p, elsewhere.places, countdown)
         elsewhere.refuse(p, max(near.pair.value + near.error, *(place.rate for place in elsewhere.places), 0.0))
-        far = self.far.solution(p, tolerance, started) if other_places(near.pair) else None
+        far = self.far.solution(p, tolerance, countdown) if other_places(near.pair) else None
         if far is None or far.pair.value - far.error < near.pair.value + 10 * near.error:
-            near = self.near.solution(p, tolerance, started)
+            near = self.near.solution(p, tolerance, countdown)
         found = max((each for each in (near, far) if each), key=lambda each: each.pair.value)
         if found.pair.value + found.error < 0 and grows_far_out(self.near.problem):
             raise NotConverged(Message(Code.HELD_TOO_FAR, p=p, z=FURTHEST, value=found.pair.value))
@@ -323,7 +348,7 @@ class _Search:
     place: NearPlace
     p: float
     tolerance: Tolerance
-    started: float
+    countdown: Countdown
     stages: int = 0
     best: Solution | None = None
     error: float = math.inf
@@ -338,8 +363,8 @@ class _Search:
         try:
             return self.sought()
         except _OutOfTime:
-            seconds = time.thread_time() - self.started + self.longest
-            return self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.place.budget.seconds))
+            seconds = self.countdown.elapsed + self.longest
+            return self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.countdown.seconds))
 
     def sought(self) -> Solution:
         """The same, which `tick` may end."""
@@ -418,15 +443,15 @@ class _Search:
 
     def check(self, chosen: Discretisation) -> None:
         """Refuse a stage beyond the budget, and count it."""
-        size, elapsed = chosen.size, time.thread_time() - self.started
+        size, elapsed = chosen.size, self.countdown.elapsed
         cost = max(SECONDS_PER_UNKNOWN, (elapsed - self.last[0]) / max(self.last[1], 1) ** 1.5 if self.last[1] else 0.0)
         seconds = elapsed + cost * size**1.5
         if not self.last[1] and self.place.problem.noise.longest_jump > MAX_BAND:
             seconds += SECONDS_PER_CUBE * size**3
         if size > self.place.budget.unknowns:
             self.stop(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=self.place.budget.unknowns))
-        if seconds > self.place.budget.seconds:
-            self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.place.budget.seconds))
+        if seconds > self.countdown.seconds:
+            self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.countdown.seconds))
         if self.stages >= MAX_STAGES:
             self.stop(Message(Code.MESHES_SPENT, count=MAX_STAGES))
         self.last, self.stages = (elapsed, size), self.stages + 1
@@ -434,9 +459,9 @@ class _Search:
 
     def tick(self) -> None:
         """End the search where the next factorisation, by the longest of this stage, leaves no time."""
-        now = time.thread_time()
+        now = self.countdown.elapsed
         self.longest, self.ticked = max(self.longest, now - self.ticked), now
-        if now - self.started + self.longest > A_THIRD_MORE * self.place.budget.seconds:
+        if now + self.longest > A_THIRD_MORE * self.countdown.seconds:
             raise _OutOfTime
 
     def note(self, solution: Solution, error: float, allowed: float) -> None:

@@ -20,6 +20,7 @@ from fpsolve.exponent.adapt import (
     WIDER,
     AllPlaces,
     Budget,
+    Countdown,
     FarPlaces,
     NearPlace,
     Tolerance,
@@ -119,6 +120,7 @@ class ExponentSolver:
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a discretisation may cost.
         starts: solutions of a problem with parameters close by, by their p, see `NearPlace`.
+        countdown: that all p share; each has the seconds of the budget if None.
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
@@ -132,6 +134,7 @@ class ExponentSolver:
     rtol: float = 1e-8
     budget: Budget = field(default_factory=Budget)
     starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
+    countdown: Countdown | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind, words in _KINDS:
@@ -147,8 +150,12 @@ class ExponentSolver:
         """Λ(p) around the place nearest to ξ = 0, for all noise but that of algebraic tails the only one."""
         if self.classes:  # near p = 0
             return max(self.classes, key=lambda each: each.lyapunov_exponent().value).near
-        own: Any = {"rtol": self.rtol, "budget": self.budget, "tolerance": self.tolerance}
-        return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **own)
+        return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **self._own)
+
+    @property
+    def _own(self) -> dict[str, Any]:
+        names = ("rtol", "budget", "tolerance", "countdown")
+        return {name: getattr(self, name) for name in names}
 
     @cached_property
     def place(self) -> NearPlace | AllPlaces:
@@ -158,8 +165,7 @@ class ExponentSolver:
         """
         if self.mesh is not None or not self.problem.noise.has_algebraic_tails:
             return self.near
-        far = FarPlaces(self.problem, rtol=self.rtol, budget=self.budget, tolerance=self.tolerance)
-        return AllPlaces(self.near, far)
+        return AllPlaces(self.near, FarPlaces(self.problem, **self._own))
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
@@ -170,9 +176,8 @@ class ExponentSolver:
     @cached_property
     def classes(self) -> tuple[ExponentSolver, ...]:
         """Those of the `classes` of a problem whose phase never leaves a ray; nothing for others."""
-        return tuple(
-            ExponentSolver(each, self.mesh, rtol=self.rtol, budget=self.budget) for each in self.problem.classes
-        )
+        own: Any = {"rtol": self.rtol, "budget": self.budget, "countdown": self.countdown}
+        return tuple(ExponentSolver(each, self.mesh, **own) for each in self.problem.classes)
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, that of rtol if none is given.

@@ -616,13 +616,13 @@ class Worked:
         self.now, self.cost = 0.0, cost
         for name in ("zero", "scan"):
             monkeypatch.setattr(f"fpsolve.analysis.{name}.time", SimpleNamespace(thread_time=lambda: self.now))
-        monkeypatch.setattr(ZeroField, "_sample", lambda _, at, problem, budget: self.sample(at, budget))
+        monkeypatch.setattr(ZeroField, "_sample", lambda _, at, problem, most: self.sample(at, most))
 
-    def sample(self, at, budget):
-        cost = self.cost(at)
-        self.now += min(cost, 4 / 3 * budget.seconds)
-        if cost > budget.seconds:
-            raise NotConverged(Message(Code.SECONDS_SPENT, seconds=cost, most=budget.seconds))
+    def sample(self, at, countdown):
+        cost, seconds = self.cost(at), countdown.seconds if countdown else 60.0
+        self.now += min(cost, 4 / 3 * seconds)
+        if cost > seconds:
+            raise NotConverged(Message(Code.SECONDS_SPENT, seconds=cost, most=seconds))
         return Sample(at, at[0] + at[1] - 0.8, np.ones(2), 0.0, 1.0)
 
 
