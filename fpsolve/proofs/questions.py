@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.function import moment_lyapunov
-from fpsolve.exponent.quantities import lyapunov_exponent
-from fpsolve.exponent.quantities import stability_index as estimated_index
+from fpsolve.exponent.adapt import Budget, Countdown
+from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.proofs.balls import precision
 from fpsolve.proofs.certificate import NOTHING, Enclosure, around, trivial
@@ -20,8 +21,8 @@ from fpsolve.theory.perturbation import scale_of
 
 SHARE = 1e-7
 """The width that is sought if none is given, as a share of the scale of what is bounded."""
-GUESS = Budget(seconds=15.0)
-"""What one of the two guesses of a number may cost."""
+GUESS_SHARE = 0.25
+"""Of the time of a bound, for one of the two guesses of the number."""
 INDEX_WIDTH, WIDENINGS = 1e-6, 4
 """The width sought for δ_p, and how often it is tried again with one ten times as large."""
 
@@ -51,7 +52,14 @@ NO_INDEX = IndexEnclosure(-math.inf, math.inf)
 
 
 @of_problem
-def prove(problem: Problem, p: float, *, width: float | None = None) -> Enclosure:
+def prove(
+    problem: Problem,
+    p: float,
+    *,
+    width: float | None = None,
+    budget: Budget | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> Enclosure:
     """Bounds on Λ(p) that hold with certainty, for noise of Eq. (7) with r₀ ≤ 1 or (15), sine-Wiener noise, and chains.
 
     They follow from a function T > 0 with λ₋ T ≤ L(p) T ≤ λ₊ T, Eq. (19), which is verified in ball arithmetic; neither
@@ -69,6 +77,8 @@ def prove(problem: Problem, p: float, *, width: float | None = None) -> Enclosur
             within 1e-12 of a multiple of π/4 for that multiple.
         p: order of the moment, in the same sense.
         width: wanted upper − lower, in 1/time; 1e-7 of the scale of Λ(p) if None.
+        budget: its `seconds` of the processor are for the bounds, all in all; they may take a third more.
+        progress: called after each trial function.
 
     Returns:
         The closest bounds that were found, maybe farther apart than wanted; infinite where nothing could be proven.
@@ -79,19 +89,27 @@ def prove(problem: Problem, p: float, *, width: float | None = None) -> Enclosur
         ValueError: p is not finite, the width not positive, or the phase may pass the ray of a jump both ways.
         MissingFlint: python-flint is not installed.
     """
-    return prove_bounds(problem, statement_of(problem), repr(float(p)), width)
+    return prove_bounds(problem, statement_of(problem), repr(float(p)), width, budget or Budget(), progress)
 
 
 @of_problem
-def prove_lyapunov_exponent(problem: Problem, *, width: float | None = None) -> Enclosure:
+def prove_lyapunov_exponent(
+    problem: Problem,
+    *,
+    width: float | None = None,
+    budget: Budget | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> Enclosure:
     """Bounds on the largest Lyapunov exponent λ that hold for almost every path; as `prove`."""
-    return prove_bounds(problem, statement_of(problem), None, width)
+    return prove_bounds(problem, statement_of(problem), None, width, budget or Budget(), progress)
 
 
 @of_problem
-def prove_stability_index(problem: Problem) -> IndexEnclosure:
-    """Bounds on the stability index δ_p, from the signs of Λ beside it; as `prove`."""
-    return prove_index(problem, statement_of(problem))
+def prove_stability_index(
+    problem: Problem, *, budget: Budget | None = None, progress: Callable[[], None] = lambda: None
+) -> IndexEnclosure:
+    """Bounds on the stability index δ_p, from the signs of Λ beside it; as `prove`, but they may take twice as long."""
+    return prove_index(problem, statement_of(problem), budget or Budget(), progress)
 
 
 def check_width(width: float | None) -> None:
@@ -106,8 +124,16 @@ def refuse_unprovable(stated: Statement) -> None:
         cylinder(stated)
 
 
-def prove_bounds(problem: Problem, stated: Statement, p: str | None, width: float | None) -> Enclosure:
-    """Bounds on Λ(p), or on λ where p is None, with p as a decimal."""
+def prove_bounds(
+    problem: Problem,
+    stated: Statement,
+    p: str | None,
+    width: float | None,
+    budget: Budget,
+    progress: Callable[[], None] = lambda: None,
+) -> Enclosure:
+    """Bounds on Λ(p), or on λ where p is None, with p as a decimal, within the seconds of a budget."""
+    countdown, guess = Countdown(budget.seconds), None
     order = math.nan if p is None else float(p)
     if p is not None and not math.isfinite(order):
         raise ValueError(f"got p = {p}; must be finite")
@@ -115,37 +141,50 @@ def prove_bounds(problem: Problem, stated: Statement, p: str | None, width: floa
     refuse_unprovable(stated)
     if order == 0:
         return trivial(stated)
-    guess = None
     for rtol in (1e-8, 1e-3):  # what finite elements find, at a smaller accuracy if need be
+        most: Any = {"budget": budget, "countdown": Countdown(GUESS_SHARE * budget.seconds)}
+        solver = ExponentSolver(problem, rtol=rtol, **most)
         with suppress(NotConverged):
-            if p is None:
-                guess = lyapunov_exponent(problem, rtol=rtol, budget=GUESS).value
-            else:
-                guess = float(moment_lyapunov(problem, [order], rtol=rtol, budget=GUESS).value[0])
+            guess = solver.lyapunov_exponent().value if p is None else solver.pair(order).value
             break
     theory = scale_of(problem)
     scale = max(abs(guess or 0.0), float(theory.linear if p is None else theory.moment(order)))
     wanted = SHARE * scale if width is None else width
-    found = NOTHING if p is not None and guess is None else enclose(stated, p, wanted, guess or 0.0)
+    is_hopeless = p is not None and guess is None
+    found = NOTHING if is_hopeless else enclose(stated, p, wanted, guess or 0.0, countdown, progress)
     return replace(found, wanted=wanted)
 
 
-def prove_index(problem: Problem, stated: Statement) -> IndexEnclosure:
-    """Bounds on δ_p; none where there is none, or where it is not found."""
+def prove_index(
+    problem: Problem, stated: Statement, budget: Budget, progress: Callable[[], None] = lambda: None
+) -> IndexEnclosure:
+    """Bounds on δ_p; none where there is none, or where it is not found.
+
+    They may take twice the seconds of a budget, as they need bounds at two p.
+    """
     refuse_unprovable(stated)
+    countdown = Countdown(2 * budget.seconds)
+    most: Any = {"budget": budget, "countdown": Countdown(2 * GUESS_SHARE * budget.seconds)}
+    solver = ExponentSolver(problem, **most)
     try:
-        found = estimated_index(problem)
+        found = nonzero_root(solver)
         if not found:
             return NO_INDEX
-        slope = abs(float(moment_lyapunov(problem, [found.value]).derivative[0]))
+        slope = abs(solver.pair(found.value).derivative)
     except NotConverged:
         return NO_INDEX
     half = max(INDEX_WIDTH * max(1.0, abs(found.value)) / 2, 2 * found.error_estimate)
     for _ in range(WIDENINGS):
         if half < abs(found.value):
             sides = [repr(float(f"{found.value + sign * half:.12g}")) for sign in (-1, 1)]
-            moments = tuple((p, prove_bounds(problem, stated, p, slope * half / 2)) for p in sides)
+            moments = []
+            for left, p in zip((2, 1), sides, strict=True):  # for the first half of what is left
+                seconds = (countdown.seconds - countdown.elapsed) / left
+                if seconds <= 0:
+                    return NO_INDEX
+                most = replace(budget, seconds=seconds)
+                moments.append((p, prove_bounds(problem, stated, p, slope * half / 2, most, progress)))
             if moments[0][1].sign * moments[1][1].sign < 0:
-                return IndexEnclosure(*around(*sides), moments)
+                return IndexEnclosure(*around(*sides), tuple(moments))
         half *= 10
     return NO_INDEX

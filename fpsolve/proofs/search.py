@@ -10,15 +10,15 @@ the noise part of L is −½ ν ∫ P_s T_z S_z in its weak form, so that u solv
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from time import thread_time
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.special import roots_jacobi
 
 from fpsolve.arrays import FloatArray
+from fpsolve.exponent.adapt import Budget, Countdown
 from fpsolve.fem.factors import sparse_lu
 from fpsolve.proofs.balls import above, ball, balls, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Circle, Core, Plain, States, Whole, hermite_table
@@ -27,8 +27,6 @@ from fpsolve.proofs.certificate import NOTHING, BasisRecord, Certificate, Enclos
 from fpsolve.proofs.statement import Cylinder, Statement, cylinder
 from fpsolve.proofs.verify import objection
 
-SECONDS = 60.0
-"""Of the processor for one bound; the next trial is foreseen from the last one, so that it may take a third more."""
 SMALLEST, GROWTH, MOST_UNKNOWNS = (5, 9), 1.35, 25_000
 """Modes on either side and polynomials of the first trial, by what one of both grows, and how far."""
 ABSENT = 1e9
@@ -188,13 +186,22 @@ def _tabulated(basis: Core | Whole, z: FloatArray, degrees: int) -> tuple[FloatA
 
 
 @precision()
-def enclose(stated: Statement, p: str | None, width: float, guess: float = 0.0) -> Enclosure:
+def enclose(
+    stated: Statement,
+    p: str | None,
+    width: float,
+    guess: float = 0.0,
+    countdown: Countdown | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> Enclosure:
     """Bounds on Λ(p), or on λ where p is None, that are at most `width` apart, if that can be done.
 
     Args:
         stated: parameters as decimals.
         p: the moment as a decimal.
         guess: Λ(p), about.
+        countdown: of the time for it; the next trial is foreseen from the last one, so that it may take a third more.
+        progress: called after each trial function.
 
     Returns:
         The closest bounds that were found.
@@ -202,11 +209,11 @@ def enclose(stated: Statement, p: str | None, width: float, guess: float = 0.0) 
     Raises:
         NoSuchExponent: the noise has algebraic tails, r₀ > 1.
     """
-    noise, best, size, started = cylinder(stated), NOTHING, SMALLEST, thread_time()
+    noise, best, size, left = cylinder(stated), NOTHING, SMALLEST, countdown or Countdown(Budget().seconds)
     if noise.states is not None:
         size = size[0], len(noise.states)
     for basis in bases(noise, p):
-        for found, waves, degrees in _enlarged(stated, noise, basis, p, guess, size, started):
+        for found, waves, degrees in _enlarged(stated, noise, basis, p, guess, size, left, progress):
             if best.certificate is None or _apart(found) < _apart(best.certificate):
                 best, size = enclosure_of(found), (waves, degrees)
             if best.width <= width:
@@ -221,15 +228,16 @@ def _enlarged(
     p: str | None,
     guess: float,
     size: tuple[int, int],
-    started: float,
+    countdown: Countdown,
+    progress: Callable[[], None],
 ) -> Iterator[tuple[Certificate, int, int]]:
     """Certificates by larger and larger trials, as long as the bounds come closer, and the sizes of the trials."""
     delta, idle, value, (waves, degrees) = math.inf, 0, math.inf, size
     cost, unknowns = 0.0, (2 * waves + 1) * degrees
     while idle < PATIENCE[delta > FAR * abs(value)] and (2 * waves + 1) * degrees <= MOST_UNKNOWNS:
-        begun = thread_time()
+        begun = countdown.elapsed
         cost, unknowns = cost * ((2 * waves + 1) * degrees / unknowns) ** 1.5, (2 * waves + 1) * degrees
-        if begun - started + cost > SECONDS:
+        if begun + cost > countdown.seconds:
             return
         try:
             pair, basis = _solved(noise, basis, p, guess, waves, degrees)
@@ -239,13 +247,15 @@ def _enlarged(
         if not math.isfinite(value):
             return
         certificate = certificate_of(stated, noise, basis, p, pair)
-        if certificate is not None and not objection(certificate):
+        is_proof = certificate is not None and not objection(certificate)
+        progress()
+        if certificate is not None and is_proof:
             idle = 0 if _apart(certificate) < PROGRESS * delta else idle + 1
             delta = min(delta, _apart(certificate))
             yield certificate, waves, degrees
         elif delta < math.inf:
             idle += 1
-        cost = thread_time() - begun
+        cost = countdown.elapsed - begun
         edges = pair.edges if noise.states is None else (pair.edges[0], 0.0)
         waves, degrees = (
             math.ceil(GROWTH * n) + 1 if edge > 0.1 * max(edges) else n

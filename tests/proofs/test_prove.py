@@ -2,12 +2,16 @@
 
 import itertools
 import math
+import time
 
 import pytest
 
 import fpsolve
 from fpsolve.errors import NoSuchExponent
+from fpsolve.exponent import adapt
+from fpsolve.exponent.adapt import Budget
 from fpsolve.proofs import objection, prove, prove_lyapunov_exponent, prove_stability_index, search
+from fpsolve.proofs.statement import statement_of
 from tests import random_proofs
 
 FIG1 = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1, "D0": 1.0, "tau0": 0.5, "r0": 0.95}
@@ -129,13 +133,23 @@ def test_a_width_beyond_reach_is_told():
 
 def test_a_bound_takes_no_longer_than_stated(monkeypatch):
     """By a clock that each look sets forward by a second: a trial is foreseen to take as long as the last one."""
-    seconds = itertools.count()
-    monkeypatch.setattr(search, "thread_time", lambda: next(seconds))
-    monkeypatch.setattr(search, "SECONDS", 6.0)
-    found = prove(problem(**FIG1 | {"reduced": True}), 1.0, width=1e-30)
+    seconds, told, motion = itertools.count(), [], problem(**FIG1 | {"reduced": True})
+    monkeypatch.setattr(adapt.time, "thread_time", lambda: next(seconds))
+    countdown = adapt.Countdown(8.0)
+    found = search.enclose(statement_of(motion), "1.0", 1e-30, 0.014, countdown, lambda: told.append(next(seconds)))
     assert found.is_proven
-    assert not found.is_met
-    assert 6 <= next(seconds) <= 9
+    assert len(told) > 1
+    assert 8 <= next(seconds) <= 11
+
+
+@pytest.mark.parametrize("p", [1e6, "delta"])
+def test_what_cannot_be_proven_ends_with_its_time(p):
+    """An index has twice the time, for both of its bounds; before, each of eight had a minute and a half."""
+    hard, started = problem(**FIG1 | {"epsilon": 1.0, "D0": 1.0, "reduced": True}), time.thread_time()
+    budget = Budget(seconds=0.4)
+    found = prove_stability_index(hard, budget=budget) if p == "delta" else prove(hard, p, budget=budget)
+    assert not found.is_proven
+    assert time.thread_time() - started < (3.0 if p == "delta" else 1.5)
 
 
 def test_algebraic_tails_are_refused():
