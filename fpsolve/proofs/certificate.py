@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -135,10 +136,14 @@ class Certificate(Record):
 
     @property
     def work(self) -> int:
-        """About how many operations it takes to verify, some 2e-7 s each."""
-        cells = sum(len(self._cells(side)) for side in (self.upper, self.lower) if side is not None)
+        """About how many operations it takes to verify, 2e-7 s each or less.
+
+        Measured on one processor: for each cell of the noise 0.15 ms, 2.5 µs for each row and column, twelve more of
+        which count for each row, and 0.55 µs for each cell of the phase, 1% more for each row.
+        """
+        cells = {cell for side in (self.upper, self.lower) if side is not None for cell in pairwise(self._cells(side))}
         rows, columns = len(self.cosine), len(self.cosine[0])
-        return cells * (self.phases * (20 + rows) // 20 + 6 * rows * columns)
+        return len(cells) * (750 + 12 * rows * (columns + 12) + self.phases * (110 + rows) // 40)
 
     @property
     def statement(self) -> Statement:

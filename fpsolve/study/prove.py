@@ -109,11 +109,11 @@ class Plan:
     def questions(self) -> Iterator[Question]:
         for curve in self.case.curves():
             problem, stated, budget = curve.problem, self.stated(curve), self.case.budget
-            yield from (partial(prove_bounds, problem, stated, p, self.width, budget) for p in self._orders)
+            yield from (partial(prove_bounds, problem, stated, p, self.width, budget=budget) for p in self._orders)
             if LYAPUNOV_EXPONENT.name in self.indices:
-                yield partial(prove_bounds, problem, stated, None, self.width, budget)
+                yield partial(prove_bounds, problem, stated, None, self.width, budget=budget)
             if STABILITY_INDEX.name in self.indices:
-                yield partial(prove_index, problem, stated, budget)
+                yield partial(prove_index, problem, stated, budget=budget)
 
     def gathered(self, answers: Sequence[Enclosure | IndexEnclosure]) -> list[CurveProof]:
         """What is proven of each curve, from the first answers, in the order of the questions."""

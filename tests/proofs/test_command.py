@@ -42,7 +42,7 @@ def case(tmp_path, monkeypatch):
 @pytest.fixture
 def no_proving(monkeypatch):
     """Nothing is proven in less than no time."""
-    monkeypatch.setattr("fpsolve.proofs.questions.moment_lyapunov", lambda *_, **__: pytest.fail("proves"))
+    monkeypatch.setattr("fpsolve.proofs.questions.ExponentSolver", lambda *_, **__: pytest.fail("proves"))
 
 
 def read(folder):
@@ -262,7 +262,7 @@ def test_what_an_interrupted_run_has_proven_is_kept(case, tmp_path, kind, code):
     slow = CODE.replace(
         "print(",
         "import fpsolve.proofs.questions as questions, time; "
-        "questions.moment_lyapunov = lambda *_, **__: (print('slow', flush=True), time.sleep(60)); print(",
+        "questions.ExponentSolver = lambda *_, **__: (print('slow', flush=True), time.sleep(60)); print(",
     )
     process = subprocess.Popen(
         [sys.executable, "-c", slow, "prove", case, "--jobs", "1"],
