@@ -145,7 +145,7 @@ def prove_bounds(
         most: Any = {"budget": budget, "countdown": Countdown(GUESS_SHARE * budget.seconds)}
         solver = ExponentSolver(problem, rtol=rtol, **most)
         with suppress(NotConverged):
-            guess = solver.lyapunov_exponent().value if p is None else solver.pair(order).value
+            guess = solver.lyapunov_exponent().value if p is None else solver.solution(order).pair.value
             break
     theory = scale_of(problem)
     scale = max(abs(guess or 0.0), float(theory.linear if p is None else theory.moment(order)))
@@ -170,7 +170,7 @@ def prove_index(
         found = nonzero_root(solver)
         if not found:
             return NO_INDEX
-        slope = abs(solver.pair(found.value).derivative)
+        slope = abs(solver.solution(found.value).pair.derivative)
     except NotConverged:
         return NO_INDEX
     half = max(INDEX_WIDTH * max(1.0, abs(found.value)) / 2, 2 * found.error_estimate)
