@@ -12,6 +12,7 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
 from fpsolve.proofs import objection, prove, prove_lyapunov_exponent
 from fpsolve.proofs.certificate import Certificate
+from tests import random_proofs
 from tests.conftest import sampled
 from tests.oracles.harmonics import moment_exponent
 from tests.oracles.moment_hierarchy import ornstein_uhlenbeck_exponent
@@ -219,3 +220,11 @@ def test_a_certificate_states_the_exact_values_of_floats():
     assert Certificate.model_validate(stated) == chain.certificate
     old = prove(fpsolve.VibroImpactOscillator(1.0, 0.8, 0.1, 0.1), Telegraph(0.5, 1.0), 2.0).certificate
     assert not {"motion", "chain"} & old.model_dump(mode="json").keys()
+
+
+@pytest.mark.parametrize("seed", sampled(0, 1, 4, 2, 3, keep=3))
+def test_random_systems(seed):
+    """A hundred others: `python -m tests.random_proofs 100 systems`."""
+    found = random_proofs.outcome(seed, is_system=True)
+    assert found.width < 1e-6
+    assert found.off <= 1
