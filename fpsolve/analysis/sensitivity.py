@@ -185,6 +185,7 @@ def sensitivities(
     rtol: float = 1e-8,
     mesh: CylinderMesh | None = None,
     budget: Budget | None = None,
+    progress: Callable[[], None] = lambda: None,
 ) -> Sensitivities:
     """∂Λ(p)/∂θ, ∂λ/∂θ, ∂δ_p/∂θ and ∂Λ″(0)/∂θ for every parameter θ of the oscillator and of the noise.
 
@@ -195,6 +196,7 @@ def sensitivities(
         p: one moment, or an array of shape (n,); none by default.
         original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).
         rtol, mesh, budget: as for `moment_lyapunov`.
+        progress: called once for each p, and for each of λ, δ_p and Λ″(0).
 
     Raises:
         ValueError: a p is not finite, or the noise is not the reduction of `original`.
@@ -203,7 +205,7 @@ def sensitivities(
     problem = with_original(problem, original)
     solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
     points = checked_moments(p, problem, may_be_empty=True)
-    return solve_sensitivities(solver, points, problem.derivatives())
+    return solve_sensitivities(solver, points, problem.derivatives(), progress=progress)
 
 
 def solve_sensitivities(
@@ -213,6 +215,7 @@ def solve_sensitivities(
     *,
     indices: Sequence[str] = DIFFERENTIATED,
     root: float | None = None,
+    progress: Callable[[], None] = lambda: None,
 ) -> Sensitivities:
     """The same with a solver of the problem, along some directions.
 
@@ -222,6 +225,7 @@ def solve_sensitivities(
         along: the directions, by name.
         indices: those wanted.
         root: near δ_p, if it is known.
+        progress: called once for each p and each index, also where it fails.
     """
     found, notes, parameters = Gradient(solver, along), list[Message](), solver.problem.parameters
 
@@ -234,6 +238,8 @@ def solve_sensitivities(
             reason = Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
         else:
             return {key: replace(each, quantity=record.by(parameters[key].quantity)) for key, each in slopes.items()}
+        finally:
+            progress()
         symbol = record.symbol if p is None else "Λ(p)"
         notes.append(Message(Code.NO_SENSITIVITIES, p=p, symbol=symbol, reason=reason))
         return {}

@@ -6,14 +6,14 @@ They are simulated one after the other, here or on a cluster, and kept alike.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, ClassVar
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.output.datasets import write_dataset
@@ -54,25 +54,39 @@ def keep(folder: Path, order: Order, solved: Solved) -> Found:
     return curve.number, append(folder / SOLVED_RECORDS, order.key, record_of(result)), is_failed
 
 
-class Sweep:
-    """All sets of a case on the way to being solved.
+class _Kept:
+    """The curves of a case, of which an earlier run may have kept some.
 
     Args:
-        case: whose sets these are.
+        case: whose curves these are.
         folder: where they are kept.
-        is_fresh: whether to solve all of them again.
+        is_fresh: whether to do all of them again.
     """
 
+    place: ClassVar[str]
+
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
-        self.case, self.folder = case, folder.resolve()
+        self.case, self.folder, self.records = case, folder, Records(folder / self.place)
+        if is_fresh:
+            self.records.remove()
+
+    def looked_through(self) -> Iterable[Curve]:
+        """All of them if there are records."""
+        return self.case.curves() if self.records.look().are_there else ()
+
+
+class Sweep(_Kept):
+    """All sets of a case on the way to being solved."""
+
+    place = SOLVED_RECORDS
+
+    def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
+        super().__init__(case, folder.resolve(), is_fresh=is_fresh)
         self.started, self._clock = datetime.now(UTC), monotonic()
         self.numerics, self.first, self.further = Numerics.of(case), everything(case, 1), everything(case, 2)
-        self.records = Records(self.folder / SOLVED_RECORDS)
         self.results = Results(case, self.records)
         self._tabled = self._settled = 0
         self._steps_each = max(self.first.p.size, 1) if case.planned == 1 else 1
-        if is_fresh:
-            self.records.remove()
         self.find()
         self.known = len(self.results)
 
@@ -85,7 +99,7 @@ class Sweep:
 
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished without reporting them."""
-        for curve in self.case.curves() if self.records.look().are_there else ():
+        for curve in self.looked_through():
             if self.results.find(curve, self._key(curve)):
                 self._settled += not self._wanted(curve).draws
 
@@ -158,23 +172,15 @@ class _Queue(Iterator[Orders]):
         return self.again.popleft() if self.again else next(self.source)
 
 
-class Simulations:
-    """The simulations of the curves of a case; finished ones are taken from their records.
+class Simulations(_Kept):
+    """The simulations of the curves of a case; finished ones are taken from their records."""
 
-    Args:
-        case: whose curves these are.
-        folder: where they are kept.
-        is_fresh: whether to simulate all of them again.
-    """
+    place = SIMULATED_RECORDS
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
-        self.case, self.folder = case, folder
+        super().__init__(case, folder, is_fresh=is_fresh)
         self.asked: dict[str, Any] = {"orders": case.simulated.tolist(), "setting": case.monte_carlo}
-        self.records = Records(folder / SIMULATED_RECORDS)
-        if is_fresh:
-            self.records.remove()
-        curves = case.curves() if self.records.look().are_there else ()
-        self._known = {curve.number for curve in curves if self._found(curve)}
+        self._known = {curve.number for curve in self.looked_through() if self._found(curve)}
 
     @property
     def known(self) -> int:

@@ -225,3 +225,10 @@ def test_the_original_of_a_noise_may_still_be_named():
     with pytest.warns(DeprecationWarning, match="knows D0, tau0 and r0"):
         [found] = sensitivities(Problem(problem.system, own), p, original=noise).moments
     assert found == sensitivities(problem, p).moments[0]
+
+
+def test_progress_is_told_of_each_p_and_index():
+    told, (theta, law, is_exact, _) = [], drawn(1)
+    problem, _ = problem_of(theta, law, is_exact)
+    sensitivities(problem, [1.0, 2.0], rtol=1e-4, progress=lambda: told.append(1))
+    assert len(told) == 2 + 3
