@@ -170,8 +170,10 @@ def step_driven(m, h, x, u, mean, rise, log_norm, x_end, u_end, care):  # type: 
             before, after = _side(rays, j, x[i], u[i]), _side(rays, j, x_end[i], u_end[i])
             care[i] = max(care[i], 0.0 if before * after > 0 else 1.0)
         if rays.ways[j] == 0:
+            turn = h * h * (p1 * p1 + 0.5 * (q1 * q1 + r1 * r1)) / _LIMIT
             for i in range(n):
-                if _may_return(m, j, x[i], u[i], x_end[i], u_end[i], mean[i], rise[i]):
+                is_far = turn * rise[i] * rise[i] > 1  # and back again
+                if is_far or _may_return(m, j, x[i], u[i], x_end[i], u_end[i], mean[i], rise[i]):
                     care[i] = 2.0
     for i in range(n):
         if care[i] == 2:
