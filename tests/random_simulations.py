@@ -30,7 +30,7 @@ MOST, USUAL = 4.0, 3.0
 
 
 def drawn(seed: int) -> tuple[str, Problem]:
-    """The kind of noise and the system: every kind of noise in turn; half of the A₀ turn, half of the systems have a wall.
+    """The kind of noise and the system: every kind in turn; half of the A₀ turn, half of the systems have a wall.
 
     White noise leaves the phase alone at a wall, as does other noise in half of the systems with one.
     """

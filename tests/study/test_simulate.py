@@ -20,6 +20,7 @@ from fpsolve.output import figures
 from fpsolve.simulation import response
 from fpsolve.study import simulate as simulated
 from tests.conftest import heed_signals
+from tests.oracles import closed_forms
 from tests.solving import case_text
 
 SECTIONS = "[moments]\np = [-1.0, 1.0]\n[monte_carlo]\npaths = 6400\ntime = 40.0\nseed = 7\n"
@@ -368,3 +369,14 @@ def test_a_folder_that_cannot_be_made(case, tmp_path, capsys):
     blocker.write_text("", encoding="utf-8")
     assert simulate(case, "--out", blocker) == 2
     assert "choose another --out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("noise", ['kind = "telegraph"\na = 0.5\nk = 1.0', 'kind = "white"\ns = 0.5'])
+def test_any_system_is_simulated(tmp_path, out, noise):
+    """λ by `tests.oracles`; white noise has that of Airy functions."""
+    system = '[system]\nkind = "parametric"\nstiffness = 1.0\ndamping = 0.05\n'
+    (tmp_path / "quick.toml").write_text(f'title = "Mathieu"\n{system}[noise]\n{noise}\n{SECTIONS}', encoding="utf-8")
+    assert simulate(tmp_path / "quick.toml", "--out", out) == 0
+    found = read(out / "quick/monte_carlo.json")["lyapunov_exponent"]
+    value = -0.0329794566817157 if "telegraph" in noise else closed_forms.white_stiffness(1.0, 0.5, damping=0.05)
+    assert abs(found["value"] - value) < 4 * found["standard_error"] < 4e-3
