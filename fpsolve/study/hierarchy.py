@@ -11,7 +11,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.sections import Expectation
 from fpsolve.errors import FpsolveError, NoHierarchy
 from fpsolve.study.results import Comparison, CurveResult
-from fpsolve.theory.hierarchy import hierarchy_exponent
+from fpsolve.theory.hierarchy import hierarchy_exponent, refuse_open_hierarchy
 
 SOURCE = "moment hierarchy; ± the stated error"
 
@@ -28,7 +28,7 @@ def refuse_no_hierarchy(case: Case) -> None:
         raise FpsolveError(f"{case.path}: moments.p: has no even p > 0, for which alone moments close; add 2.0")
     for curve in case.curves():
         try:
-            hierarchy_exponent(curve.problem, float(orders.max()))
+            refuse_open_hierarchy(curve.problem, float(orders.max()))
         except NoHierarchy as failure:
             place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
             raise FpsolveError(f"{place}: {failure}") from None

@@ -9,7 +9,6 @@ between two of the moments.
 from __future__ import annotations
 
 import sys
-from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -29,15 +28,9 @@ def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
     Raises:
         NoHierarchy: the equations do not close for this problem and this p, or are too many.
     """
+    refuse_open_hierarchy(problem, p)
     noise, order = problem.noise, int(p)
-    if not (p > 0 and p % 2 == 0):
-        raise NoHierarchy(f"got p = {p:g}; the moments close for even p > 0 only; choose p = 2, 4, …")
-    refuse_open_hierarchy(problem)
-    states: Any = noise.reached  # ξ = 0 of white noise
-    if states.size * (order + 1) > MOST:
-        raise NoHierarchy(
-            f"got p = {p:g}; its {states.size * (order + 1)} equations are more than {MOST}; use a smaller p"
-        )
+    states = noise.reached  # ξ = 0 of white noise
     rates = np.array(noise.rates)  # type: ignore[attr-defined]
     total = np.kron(rates.T, np.eye(order + 1))
     diffused = [
@@ -52,19 +45,24 @@ def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
     return float(values[at].real), 10 * sys.float_info.epsilon * float(np.linalg.norm(total)) * float(condition)
 
 
-def refuse_open_hierarchy(problem: Problem) -> None:
-    """Refuse a problem whose moments do not close. Raises `NoHierarchy`."""
+def refuse_open_hierarchy(problem: Problem, p: float) -> None:
+    """Refuse a problem whose moments of order p do not close, or are too many. Raises `NoHierarchy`."""
     noise = problem.noise
+    if not (p > 0 and p % 2 == 0):
+        raise NoHierarchy(f"got p = {p:g}; the moments close for even p > 0 only; choose p = 2, 4, …")
     if not noise.has_states:
         raise NoHierarchy(
-            f"the moments close for white noise and for chains, but not for {noise.kind} noise, each of which needs "
-            "higher powers of it; compare with `fpsolve simulate`"
+            f"the moments close for white noise and for chains, but not for {noise.kind} noise, where each needs one "
+            "with a higher power of the noise; compare with `fpsolve simulate`"
         )
     if any(jump.log_factor for jump in problem.system.jumps):
         raise NoHierarchy(
             "the moments do not close where a wall changes the state, as that takes place at one phase; compare with "
             "`fpsolve simulate`, or without the wall"
         )
+    count = noise.reached.size * (int(p) + 1)
+    if count > MOST:
+        raise NoHierarchy(f"got p = {p:g}; its {count:.12g} equations are more than {MOST}; use a smaller p")
 
 
 def _moved(matrix: FloatArray, order: int) -> FloatArray:
