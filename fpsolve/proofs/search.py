@@ -23,7 +23,7 @@ from fpsolve.fem.factors import sparse_lu
 from fpsolve.proofs.balls import above, ball, balls, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Circle, Core, Plain, States, Whole, hermite_table
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, HeldBounds, Trial
-from fpsolve.proofs.certificate import NOTHING, BasisRecord, Certificate, Enclosure, SideRecord, enclosure_of
+from fpsolve.proofs.certificate import MOST, NOTHING, BasisRecord, Certificate, Enclosure, SideRecord, enclosure_of
 from fpsolve.proofs.statement import Cylinder, Statement, cylinder
 from fpsolve.proofs.verify import objection
 
@@ -39,7 +39,7 @@ WHOLE_BELOW = 6.0
 CELLS, REACH, HELD_FROM, CANDIDATES = 480, 10.0, 3.5, 24
 SLACK = 1e-6
 """Of the mismatch, relative, so that another machine's rounding does not matter."""
-MOST = 1e6
+STEEPEST = 1e6
 """More than W needs to be anywhere; for q = −1 it would grow beyond all bounds."""
 NUDGE = 1e-10
 """Of a shift off an eigenvalue, relative."""
@@ -258,8 +258,8 @@ def _enlarged(
         cost = countdown.elapsed - begun
         edges = pair.edges if noise.states is None else (pair.edges[0], 0.0)
         waves, degrees = (
-            math.ceil(GROWTH * n) + 1 if edge > 0.1 * max(edges) else n
-            for n, edge in zip((waves, degrees), edges, strict=True)
+            min(math.ceil(GROWTH * n) + 1, most) if edge > 0.1 * max(edges) else n
+            for n, edge, most in zip((waves, degrees), edges, (MOST["rows"] - 1, MOST["columns"]), strict=True)
         )
 
 
@@ -406,7 +406,7 @@ def _step(value: float, width: float, room: float, inward: float, q: int) -> flo
     if found < 0 or not math.isfinite(found):
         return None
     growth = found - value
-    return min(value + growth * (1 - 1e-12 if growth > 0 else 1 + 1e-12), MOST)
+    return min(value + growth * (1 - 1e-12 if growth > 0 else 1 + 1e-12), STEEPEST)
 
 
 def _pull(value: float, inward: float, q: int) -> float:

@@ -10,7 +10,7 @@ import fpsolve
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
-from fpsolve.proofs import objection, prove, prove_lyapunov_exponent
+from fpsolve.proofs import objection, prove, prove_lyapunov_exponent, search
 from fpsolve.proofs.certificate import Certificate
 from tests import random_proofs
 from tests.conftest import sampled
@@ -228,3 +228,12 @@ def test_random_systems(seed):
     found = random_proofs.outcome(seed, is_system=True)
     assert found.width < 1e-6
     assert found.off <= 1
+
+
+def test_trials_stay_within_what_a_certificate_may_hold(monkeypatch):
+    """The phase stands still in either state: functions of it are not smooth, and no number of waves suffices."""
+    monkeypatch.setitem(search.MOST, "rows", 40)
+    found = bounds(SADDLE, Telegraph(0.5, 2.0), None)
+    assert len(found.certificate.cosine) <= 40
+    assert not found.is_met
+    assert found.lower < fpsolve.lyapunov_exponent(SADDLE, Telegraph(0.5, 2.0)).value < found.upper
