@@ -265,7 +265,7 @@ def solve_sensitivities(
 
 
 class Gradient:
-    """The derivatives along some directions; their errors are the differences from those of a finer discretisation.
+    """The derivatives along some directions; their errors are from the differences to those of a finer discretisation.
 
     Args:
         solver: of the problem.
@@ -281,7 +281,7 @@ class Gradient:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
         pair = self._solver.pair(p)
         finer = self._solver.near.finer_pair(pair, pair.generator.chosen.enriched())
-        return {key: _between(changed_value(pair, by), changed_value(finer, by)) for key, by in self._along.items()}
+        return _compared(*({key: changed_value(each, by) for key, by in self._along.items()} for each in (pair, finer)))
 
     def lyapunov_exponent(self) -> dict[str, Estimate]:
         """∂λ/∂θ. Raises `NotConverged`."""
@@ -305,8 +305,7 @@ class Gradient:
         return {key: _times(factor, each) for key, each in slopes.items()}
 
     def _at_zero(self, changed: Callable[[Bordered, ParameterDerivative], Estimate]) -> dict[str, Estimate]:
-        coarse, fine = self._pairs_at_zero
-        return {key: _between(changed(coarse, by), changed(fine, by)) for key, by in self._along.items()}
+        return _compared(*({key: changed(each, by) for key, by in self._along.items()} for each in self._pairs_at_zero))
 
     @cached_property
     def _pairs_at_zero(self) -> tuple[Bordered, Bordered]:
@@ -314,9 +313,18 @@ class Gradient:
         return Bordered(coarse), Bordered(fine)
 
 
-def _between(coarse: Estimate, fine: Estimate) -> Estimate:
-    """The finer one, its error including how far both are apart."""
-    return Estimate(fine.value, abs(fine.value - coarse.value) + fine.error_estimate, fine.scale)
+def _compared(coarse: Slopes, fine: Slopes) -> dict[str, Estimate]:
+    """The finer ones, their errors from how far both are apart.
+
+    That of one parameter may be small by chance, or fall slowly: twice as much counts, and by the scale of each what is
+    usual among all.
+    """
+    apart = {key: abs(each.value - coarse[key].value) for key, each in fine.items()}
+    usual = np.median([apart[key] / each.scale for key, each in fine.items() if each.scale] or [0.0])
+    return {
+        key: Estimate(each.value, 2 * apart[key] + float(usual) * each.scale + each.error_estimate, each.scale)
+        for key, each in fine.items()
+    }
 
 
 def _summed(parts: Sequence[Any], norm: float) -> Estimate:

@@ -215,9 +215,7 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
             others = tuple(k for k in range(len(space.axes)) if k != at)
             shares = np.abs(left * mask * image).sum(axis=others)[high]
             effects.append(np.bincount(axis.cells[high], shares, minlength=count) / abs(norm))
-        # T is not smooth in φ where the phase rests in a state, and its effects fall unevenly
-        slowest = max(axis.slowest, float(pair.generator.problem.noise.has_states))
-        found.append(ModeEffects(degrees, effects[0], effects[1], slowest))
+        found.append(ModeEffects(degrees, effects[0], effects[1], axis.slowest))
     return tuple(found)
 
 

@@ -25,9 +25,9 @@ SAMPLES = 721
 """φ at which the growth by white noise is looked at."""
 MOST_FOR_A_BOUND = 300
 """Functions of ξ up to which the sharper bound of Λ is used; beyond, that of noise that rests at an end."""
-LEFT_BY_DIFFUSION = 0.3
-"""Share of the effect of two modes that is left at least where T is smooth only, not analytic, as at φ that white noise
-does not move: there it falls ever more slowly."""
+LEFT_BY_STATES = 1.0
+"""Share of the effect of two modes that is left at least where T is not analytic, as where the phase rests in a state,
+or at φ that white noise does not move: there it falls unevenly, and ever more slowly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +65,8 @@ class Generator:
             chosen = Discretisation.on(chosen, problem.noise, problem.frame)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
         self.phi = PhaseAxis(chosen.phase.lines, chosen.phase.degrees)
-        if problem.diffusions:
-            self.phi.slowest = LEFT_BY_DIFFUSION
+        if problem.noise.has_states:
+            self.phi.slowest = LEFT_BY_STATES
         self._spaces: dict[float, TensorSpace] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
