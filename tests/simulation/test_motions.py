@@ -14,7 +14,7 @@ from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, ParametricOscill
 from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.kernels import advance
 from fpsolve.simulation.motions import step_driven
-from fpsolve.simulation.setup import largest_step, transient
+from fpsolve.simulation.setup import default_step, largest_step, transient
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, sampled
 from tests.oracles import closed_forms, moment_hierarchy
 
@@ -246,3 +246,16 @@ def test_a_moment_that_crossings_make_infinite_is_refused():
     problem = Problem(plane([[0.0, 1.0], [-1.0, 0.0]], J, (Jump(0.0, 1.0),)), OrnsteinUhlenbeck(1.0, 3.0))
     with pytest.raises(NoSuchExponent, match="infinite"):
         simulate(problem, [2.0])
+
+
+@pytest.mark.slow
+def test_passages_of_a_ray_that_is_passed_both_ways():
+    """φ̇ = ω + ξ passes a ray E|ω + ξ|/π times in unit time, as φ is uniform; some are lost, fewer in smaller steps."""
+    omega, system = 0.2, plane([[0.0, 0.2], [-0.2, 0.0]], ((0.0, 1.0), (-1.0, 0.0)), (Jump(0.3, -0.1),))
+    rate = omega * math.erf(omega / math.sqrt(2)) + math.sqrt(2 / math.pi) * math.exp(-(omega**2) / 2)
+    noise, lost = OrnsteinUhlenbeck(1.0, math.sqrt(2)), []
+    for factor in (2, 0.5):
+        step = factor * default_step(system, noise)
+        found = simulate(system, noise, [], paths=16384, time=100.0, step=step, seed=1)
+        lost.append(1 - found.impacts / (found.paths * found.time) * math.pi / rate)
+    assert 0 < lost[1] < 0.7 * lost[0] < 0.01
