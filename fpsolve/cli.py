@@ -341,6 +341,7 @@ def prove(
 ) -> int:
     """Prove bounds on the exponents that hold with certainty; write them with certificates, OUT/<case>/proof.json.
 
+    A bound takes [budget] seconds of the processor at most, those of δ_p together twice as much, and a third more.
     Needs python-flint: pip install 'fpsolve[proof]'. Exit codes: 0 proven, 3 a width is not met; of --check 0 accepted,
     1 rejected, 2 malformed.
 

@@ -184,7 +184,9 @@ def prove_index(
                     return NO_INDEX
                 most = replace(budget, seconds=seconds)
                 moments.append((p, prove_bounds(problem, stated, p, slope * half / 2, most, progress)))
-            if moments[0][1].sign * moments[1][1].sign < 0:
+                if not moments[-1][1].sign:  # the time is for wider ones
+                    break
+            if len(moments) == 2 and moments[0][1].sign * moments[1][1].sign < 0:
                 return IndexEnclosure(*around(*sides), tuple(moments))
         half *= 10
     return NO_INDEX
