@@ -60,7 +60,7 @@ def prove(
     budget: Budget | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Enclosure:
-    """Bounds on Λ(p) that hold with certainty, for noise of Eq. (7) with r₀ ≤ 1 or (15), sine-Wiener noise, and chains.
+    """Bounds on Λ(p) that hold with certainty, for any system with coefficients a + bξ, and noise with r₀ ≤ 1.
 
     They follow from a function T > 0 with λ₋ T ≤ L(p) T ≤ λ₊ T, Eq. (19), which is verified in ball arithmetic; neither
     the finite elements nor the eigenvalue iteration are trusted. See `fpsolve.proofs.verify` for the theorem.
@@ -72,9 +72,10 @@ def prove(
 
     Args:
         oscillator, noise: the motion and its noise, or one `Problem` of both, in their place or as `problem`. Bounds
-            hold for the decimals that parameters are printed as; for a system that is no `VibroImpactOscillator`, and
-            for a chain, for the exact binary values of matrices, ln R, states and rates, and for a phase of a jump
-            within 1e-12 of a multiple of π/4 for that multiple.
+            hold for the decimals that parameters are printed as; for systems besides `VibroImpactOscillator` and
+            `ParametricOscillator`, and for a `MarkovChain`, for the exact binary values of matrices, ln R, states and
+            rates, and for a phase of a jump within 1e-12 of a multiple of π/4 for that multiple. A coefficient that is
+            a function counts as the a + bξ that its values show, which the certificate states.
         p: order of the moment, in the same sense.
         width: wanted upper − lower, in 1/time; 1e-7 of the scale of Λ(p) if None.
         budget: its `seconds` of the processor are for the bounds, all in all; they may take a third more.

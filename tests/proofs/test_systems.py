@@ -222,7 +222,7 @@ def test_a_certificate_states_the_exact_values_of_floats():
     assert not {"motion", "chain"} & old.model_dump(mode="json").keys()
 
 
-@pytest.mark.parametrize("seed", sampled(0, 1, 4, 2, 3, keep=3))
+@pytest.mark.parametrize("seed", sampled(0, 1, 4, 2, 8, keep=3))
 def test_random_systems(seed):
     """A hundred others: `python -m tests.random_proofs 100 systems`."""
     found = random_proofs.outcome(seed, is_system=True)
