@@ -15,7 +15,7 @@ from pydantic import ValidationError, ValidationInfo, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
-from fpsolve.case.messages import UNBOUNDED, Refusal, nearest, refuse, shown_with_kind
+from fpsolve.case.messages import UNBOUNDED, Refusal, details_of, nearest, refuse, shown_with_kind
 from fpsolve.model.faults import TableError, fields_of
 from fpsolve.model.kinds import kind_names, noise_kind, system_kind
 from fpsolve.model.parameters import STRICT, Parametrised
@@ -47,7 +47,7 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
         try:
             made = _made(half, table[name])
         except ValidationError as error:
-            refuse([], [each | {"loc": (name, *each["loc"])} for each in _details(error)])
+            refuse([], details_of(error, name))
     return made
 
 
@@ -83,12 +83,12 @@ def _made(half: Half, table: Mapping[str, Any]) -> Parametrised:
         said = create_model(half, __config__=STRICT, **fields).model_validate(given)
         known |= {word: getattr(said, word) for word in given}
     except ValidationError as error:
-        faults += _details(error)
+        faults += details_of(error)
     if not (faults and any(field.is_required() for field in kind.stated.values())):
         try:
             made = kind.from_table(known)
         except ValidationError as error:
-            faults += _details(error)
+            faults += details_of(error)
         except TableError as error:
             if not faults:
                 refuse([(error.path, None, error.text)])
@@ -97,13 +97,6 @@ def _made(half: Half, table: Mapping[str, Any]) -> Parametrised:
                 raise ValueError(str(error)) from None
     refuse([], faults)
     return made
-
-
-def _details(error: ValidationError) -> list[InitErrorDetails]:
-    return [
-        InitErrorDetails(type=each["type"], loc=each["loc"], input=each["input"], ctx=each.get("ctx", {}))
-        for each in error.errors(include_url=False)
-    ]
 
 
 def _kind(half: Half, table: Any) -> type[Parametrised]:

@@ -45,6 +45,19 @@ def refuse(refusals: Iterable[Refusal], others: Iterable[InitErrorDetails] = ())
         raise ValidationError.from_exception_data("case", details)
 
 
+def details_of(error: ValidationError, *place: str) -> list[InitErrorDetails]:
+    """The faults of an error, at a place around its own, to be raised again."""
+    return [
+        InitErrorDetails(
+            type=PydanticCustomError(each["type"], each["msg"]) if each["type"] in (_OWN, _RANGE) else each["type"],
+            loc=(*place, *each["loc"]),
+            input=each["input"],
+            ctx=each.get("ctx", {}),
+        )
+        for each in error.errors(include_url=False)
+    ]
+
+
 def is_list(value: Any) -> bool:
     """Whether a value is a list of TOML, or a tuple of Python."""
     return isinstance(value, list | tuple)

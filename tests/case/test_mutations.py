@@ -13,7 +13,7 @@ from tests.snapshots import good
 
 COUNT = 48
 """Mutations of each kind; two thousand take a minute."""
-CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.toml"))
+CASES = sorted((Path(__file__).parents[2] / "cases").rglob("*.toml"))
 GOOD = good("bad")
 VALUES = [
     *("0", "-1", "1e308", "5e-324", "nan", "inf", "-0.0", "true", '"x"', "[]", "{}", "1e400", "9" * 400, "0x10"),
