@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from numbers import Real
@@ -142,8 +143,10 @@ class ExponentSolver:
                 raise TypeError(f"got {name} = {shown(getattr(self, name))}; must be {words}")
         if not (self.problem.noise.is_white or math.isfinite(self.problem.noise.standard_deviation)):
             raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))
-        if not 0 < self.rtol <= sys.float_info.max:
-            raise ValueError(f"rtol is {shown(self.rtol)}; it must be a positive number such as 1e-8")
+        with suppress(ValueError):
+            if real_number(self.rtol, "rtol") > 0:
+                return
+        raise ValueError(f"rtol is {shown(self.rtol)}; it must be a positive number such as 1e-8")
 
     @cached_property
     def near(self) -> NearPlace:
