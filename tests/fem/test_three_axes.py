@@ -25,7 +25,8 @@ def pencil(p, cells=4, degree=8, count=11):
     lines = np.linspace(np.pi / 2, 3 * np.pi / 2, cells + 1)
     phase = PhaseAxis(lines, np.full(cells, degree))
     space = TensorSpace([phase, *(PolynomialAxis(noise, count) for noise in NOISES)])
-    first = Problem(PlaneSystem([CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, STIFFNESS, identity)]), NOISES[0])
+    free = [CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))), CoefficientMatrix(1, ((0.0, 0.0), (0.0, -0.1)))]
+    first = Problem(PlaneSystem([*free, CoefficientMatrix(1, STIFFNESS, identity)]), NOISES[0])
     second = Problem(PlaneSystem([CoefficientMatrix(1, DAMPING, identity)]), NOISES[1])
     terms = [*Terms(first, space, 1).whole(), *Terms(second, space, 2).whole()]
     return Pencil(p, space, TermSum(terms).matrix(space, p))
