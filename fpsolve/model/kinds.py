@@ -49,6 +49,11 @@ def kind_classes(room: Literal["systems", "noises"]) -> tuple[type[Any], ...]:
     return tuple(each for kind in kinds for each in (kind, *kind.variants))
 
 
+def is_ours(half: Parametrised) -> bool:
+    """Whether a system or a noise is of one of our kinds itself, and not of a class that is derived from it."""
+    return type(half) in (*kind_classes("systems"), *kind_classes("noises"))
+
+
 def kind_names(room: Literal["systems", "noises"]) -> tuple[str, ...]:
     """The names of all kinds, those of other packages last."""
     ours = SYSTEMS if room == "systems" else NOISES

@@ -83,7 +83,7 @@ class Certificate(Record):
         p: the moment as a decimal.
         parameters: as decimals, and two words, by the keys of a case file.
         motion, chain: the system by its matrices, the noise by its rates, where the parameters do not tell them; then
-            those are mere labels. Absent elsewhere.
+            those are mere labels, and not all that tell another one. Absent elsewhere.
         cosine, sine: the trial function, as `bounds.Trial` has it.
         upper, lower: the two bounds; None where one is not proven.
         phases: how many cells of φ suffice.

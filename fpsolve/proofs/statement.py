@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.model.exact import BasisKind, ExactLaw, ExactMotion
-from fpsolve.model.kinds import kind_classes
+from fpsolve.model.kinds import is_ours, kind_classes
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import System
@@ -123,6 +123,8 @@ def linear_values(problem: Problem) -> Mapping[str, float | str]:
 def statement_of(problem: Problem, stated: Parameters | None = None) -> Statement:
     """A problem by its decimals, else by its matrices and rates as floats.
 
+    Those of a derived class are not told by its parameters, as it may make something else of them.
+
     Args:
         stated: its parameters as decimals; None for the shortest that are read as its numbers.
 
@@ -134,8 +136,9 @@ def statement_of(problem: Problem, stated: Parameters | None = None) -> Statemen
     if stated is None:
         stated = {key: str(value) for key, value in linear_values(problem).items()}
     system, noise = problem.system, problem.noise
-    chain = ChainRecord.of(noise) if noise.exact_law(_named(noise, stated)) is None else None
-    motion = MotionRecord.of(system) if system.exact_motion(_named(system, stated)) is None else None
+    is_told = is_ours(system) and system.exact_motion(_named(system, stated)) is not None
+    is_law_told = is_ours(noise) and noise.exact_law(_named(noise, stated)) is not None
+    motion, chain = None if is_told else MotionRecord.of(system), None if is_law_told else ChainRecord.of(noise)
     found = Statement(stated, motion, chain)
     exact_halves(found)
     return found
@@ -154,7 +157,11 @@ def exact_halves(stated: Statement) -> tuple[ExactMotion, ExactLaw, list[int]]:
     expected = set[str]()
     for half, record in ((system, stated.motion), (noise, stated.chain)):
         section = System.section if half is system else Noise.section
-        expected |= _keys(half) if record is None else {key for key in parameters if _section(key) == section}
+        labels = {key for key in parameters if _section(key) == section}
+        if record is not None and labels and labels == _keys(half):
+            names = ", ".join(sorted(labels))
+            raise ValueError(f"parameters {names} tell a {half.__name__}, but another {section} is stated; rename one")
+        expected |= _keys(half) if record is None else labels
     if set(parameters) != expected:
         raise ValueError(f"parameters must be {', '.join(sorted(expected))}")
     motion = _exact_motion(system, parameters) if stated.motion is None else stated.motion.exact

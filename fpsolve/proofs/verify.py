@@ -5,14 +5,20 @@ T(φ⁻) = R^p T(φ⁺) where the phase passes forward and T(φ⁺) = R^p T(φ�
 elsewhere, twice in ξ but for finitely many ξ, where T_ξ is continuous, or jumps by a smooth function of φ (a kink),
 and let λ₋ T ≤ L(p) T ≤ λ₊ T elsewhere. The ξ that are left out take no time.
 
+Λ(p) = lim ln E‖x(t)‖^p/t, and the bounds hold for every start x(0) ≠ 0, of the upper and of the lower limit. Where the
+phase never leaves a ray, and Λ(p) depends on the start, they hold for each of its values: close bounds show that there
+is one. Other coordinates P⁻¹x have the same Λ(p) and λ, as ‖P⁻¹x‖/‖x‖ is between two positive numbers; rays, and the
+way in which they are passed, are those of P⁻¹x.
+
 *Upper bound.* Let T ≥ c > 0 and its kinks in ξ be concave. By Itô's and Tanaka's formulas M = e^{−λ₊ t} ‖x‖^p T(φ, ξ)
 is a local supermartingale: at impacts ‖x‖^p gains R^p and T loses it, between them the drift of M is
 e^{−λ₊ t} ‖x‖^p (L(p) T − λ₊ T) ≤ 0, and kinks add local times with a sign ≤ 0. As M ≥ 0, E M(t) ≤ M(0), which
 is finite for every start, so that E‖x(t)‖^p ≤ e^{λ₊ t} M(0)/c and Λ(p) ≤ λ₊.
 
 *Lower bound.* Let T ≤ C and its kinks be convex. M = e^{−λ₋ t} ‖x‖^p T is a local submartingale; on [0, t] it is at
-most C e^{|λ₋| t} sup‖x‖^p, whose mean is finite as d ln‖x‖/dt and dφ/dt, and with it the number of impacts in [0, t],
-are at most linear in ξ, bounded or Gaussian. So M(0) ≤ E M(t) ≤ C e^{−λ₋ t} E‖x(t)‖^p and Λ(p) ≥ λ₋.
+most C e^{|λ₋| t} sup‖x‖^p, whose mean is finite: d ln‖x‖/dt and dφ/dt are at most linear in ξ, and so is the number
+of impacts in [0, t] in sup|ξ|, as no ray is passed back; and sup|ξ| is bounded or has Gaussian tails. So
+M(0) ≤ E M(t) ≤ C e^{−λ₋ t} E‖x(t)‖^p and Λ(p) ≥ λ₋.
 
 *Ends of bounded noise*, |ξ| → half_width. The distance X from an end is, up to its scale and to bounded drifts, a
 Bessel process of dimension 1 + a, a = 1/(1 − r₀) > 0. For r₀ ≥ 0 the ends are not reached and nothing is asked there.
@@ -20,7 +26,7 @@ For r₀ < 0 they are; as 1 + a > 1, X = X(0) + W(t) + (a/2) ∫ dt/X with a fin
 term at the end for T that is twice differentiable up to it (D. Revuz, M. Yor, Continuous martingales and Brownian
 motion, chapter XI). LT may tend to −∞ there for the upper bound, to +∞ for the lower one, as b T_z does.
 
-*The Lyapunov exponent.* Let f(φ⁻) = f(φ⁺) + ln R at impacts, |f| ≤ C (1 + |ξ|), f_ξ be bounded, and let
+*The Lyapunov exponent.* Let f before a jump be f after it and ln R, |f| ≤ C (1 + |ξ|), f_ξ be bounded, and let
 λ₋ ≤ q + L(0) f with convex kinks, q + L(0) f ≤ λ₊ with concave ones. Then ln‖x‖ + f − ∫ (q + L(0) f) dt less the local
 times is a martingale whose bracket is at most C t, hence o(t), and so is f: λ₋ ≤ λ ≤ λ₊ for almost every path.
 
@@ -52,9 +58,15 @@ z → −z, β → −β, W → −W.
 *Other noise* has T = R^{ps} u without ψ, and Lu ≤ (μ + δ) u, Lu ≥ (μ − δ) u are verified, or the same of the drift of
 ln‖x‖ + f. For z = cos θ, dθ = √ν dW, T is an even function of θ, so that the theorem holds with θ in the place of ξ.
 For a chain T has a component for each state, the noise's part of LT is its matrix of rates, and Dynkin's formula stands
-in the place of Itô's. Under white noise T is one function of the phase, and L = F₀ + ½ F₁². As h₁ = 0 at every ray,
-the phase passes there by its drift alone, one way, and next to a ray it moves as it does elsewhere. As dφ has bounded
-coefficients, n jumps in [0, t] have a probability below C e^{−cn²}, so that sup‖x‖^p has a finite mean.
+in the place of Itô's.
+
+*White noise* has L = F₀ + ½ F₁², and T is one function of the phase. Every ray has h₁ = 0 and h₀ ≠ 0. Let v and w be
+the coordinates of x across and along it: A₁ leaves it alone, so that dv = (av + bw) dt + cv ∘ dW with b ≠ 0. With
+dE = E (a dt + c ∘ dW), v/E has the derivative bw/E: wherever v = 0, v/w changes its sign in the same sense, that of h₀.
+So the phase passes each ray one way, finitely often in [0, t], and never back. With Φ the phase that counts its turns
+and X the size of x without jumps, ‖x‖^p T is X^p e^{pκΦ} u(Φ) but for a constant factor, to which Itô's formula
+applies. As dΦ has bounded coefficients, n jumps in [0, t] have a probability below C e^{−cn²}, and sup‖x‖^p has a
+finite mean.
 
 The drift of ln‖x‖ + f ± ψ is bounded in the same way, with e = q (its drift − μ), without W² and with B = b, β = 0 and
 r = f_z.

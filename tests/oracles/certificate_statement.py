@@ -113,6 +113,11 @@ def binary(values):
     return array
 
 
+SYSTEM_NAMES = ({"stiffness", "damping", "restitution"},)
+NOISE_NAMES = (
+    *({"a", "k"}, {"s", "interpretation"}, {"amplitude", "sigma"}, {"alpha", "standard_deviation"}),
+    *({"alpha", "sigma"}, {"D0", "tau0"}, {"D0", "tau0", "r0", "treatment"}),
+)
 WORDS = ("oscillator.impact", "noise.treatment", "noise.interpretation")
 
 
@@ -121,6 +126,10 @@ def model_of(certificate):
     quantity = certificate["quantity"]
     require(quantity in ("moment", "lyapunov_exponent"), f"No quantity is called {quantity!r}.")
     given = _given(certificate["parameters"])
+    for part, told in (("motion", SYSTEM_NAMES), ("chain", NOISE_NAMES)):
+        section = "system" if part == "motion" else "noise"
+        names = {name.partition(".")[2] for name in given if name.startswith(f"{section}.")}
+        require(certificate.get(part) is None or names not in told, f"Its labels tell another {section}.")
     noise = _noise(given) if certificate.get("chain") is None else _chain(certificate["chain"])
     require(Fraction(1, 10**80) < noise.nu < 10**80, "The rate of the noise is out of range.")
     if certificate.get("motion") is not None:
@@ -194,8 +203,8 @@ def _oscillator(given):
 
 def _parametric(given):
     """The same of ẍ + 2·damping·ẋ + (stiffness + ξ)x = 0 in (x, ẋ)."""
-    names = {name for name in given if name.startswith("system.")}
-    require(names == {f"system.{name}" for name in ("stiffness", "damping", "restitution")}, "Other parameters.")
+    names = {name.partition(".")[2] for name in given if name.startswith("system.")}
+    require(names in SYSTEM_NAMES, "Other parameters.")
     require(given["system.restitution"] > 0, "The wall leaves no positive factor.")
     still = [[Fraction(0), Fraction(1)], [-given["system.stiffness"], -2 * given["system.damping"]]]
     wall = (Fraction(0), Fraction(1)), cs.IV.log(cs.exact(given["system.restitution"]))

@@ -159,6 +159,38 @@ class Mystery(SineWiener):
         return None
 
 
+class Pushed(ParametricOscillator):
+    """With other matrices than its parameters tell of the class that it is derived from."""
+
+    @property
+    def terms(self):
+        free = ((0.0, 1.0), (-self.stiffness, 2 * self.damping))
+        return CoefficientMatrix(0, free), CoefficientMatrix(1, STIFFNESS, identity)
+
+
+class Lopsided(Telegraph):
+    """With other states."""
+
+    @property
+    def states(self):
+        return 0.0, 3 * self.a
+
+
+class Labelled(Lopsided):
+    """With one parameter more."""
+
+    @property
+    def values(self):
+        return {**super().values, "ratio": 3.0}
+
+
+def test_a_derived_class_is_proven_by_its_own_rates():
+    noise, chain = Labelled(0.5, 1.0), MarkovChain((0.0, 1.5), ((0.0, 1.0), (1.0, 0.0)))
+    found, other = (bounds(spring(), each, 2.0) for each in (noise, chain))
+    assert found.certificate.chain == other.certificate.chain
+    assert found.certificate.parameters["noise.ratio"] == "3.0"
+
+
 ALONG = Jump(math.pi / 2, math.log(0.8))
 
 
@@ -171,6 +203,8 @@ ALONG = Jump(math.pi / 2, math.log(0.8))
             TypeError,
             "got the coefficient cubic(ξ); proofs are for coefficients a + b ξ",
         ),
+        (Pushed(1.0, 0.1), White(0.5), ValueError, "tell a ParametricOscillator, but another system is stated"),
+        (spring(), Lopsided(0.5, 1.0), ValueError, "noise.a, noise.k tell a Telegraph, but another noise is stated"),
         (spring(), Mystery(1.0, 1.0), TypeError, "got Mystery; proofs are for OrnsteinUhlenbeck, NonGaussianNoise"),
         (
             plane(((0.0, 1.0), (-1.0, 0.0)), TURN, ALONG),

@@ -253,3 +253,22 @@ def test_statements_that_make_no_sense(name, change, reason):
         entry["certificate"][part].update(values)
     assert not is_taken(entry)
     assert reason in checker.check(entry)
+
+
+@pytest.mark.parametrize(
+    "labels",
+    [
+        {"system.stiffness": "1", "system.damping": "0.1", "system.restitution": "1"},
+        {"system.epsilon": "1.0", "noise.a": "0.4", "noise.k": "1"},
+        {"system.epsilon": "1.0", "noise.s": "0.4", "noise.interpretation": "ito"},
+    ],
+)
+def test_labels_that_tell_another_system_or_noise(labels):
+    """Beside matrices and rates; a reader would take the bounds for those of the parameters."""
+    entry = entry_of("chain with a wall")
+    entry["certificate"]["parameters"] = labels
+    assert not is_taken(entry)
+    assert "labels" in checker.check(entry)
+    entry["certificate"]["parameters"] = labels | {"system.mass": "2.0", "noise.colour": "3.0"}
+    assert is_taken(entry)
+    assert checker.check(entry) == ""
