@@ -28,7 +28,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.adapt import Budget, widened
 from fpsolve.exponent.eigen import Bordered, PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
@@ -265,7 +265,8 @@ def solve_sensitivities(
 
 
 class Gradient:
-    """The derivatives along some directions; their errors are from the differences to those of a finer discretisation.
+    """The derivatives along some directions; their errors are from the differences to those of a finer discretisation,
+    for algebraic tails also a wider one: at their ends ∂ ln P_s/∂r₀ is large.
 
     Args:
         solver: of the problem.
@@ -280,7 +281,7 @@ class Gradient:
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
         pair = self._solver.pair(p)
-        finer = self._solver.near.finer_pair(pair, pair.generator.chosen.enriched())
+        finer = self._solver.near.finer_pair(pair, widened(pair.generator).enriched())
         return _compared(*({key: changed_value(each, by) for key, by in self._along.items()} for each in (pair, finer)))
 
     def lyapunov_exponent(self) -> dict[str, Estimate]:

@@ -533,10 +533,12 @@ def _phase(system: System, xi: FloatArray, digits: float, more: int = 0) -> Phas
 
 
 def widened(generator: Generator) -> Discretisation:
-    """That of a generator on an interval `WIDER` times as wide, where that is one of algebraic tails."""
-    chosen, lines = generator.chosen, generator.chosen.noise.lines
-    if not (lines.size and generator.problem.noise.has_algebraic_tails):
+    """That of a generator on an interval `WIDER` times as wide, or far out a cell wider, for algebraic tails."""
+    chosen, lines, noise = generator.chosen, generator.chosen.noise.lines, generator.problem.noise
+    if not (lines.size and noise.has_algebraic_tails):
         return chosen
+    if chosen.is_killed:
+        return chosen.with_noise(chosen.noise.reaching((math.e, math.e), partial(_log_density, noise)))
     steps = WIDER ** np.linspace(0, 1, 4)[1:]
     wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
     return chosen.with_noise(replace(chosen.noise, lines=wide))

@@ -15,7 +15,7 @@ from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.systems.vibro_impact import DAMPING
 from tests.conftest import sampled
 from tests.oracles import moment_hierarchy, phase_fraction
-from tests.random_sensitivities import RTOL, central, drawn, problem_of
+from tests.random_sensitivities import RTOL, central, drawn, heavy_tailed, problem_of
 
 
 @pytest.mark.parametrize("seed", sampled(*range(1, 17), keep=4))
@@ -148,6 +148,16 @@ def test_against_the_moment_hierarchy():
         name = key.partition(".")[2]
         if name in theta:  # the restitution is not in these equations
             assert estimate.value == pytest.approx(central(theta, name, known, 1e-3), rel=1e-8), key
+
+
+@pytest.mark.slow
+def test_errors_hold_what_is_beyond_the_ends_of_algebraic_tails():
+    theta, law, is_exact, p = heavy_tailed(14)
+    problem, _ = problem_of(theta, law, is_exact)
+    [found], [finer] = (sensitivities(problem, p, rtol=rtol).moments for rtol in (1e-8, 1e-9))
+    for key, estimate in found.items():
+        off = abs(estimate.value - finer[key].value)
+        assert off <= estimate.error_estimate + finer[key].error_estimate, key
 
 
 @pytest.mark.slow
