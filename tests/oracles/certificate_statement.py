@@ -283,6 +283,8 @@ def _noise(given):
     if names == {"alpha", "sigma"}:
         alpha = value["alpha"]
         return Noise("line", 2 * alpha, Fraction(1, 2), value["sigma"] ** 2 / (2 * alpha))
+    if names == {"D0", "tau0"}:
+        return Noise("line", 2 / value["tau0"], Fraction(1, 2), value["D0"] / value["tau0"])
     d0, tau, r0, treatment = (value[name] for name in ("D0", "tau0", "r0", "treatment"))
     if treatment == "exact" and r0 < 1:
         return Noise("bounded", (1 - r0) / tau, 1 / (1 - r0), 2 * d0 / (tau * (1 - r0)))

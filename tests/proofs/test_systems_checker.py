@@ -11,6 +11,7 @@ import pytest
 
 import fpsolve
 from fpsolve.model import Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity
 from fpsolve.proofs import prove, prove_lyapunov_exponent
 from fpsolve.proofs.claims import Bound, MomentBound
 from tests.conftest import sampled
@@ -253,6 +254,18 @@ def test_statements_that_make_no_sense(name, change, reason):
         entry["certificate"][part].update(values)
     assert not is_taken(entry)
     assert reason in checker.check(entry)
+
+
+def test_gaussian_noise_by_its_intensity():
+    """The parameters D₀ and τ₀ tell α = 1/τ₀ and the standard deviation √(D₀/τ₀)."""
+    found = prove(spring(0.1, 2.0), OrnsteinUhlenbeckByIntensity(D0=0.005, tau0=0.5), 2.0, width=1e-3)
+    certificate = found.certificate.model_dump(mode="json")
+    entry = {"p": 2.0, "lower": found.lower, "upper": found.upper, "certificate": certificate}
+    assert is_taken(entry)
+    assert checker.check(entry) == ""
+    certificate["parameters"] |= {"noise.tau0": "0.7"}
+    assert not is_taken(entry)
+    assert checker.check(entry) != ""
 
 
 @pytest.mark.parametrize(
