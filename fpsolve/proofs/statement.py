@@ -157,9 +157,9 @@ def exact_halves(stated: Statement) -> tuple[ExactMotion, ExactLaw, list[int]]:
     expected = set[str]()
     for half, record in ((system, stated.motion), (noise, stated.chain)):
         section = System.section if half is system else Noise.section
-        labels = {key for key in parameters if _section(key) == section}
-        if record is not None and labels and labels == _keys(half):
-            names = ", ".join(sorted(labels))
+        labels, told = ({key for key in parameters if _section(key) == each} for each in (section, half.section))
+        if record is not None and told and told == _keys(half):
+            names = ", ".join(sorted(told))
             raise ValueError(f"parameters {names} tell a {half.__name__}, but another {section} is stated; rename one")
         expected |= _keys(half) if record is None else labels
     if set(parameters) != expected:

@@ -168,6 +168,10 @@ class Pushed(ParametricOscillator):
         return CoefficientMatrix(0, free), CoefficientMatrix(1, STIFFNESS, identity)
 
 
+class Leaning(fpsolve.VibroImpactOscillator):
+    """Another derived class."""
+
+
 class Lopsided(Telegraph):
     """With other states."""
 
@@ -204,6 +208,7 @@ ALONG = Jump(math.pi / 2, math.log(0.8))
             "got the coefficient cubic(ξ); proofs are for coefficients a + b ξ",
         ),
         (Pushed(1.0, 0.1), White(0.5), ValueError, "tell a ParametricOscillator, but another system is stated"),
+        (Leaning(1.0, 0.8, 0.1, 0.1), White(0.5), ValueError, "tell a VibroImpactOscillator, but another system is"),
         (spring(), Lopsided(0.5, 1.0), ValueError, "noise.a, noise.k tell a Telegraph, but another noise is stated"),
         (spring(), Mystery(1.0, 1.0), TypeError, "got Mystery; proofs are for OrnsteinUhlenbeck, NonGaussianNoise"),
         (
