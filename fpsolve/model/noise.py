@@ -55,6 +55,7 @@ class Noise(Parametrised):
         may_tilt: whether functions of ξ gain by a factor exp(s ξ), as where P_s falls to both sides.
         is_white: whether it has no value but ξ dt = s dW; it then has one state, ξ = 0, and moves what it drives by
             diffusion, see `motion`.
+        of_xi: the names of parameters whose unit is that of ξ, or made of it; it is stated for ξ in 1/time.
     """
 
     section: ClassVar[str] = "noise"
@@ -64,6 +65,7 @@ class Noise(Parametrised):
     tails_beyond: ClassVar[tuple[str, float, str] | None] = None
     may_tilt: ClassVar[bool] = True
     is_white: ClassVar[bool] = False
+    of_xi: ClassVar[Sequence[str]] = ()
 
     @property
     @abstractmethod

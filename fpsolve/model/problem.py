@@ -25,6 +25,8 @@ from fpsolve.model.quantity import NOISE, Quantity
 
 P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
+RATE = "1/time"
+"""The unit of ξ for which those of parameters of noises are stated."""
 LINE = 90
 """Letters of a line of parameters at most."""
 
@@ -165,11 +167,14 @@ class Problem:
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """All parameters by their keys, with symbol, words, unit and range."""
-        return {
-            (key := f"{section}.{name}"): Parameter(value, _keyed(half.quantity_of(name), key), type(half))
-            for section, half in self.sections.items()
-            for name, value in half.values.items()
-        }
+        found = dict[str, Parameter]()
+        for section, half in self.sections.items():
+            for name, value in half.values.items():
+                quantity = _keyed(half.quantity_of(name), key := f"{section}.{name}")
+                if half is self.noise and name in self.noise.of_xi and self.system.noise_unit != RATE:
+                    quantity = replace(quantity, unit="unknown")
+                found[key] = Parameter(value, quantity, type(half))
+        return found
 
     @property
     def differentiable(self) -> list[str]:

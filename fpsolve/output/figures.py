@@ -326,7 +326,8 @@ def _draw_few(axes: Any, case: Case, series: Sequence[Series], equation: str) ->
         axes.plot([], [], linestyle=line, label=legend(item.varied, case.about), **hollow)
     words = "finite elements (not all marked)" if any(item.every > 1 for item in series) else "finite elements"
     axes.plot([], [], "o", markerfacecolor="none", label=words, **_GREY)
-    axes.plot([], [], "-", label=f"perturbation, Eq. {equation}", **_GREY)
+    if any(np.any(np.isfinite(item.line_y)) for item in series):
+        axes.plot([], [], "-", label=f"perturbation, Eq. {equation}", **_GREY)
     return colours
 
 

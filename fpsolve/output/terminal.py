@@ -330,14 +330,16 @@ def _moment_grid(case: Case, result: CurveResult) -> Grid:
     is_exact = result.curve.is_exact
     theory = Column(f"Eq. {MOMENT.closed_form}{'*' if is_exact else ''}", 1)
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
-    grid = Grid(case.heading(result.curve), columns, remark=STAR if is_exact else "")
     moments = result.moments
+    has_theory = any(map(math.isfinite, moments.perturbation))
+    remark = STAR if is_exact and has_theory else ""
+    grid = Grid(case.heading(result.curve), columns if has_theory else columns[:3], remark=remark)
     for p, value, error, closed in zip(
         moments.p, moments.value, moments.error_estimate, moments.perturbation, strict=True
     ):
         shown = f"{error:.0e}" if error else "0"
         numbers = [digits(value, error), shown, f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"]
-        grid.rows.append([f"{p + 0.0:g}", *numbers])
+        grid.rows.append([f"{p + 0.0:g}", *(numbers if has_theory else numbers[:2])])
     return grid
 
 

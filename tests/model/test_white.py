@@ -194,3 +194,12 @@ def test_it_pickles():
     problem = pickle.loads(pickle.dumps(oscillator(1.0, 0.1, 0.5)))
     assert problem == oscillator(1.0, 0.1, 0.5)
     assert problem.diffusions
+
+
+def test_its_unit_is_that_of_the_noise():
+    """The oscillator's ξ is in 1/time; what another system multiplies is not known, nor the unit of s."""
+    assert (
+        Problem(VibroImpactOscillator(2.0, 0.9, 0.1, 0.1), White(0.6)).parameters["noise.s"].quantity.unit
+        == "1/time^(1/2)"
+    )
+    assert oscillator().parameters["noise.s"].quantity.unit == "unknown"

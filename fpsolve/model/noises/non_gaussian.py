@@ -132,6 +132,7 @@ class NonGaussianNoise(TreatedNoise):
     r0: Annotated[Departure, Field(lt=3)]
 
     kind: ClassVar[str] = "non-gaussian"
+    of_xi: ClassVar[Sequence[str]] = ("D0",)
     words: ClassVar[Mapping[str, str]] = {"treatment": "exact"}
     approximates_spectrum: ClassVar[bool] = True
     tails_beyond: ClassVar[tuple[str, float, str] | None] = "r0", 1.0, 'use treatment = "ou-reduction"'
@@ -317,6 +318,7 @@ class ReducedNoise(TreatedNoise, GaussianNoise):
     r0: Annotated[Departure, Field(lt=math.nextafter(5 / 3, 0))]  # at which 5 - 3 r0 is 0 already
 
     kind: ClassVar[str] = "ou-reduction"
+    of_xi: ClassVar[Sequence[str]] = ("D0",)
     words: ClassVar[Mapping[str, str]] = {"treatment": "ou-reduction"}
 
     @property

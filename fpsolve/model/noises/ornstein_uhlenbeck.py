@@ -138,6 +138,7 @@ class OrnsteinUhlenbeckByIntensity(GaussianNoise):
     tau0: Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
+    of_xi: ClassVar[Sequence[str]] = ("D0", "sigma", "standard_deviation")
 
     @property
     def alpha(self) -> float:  # type: ignore[override]
@@ -175,6 +176,7 @@ class OrnsteinUhlenbeckByDeviation(GaussianNoise):
     )
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
+    of_xi: ClassVar[Sequence[str]] = ("D0", "sigma", "standard_deviation")
 
     @property
     def sigma(self) -> float:  # type: ignore[override]
@@ -211,6 +213,7 @@ class OrnsteinUhlenbeck(GaussianNoise):
     sigma: Annotated[float, parameter("intensity of its white noise", "", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)]
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
+    of_xi: ClassVar[Sequence[str]] = ("D0", "sigma", "standard_deviation")
     variants: ClassVar[Sequence[type[Noise]]] = (OrnsteinUhlenbeckByIntensity, OrnsteinUhlenbeckByDeviation)
 
     @classmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Annotated, ClassVar, NamedTuple
 
@@ -62,6 +62,7 @@ class SineWiener(Noise):
     ]
 
     kind: ClassVar[str] = "sine-wiener"
+    of_xi: ClassVar[Sequence[str]] = ("amplitude",)
     may_tilt: ClassVar[bool] = False
 
     @property

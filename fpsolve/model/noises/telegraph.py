@@ -39,6 +39,7 @@ class Telegraph(Chain):
     k: Annotated[float, parameter("rate at which each value is left", "k = 1.0", "$k$", "1/time", **SIZE)]
 
     kind: ClassVar[str] = "telegraph"
+    of_xi: ClassVar[Sequence[str]] = ("a",)
 
     @property
     def states(self) -> Sequence[float]:  # type: ignore[override]

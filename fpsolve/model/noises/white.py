@@ -78,6 +78,7 @@ class White(Noise):
     ] = Interpretation.STRATONOVICH
 
     kind: ClassVar[str] = "white"
+    of_xi: ClassVar[Sequence[str]] = ("s",)
     is_white: ClassVar[bool] = True
     mixes_slowly: ClassVar[bool] = True
     has_states: ClassVar[bool] = True
