@@ -58,7 +58,9 @@ def display():
 SCRIPTS = """
 import contextlib, io, json, os, sys, traceback
 from paraview import simple
+save = simple.SaveScreenshot  # which a script may have put another function in place of
 for line in open(0):
+    simple.SaveScreenshot = save
     folder, *sys.argv = json.loads(line)
     os.chdir(folder)
     code, out, err = 0, io.StringIO(), io.StringIO()
