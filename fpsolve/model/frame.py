@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, is_driven, squared_frequency
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, combined, is_driven, squared_frequency
 
 MOST_PARTS = 1000
 
@@ -98,9 +98,12 @@ def normal_frame(
         epsilon: ε.
         deviation, memory: the standard deviation of ξ and about how long it remembers its value.
     """
-    a = _sum([term for term in drift if is_free(term)])
+    numbers = combined((float(term.g(0.0)), term) for term in drift if is_free(term))
+    if numbers[1] == -numbers[2] and numbers[0] == numbers[3]:
+        return None
+    a = np.reshape(numbers, (2, 2))
     square = float(squared_frequency(a))
-    if not square > 0 or (a[0, 1] == -a[1, 0] and a[0, 0] == a[1, 1]):
+    if not square > 0:
         return None
     side = math.copysign(1.0, a[0, 1])
     lower = side * (0.5 * (a[1, 1] - a[0, 0]))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -54,6 +54,16 @@ class Harmonics:
     @property
     def vanishes(self) -> bool:
         return not np.any([self.mean, self.cosine, self.sine])
+
+
+def combined(parts: Iterable[tuple[float, CoefficientMatrix]]) -> tuple[float, float, float, float]:
+    """Σ c A of some terms, row by row."""
+    a = b = c = d = 0.0
+    for size, term in parts:
+        if size:
+            (p, q), (r, s) = term.matrix
+            a, b, c, d = a + size * p, b + size * q, c + size * r, d + size * s
+    return a, b, c, d
 
 
 def turning(a: FloatArray) -> Harmonics:

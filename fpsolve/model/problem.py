@@ -20,7 +20,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.frame import Frame, normal_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import Parameter, Parametrised
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, crosses_both_ways, turning
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, combined, crosses_both_ways, turning
 from fpsolve.model.quantity import NOISE, Quantity
 
 P = ParamSpec("P")
@@ -102,6 +102,14 @@ class Problem:
         """φ of a ray that the phase never leaves, nor reaches, whatever the noise does; None where there is none."""
         drift, diffusions = self._moved
         lines = [affine(term.g) for term in drift.terms]
+        if None not in lines:  # most turn without noise: numbers are quicker than arrays
+            a, b, c, d = combined(
+                (line[0] * drift.epsilon**each.order, each)
+                for line, each in zip(lines, drift.terms, strict=True)
+                if line
+            )
+            if abs(b - c) > math.hypot(a - d, b + c) * (1 + 1e-12):
+                return None
         matrices = [np.array(each.matrix) for each in diffusions]
         if None in lines:
             matrices += [np.array(term.matrix) for term in drift.terms]
