@@ -151,7 +151,7 @@ class Terms:
         for term in self.system.terms:
             yield from self._driven(term)
         for each in self._diffusions:
-            yield from self._diffused([(0.5, each, each)])
+            yield from self._diffused(each, [(0.5, each, each)])
         # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
         text, jump = "upwind loads between cells", self._jump
         if not np.all(self._is_exact):
@@ -175,7 +175,7 @@ class Terms:
         for term in by.terms:
             yield from self._driven(term)
         for own, other in zip(self._diffusions, by.diffusions, strict=bool(by.diffusions)):
-            yield from self._diffused([(0.5, own, other), (0.5, other, own)])
+            yield from self._diffused(own, [(0.5, own, other), (0.5, other, own)])
         for j in self._two_way:
             yield self._term(-0.5 * jump[[j]].T @ jump[[j]], self._faster(moved, float(self._vertices[j])), text)
         for ray, slope in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
@@ -199,16 +199,17 @@ class Terms:
             along = size * self.phi.mass(term.q)
             yield self._term(along, term.g, f"p {text}{_written(term.q)}", OfMoment(1), order=term.order)
 
-    def _diffused(self, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]) -> Iterator[Term]:
-        """Σ c (h_a ∂φ + p q_a)(h_b ∂φ + p q_b) of matrices a and b."""
+    def _diffused(
+        self, own: CoefficientMatrix, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]
+    ) -> Iterator[Term]:
+        """Σ c (h_a ∂φ + p q_a)(h_b ∂φ + p q_b) of matrices a and b, written by the one of the noise itself."""
         order, epsilon, totals = min(a.order + b.order for _, a, b in pairs), self.system.epsilon, [0.0, 0.0, 0.0]
         for c, a, b in pairs:
             size = c * epsilon ** (a.order + b.order)
             totals = [total + size * part for total, part in zip(totals, self.phi.diffusion(a, b), strict=True)]
-        parts = ", ".join(f"h = {_written(each.h)}, q = {_written(each.q)}" for each in pairs[0][1:2])
+        text = f"½ (h ∂φ + p q)² of white noise, h = {_written(own.h)}, q = {_written(own.q)}"
         for power, total in enumerate(totals):
-            text = f"{('', 'p ', 'p² ')[power]}½ (h ∂φ + p q)² of white noise, {parts}"
-            yield self._term(total, one, text, OfMoment(power), order)
+            yield self._term(total, one, ("", "p ", "p² ")[power] + text, OfMoment(power), order)
 
     def typical_speed(self) -> FloatArray:
         """θ at the φ-vertices for the typical ξ, shape (m,)."""

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, combined, is_driven, squared_frequency
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, combined, is_driven, rotating_coordinates
 
 MOST_PARTS = 1000
 
@@ -47,9 +47,8 @@ class Frame:
 
     def motion(self, system: System) -> System:
         """The same system for y, the terms of order 0 that no noise drives as one."""
-        free = [term for term in system.terms if is_free(term)]
         others = [self.term(term) for term in system.terms if not is_free(term)]
-        a = self._inverse @ _sum(free) @ self._array
+        a = self._inverse @ np.reshape(_free(system.terms), (2, 2)) @ self._array
         growth, speed = 0.5 * (a[0, 0] + a[1, 1]), 0.5 * (a[0, 1] - a[1, 0])
         rotation = CoefficientMatrix(0, ((growth, speed), (-speed, growth)))  # exactly one
         jumps = [replace(jump, phase=float(self.phase(np.array(jump.phase)))) for jump in system.jumps]
@@ -98,17 +97,13 @@ def normal_frame(
         epsilon: ε.
         deviation, memory: the standard deviation of ξ and about how long it remembers its value.
     """
-    numbers = combined((float(term.g(0.0)), term) for term in drift if is_free(term))
+    numbers = _free(drift)
     if numbers[1] == -numbers[2] and numbers[0] == numbers[3]:
         return None
-    a = np.reshape(numbers, (2, 2))
-    square = float(squared_frequency(a))
-    if not square > 0:
+    if (rotating := rotating_coordinates(np.reshape(numbers, (2, 2)))) is None:
         return None
-    side = math.copysign(1.0, a[0, 1])
-    lower = side * (0.5 * (a[1, 1] - a[0, 0]))
-    scale = abs(a[0, 1])
-    frame = Frame(((1.0, 0.0), (lower / scale, math.sqrt(square) / scale)))
+    (first, _), (lower, last) = rotating.tolist()
+    frame = Frame(((1.0, 0.0), (lower / first, last / abs(first))))
 
     def unevenness(terms: Sequence[CoefficientMatrix], whites: Sequence[CoefficientMatrix]) -> float:
         """The amplitudes of the waves of dφ/dt over its mean."""
@@ -128,9 +123,9 @@ def normal_frame(
     return frame if here < unevenness(drift, diffusions) else None
 
 
-def _sum(free: Sequence[CoefficientMatrix]) -> FloatArray:
-    """The matrix of terms that no noise drives."""
-    return np.asarray(sum((float(term.g(0.0)) * np.array(term.matrix) for term in free), np.zeros((2, 2))))
+def _free(terms: Sequence[CoefficientMatrix]) -> tuple[float, float, float, float]:
+    """The matrix of those of order 0 that no noise drives, row by row."""
+    return combined((float(term.g(0.0)), term) for term in terms if is_free(term))
 
 
 def _unit(phi: FloatArray) -> FloatArray:

@@ -368,6 +368,16 @@ def squared_frequency(a: FloatArray) -> FloatArray:
     return a[..., 0, 0] * a[..., 1, 1] - a[..., 0, 1] * a[..., 1, 0] - half**2
 
 
+def rotating_coordinates(a: FloatArray) -> FloatArray | None:
+    """P for which P⁻¹AP is growth and a rotation: 1 where A is that already, None where it does not rotate."""
+    half, square = 0.5 * (a[0, 0] + a[1, 1]), float(squared_frequency(a))
+    if not square > 0:
+        return None
+    if a[0, 1] == -a[1, 0] and a[0, 0] == a[1, 1]:
+        return np.eye(2)
+    return np.array([[a[0, 1], 0.0], [half - a[0, 0], math.sqrt(square)]])
+
+
 def angular_frequency(system: System) -> float:
     """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0, or of all without one.
 

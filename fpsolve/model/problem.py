@@ -307,8 +307,8 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     noise, system = problem.noise, problem.motion
     noise.check_existence(p)
     if problem.classes:
-        if p < problem.moments[0] or any(jump.log_factor for jump in system.jumps):
-            has_jumps = any(jump.log_factor for jump in system.jumps)
+        has_jumps = any(jump.log_factor for jump in system.jumps)
+        if has_jumps or p < problem.moments[0]:
             raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_ray, has_jumps=has_jumps))
         return
     if not any(p * jump.log_factor > math.log(2.0) for jump in system.jumps):

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from fpsolve.model.exact import Exact, ExactJump, ExactLaw, ExactMotion, chain_law
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System, affine, matrix_at, squared_frequency, written_coefficient
+from fpsolve.model.plane import System, affine, matrix_at, rotating_coordinates, written_coefficient
 
 MOST_TERMS, MOST_ORDER, MOST_STATES = 200, 40, 400
 KNOWN = "OrnsteinUhlenbeck, NonGaussianNoise, SineWiener, Telegraph, MarkovChain and White"
@@ -155,11 +155,8 @@ def ray_of(phase: float) -> list[float]:
 
 def _rotating(system: System) -> list[list[float]]:
     """P for which P⁻¹A₀P is growth and a rotation, or the identity where the order 0 does not rotate."""
-    a = matrix_at(system, 0.0, slice(0, 1))
-    square, half = float(squared_frequency(a)), float(a[0, 0] + a[1, 1]) / 2
-    if not square > 0 or (a[0, 1] == -a[1, 0] and a[0, 0] == a[1, 1]):
-        return [[1.0, 0.0], [0.0, 1.0]]
-    return [[float(a[0, 1]), 0.0], [half - float(a[0, 0]), math.sqrt(square)]]
+    found = rotating_coordinates(matrix_at(system, 0.0, slice(0, 1)))
+    return (np.eye(2) if found is None else found).tolist()
 
 
 def _fractions(numbers: Any) -> Exact:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from fpsolve.model.plane import (
     affine,
     angular_frequency,
     matrix_at,
+    rotating_coordinates,
     squared_frequency,
     stretching,
     turning,
@@ -119,6 +121,13 @@ def second_order(problem: Problem) -> SecondOrder:
     Raises:
         NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in the noise.
     """
+    try:
+        return _kept(problem)
+    except TypeError:  # a motion or a noise of the user's own that cannot be hashed
+        return _second_order(problem)
+
+
+def _second_order(problem: Problem) -> SecondOrder:
     system, noise = problem.motion, problem.noise
     steady, driven = matrix_at(system, 0.0, slice(0, 1)), np.zeros((2, 2))
     for term in system.terms if has_mean(problem) else ():
@@ -142,7 +151,7 @@ def second_order(problem: Problem) -> SecondOrder:
     for each in problem.diffusions:
         if each.order != 1:
             raise NoPerturbationTheory(f"perturbation theory is for white noise of order 1, not {each.order}")
-        of_noise = [(_growth(each.matrix, frame), 1.0, 1.0)]
+        of_noise.append((_growth(each.matrix, frame), 1.0, 1.0))  # beside nothing: no path of white noise drives
     half_turns, log_factors = omega / math.pi, [jump.second_order for jump in system.jumps]
     parts += [half_turns * log_factor for log_factor in log_factors]
     parts += [system.epsilon**2 * at_twice / 2 * q.amplitude**2 for q, _, at_twice in of_noise]
@@ -153,6 +162,10 @@ def second_order(problem: Problem) -> SecondOrder:
         )
     )
     return SecondOrder(tuple(map(float, parts)), quadratic, half_turns, float(sum(log_factors)))
+
+
+_kept = lru_cache(maxsize=8)(_second_order)
+"""A set asks for it five times: scales, columns and notes."""
 
 
 def second_order_or_none(problem: Problem) -> SecondOrder | None:
@@ -249,13 +262,8 @@ def _growth(matrix: Any, frame: FloatArray) -> Harmonics:
 
 def _rotating_frame(a: FloatArray) -> tuple[FloatArray, float]:
     """P and ω for which P⁻¹AP is growth and a rotation by ω."""
-    half = 0.5 * (a[0, 0] + a[1, 1])
-    square = float(squared_frequency(a))
-    if not square > 0:
+    if (frame := rotating_coordinates(a)) is None:
         raise NoPerturbationTheory(
             "perturbation theory is for motions that rotate without noise, which this one does not"
         )
-    omega = math.sqrt(square)
-    if a[0, 1] == -a[1, 0] and a[0, 0] == a[1, 1]:
-        return np.eye(2), omega
-    return np.array([[a[0, 1], 0.0], [half - a[0, 0], omega]]), omega
+    return frame, math.sqrt(squared_frequency(a))
