@@ -1,8 +1,8 @@
 """Arithmetic in texts: numbers, names, + − * / **, pi, exp and sqrt.
 
-A text is parsed, and its tree is walked here: nothing in it is ever run. A value is a polynomial in what the names
-stand for, at most of degree 1 in the state and in the noise, whose coefficients are Taylor series in one parameter. So
-the matrices, their orders in ε and their derivatives are all exact.
+A text is parsed, and each node of its tree becomes a function here: nothing in it is ever run. A value is a polynomial
+in what the names stand for, at most of degree 1 in the state and in the noise, whose coefficients are Taylor series in
+one parameter. So the matrices, their orders in ε and their derivatives are all exact.
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ import ast
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from keyword import iskeyword
 from operator import add
+from typing import Any
 
 Series = tuple[float, ...]
 """Taylor coefficients in one parameter, the value first; all in one calculation have one length."""
@@ -23,12 +24,11 @@ Monomial = tuple[str, str, int]
 """A variable of the state or "", a noise or "", and the power of ε."""
 MOST_LETTERS, MOST_LEVELS, LARGEST_POWER = 1000, 50, 10
 CONSTANTS = {"pi": math.pi}
-FUNCTIONS = ("exp", "sqrt")
-RESERVED = (*CONSTANTS, *FUNCTIONS)
 _LETTERS = re.compile(r"[A-Za-z0-9_+\-*/().\s]")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _KNOWN = "write numbers, names, + - * / **, parentheses, pi, exp() and sqrt() only"
-_SUMS, _PRODUCTS = (ast.Add, ast.Sub), (ast.Mult, ast.Div)
+_SUMS, _PRODUCTS, _SIGNS = ("Add", "Sub"), ("Mult", "Div"), {"UAdd": 1.0, "USub": -1.0}
+_TOO_DEEP = f"is nested too deeply; must be at most {MOST_LEVELS} levels; use fewer parentheses and signs"
 
 
 class ExpressionError(ValueError):
@@ -148,9 +148,35 @@ def _real_power(a: Series, power: float) -> Series:
     return tuple(c)
 
 
+FUNCTIONS: Mapping[str, Callable[[Series], Series]] = {
+    "exp": _exponential,
+    "sqrt": lambda series: _real_power(series, 0.5),
+}
+RESERVED = (*CONSTANTS, *FUNCTIONS)
+
+
+@dataclass(frozen=True)
+class _Node:
+    """A part of an expression.
+
+    Attributes:
+        written: how it is written, cut to a readable length.
+        form: its value, of what a walk knows.
+        number: itself, if it is a number with signs, else NaN.
+        summands: of a sum, each with its sign, first to last.
+        exponent: of exp().
+    """
+
+    written: str
+    form: Callable[[_Walk], Form]
+    number: float = math.nan
+    summands: Sequence[tuple[str, _Node]] = ()
+    exponent: _Node | None = None
+
+
 @lru_cache(maxsize=1024)
-def parsed(text: str) -> ast.expr:
-    """The tree of an expression, in which there is nothing but arithmetic.
+def _parsed(text: str) -> tuple[_Node, frozenset[str]]:
+    """An expression in which there is nothing but arithmetic, and its names without those of functions and constants.
 
     Raises:
         ExpressionError: it is empty, too long or too deep, or something else.
@@ -165,87 +191,115 @@ def parsed(text: str) -> ast.expr:
         if not _LETTERS.fullmatch(letter):
             more = "write ** for powers" if letter == "^" else _KNOWN
             raise ExpressionError(f"has the character {letter!a}, which is no arithmetic; {more}")
+    line = " ".join(text.split())
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            tree = ast.parse(_one_line(text), mode="eval").body
+            tree = ast.parse(line, mode="eval").body
     except SyntaxError as error:
         raise ExpressionError(f"cannot be read ({error.msg}); write, for example, -omega**2 * x") from None
     except (ValueError, RecursionError, MemoryError):
-        raise ExpressionError(_too_deep()) from None
-    _check(text, tree)
-    return tree
+        raise ExpressionError(_TOO_DEEP) from None
+    reader = _Reader(line)
+    return reader.visit(tree), frozenset(reader.names)
 
 
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
+class _Operator(ast.NodeVisitor):
+    """The name of a node's operator, as "Add"; empty for what has none."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> str:
+        return type(node.op).__name__
+
+    def generic_visit(self, _: ast.AST) -> str:
+        return ""
 
 
-def _too_deep() -> str:
-    return f"is nested too deeply; must be at most {MOST_LEVELS} levels; use fewer parentheses and signs"
+class _Reader(ast.NodeVisitor):
+    """Makes the nodes of one line; what is no arithmetic, and too many levels, are refused."""
 
+    def __init__(self, line: str) -> None:
+        self.names = set[str]()
+        self._line, self._level = line, 0
 
-def _check(text: str, tree: ast.expr) -> None:
-    """Refuse trees with something else than arithmetic, or with too many levels."""
-    waiting = [(tree, 1)]
-    while waiting:
-        node, level = waiting.pop()
-        if level > MOST_LEVELS:
-            raise ExpressionError(_too_deep())
-        match node:
-            case ast.Constant(value=int() | float()) if not isinstance(node.value, bool):
-                continue
-            case ast.Name():
-                continue
-            case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=inner):
-                waiting.append((inner, level + 1))
-            case ast.BinOp(op=ast.Pow(), left=base, right=power):
-                _exponent(text, power)
-                waiting.append((base, level + 1))
-            case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div()):
-                waiting += [(each, level + 1) for _, each in _chain(node)]
-            case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]) if name in FUNCTIONS:
-                waiting.append((inner, level + 1))
-            case ast.Call(func=ast.Name(id=name)) if name in FUNCTIONS:
-                raise ExpressionError(f"has {_source(text, node)}, but {name} takes one number; write {name}(...)")
-            case ast.Call():
-                remedy = f"the functions are {' and '.join(FUNCTIONS)}; write * for products"
-                raise ExpressionError(f"has {_source(text, node)}, which calls no known function; {remedy}")
-            case _:
-                raise ExpressionError(f"has {_source(text, node)}, which is no arithmetic; {_KNOWN}")
+    def visit(self, node: ast.AST) -> Any:
+        self._level += 1
+        if self._level > MOST_LEVELS:
+            raise ExpressionError(_TOO_DEEP)
+        made = super().visit(node)
+        self._level -= 1
+        return made
 
+    def _source(self, node: Any) -> str:
+        return self._line[node.col_offset : node.end_col_offset]
 
-def _exponent(text: str, node: ast.expr) -> float:
-    """The number of an exponent."""
-    sign, inner = 1.0, node
-    while isinstance(inner, ast.UnaryOp) and isinstance(inner.op, ast.USub | ast.UAdd):
-        sign, inner = (-sign if isinstance(inner.op, ast.USub) else sign), inner.operand
-    value = inner.value if isinstance(inner, ast.Constant) else None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not value <= LARGEST_POWER:
-        must = f"must be a number from -{LARGEST_POWER} to {LARGEST_POWER}"
-        raise ExpressionError(f"has the exponent {_source(text, node)}; {must}; write the factors")
-    return sign * float(value)
+    def _written(self, node: ast.AST) -> str:
+        source = self._source(node)
+        return source if len(source) <= 60 else f"{source[:57]}..."
 
+    def generic_visit(self, node: ast.AST) -> _Node:
+        raise ExpressionError(f"has {self._written(node)}, which is no arithmetic; {_KNOWN}")
 
-def _chain(node: ast.expr) -> Iterator[tuple[str, ast.expr]]:
-    """The summands of a sum, or the factors of a product, each with its sign, first to last; else the node itself."""
-    kinds = next((each for each in (_SUMS, _PRODUCTS) if isinstance(node, ast.BinOp) and isinstance(node.op, each)), ())
-    found = list[tuple[str, ast.expr]]()
-    while isinstance(node, ast.BinOp) and isinstance(node.op, kinds):
-        found.append((type(node.op).__name__, node.right))
-        node = node.left
-    return reversed([*found, ("", node)])
+    def visit_Constant(self, node: ast.Constant) -> _Node:
+        try:
+            number = float(repr(node.value))
+        except ValueError:  # as of True and 1j
+            return self.generic_visit(node)
+        return _Node(self._written(node), lambda walk: constant(number, *walk.rest), number)
 
+    def visit_Name(self, node: ast.Name) -> _Node:
+        if node.id not in RESERVED:
+            self.names.add(node.id)
+        return _Node(self._written(node), lambda walk: walk.named(node.id))
 
-def _source(text: str, node: ast.expr) -> str:
-    """How a part of a text is written there, cut to a readable length."""
-    found = ast.get_source_segment(_one_line(text), node) or ast.unparse(node)
-    return found if len(found) <= 60 else f"{found[:57]}..."
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> _Node:
+        sign = _SIGNS.get(type(node.op).__name__)
+        if sign is None:
+            return self.generic_visit(node)
+        inner = self.visit(node.operand)
+        return _Node(self._written(node), lambda walk: Form({}).plus(walk.value(inner), sign), sign * inner.number)
+
+    def visit_BinOp(self, node: ast.BinOp) -> _Node:
+        operator = _Operator()
+        name = operator.visit(node)
+        if name == "Pow":
+            return self._power(node)
+        kinds = next((each for each in (_SUMS, _PRODUCTS) if name in each), None)
+        if kinds is None:
+            return self.generic_visit(node)
+        parts, left = list[tuple[str, _Node]](), node  # of any length in one level
+        while (name := operator.visit(left)) in kinds:
+            parts.append((name, self.visit(left.right)))
+            left = left.left
+        parts = [("", self.visit(left)), *reversed(parts)]
+        summands = parts if kinds is _SUMS else ()
+        return _Node(self._written(node), lambda walk: walk.chain(parts), summands=summands)
+
+    def _power(self, node: ast.BinOp) -> _Node:
+        try:
+            power = _Reader(self._line).visit(node.right).number
+        except ExpressionError:
+            power = math.nan
+        if not abs(power) <= LARGEST_POWER:
+            must = f"must be a number from -{LARGEST_POWER} to {LARGEST_POWER}"
+            raise ExpressionError(f"has the exponent {self._written(node.right)}; {must}; write the factors")
+        base = self.visit(node.left)
+        return _Node(self._written(node), lambda walk: walk.power(walk.value(base), power))
+
+    def visit_Call(self, node: ast.Call) -> _Node:
+        name = self._source(node.func)
+        if name not in FUNCTIONS:
+            remedy = f"the functions are {' and '.join(FUNCTIONS)}; write * for products"
+            raise ExpressionError(f"has {self._written(node)}, which calls no known function; {remedy}")
+        if len(node.args) != 1:
+            raise ExpressionError(f"has {self._written(node)}, but {name} takes one number; write {name}(...)")
+        inner, function = self.visit(node.args[0]), FUNCTIONS[name]
+        exponent = inner if name == "exp" else None
+        return _Node(self._written(node), lambda walk: walk.value(inner).of(function), exponent=exponent)
 
 
 def names_in(text: str) -> frozenset[str]:
     """The names in an expression, without those of functions and constants. Raises `ExpressionError`."""
-    return frozenset(each.id for each in ast.walk(parsed(text)) if isinstance(each, ast.Name)) - set(RESERVED)
+    return _parsed(text)[1]
 
 
 def evaluate(text: str, names: Mapping[str, Form], place: str) -> Form:
@@ -259,15 +313,15 @@ def evaluate(text: str, names: Mapping[str, Form], place: str) -> Form:
     Raises:
         ExpressionError: it is no arithmetic, has other names, is not finite, or of a degree above 1.
     """
-    return _Walk(text, names, place).value(parsed(text))
+    return _Walk(names, place).value(_parsed(text)[0])
 
 
 def summands(text: str, names: Mapping[str, Form], place: str) -> Iterator[tuple[str, Form]]:
     """The terms of an expression that is a sum, as they are written, with their values. Raises `ExpressionError`."""
-    walk = _Walk(text, names, place)
-    for sign, node in _chain(parsed(text)) if _is_sum(parsed(text)) else [("", parsed(text))]:
+    walk, (tree, _) = _Walk(names, place), _parsed(text)
+    for sign, node in tree.summands or [("", tree)]:
         form = walk.value(node)
-        yield _source(text, node), Form({}).plus(form, -1.0) if sign == "Sub" else form
+        yield node.written, Form({}).plus(form, -1.0) if sign == "Sub" else form
 
 
 def log_of(text: str, names: Mapping[str, Form], place: str) -> Series:
@@ -276,38 +330,32 @@ def log_of(text: str, names: Mapping[str, Form], place: str) -> Series:
     Raises:
         ExpressionError: as `evaluate`, or it is not positive.
     """
-    tree, walk = parsed(text), _Walk(text, names, place)
-    if isinstance(tree, ast.Call) and isinstance(tree.func, ast.Name) and tree.func.id == "exp":
-        scalar = walk.value(tree.args[0]).scalar
-        walk.value(tree)  # which may overflow
-    else:
-        scalar = walk.value(tree).scalar
-        if scalar is not None and not scalar[0] > 0:
+    walk, (tree, _) = _Walk(names, place), _parsed(text)
+    scalar = walk.value(tree).scalar
+    if tree.exponent:
+        scalar = walk.value(tree.exponent).scalar
+    elif scalar is not None:
+        if not scalar[0] > 0:
             raise ExpressionError(f"{place} is {scalar[0]:.6g}; must be > 0; change it or its parameters")
-        if scalar is not None:
-            each = [form.scalar or (0.0,) for _, form in summands(text, names, place)]
-            scalar = _logarithm(scalar, math.log1p(math.fsum([*(first for first, *_ in each), -1.0])))
+        each = [form.scalar or (0.0,) for _, form in summands(text, names, place)]
+        scalar = _logarithm(scalar, math.log1p(math.fsum([*(first for first, *_ in each), -1.0])))
     if scalar is None:
         raise ExpressionError(f"{place} must be a number or an expression in parameters; leave out the others")
     return scalar
 
 
-def _is_sum(node: ast.expr) -> bool:
-    return isinstance(node, ast.BinOp) and isinstance(node.op, _SUMS)
-
-
 class _Walk:
     """The values of the nodes of one tree."""
 
-    def __init__(self, text: str, names: Mapping[str, Form], place: str) -> None:
-        self._text, self._names, self._place = text, names, place
+    def __init__(self, names: Mapping[str, Form], place: str) -> None:
+        self._names, self._place = names, place
         length = len(next((series for form in names.values() for series in form.parts.values()), (0.0,)))
-        self._rest: Series = (0.0,) * (length - 1)
+        self.rest: Series = (0.0,) * (length - 1)
 
-    def value(self, node: ast.expr) -> Form:
+    def value(self, node: _Node) -> Form:
         """Of a node. Raises `ExpressionError`."""
         try:
-            found = self._value(node)
+            found = node.form(self)
             if all(math.isfinite(each) for series in found.parts.values() for each in series):
                 return found
             reason, remedy = NOT_FINITE
@@ -319,28 +367,21 @@ class _Walk:
             ", ".join(name for name, form in self._names.items() if any(key[i] for key in form.parts)) for i in (0, 1)
         )
         told = reason.format(states=states, noises=noises)
-        raise ExpressionError(f"the term {_source(self._text, node)} of {self._place} {told}; {remedy}")
+        raise ExpressionError(f"the term {node.written} of {self._place} {told}; {remedy}")
 
-    def _value(self, node: ast.expr) -> Form:
-        match node:
-            case ast.Constant(value=int() | float() as number):
-                return constant(float(number), *self._rest)
-            case ast.Name(id=name) if name in CONSTANTS:
-                return constant(CONSTANTS[name], *self._rest)
-            case ast.Name(id=name) if name in self._names:
-                return self._names[name]
-            case ast.Name(id=name):
-                known = f"known names: {', '.join(self._names) or 'none'}"
-                raise ExpressionError(f"{self._place} has the unknown name {name}; {known}; add or rename it")
-            case ast.UnaryOp(op=op, operand=inner):
-                return Form({}).plus(self.value(inner), -1.0 if isinstance(op, ast.USub) else 1.0)
-            case ast.BinOp(op=ast.Pow(), left=base, right=power):
-                return self._power(self.value(base), _exponent(self._text, power))
-            case ast.Call(func=ast.Name(id=function), args=[inner]):
-                made = self.value(inner)
-                return made.of(_exponential if function == "exp" else lambda series: _real_power(series, 0.5))
+    def named(self, name: str) -> Form:
+        """What a name stands for. Raises `ExpressionError`."""
+        if name in CONSTANTS:
+            return constant(CONSTANTS[name], *self.rest)
+        if name not in self._names:
+            known = f"known names: {', '.join(self._names) or 'none'}"
+            raise ExpressionError(f"{self._place} has the unknown name {name}; {known}; add or rename it")
+        return self._names[name]
+
+    def chain(self, parts: Sequence[tuple[str, _Node]]) -> Form:
+        """A sum or a product. Raises `_Unsuitable`."""
         total = Form({})
-        for sign, each in _chain(node):
+        for sign, each in parts:
             form = self.value(each)
             match sign:
                 case "":
@@ -353,10 +394,11 @@ class _Walk:
                     total = total.times(form.of(_inverse))
         return total
 
-    def _power(self, base: Form, power: float) -> Form:
+    def power(self, base: Form, power: float) -> Form:
+        """A power of a value. Raises `_Unsuitable`."""
         if not power.is_integer():
             return base.of(lambda series: _real_power(series, power))
-        total = constant(1.0, *self._rest)
+        total = constant(1.0, *self.rest)
         for _ in range(abs(int(power))):
             total = total.times(base)
         return total.of(_inverse) if power < 0 else total
