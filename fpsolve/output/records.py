@@ -47,6 +47,8 @@ SHARED_SECONDS = 60.0
 """After which a file that another machine has written is there, if it ever is."""
 LONGEST, MOST_NUMBERS = 2**28, 2**24
 """Of a line, in bytes, and of an array."""
+KEPT = 2**24
+"""Bytes of the records whose results stay in memory once they are read, as each table and figure asks for all."""
 _NAMES: dict[int, str] = {}
 """The file of this process."""
 Record = dict[str, Any]
@@ -125,7 +127,7 @@ class Records:
 
 
 class Results(Sequence[CurveResult]):
-    """What is known of the curves of a case, in their order; each is read from its record when it is looked at.
+    """What is known of the curves of a case, in their order; each is read from its record when it is first looked at.
 
     Args:
         case: whose curves these are.
@@ -136,11 +138,14 @@ class Results(Sequence[CurveResult]):
         self._case, self._records, self._asked = case, records, everything(case).p.tolist()
         self._found: dict[int, Address | CurveResult] = {}
         self._order: list[int] = []
+        self._kept: dict[int, CurveResult] = {}
+        self._room = KEPT
 
     def add(self, number: int, found: Address | CurveResult) -> None:
         if number not in self._found:
             insort(self._order, number)
         self._found[number] = found
+        self._kept.pop(number, None)
 
     def find(self, curve: Curve, key: str) -> bool:
         """Take the result of a curve from the record of a key; whether there is one that can be read."""
@@ -167,12 +172,20 @@ class Results(Sequence[CurveResult]):
         numbers = self._order[index]
         if isinstance(numbers, list):
             return [self[i] for i in range(*index.indices(len(self)))]
+        if (known := self._kept.get(numbers)) is not None:
+            return known
         [curve] = self._case.curves(numbers - 1, numbers)
         return self._result(curve)
 
     def _result(self, curve: Curve) -> CurveResult:
         found = self._found[curve.number]
-        return result_of(self._records.read(found), curve) if isinstance(found, Address) else found
+        if not isinstance(found, Address):
+            return found
+        result = result_of(self._records.read(found), curve)
+        if found.size <= self._room:
+            self._room -= found.size
+            self._kept[curve.number] = result
+        return result
 
 
 def append(folder: Path, key: str, record: Record) -> Address:
