@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from keyword import iskeyword
 from operator import add
-from typing import Any
+from typing import Any, cast
 
 Series = tuple[float, ...]
 """Taylor coefficients in one parameter, the value first; all in one calculation have one length."""
@@ -266,7 +266,7 @@ class _Reader(ast.NodeVisitor):
         kinds = next((each for each in (_SUMS, _PRODUCTS) if name in each), None)
         if kinds is None:
             return self.generic_visit(node)
-        parts, left = list[tuple[str, _Node]](), node  # of any length in one level
+        parts, left = list[tuple[str, _Node]](), cast("Any", node)  # of any length in one level
         while (name := operator.visit(left)) in kinds:
             parts.append((name, self.visit(left.right)))
             left = left.left

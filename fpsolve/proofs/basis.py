@@ -16,7 +16,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import factorial
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -53,19 +53,26 @@ def turned(bands: Balls, u: Balls) -> Balls:
     return found
 
 
-@dataclass(frozen=True)
-class Core:
-    """Polynomials He_m(y)/√m! of y = (z − centre)/scale, used in the part of the line where the noise mostly is.
+class Basis(ABC):
+    """Functions B_m of the noise.
 
     Attributes:
-        gauge: β in T = e^{βz} u, which levels u.
+        gauge: β in T = e^{βz} u.
     """
 
-    kind: ClassVar[Literal["core"]] = "core"
-    is_core: ClassVar[bool] = True
-    centre: float
-    scale: float
-    gauge: float
+    kind: ClassVar[BasisKind]
+    is_core: ClassVar[bool] = False
+    centre: float = 0.0
+    scale: float = 1.0
+    gauge: float = 0.0
+
+    def cover(self, columns: int) -> tuple[FloatArray, FloatArray] | None:
+        """The ends of cells that cover the noise, for so many functions, where T = u; None where cells are chosen."""
+        return None
+
+    def products(self, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+        """⟨B_n, B_m⟩, ⟨z B_n, B_m⟩ and the noise's part of L in floats, where T = u; None where these are integrals."""
+        return None
 
     def one(self, columns: int) -> Balls:
         """The coefficients of 1, so many at most."""
@@ -74,6 +81,45 @@ class Core:
     def values(self, u: Balls) -> Balls:
         """u, by coefficients of the polynomials that `taylor` takes."""
         return u
+
+    def slope(self, u: Balls) -> Balls:
+        """u_z, which is not needed where T = u."""
+        raise NotImplementedError
+
+    @abstractmethod
+    def diffused(self, u: Balls, noise: Cylinder) -> Balls:
+        """What D ν (½ ∂zz − b ∂z) makes of u e^{βz}, without the factor e^{βz}."""
+
+    def cleared(self, u: Balls, noise: Cylinder) -> Balls:
+        """D u."""
+        return u
+
+    @abstractmethod
+    def times_z(self, u: Balls, noise: Cylinder) -> Balls:
+        """z u."""
+
+    @abstractmethod
+    def places(self, low: FloatArray, high: FloatArray) -> tuple[Balls, Balls]:
+        """The ends of cells in the variable of `taylor`."""
+
+    @abstractmethod
+    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+        """Derivatives of sums at the middles of cells from the zeroth on, up to signs, and a bound of what remains."""
+
+
+@dataclass(frozen=True)
+class Core(Basis):
+    """Polynomials He_m(y)/√m! of y = (z − centre)/scale, used in the part of the line where the noise mostly is.
+
+    Attributes:
+        gauge: what levels u.
+    """
+
+    kind: ClassVar[BasisKind] = "core"
+    is_core: ClassVar[bool] = True
+    centre: float
+    scale: float
+    gauge: float
 
     def slope(self, u: Balls) -> Balls:
         """u_z, from d/dy He_m = m He_{m−1}."""
@@ -130,22 +176,13 @@ class Core:
 
 
 @dataclass(frozen=True)
-class Whole:
+class Whole(Basis):
     """B_0 = 1 and ∫(1 − z²) T_{m−1} dz on the whole support [−1, 1] of bounded noise.
 
-    Both ends have u_z = 0, and b u_z is a polynomial, −b B_m′ = −a z T_{m−1}. The methods are those of `Core`; nothing
-    needs to be cleared, D = 1.
+    Both ends have u_z = 0, and b u_z is a polynomial, −b B_m′ = −a z T_{m−1}. Nothing needs to be cleared, D = 1.
     """
 
-    kind: ClassVar[Literal["whole"]] = "whole"
-    is_core: ClassVar[bool] = False
-    centre: ClassVar[float] = 0.0
-    scale: ClassVar[float] = 1.0
-    gauge: ClassVar[float] = 0.0
-
-    def one(self, columns: int) -> Balls:
-        """The coefficients of 1, so many at most."""
-        return balls([1.0])
+    kind: ClassVar[BasisKind] = "whole"
 
     def values(self, u: Balls) -> Balls:
         """u in Chebyshev polynomials, of two degrees more; ∫T_n = ½ (T_{n+1}/(n + 1) − T_{n−1}/(n − 1))."""
@@ -177,10 +214,6 @@ class Whole:
             second[:, n + 1] -= inner[:, n] * (n + 2) / 2
         return added(second * (noise.nu / 2), self.times_z(inner, noise) * (-noise.nu * noise.slope))
 
-    def cleared(self, u: Balls, noise: Cylinder) -> Balls:
-        """u."""
-        return u
-
     def times_z(self, u: Balls, noise: Cylinder) -> Balls:
         """z u."""
         return times_cosine(u)
@@ -195,42 +228,23 @@ class Whole:
         return cosine_taylor(parts, middle, half)
 
 
-class Plain(ABC):
-    """What is in common where T = u."""
-
-    is_core: ClassVar[bool] = False
-    centre: ClassVar[float] = 0.0
-    scale: ClassVar[float] = 1.0
-    gauge: ClassVar[float] = 0.0
-
-    def values(self, u: Balls) -> Balls:
-        """u."""
-        return u
-
-    def cleared(self, u: Balls, noise: Cylinder) -> Balls:
-        """u, as D = 1."""
-        return u
-
-    @abstractmethod
-    def cover(self, columns: int) -> tuple[FloatArray, FloatArray]:
-        """The ends of cells of the noise that cover it, for so many functions."""
-
-
 @dataclass(frozen=True)
-class Circle(Plain):
+class Circle(Basis):
     """cos mθ of z = cos θ."""
 
-    kind: ClassVar[Literal["circle"]] = "circle"
-
-    def one(self, columns: int) -> Balls:
-        """The coefficients of 1, so many at most."""
-        return balls([1.0])
+    kind: ClassVar[BasisKind] = "circle"
 
     def cover(self, columns: int) -> tuple[FloatArray, FloatArray]:
         """Cells of θ/π."""
         count = FINE * (columns + 2)
         ends = np.arange(count + 1) / count
         return ends[:-1], ends[1:]
+
+    def products(self, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Means over θ."""
+        mass = np.diag(np.where(np.arange(degrees) > 0, 0.5, 1.0))
+        position = self.times_z(balls(np.eye(degrees)), noise)[:, :degrees].astype(float) @ mass
+        return mass, position, -float(noise.nu) / 2 * np.arange(degrees) ** 2 * mass
 
     def diffused(self, u: Balls, noise: Cylinder) -> Balls:
         """½ ν ∂θθ u."""
@@ -251,10 +265,10 @@ class Circle(Plain):
 
 
 @dataclass(frozen=True)
-class States(Plain):
+class States(Basis):
     """1 in state m of a chain, 0 in the others; a cell is a state."""
 
-    kind: ClassVar[Literal["states"]] = "states"
+    kind: ClassVar[BasisKind] = "states"
 
     def one(self, columns: int) -> Balls:
         """1 in all states."""
@@ -263,6 +277,12 @@ class States(Plain):
     def cover(self, columns: int) -> tuple[FloatArray, FloatArray]:
         """The states."""
         return np.arange(float(columns)), np.arange(float(columns))
+
+    def products(self, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Sums over the states."""
+        assert noise.states is not None
+        assert noise.rates is not None
+        return np.eye(degrees), np.diag(noise.states.astype(float)), noise.rates.astype(float)
 
     def diffused(self, u: Balls, noise: Cylinder) -> Balls:
         """Σ_n rates_mn u_n."""
@@ -286,7 +306,6 @@ class States(Plain):
         return iter([parts]), np.zeros(parts.shape)
 
 
-Basis = Core | Whole | Circle | States
 OTHERS: Mapping[BasisKind, Basis] = {"whole": Whole(), "circle": Circle(), "states": States()}
 """Those that need no numbers."""
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
 from fpsolve.proofs.balls import Balls, above, ball, balls, below, each, magnitudes, raised, rounded
-from fpsolve.proofs.basis import Basis, Plain, added, padded, turned
+from fpsolve.proofs.basis import Basis, added, padded, turned
 from fpsolve.proofs.statement import Cylinder
 
 UPPER, LOWER = 1, -1
@@ -167,7 +167,6 @@ class Trial:
     @cached_property
     def slope(self) -> Balls:
         """u_z."""
-        assert not isinstance(self.basis, Plain)
         return self.basis.slope(self._u)
 
     @cached_property
@@ -262,7 +261,7 @@ class Bounder:
         cells = Cells(trial.basis, low, high)
         divisor = self._divisor(cells)
         mismatch = self._range(cells.modes(trial.mismatch), divisor)
-        if isinstance(trial.basis, Plain):
+        if trial.basis.cover(1) is not None:
             return Bounds(mismatch, mismatch)
         if trial.noise.is_bounded and trial.basis.is_core:
             mismatch = _divided(mismatch, low, high)

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.model.exact import BasisKind
 from fpsolve.proofs.balls import ball, precision
-from fpsolve.proofs.basis import OTHERS, Basis, Core, Plain
+from fpsolve.proofs.basis import OTHERS, Basis, Core
 from fpsolve.proofs.records import ChainRecord, MotionRecord, Record
 from fpsolve.proofs.statement import Statement, check_decimal, exact_halves
 
@@ -115,7 +115,8 @@ class Certificate(Record):
             (each.tails is None) == basis.is_core for each in sides
         ):
             raise ValueError("a moment has its p, and a core its tails; nothing else has")
-        if any(bool(each.nodes) == isinstance(basis, Plain) or len(each.nodes) == 1 for each in sides):
+        is_covered = basis.cover(1) is not None
+        if any(bool(each.nodes) == is_covered or len(each.nodes) == 1 for each in sides):
             raise ValueError("a core and a whole support have two nodes at least; nothing else has any")
         return self
 
@@ -131,8 +132,8 @@ class Certificate(Record):
 
     def _cells(self, side: SideRecord) -> Sequence[float]:
         """Ends of the cells of the noise."""
-        basis = self.basis.basis
-        return basis.cover(len(self.cosine[0]))[0].tolist() if isinstance(basis, Plain) else side.nodes
+        covered = self.basis.basis.cover(len(self.cosine[0]))
+        return side.nodes if covered is None else covered[0].tolist()
 
     @property
     def work(self) -> int:

@@ -21,7 +21,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.exponent.adapt import Budget, Countdown
 from fpsolve.fem.factors import sparse_lu
 from fpsolve.proofs.balls import above, ball, balls, below, precision
-from fpsolve.proofs.basis import OTHERS, Basis, Circle, Core, Plain, States, Whole, hermite_table
+from fpsolve.proofs.basis import OTHERS, Basis, Core, Whole, hermite_table
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, HeldBounds, Trial
 from fpsolve.proofs.certificate import MOST, NOTHING, BasisRecord, Certificate, Enclosure, SideRecord, enclosure_of
 from fpsolve.proofs.statement import Cylinder, Statement, cylinder
@@ -141,14 +141,8 @@ class Galerkin:
 
 def _axis(noise: Cylinder, basis: Basis, degrees: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """⟨B_n, B_m⟩, ⟨z B_n, B_m⟩ and the noise's part of L, shape (degrees, degrees) each."""
-    if isinstance(basis, States):
-        assert noise.states is not None
-        assert noise.rates is not None
-        return np.eye(degrees), np.diag(noise.states.astype(float)), noise.rates.astype(float)
-    if isinstance(basis, Circle):
-        mass = np.diag(np.where(np.arange(degrees) > 0, 0.5, 1.0))
-        position = basis.times_z(balls(np.eye(degrees)), noise)[:, :degrees].astype(float) @ mass
-        return mass, position, -float(noise.nu) / 2 * np.arange(degrees) ** 2 * mass
+    if (known := basis.products(noise, degrees)) is not None:
+        return known
     z, weight = _quadrature(basis, noise, degrees)
     values, slopes = _tabulated(basis, z, degrees)
     full = slopes + basis.gauge * values
@@ -156,7 +150,7 @@ def _axis(noise: Cylinder, basis: Basis, degrees: int) -> tuple[FloatArray, Floa
     return (values * weight) @ values.T, (values * weight * z) @ values.T, -diffusion
 
 
-def _quadrature(basis: Core | Whole, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray]:
+def _quadrature(basis: Basis, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray]:
     """Gauss's z and weights that sum to 1."""
     a = float(noise.slope)
     if not basis.is_core:
@@ -172,7 +166,7 @@ def _quadrature(basis: Core | Whole, noise: Cylinder, degrees: int) -> tuple[Flo
     return z, weight / weight.sum()
 
 
-def _tabulated(basis: Core | Whole, z: FloatArray, degrees: int) -> tuple[FloatArray, FloatArray]:
+def _tabulated(basis: Basis, z: FloatArray, degrees: int) -> tuple[FloatArray, FloatArray]:
     """B_m(z) and B_m′(z), (degrees, points) each."""
     if basis.is_core:
         root = np.sqrt(np.arange(degrees))
@@ -417,8 +411,8 @@ def _pull(value: float, inward: float, q: int) -> float:
 def _sides(trial: Trial, phases: int) -> tuple[SideRecord | None, SideRecord | None]:
     """The least δ of the upper and of the lower bound, to 1 %, each None where there is none."""
     bounder = Bounder(trial, phases)
-    if isinstance(trial.basis, Plain):
-        bounds = bounder.bounds(*trial.basis.cover(trial.cosine.shape[1]))
+    if (covered := trial.basis.cover(trial.cosine.shape[1])) is not None:
+        bounds = bounder.bounds(*covered)
         if not np.all(bounds.is_positive):
             return None, None
         most = (max(float(np.max(bounds.above(q))), 1e-18) * (1 + SLACK) for q in (UPPER, LOWER))

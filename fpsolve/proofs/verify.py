@@ -82,7 +82,6 @@ from itertools import pairwise
 import numpy as np
 
 from fpsolve.proofs.balls import ball, precision
-from fpsolve.proofs.basis import Plain
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, Trial
 from fpsolve.proofs.certificate import MOMENT, Certificate, SideRecord
 from fpsolve.proofs.statement import Cylinder, cylinder
@@ -103,8 +102,8 @@ def objection(certificate: Certificate) -> str:
         sine=np.array(certificate.sine),
     )
     bounder = Bounder(trial, certificate.phases)
-    if isinstance(trial.basis, Plain):
-        return _plain_objection(bounder, trial.basis, certificate)
+    if (covered := trial.basis.cover(len(certificate.cosine[0]))) is not None:
+        return _plain_objection(bounder.bounds(*covered), certificate)
     for _, side in sides:
         misplaced = _misplaced(certificate, trial.noise, side)
         if misplaced:
@@ -119,9 +118,8 @@ def objection(certificate: Certificate) -> str:
     )
 
 
-def _plain_objection(bounder: Bounder, basis: Plain, certificate: Certificate) -> str:
+def _plain_objection(bounds: Bounds, certificate: Certificate) -> str:
     """Why LT ≤ (μ + δ) T or LT ≥ (μ − δ) T need not hold for T = u."""
-    bounds = bounder.bounds(*basis.cover(len(certificate.cosine[0])))
     if not np.all(bounds.is_positive):
         return "u > 0 is not certain"
     for q, side in ((UPPER, certificate.upper), (LOWER, certificate.lower)):
