@@ -11,7 +11,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, Self
 
 from fpsolve import __version__
-from fpsolve.drawing import canvas_of, draw, title_of
+from fpsolve.drawing import canvas_of, draw, title_of, typeset
 from fpsolve.errors import FpsolveError
 
 if TYPE_CHECKING:  # each takes some tenths of a second to import
@@ -64,17 +64,21 @@ class Quantity:
         """The label of an axis, in LaTeX, with the unit."""
         return title_of(self.attributes)
 
+    @property
+    def shown(self) -> str:
+        """Its symbol in a figure, or else its name, of a parameter without the section."""
+        return self.latex or self.name.rpartition(".")[2]
+
     def timed(self, unit: str) -> Self:
         """The same with a unit of time: "1/s" instead of "1/time"."""
         return replace(self, unit=re.sub(r"\btime\b", unit, self.unit))
 
     def stated(self, value: float | str) -> str:
         r"""A value of it in a figure: "$D_0$ = 0.1/time", "impact = delta"."""
-        name = self.latex or self.name.rpartition(".")[2]
         if isinstance(value, str):
-            return f"{name} = {value}"
-        unit = "" if self.unit in ("1", "unknown") else f" {self.unit}"
-        return f"{name} = {value:g}{unit.removeprefix(' 1')}"
+            return f"{self.shown} = {value}"
+        unit = "" if self.unit in ("1", "unknown") else f" {typeset(self.unit)}"
+        return f"{self.shown} = {value:g}{unit.removeprefix(' 1')}"
 
     @property
     def _plain(self) -> Quantity:
@@ -106,6 +110,11 @@ class Quantity:
             unit=unit,
             dims=(*self.dims, *other.dims),
         )
+
+
+def plain_unit(unit: str) -> str:
+    """A unit in a sentence, without powers in parentheses: "1/sqrt(time)", "1/time^1.5"."""
+    return re.sub(r"(\w+)\^\(1/2\)", r"sqrt(\1)", unit).replace("^(3/2)", "^1.5")
 
 
 def brief(thing: object, text: str) -> str:

@@ -181,9 +181,14 @@ def is_math(text: str) -> bool:
     return True
 
 
+def typeset(unit: str) -> str:
+    """A unit in which matplotlib raises what follows a "^": "1/time$^{1/2}$"."""
+    return unit if "$" in unit else re.sub(r"\^(?:\(([^()]+)\)|([+-]?[\d.]+))", r"$^{\1\2}$", unit)
+
+
 def title_of(attributes: Mapping[str, Any]) -> str:
     r"""A variable on an axis, from its attributes: "largest Lyapunov exponent $\lambda$ (1/time)"."""
-    unit = "" if attributes["units"] == "1" else f"({attributes['units']})"
+    unit = "" if attributes["units"] == "1" else f"({typeset(attributes['units'])})"
     return " ".join(part for part in (attributes["long_name"], attributes.get("symbol", ""), unit) if part)
 
 
@@ -213,14 +218,15 @@ def scale_axis(axis: Any, scale: str, limits: tuple[float, float] | None = None)
 
 def plain_numbers(axis: Any) -> None:
     """Numbers such as 0.5, 1, 2 on a logarithmic axis of a few decades; fewer of them in a small figure."""
-    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator, StrMethodFormatter
 
     start, stop = axis.get_view_interval()
     decades, is_large = math.log10(stop / start), points(1) > 0.7
     if decades < 4:
-        few = MaxNLocator(5 if is_large else 4)
-        many = LogLocator(subs=(1, 2, 5) if decades < (2.5 if is_large else 1.8) else (1,))
-        axis.set_major_locator(few if decades < 0.7 else many)
+        subs = (1, 1.5, 2, 3, 4, 5, 7) if decades < 0.7 else (1, 2, 5) if decades < (2.5 if is_large else 1.8) else (1,)
+        axis.set_major_locator(MaxNLocator(5 if is_large else 4) if decades < 0.4 else LogLocator(subs=subs))
+        if decades < 0.7:
+            axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.set_minor_formatter(NullFormatter())
 

@@ -187,11 +187,13 @@ class Code(Enum):
         "noise P(sup ‖x‖ > A) may fall faster than any power of A}"
     )
     NOT_ONE_RAY = "note: the motion has impacts on {count:?{count}¦no} rays, and only on a single one have they a rate"
-    RARE_IMPACTS = "note: impacts are too rare to matter, N < {most:.1g}"
+    RARE_IMPACTS = (
+        "note: N cannot be told from 0, N < {most:.1g}, as where the motion does not turn: R leaves λ as it is"
+    )
     LOG_OUT_OF_RANGE = "note: its logarithm is {value:.3g}, beyond ±{most:g}"
     NO_RESTITUTION = "note: the motion has no coefficient of restitution"
-    ALWAYS_STABLE = "note: almost surely stable for every r in (0, 1], as λ without loss is {value:.3g}"
-    ALWAYS_UNSTABLE = "note: unstable for every r in (0, 1]: it would have to be {value:.3g}"
+    ALWAYS_STABLE = "note: almost surely stable for every {symbol} in (0, 1], as λ without loss is {value:.3g}"
+    ALWAYS_UNSTABLE = "note: unstable for every {symbol} in (0, 1]: it would have to be {value:.3g}"
 
     RARE_PATHS = (
         "note: at p = {p:g} rare paths carry the moment{first:?, at p = {first:g} those¦, those} with noise around "
@@ -219,6 +221,8 @@ class Code(Enum):
         "{rest:.3g}, {size:.0%}"
     )
     NO_SENSITIVITIES = "note: no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
+    UNUSED = "note: {keys}: in no rate and in no restitution, so that nothing depends on it"
+    NO_DERIVATIVE = "note: no sensitivities to {key}: the derivative of the system by it is not finite at {value:g}"
     ONE_SIDED = (
         "note: the sensitivities to {key} = {value:g} are derivatives from below: above, Λ is infinite or another one"
     )

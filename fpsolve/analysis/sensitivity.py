@@ -117,7 +117,7 @@ class Sensitivities(Result):
             label: np.array([self.theta[key] * each.value for key, each in slopes.items()])
             for label, (_, slopes) in self.shown().items()
         }
-        draw_bars(axes, bars, [each.latex or key for key, each in self.quantities.items()], **kwargs)
+        draw_bars(axes, bars, [each.shown for each in self.quantities.values()], **kwargs)
         axes.set_xlabel(r"effect of a relative change, $\theta\,\partial/\partial\theta$ (1/time)")
         if bars:
             add_legend(axes)
@@ -227,7 +227,9 @@ def solve_sensitivities(
         root: near δ_p, if it is known.
         progress: called once for each p and each index, also where it fails.
     """
-    found, notes, parameters = Gradient(solver, along), list[Message](), solver.problem.parameters
+    found, parameters = Gradient(solver, along), solver.problem.parameters
+    left = solver.problem.undifferentiable
+    notes = [Message(Code.NO_DERIVATIVE, key=key, value=value) for key, value in left.items()]
 
     def tried(record: Quantity, solve: Callable[[], Slopes], p: float | None = None) -> Slopes:
         try:

@@ -371,11 +371,14 @@ class OutputSection(Section):
     sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
 
     @property
+    def states_quantities(self) -> bool:
+        """Whether the file itself says what is computed."""
+        return "quantities" in self.model_fields_set
+
+    @property
     def asks_for_eigenfunctions(self) -> bool:
         """Whether the file itself says that they are written, and not the defaults alone."""
-        return EIGENFUNCTIONS in self.quantities and (
-            self.eigenfunctions is not None or "quantities" in self.model_fields_set
-        )
+        return EIGENFUNCTIONS in self.quantities and (self.eigenfunctions is not None or self.states_quantities)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

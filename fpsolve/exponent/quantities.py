@@ -118,12 +118,12 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
     if log.value > 0:
         # λ is affine in ln R, and 0 at ln R_c
         lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[number].log_factor)
-        return Absent(Message(Code.ALWAYS_STABLE, value=lossless))
+        return Absent(Message(Code.ALWAYS_STABLE, symbol=system.impact_symbol, value=lossless))
     value = system.impact_value(log.value)
     if math.isnan(value):
         return Absent(Message(Code.NO_RESTITUTION))
     if value <= 0:
-        return Absent(Message(Code.ALWAYS_UNSTABLE, value=value))
+        return Absent(Message(Code.ALWAYS_UNSTABLE, symbol=system.impact_symbol, value=value))
     slope = system.impact_slope(log.value)
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
     return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.near.remedy)
@@ -253,4 +253,10 @@ INDICES: Mapping[str, Index] = {
         *(IMPACT_RATE, CRITICAL_IMPACT_FACTOR, CRITICAL_RESTITUTION),
     )
 }
+BY_JUMP: Mapping[str, Callable[[ExponentSolver, int], Estimate | Absent]] = {
+    IMPACT_RATE.name: impact_rate,
+    CRITICAL_IMPACT_FACTOR.name: critical_impact_factor,
+    CRITICAL_RESTITUTION.name: critical_restitution,
+}
+"""Those of them that each jump of a system has."""
 QUANTITIES: Mapping[str, Quantity] = {MOMENT.name: MOMENT, **INDICES}

@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from fpsolve.data import plain_unit
 from fpsolve.messages import Message
 from fpsolve.model.quantity import Quantity
 
@@ -62,7 +63,7 @@ def unit_of(field: FieldInfo) -> str:
 def meaning_of(field: FieldInfo) -> str:
     """What a `parameter` is, with its unit."""
     unit, meaning = unit_of(field), field.description or ""
-    return f"{meaning}, in {unit}" if unit else meaning
+    return f"{meaning}, in {plain_unit(unit)}" if unit else meaning
 
 
 def _extra(field: FieldInfo) -> Mapping[str, str]:

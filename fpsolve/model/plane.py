@@ -288,6 +288,11 @@ class System(Parametrised):
     def impact_parameter(self) -> str:
         return ""
 
+    @property
+    def impact_symbol(self) -> str:
+        """What its coefficient of restitution is called in sentences."""
+        return "R"
+
     def impact_value(self, log_factor: float) -> float:
         """The coefficient of restitution of a wall with a given ln R, by its law; it may be out of range. Here R."""
         with np.errstate(over="ignore"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, wraps
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_numbers, shown
+from fpsolve.data import plain_unit
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message
 from fpsolve.model.frame import Frame, normal_frame
@@ -174,7 +176,7 @@ class Problem:
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
-        """All parameters by their keys, with symbol, words, unit and range."""
+        """All parameters by their keys, with symbol, words, unit and range; no two have one symbol."""
         found = dict[str, Parameter]()
         for section, half in self.sections.items():
             for name, value in half.values.items():
@@ -182,12 +184,25 @@ class Problem:
                 if half is self.noise and name in self.noise.of_xi and self.system.noise_unit != RATE:
                     quantity = replace(quantity, unit="unknown")
                 found[key] = Parameter(value, quantity, type(half))
-        return found
+        signs = Counter(_sign(each.quantity) for each in found.values())
+        return {
+            key: each._replace(quantity=_of_noise(each.quantity))
+            if signs[_sign(each.quantity)] > 1 and not key.startswith(f"{self.system.section}.")
+            else each
+            for key, each in found.items()
+        }
 
     @property
     def differentiable(self) -> list[str]:
         """The keys of the parameters by which Λ can be differentiated."""
         return [f"{section}.{name}" for section, half in self.sections.items() for name in half.differentiable]
+
+    @property
+    def undifferentiable(self) -> Mapping[str, float]:
+        """The other numbers on which Λ depends, by their keys: the system has an infinite derivative by each."""
+        inert = {f"{section}.{name}" for section, half in self.sections.items() for name in half.inert}
+        left = inert.union(self.differentiable)
+        return {key: value for key, value in self.values.items() if not isinstance(value, str) and key not in left}
 
     @property
     def remarks(self) -> list[Message]:
@@ -248,6 +263,19 @@ def _keyed(quantity: Quantity, key: str) -> Quantity:
     return quantity if quantity.name == key else replace(quantity, name=key, symbol=key)
 
 
+def _sign(quantity: Quantity) -> str:
+    """The symbol of a parameter in a figure, or its name, upright or not."""
+    return quantity.shown.strip("$")
+
+
+def _of_noise(quantity: Quantity) -> Quantity:
+    """A parameter of a noise whose symbol another parameter has: with the name of the noise below it."""
+    name = quantity.name.split(".")[1:-1]
+    below = rf"\mathrm{{{name[0]}}}".replace("_", r"\_") if name else r"\xi"
+    sign = quantity.latex.strip("$") or rf"\mathrm{{{quantity.shown}}}".replace("_", r"\_")
+    return replace(quantity, latex=f"${{{sign}}}_{{{below}}}$")
+
+
 def parameter_words(parameters: Mapping[str, Parameter], keys: Collection[str]) -> str:
     """Some of the parameters with their units, by dotted keys: "noise.D0 = 0.1 (1/time), noise.r0 = 0.9"."""
     return ", ".join(f"{key} = {_valued(parameters[key])}" for key in keys)
@@ -267,7 +295,7 @@ def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str
 def _valued(parameter: Parameter) -> str:
     """The value of a parameter with its unit."""
     text = parameter.value if isinstance(parameter.value, str) else f"{parameter.value:g}"
-    return text if parameter.quantity.unit in ("1", "unknown") else f"{text} ({parameter.quantity.unit})"
+    return text if parameter.quantity.unit in ("1", "unknown") else f"{text} ({plain_unit(parameter.quantity.unit)})"
 
 
 def with_original(problem: Problem, original: Any) -> Problem:

@@ -173,7 +173,7 @@ def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path)
         held = held_in_words(result.curve, (), case.figure.time_unit)
         with figure_for(_paths(folder, f"sensitivities{result.curve.suffix}"), case.headline, held) as figure:
             words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
-            draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).latex or key for key in found.theta])
+            draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).shown for key in found.theta])
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
@@ -299,7 +299,9 @@ def draw_series(axes: Any, case: Case, series: Sequence[Series], equation: str) 
         style |= {"markersize": points(size), "elinewidth": points(line), "capsize": points(cap)}
         draw_dots(axes, *np.concatenate(simulated, axis=1), label="Monte Carlo ± 2 standard errors", **style)
     axes.margins(x=0.03)
-    scale_axis(axes.xaxis, scale_of(np.concatenate([item.x for item in series])), setting.xlim)
+    places = np.concatenate([item.x for item in series])
+    is_short = setting.x == "p" and places.size and places.max() < 10 * places.min()
+    scale_axis(axes.xaxis, "linear" if is_short else scale_of(places), setting.xlim)
     scale_axis(axes.yaxis, "linear", setting.ylim)
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     _mark(axes, series, colours)
@@ -351,9 +353,7 @@ def _draw_many(axes: Any, case: Case, series: Sequence[Series], equation: str) -
     }
     order = [np.argsort(item.x, kind="stable") for item in series]
     paths = [np.stack([item.x[by], item.y[by]], axis=1) for item, by in zip(series, order, strict=True)]
-    others = "".join(
-        f", each for {count} values of {case.about(key).latex or key}" for key, count in encoding.unencoded
-    )
+    others = "".join(f", each for {count} values of {case.about(key).shown}" for key, count in encoding.unencoded)
     kinds = dict.fromkeys(encoding.styles)
     for kind, line in zip(kinds, STYLES, strict=False):
         chosen = [i for i, each in enumerate(encoding.styles) if each == kind]

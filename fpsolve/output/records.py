@@ -34,7 +34,7 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
 from fpsolve.errors import OutputError, Remedy
-from fpsolve.exponent.quantities import INDICES
+from fpsolve.exponent.quantities import BY_JUMP, INDICES
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Message, message_of
 from fpsolve.model.kinds import version_of
@@ -239,7 +239,7 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
         CurveResult,
         **_of_curve(curve),
         p=wanted.p.tolist(),
-        wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated],
+        wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated, wanted.is_stated],
         numerics=[numerics.rtol, budget.unknowns, budget.seconds, mesh and codec(CylinderMesh).plain(mesh)],
     )
 
@@ -282,7 +282,7 @@ def fits(result: CurveResult, asked: Sequence[float]) -> bool:
     found, slopes, failed = result.moments, result.sensitivities, [each.p for each in result.failures]
     columns = [getattr(found, each.name) for each in fields(found)]
     p, solved = found.p.tolist(), {*found.p.tolist(), *failed}
-    indices = list(filter(None, result.estimates.values()))
+    indices = [each for some in (result.estimates, *result.jumps) for each in some.values() if each]
     is_whole = (
         all(each.shape == found.p.shape for each in columns[:-1])
         and found.p.ndim == found.rare.ndim == 1
@@ -291,6 +291,8 @@ def fits(result: CurveResult, asked: Sequence[float]) -> bool:
         and len(set(p)) == len(p)
         and {*p, *found.rare.tolist()} <= set(asked) <= (solved if None not in solved else {*asked})
         and result.estimates.keys() == INDICES.keys()
+        and len(result.jumps) in (0, len(result.curve.problem.system.jumps))
+        and all(each.keys() <= BY_JUMP.keys() for each in result.jumps)
         and 0 <= result.seconds < math.inf
     )
     if is_whole and slopes is not None:

@@ -133,6 +133,15 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
     for index in asked(case):
         numbers = result.index(index)
         found[index.name] = numbers and {key: value if math.isfinite(value) else None for key, value in numbers.items()}
+    if result.jumps:
+        found["jumps"] = [
+            {"phase": ray.phase, "log_factor": ray.log_factor}
+            | {
+                name: each and {"value": each.value, "error_estimate": each.error_estimate}
+                for name, each in of_ray.items()
+            }
+            for ray, of_ray in zip(result.curve.problem.system.jumps, result.jumps, strict=True)
+        ]
     if SENSITIVITIES in case.output.quantities:
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
     return {

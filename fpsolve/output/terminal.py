@@ -16,11 +16,13 @@ from rich.text import Text
 
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.vary import written
+from fpsolve.case.vary import short_names, written
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import (
+    BY_JUMP,
     CRITICAL_RESTITUTION,
     IMPACT_RATE,
+    INDICES,
     LYAPUNOV_EXPONENT,
     MOMENT,
     STABILITY_INDEX,
@@ -88,8 +90,14 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
 
 
 def varied_columns(case: Case) -> list[Column]:
-    """A column for each varied key, without its section."""
-    return [Column(key.rpartition(".")[2]) for key in case.vary.keys]
+    """A column for each varied key, without its section where that is not needed."""
+    return [Column(name) for name in short_names(case.vary.keys)]
+
+
+def _told(case: Case) -> list[Index]:
+    """The indices that a case asks for, without those of impacts where it names none, and not one ray has them."""
+    has_impacts = len(case.system.jumps) == 1 or case.output.states_quantities
+    return [index for index in asked(case) if has_impacts or index.name not in BY_JUMP]
 
 
 def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
@@ -102,7 +110,7 @@ def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
 
 def _quantities(case: Case) -> list[_Shown]:
     """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
-    ordered = sorted(asked(case), key=lambda index: index not in MAIN)
+    ordered = sorted(_told(case), key=lambda index: index not in MAIN)
     if case.figure.x != "p":
         return [each for index in ordered if index in MAIN for each in (_index(index, 0), _theory(case, index))]
     found = [_index(each, rank + 1 if rank > 1 else 0) for rank, each in enumerate(ordered)]
@@ -191,7 +199,7 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
             if result.moments.p.size:
                 screen.show(_moment_grid(case, result))
             groups: list[list[str]] = [[]]  # what concerns impacts apart from the others
-            for index in asked(case) if any(result.estimates.values()) else ():
+            for index in _told(case) if any(result.estimates.values()) else ():
                 estimate = result.estimates[index.name]
                 error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
                 if index == IMPACT_RATE:
@@ -199,6 +207,9 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
                 groups[-1].append(f"{index.symbol} = {index_text(index, result)}{error}")
             for group in groups:
                 screen.packed(group)
+            for ray, found in zip(result.curve.problem.system.jumps, result.jumps, strict=False):
+                numbers = [f"{INDICES[name].symbol} = {each}" for name, each in found.items() if each]
+                screen.packed([f"φ = {ray.phase:.6g}:", *numbers])
             screen.lines([""])
     print_remarks(case, results)
 
@@ -346,7 +357,8 @@ def _moment_grid(case: Case, result: CurveResult) -> Grid:
 def print_chart(case: Case, chart: Chart) -> None:
     """The special points of every line, and what the regions are."""
     screen = Screen.of()
-    names = [axis.key.rpartition(".")[2] for axis in (charted(case).x, charted(case).y)]
+    keys = charted(case).x.key, charted(case).y.key
+    names = short_names(keys)
     columns = [Column("line"), Column("branch", 1), Column("points", 2), *map(Column, names)]
     grid = Grid(case.headline, [*columns, Column("special point", is_text=True)])
     for line in chart.lines:
@@ -355,7 +367,9 @@ def print_chart(case: Case, chart: Chart) -> None:
             count = f"{branch.x.size}{', closed' if branch.closed else ''}"
             grid.rows.append([line.zero.equation, str(number), count, "", "", ""])
             for i in special:
-                label = branch.labels[i].replace("oscillator.", "").replace("noise.", "")
+                label = branch.labels[i]
+                for key, name in zip(keys, names, strict=True):
+                    label = label.replace(f"{key} ", f"{name} ")
                 grid.rows.append(["", "", "", f"{branch.x[i]:.7g}", f"{branch.y[i]:.7g}", label])
             grid.ends.add(len(grid.rows) - 1)
     screen.show(grid)

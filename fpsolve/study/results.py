@@ -77,6 +77,7 @@ class CurveResult(Result):
         warnings: what limits these numbers.
         notes: where the theories compared with are not valid.
         failures: why some p are missing, or with all p some indices.
+        jumps: where a system has several, the `BY_JUMP` of each by their names, as `estimates`.
         sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
         seconds: how long the processor took.
     """
@@ -88,6 +89,7 @@ class CurveResult(Result):
     warnings: tuple[Message, ...] = ()
     notes: tuple[Message, ...] = ()
     failures: tuple[Failure, ...] = ()
+    jumps: tuple[Mapping[str, Estimate | None], ...] = ()
     sensitivities: Sensitivities | None = None
     seconds: float = 0.0
 

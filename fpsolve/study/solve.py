@@ -7,8 +7,9 @@ from a neighbour's mesh saves half of the time of one p in strong noise, and not
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from time import thread_time
@@ -24,10 +25,10 @@ from fpsolve.case.sections import EIGENFUNCTIONS, SENSITIVITIES
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Estimate, Failure
+from fpsolve.exponent.error import Absent, Estimate, Failure
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
 from fpsolve.exponent.function import solve_moments
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
+from fpsolve.exponent.quantities import BY_JUMP, INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity, message_of
@@ -50,6 +51,7 @@ class Wanted:
         shown: the p whose eigenfunctions are kept.
         density: whether the stationary density is.
         differentiated: the p at which Λ is differentiated by the parameters; None where no sensitivities are wanted.
+        is_stated: whether a case names what it wants, so that what there is not is told of.
     """
 
     p: FloatArray
@@ -57,6 +59,7 @@ class Wanted:
     shown: tuple[float, ...] = ()
     density: bool = False
     differentiated: tuple[float, ...] | None = None
+    is_stated: bool = True
 
     @property
     def draws(self) -> bool:
@@ -94,6 +97,7 @@ def everything(case: Case, number: int = 1) -> Wanted:
         shown=tuple(case.shown),
         density=draws and (number == 1 or case.shown.size > 0),
         differentiated=slopes if SENSITIVITIES in names else None,
+        is_stated=case.output.states_quantities,
     )
 
 
@@ -136,7 +140,10 @@ def solve_curve(
     started = thread_time()
     solver = numerics.solver(curve)
     found = solve_moments(solver, wanted.p, progress=progress)
-    estimates, missing = _solve_indices(solver, wanted.indices, found)
+    tries = {name: (INDICES[name].symbol, partial(INDICES[name].solve, solver, found.root)) for name in wanted.indices}
+    estimates, missing = _solve_indices(tries, found)
+    jumps, more = _solve_jumps(solver, wanted.indices, found)
+    missing = [each for each in missing if wanted.is_stated or not each.tells_of(Code.NOT_ONE_RAY)] + more
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
     pairs, stationary, undrawn = _functions(solver, without_failed(wanted, found.failures))
@@ -189,6 +196,7 @@ def solve_curve(
         ),
         estimates=estimates,
         discretisation=_discretisation(solver),
+        jumps=jumps,
         warnings=(*found.warnings, *limits),
         sensitivities=slopes,
         notes=tuple(note for note in notes if note is not None),
@@ -227,18 +235,21 @@ def _functions(
 
 
 def _solve_indices(
-    solver: ExponentSolver, names: Sequence[str], moments: MomentLyapunov
+    tries: Mapping[str, tuple[str, Callable[[], Estimate | Absent]]], moments: MomentLyapunov
 ) -> tuple[dict[str, Estimate | None], list[Message]]:
-    """Indices, δ_p first, None for those not asked for; why others did not converge, are infinite, or do not exist."""
+    """Indices, δ_p first, None for those not asked for; why others did not converge, are infinite, or do not exist.
+
+    Args:
+        tries: by names of `INDICES` what messages call each, and what solves it.
+        moments: what is known of Λ(p).
+    """
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
     unsolved = {each.reason: Message(Code.NO_MOMENT, p=each.p) for each in moments.failures if each.p is not None}
     missing: dict[tuple[Code, Message], list[str]] = {}
-    for index in sorted(INDICES.values(), key=lambda index: index != STABILITY_INDEX):
-        if index.name not in names:
-            continue
-        symbol = index.symbol
+    for name in sorted(tries, key=lambda name: name != STABILITY_INDEX.name):
+        symbol, solve = tries[name]
         try:
-            found = index.solve(solver, moments.root)
+            found = solve()
         except NotConverged as failure:
             code = Code.INDEX_MISSING if moments.failures else Code.INDEX_FAILED
             reason = unsolved.get(failure.message, failure.message)
@@ -248,15 +259,30 @@ def _solve_indices(
             code, reason = Code.INDEX_FAILED, Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
         else:
             if isinstance(found, Estimate):
-                estimates[index.name] = found
+                estimates[name] = found
                 continue
             code, reason = Code.INDEX_ABSENT, found.reason
-            if index == STABILITY_INDEX:
+            if name == STABILITY_INDEX.name:
                 if reason.code is Code.NO_INDEX:  # of which a note tells
                     continue
                 code, symbol = Code.INDEX_MISSING, "stability index"
         missing.setdefault((code, reason), []).append(symbol)
     return estimates, [Message(code, symbols=symbols, reason=reason) for (code, reason), symbols in missing.items()]
+
+
+def _solve_jumps(
+    solver: ExponentSolver, names: Sequence[str], moments: MomentLyapunov
+) -> tuple[tuple[Mapping[str, Estimate | None], ...], list[Message]]:
+    """Of a system with several jumps the indices of each, and why some are not there."""
+    rays, told, messages = solver.problem.system.jumps, [], list[Message]()
+    wanted = [name for name in BY_JUMP if name in names] if len(rays) > 1 else []
+    for number, ray in enumerate(rays if wanted else ()):
+        where = f"at φ = {ray.phase:.6g}"
+        tries = {name: (f"{INDICES[name].symbol} {where}", partial(BY_JUMP[name], solver, number)) for name in wanted}
+        found, missing = _solve_indices(tries, moments)
+        told.append({name: found[name] for name in wanted})
+        messages += missing
+    return tuple(told), messages
 
 
 def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:

@@ -172,7 +172,12 @@ class OrnsteinUhlenbeckByDeviation(GaussianNoise):
 
     alpha: Annotated[float, parameter("relaxation rate", "alpha = 1.0", r"$\alpha$", "1/time", **SIZE)]
     standard_deviation: float = parameter(  # type: ignore[assignment]
-        "standard deviation of the noise", "standard_deviation = 0.7", "$s$", "1/time", ge=SIZE["ge"], le=SIZE["le"]
+        "standard deviation of the noise",
+        "standard_deviation = 0.7",
+        r"$\sigma_\xi$",
+        "1/time",
+        ge=SIZE["ge"],
+        le=SIZE["le"],
     )
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"

@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray, identity, one, real_number, shown
-from fpsolve.messages import is_control
+from fpsolve.messages import Code, Message, is_control
 from fpsolve.model.expressions import ExpressionError, Form, constant, log_of, name_fault, names_in, summands
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
@@ -207,6 +207,11 @@ class EquationSystem(System):
     def from_table(cls, table: Mapping[str, Any]) -> EquationSystem:
         parameters: Mapping[str, StatedParameter] = table.get("parameters", {})
         quantities = tuple((name, _quantity(name, each)) for name, each in parameters.items())
+        signs = [quantity.shown.strip("$") for _, quantity in quantities]
+        for (name, quantity), sign in zip(quantities, signs, strict=True):
+            if quantity.latex and signs.count(sign) > 1:
+                text = f"got the symbol {sign} of two parameters; all must differ; choose another one"
+                raise TableError(text, "parameters", name, "symbol")
         named = {name: each.value for name, each in parameters.items()}
         for name in (parameters.keys() & table.keys()) - cls.stated.keys():
             try:
@@ -228,6 +233,13 @@ class EquationSystem(System):
     def epsilon(self) -> float:  # type: ignore[override]
         """The parameter of this name; 1 where there is none."""
         return dict(self.named).get(EPSILON, 1.0)
+
+    @property
+    def remarks(self) -> Sequence[Message]:
+        """Which parameters are in no rate and in no restitution."""
+        used = frozenset[str]().union(*map(names_in, [*self.drift, *(str(wall.restitution) for wall in self.walls)]))
+        unused = tuple(f"{self.section}.{name}" for name, _ in self.named if name not in used)
+        return [Message(Code.UNUSED, keys=unused)] if unused else []
 
     @property
     def noise_section(self) -> str:
@@ -388,6 +400,10 @@ class EquationSystem(System):
         except TableError:
             return ""
         return name if abs(at_one) <= _LAW and slope > 0 else ""
+
+    @property
+    def impact_symbol(self) -> str:
+        return self._law or super().impact_symbol
 
     def impact_value(self, log_factor: float) -> float:
         """The coefficient of restitution for which ln R has a given value, by Newton's method; NaN if not found."""

@@ -39,7 +39,8 @@ class ParametricOscillator(System):
     """
 
     stiffness: Annotated[
-        float, parameter("stiffness without noise", "stiffness = 1.0", "$k$", "1/time²", name="stiffness", **ANY_SIGN)
+        float,
+        parameter("stiffness without noise", "stiffness = 1.0", r"$\kappa$", "1/time²", name="stiffness", **ANY_SIGN),
     ]
     damping: Annotated[
         float,

@@ -184,6 +184,10 @@ class VibroImpactOscillator(System):
         still, driven = np.array([[[0, omega], [-omega, square * c1]], [[0, 0], [0, epsilon]]], dtype=object)
         return ExactMotion(still, driven, (jump,))
 
+    @property
+    def impact_symbol(self) -> str:
+        return "r"
+
     def impact_value(self, log_factor: float) -> float:
         """The r for which this law, with this ε, has a given ln R; it may be no coefficient of restitution."""
         with np.errstate(over="ignore"):

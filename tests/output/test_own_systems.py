@@ -1,0 +1,198 @@
+"""What figures, tables and sentences say of systems and noise of one's own: symbols, units, impacts, derivatives."""
+
+import json
+from collections import Counter
+
+import pytest
+from matplotlib.figure import Figure
+
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve.case.vary import short_names
+from fpsolve.data import plain_unit
+from fpsolve.drawing import is_math, plain_numbers, typeset
+from fpsolve.exponent import ExponentSolver, critical_impact_factor, critical_restitution, impact_rate
+from fpsolve.messages import Code
+from fpsolve.model import MarkovChain, ParametricOscillator, Telegraph, VibroImpactOscillator, White, noise_kind
+from fpsolve.model.kinds import NOISES
+from fpsolve.output.figures import draw
+from fpsolve.output.tables import write_results
+from fpsolve.output.terminal import print_results, varied_columns
+from tests.solving import case_in, solve_case
+
+OWN = """
+title = "mine"
+[system]
+variables = ["x", "v"]
+drift = ["v", "-k*x - 2*s*v - load*x"]
+parameters = { k = 1.0, s = 0.1 }
+noises = { load = "noise.axial" }
+[noise.axial]
+kind = "KIND"
+"""
+KINDS = {"telegraph": "a = 0.5\nk = 1.0\n", "white": "s = 0.5\n", "ornstein-uhlenbeck": "alpha = 1.0\nsigma = 0.5\n"}
+MOMENTS = "[moments]\np = [1.0, 2.0, 4.0]\n"
+PLANE = """
+title = "two rays"
+[system]
+kind = "plane"
+terms = [{ matrix = [[0, 1], [-1, -0.2]] }, { order = 1, matrix = [[0, 0], [-1, 0]], noise = true }]
+jumps = [{ phase = 1.5707963267948966, log_factor = -0.05 }, { phase = 0.3, log_factor = 0.1 }]
+[noise]
+kind = "telegraph"
+a = 0.5
+k = 1.0
+"""
+
+
+def own(kind):
+    return OWN.replace("KIND", kind) + KINDS[kind]
+
+
+def signs(problem):
+    return [each.quantity.shown.strip("$") for each in problem.parameters.values()]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_two_parameters_of_a_problem_have_one_symbol(kind, tmp_path):
+    case = case_in(tmp_path, own(kind) + MOMENTS)
+    assert max(Counter(signs(case.problem)).values()) == 1
+    assert [case.about(f"system.{name}").shown for name in "ks"] == ["k", "s"]
+    assert all(is_math(each.quantity.shown) for each in case.parameters.values())
+
+
+def test_the_noise_is_named_where_it_shares_a_symbol(tmp_path):
+    case = case_in(tmp_path, own("white") + MOMENTS)
+    assert case.about("noise.axial.s").stated(0.5) == r"${s}_{\mathrm{axial}}$ = 0.5"
+    unnamed = PlaneSystem.of_equations(("x", "v"), ("v", "-x - s*v - xi*x"), {"s": 0.1})
+    assert Problem(unnamed, White(s=0.5)).parameters["noise.s"].quantity.shown == r"${s}_{\xi}$"
+
+
+def test_symbols_of_the_kinds_differ():
+    """Of the oscillator with noise in its stiffness and of every noise that has parameters of its own."""
+    system = ParametricOscillator(stiffness=1.0, damping=0.1)
+    for noise in (Telegraph(a=0.5, k=1.0), White(s=0.5), OrnsteinUhlenbeck(alpha=1.0, sigma=0.5)):
+        of_system, of_noise = ([each.quantity_of(name).latex for name in each.values] for each in (system, noise))
+        assert not set(filter(None, of_system)) & set(of_noise)
+    stated = [field.json_schema_extra["symbol"] for kind in map(noise_kind, NOISES) for field in kind.fields().values()]
+    assert r"$\kappa$" not in stated
+
+
+def test_one_symbol_for_two_parameters_is_refused(tmp_path):
+    text = own("white").replace("k = 1.0, s = 0.1", 'k = { value = 1.0, symbol = "s" }, s = 0.1')
+    with pytest.raises(Exception, match="got the symbol s of two parameters; all must differ; choose another one"):
+        case_in(tmp_path, text + MOMENTS)
+
+
+def test_columns_are_told_apart(tmp_path):
+    case = case_in(tmp_path, own("telegraph") + MOMENTS + '[vary]\n"system.k" = [1.0]\n"noise.axial.k" = [1.0]\n')
+    assert [column.heading for column in varied_columns(case)] == ["system.k", "noise.axial.k"]
+    assert short_names(["system.k", "noise.a"]) == ["k", "a"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "drawn", "said"),
+    [
+        ("1/time^(1/2)", "1/time$^{1/2}$", "1/sqrt(time)"),
+        ("1/time^(3/2)", "1/time$^{3/2}$", "1/time^1.5"),
+        ("kg m^-2", "kg m$^{-2}$", "kg m^-2"),
+        ("1/time²", "1/time²", "1/time²"),
+        ("$m^2$", "$m^2$", "$m^2$"),
+    ],
+)
+def test_powers_in_units_are_typeset(unit, drawn, said):
+    assert typeset(unit) == drawn
+    assert is_math(drawn)
+    assert plain_unit(unit) == said
+
+
+@pytest.mark.parametrize(("start", "stop"), [(1.0, 4.0), (2.0, 8.0), (0.9, 4.5), (1.0, 2.0), (0.3, 0.5)])
+def test_short_logarithmic_axes_have_round_ticks(start, stop):
+    figure = Figure()
+    axes = figure.subplots()
+    axes.set(xscale="log", xlim=(start, stop))
+    plain_numbers(axes.xaxis)
+    figure.draw_without_rendering()
+    inside = [tick for tick in axes.get_xticks() if start <= tick <= stop]
+    assert len(inside) >= 3
+    assert all(len(f"{tick:.6g}".replace(".", "").strip("0")) <= 2 for tick in inside if stop > 2.5 * start)
+    assert not axes.xaxis.get_minorticklocs().size
+
+
+def test_a_short_list_of_moments_is_on_an_even_axis(drawn, tmp_path):
+    case = case_in(tmp_path, own("telegraph") + MOMENTS + '[output]\nquantities = ["moment"]\n')
+    draw(case, solve_case(case), [], tmp_path)
+    assert drawn[0].axes[0].get_xscale() == "linear"
+
+
+def test_nothing_is_said_of_impacts_where_there_are_none(tmp_path, capsys):
+    [silent] = solve_case(case := case_in(tmp_path, own("telegraph") + MOMENTS))
+    assert not [note for note in silent.notes if note.tells_of(Code.NOT_ONE_RAY)]
+    print_results(case, [silent])
+    assert "R_c" not in "".join(capsys.readouterr())
+    asked = case_in(tmp_path, own("telegraph") + MOMENTS + '[output]\nquantities = ["impact_rate"]\n')
+    [told] = solve_case(asked)
+    assert [note for note in told.notes if note.tells_of(Code.NOT_ONE_RAY)]
+    print_results(asked, [told])
+    assert "no N" in "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize(
+    ("parameters", "restitution", "symbol"),
+    [({"r": 0.8}, "r", "r"), ({"loss": 0.2}, "1 - loss", "R"), ({}, 0.8, "R"), ({"e": 0.8}, "e**2", "e")],
+)
+def test_what_is_stable_for_every_restitution_names_it(parameters, restitution, symbol):
+    wall = {"at": "x = 0", "restitution": restitution}
+    system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.2*v - xi*x"), parameters, walls=[wall])
+    found = critical_restitution(ExponentSolver(Problem(system, MarkovChain.telegraph(0.3, 1.0))))
+    assert found.reason.code is Code.ALWAYS_STABLE
+    assert f"for every {symbol} in (0, 1]" in found.reason
+    assert VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1).impact_symbol == "r"
+
+
+def test_an_overdamped_motion_has_no_impacts():
+    system = ParametricOscillator(stiffness=1.0, damping=3.0, restitution=0.9)
+    found = critical_impact_factor(ExponentSolver(Problem(system, Telegraph(a=0.5, k=1.0))))
+    assert found.reason.code is Code.RARE_IMPACTS
+    assert "as where the motion does not turn" in found.reason
+
+
+def test_every_ray_has_its_rate_in_the_summary(tmp_path, capsys):
+    case = case_in(tmp_path, PLANE + MOMENTS)
+    results = solve_case(case)
+    write_results(case, results, tmp_path, {})
+    [curve] = json.loads((tmp_path / "summary.json").read_text())["curves"]
+    assert curve["impact_rate"] is None
+    solver = ExponentSolver(case.problem)
+    for number, ray in enumerate(curve["jumps"]):
+        assert ray["phase"] == case.system.jumps[number].phase
+        assert ray["impact_rate"]["value"] == pytest.approx(impact_rate(solver, number).value, rel=1e-9)
+        assert ray["critical_impact_factor"]["value"] == pytest.approx(
+            critical_impact_factor(solver, number).value, rel=1e-7
+        )
+        assert ray["critical_restitution"] is None
+    print_results(case, results)
+    assert "φ = 0.3:" in "".join(capsys.readouterr())
+
+
+def test_parameters_without_a_derivative_are_named(tmp_path):
+    """d sqrt(c)/dc is infinite at 0."""
+    text = own("telegraph").replace("2*s*v", "(2*s + sqrt(c))*v").replace("s = 0.1", "s = 0.1, c = 0.0")
+    [result] = solve_case(case_in(tmp_path, text + MOMENTS))
+    assert "system.c" not in result.sensitivities.theta
+    assert "no sensitivities to system.c: the derivative of the system by it is not finite at 0" in result.notes
+
+
+def test_parameters_that_nothing_depends_on_are_named(tmp_path):
+    text = own("telegraph").replace("s = 0.1", "s = 0.1, unused = 3.0, loss = 0.1")
+    case = case_in(tmp_path, text + MOMENTS)
+    assert list(case.problem.remarks) == [
+        "system.unused, system.loss: in no rate and in no restitution, so that nothing depends on it"
+    ]
+    assert case.problem.remarks[0] in solve_case(case)[0].notes
+    walled = text.replace("[noise.axial]", 'walls = [{ at = "x = 0", restitution = "1 - loss" }]\n[noise.axial]')
+    assert "loss" not in case_in(tmp_path, walled + MOMENTS).problem.remarks[0]
+
+
+def test_infinite_derivatives_are_of_systems_only():
+    for noise in (Telegraph(a=0.5, k=1.0), White(s=0.5), MarkovChain.telegraph(0.5, 1.0)):
+        assert not Problem(ParametricOscillator(stiffness=1.0, damping=0.1), noise).undifferentiable
