@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -55,6 +56,11 @@ def is_log_spaced(values: Iterable[Any]) -> bool:
         return False
     steps, factors = np.diff(distinct), np.diff(np.log(distinct))
     return bool(np.std(factors) * np.mean(steps) < np.std(steps) * np.mean(factors))
+
+
+def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
+    """Whether a value is a whole number from one to another; True and False are none."""
+    return isinstance(value, int | np.integer) and type(value) is not bool and bool(least <= value <= most)
 
 
 def real_number(value: Any, name: str) -> float:

@@ -24,7 +24,7 @@ from itertools import islice
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
-from fpsolve.arrays import shown
+from fpsolve.arrays import is_whole, shown
 from fpsolve.errors import FpsolveError
 
 Item = TypeVar("Item")
@@ -100,7 +100,7 @@ def processors() -> int:
 
 def limit_processors(count: int) -> None:
     """Let this process use at most so many processors from now on. Raises `ValueError` if `count` is not ≥ 1."""
-    if type(count) is not int or count < 1:
+    if not is_whole(count, 1):
         raise ValueError(f"got count = {shown(count)}; must be a whole number >= 1")
     _limits[:] = [count]
 
@@ -266,7 +266,7 @@ def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
     Raises:
         FpsolveError: the count is not a number of processes.
     """
-    if count is not None and (type(count) is not int or not 1 <= count <= MOST_JOBS):
+    if count is not None and not is_whole(count, 1, MOST_JOBS):
         known = f"must be a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
         raise FpsolveError(f"jobs: got {shown(count)}; {known}")
     size = min(count or processors(), tasks)

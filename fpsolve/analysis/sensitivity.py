@@ -248,7 +248,7 @@ def solve_sensitivities(
 
     def of_root() -> Slopes:
         index = nonzero_root(solver, guess=root)
-        return found.root(index.value) if isinstance(index, Estimate) else {}
+        return found.root(index.value) if index else {}
 
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
     solves = dict(zip(RECORDS, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))

@@ -21,7 +21,7 @@ from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branche
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
 from fpsolve.analysis.zero import RTOL, Axis, Zero, ZeroField, check_axes, zero_of
-from fpsolve.arrays import FloatArray, real_number, shown
+from fpsolve.arrays import FloatArray, is_whole, real_number, shown
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
 from fpsolve.exponent.adapt import Budget
@@ -324,7 +324,7 @@ def boundary(
     """
     problem = with_original(problem, original)
     check_axes(problem, x, y)
-    if isinstance(nodes, bool) or not isinstance(nodes, int) or nodes < 2:
+    if not is_whole(nodes, 2):
         raise ValueError(f"got nodes = {shown(nodes)}; must be a whole number from 2")
     empty = Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
     line = Boundary(zero_of(zero), x, y, problem, scan=empty, step=_checked_step(step), budget=budget or Budget())

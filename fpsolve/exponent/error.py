@@ -46,7 +46,7 @@ def digits(value: float, error: float, most: int = 17) -> str:
 
 @dataclass(frozen=True, repr=False)
 class Estimate(Result):
-    """A number, the estimate of its error, and what both are measured by.
+    """A number, the estimate of its error, and what both are measured by; it is true, whatever the number.
 
     Attributes:
         error_estimate: half a unit in the last place of the value at least.
@@ -65,6 +65,9 @@ class Estimate(Result):
         if self.error_estimate < 0:
             raise ValueError(f"got {self.error_estimate} as the estimate of an error; must be >= 0")
         object.__setattr__(self, "error_estimate", max(self.error_estimate, 0.5 * math.ulp(self.value)))
+
+    def __bool__(self) -> Literal[True]:
+        return True
 
     @property
     def relative_error(self) -> float:

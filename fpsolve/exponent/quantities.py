@@ -30,7 +30,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from fpsolve.arrays import shown
+from fpsolve.arrays import is_whole, shown
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
@@ -66,8 +66,8 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
         NotConverged: it is not resolved.
         ValueError: there is no such jump.
     """
-    if isinstance(number := _ray(solver, jump), Absent):
-        return number
+    if (number := _ray(solver, jump)) is None:
+        return _not_one_ray(solver)
     value, better = (_flux(pair, number) for pair in solver.at_zero)
     generator = solver.at_zero[1].generator
     usual = generator.unit_rate / math.pi
@@ -87,7 +87,7 @@ def critical_impact_factor(solver: ExponentSolver, jump: int | None = None) -> E
         ValueError: there is no such jump.
     """
     log = _critical_log_factor(solver, jump)
-    if isinstance(log, Absent):
+    if not log:
         return log
     if abs(log.value) > LARGEST_LOG:
         return Absent(Message(Code.LOG_OUT_OF_RANGE, value=log.value, most=LARGEST_LOG))
@@ -108,12 +108,12 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
         ValueError: there is no such jump.
     """
     system, noise = solver.problem.system, solver.problem.noise
-    if isinstance(number := _ray(solver, jump), Absent):
-        return number
+    if (number := _ray(solver, jump)) is None:
+        return _not_one_ray(solver)
     if not is_steady(system, ray := system.jumps[number]) and crosses_both_ways(system, ray, noise.reached):
         return Absent(Message(Code.NO_RESTITUTION))
     log = _critical_log_factor(solver, number)
-    if isinstance(log, Absent):
+    if not log:
         return log
     if log.value > 0:
         # λ is affine in ln R, and 0 at ln R_c
@@ -129,14 +129,18 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
     return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.near.remedy)
 
 
-def _ray(solver: ExponentSolver, jump: int | None) -> int | Absent:
-    """The place of a jump among those of a system. Raises `ValueError` where there is none such."""
+def _ray(solver: ExponentSolver, jump: int | None) -> int | None:
+    """The place of a jump, or of the only one; None where that is not told. Raises `ValueError` where there is none."""
     count = len(solver.problem.system.jumps)
     if jump is None:
-        return 0 if count == 1 else Absent(Message(Code.NOT_ONE_RAY, count=count or None))
-    if isinstance(jump, bool) or not isinstance(jump, int) or not 0 <= jump < count:
+        return 0 if count == 1 else None
+    if not is_whole(jump, 0, count - 1):
         raise ValueError(f"got jump = {shown(jump)}; must be a whole number from 0 to {count - 1}, or None")
     return jump
+
+
+def _not_one_ray(solver: ExponentSolver) -> Absent:
+    return Absent(Message(Code.NOT_ONE_RAY, count=len(solver.problem.system.jumps) or None))
 
 
 def _flux(pair: PrincipalPair, number: int) -> float:
@@ -150,7 +154,7 @@ def _flux(pair: PrincipalPair, number: int) -> float:
 def _critical_log_factor(solver: ExponentSolver, jump: int | None) -> Estimate | Absent:
     """ln R_c = ln R − λ/N."""
     rate = impact_rate(solver, jump)
-    if isinstance(rate, Absent):
+    if not rate:
         return rate
     if rate.value <= rate.error_estimate:
         return Absent(Message(Code.RARE_IMPACTS, most=rate.value + rate.error_estimate))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, real_number, shown
+from fpsolve.arrays import FloatArray, is_whole, real_number, shown
 from fpsolve.errors import MeshError
 from fpsolve.files import atomic
 from fpsolve.messages import Code, Message, Remedy
@@ -61,7 +61,7 @@ class CylinderMesh:
                 raise MeshError(f"{name} must increase, and no cell may be thinner than 1e-9 of the whole")
         for name in ("phi_degree", "xi_degree"):
             degree = getattr(self, name)
-            if not isinstance(degree, int | np.integer) or not 1 <= degree <= MAX_DEGREE:
+            if not is_whole(degree, 1, MAX_DEGREE):
                 raise MeshError(f"{name} is {shown(degree)}; it must be a whole number from 1 to {MAX_DEGREE}")
         turns = self.span / math.pi
         if not (abs(turns - 1) < TOLERANCE or abs(turns - 2) < TOLERANCE):
@@ -124,7 +124,7 @@ def make_mesh(
         MeshError: a number is out of its range.
     """
     for name, count in (("phi_cells", phi_cells), ("xi_cells", xi_cells)):
-        if not isinstance(count, int | np.integer) or count is True or not 1 <= count <= MAX_CELLS:
+        if not is_whole(count, 1, MAX_CELLS):
             raise MeshError(f"{name} is {shown(count)}; it must be a whole number from 1 to {MAX_CELLS}")
     try:
         xi_min, xi_max = real_number(xi_min, "xi_min"), real_number(xi_max, "xi_max")

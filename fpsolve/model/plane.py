@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, one, real_array, real_number, shown
+from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, is_whole, one, real_array, real_number, shown
 from fpsolve.model.exact import ExactMotion
 from fpsolve.model.parameters import Parametrised
 
@@ -179,14 +179,14 @@ class CoefficientMatrix:
 
     def __post_init__(self) -> None:
         entries: FloatArray = np.zeros(0)
-        is_order = type(self.order) is int and self.order >= 0
         with suppress(ValueError):
             entries = real_array(self.matrix, "matrix")
-        if entries.shape != (2, 2) or not is_order:
+        if entries.shape != (2, 2) or not is_whole(self.order, 0):
             raise ValueError(
                 f"got order = {shown(self.order)} and matrix = {shown(self.matrix)}; must be a whole number >= 0 and "
                 "two rows of two finite numbers, such as ((0.0, 0.0), (0.0, 1.0))"
             )
+        object.__setattr__(self, "order", int(self.order))
         object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
         object.__setattr__(self, "g", coefficient(self.g))
 

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, real_numbers, shown
+from fpsolve.arrays import FloatArray, is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System, affine, written_coefficient
@@ -56,8 +56,8 @@ def check_settings(problem: Problem, p: float | Sequence[float], estimator: Esti
         raise ValueError("got a noise of infinite variance; must be finite, as for r0 < 5/3")
     for order in real_numbers(p, "p", may_be_empty=True):
         refuse_infinite(problem, order)
-    is_whole = all(isinstance(each, int | np.integer) for each in (paths, seed))
-    if estimator not in get_args(Estimator) or not is_whole or not BATCHES <= paths <= MAX_PATHS or seed < 0:
+    is_possible = is_whole(paths, BATCHES, MAX_PATHS) and is_whole(seed, 0)
+    if estimator not in get_args(Estimator) or not is_possible:
         raise ValueError(
             f"got estimator = {shown(estimator)}, paths = {shown(paths)}, seed = {shown(seed)}; must be one of "
             f"{', '.join(get_args(Estimator))}, a whole number from {BATCHES} to {MAX_PATHS}, and one >= 0"

@@ -258,7 +258,7 @@ def _solve_indices(
         except MemoryError:
             code, reason = Code.INDEX_FAILED, Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
         else:
-            if isinstance(found, Estimate):
+            if found:
                 estimates[name] = found
                 continue
             code, reason = Code.INDEX_ABSENT, found.reason
