@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 
@@ -31,6 +32,44 @@ def fig1_solver() -> ExponentSolver:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20)
+
+
+LONGEST = (
+    "output/test_show.py",
+    "output/test_terminal.py",
+    "exponent/test_heavy_tails.py",
+    "simulation/test_accuracy.py",
+    "test_sweeps.py",
+    "exponent/test_corners.py",
+    "proofs/test_prove.py",
+    "test_workflow.py",
+    "test_cli.py",
+    "proofs/test_certificate_checker.py",
+    "analysis/test_continuation.py",
+    "analysis/test_stability.py",
+    "test_readme.py",
+    "output/test_many_curves.py",
+    "proofs/test_claims.py",
+    "exponent/test_symmetry.py",
+    "exponent/test_solver.py",
+    "analysis/test_sensitivity.py",
+    "simulation/test_agreement.py",
+    "study/test_simulate.py",
+    "study/test_chart.py",
+)
+"""Files that begin first, so that no processor is left with a long one while the others have nothing to do."""
+
+gc.disable()  # what is collected stays: to look through it again and again took a quarter of the time
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    place = {f"tests/{name}": k for k, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
 
 
 def sampled(*cases: object, keep: int = 1) -> list[object]:
