@@ -40,7 +40,7 @@ from fpsolve.case.sections import (
     Value,
     Varied,
 )
-from fpsolve.case.toml import read_document
+from fpsolve.case.toml import Place, read_document
 from fpsolve.case.vary import EXAMPLE, Vary, assignments, vary_of
 from fpsolve.errors import CaseError, Fault
 from fpsolve.exponent.adapt import Budget
@@ -312,7 +312,7 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
     try:
         case = Case.model_validate(data, context=context)
         for key in case.vary.keys:  # which replaces what the command line says of it
-            if isinstance(document.places.get(key), str):
+            if document.places.get(key, Place()).typed:
                 remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
                 faults.append(document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}"))
     except ValidationError as error:

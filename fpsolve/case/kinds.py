@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
 from fpsolve.case.messages import UNBOUNDED, Refusal, details_of, nearest, refuse, shown_with_kind
-from fpsolve.model.faults import TableError, fields_of
+from fpsolve.model.faults import TableError, fields_of, table_of
 from fpsolve.model.kinds import kind_names, noise_kind, system_kind
 from fpsolve.model.parameters import STRICT, Parametrised
 from fpsolve.model.problem import Problem
@@ -53,7 +53,8 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
 
 def names_of(table: Any) -> list[str]:
     """The names of the noises of a [noise], as of [noise.axial]; none where it is a noise itself."""
-    return [*table] if isinstance(table, dict) and all(isinstance(each, dict) for each in table.values()) else []
+    tables = table_of(table)
+    return [*tables] if all(isinstance(each, dict) for each in tables.values()) else []
 
 
 def _misnamed(names: list[str], section: str) -> Iterator[Refusal]:
@@ -99,10 +100,10 @@ def _made(half: Half, table: Mapping[str, Any]) -> Parametrised:
     return made
 
 
-def _kind(half: Half, table: Any) -> type[Parametrised]:
+def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
     """The class that a table names by its kind and, of those of one kind, by the keys that only one of them has."""
-    name = table.get("kind") if isinstance(table, dict) else None
-    if name is None and half == "system" and isinstance(table, dict) and any(key in table for key in STATING):
+    name = table.get("kind")
+    if name is None and half == "system" and any(key in table for key in STATING):
         name = EQUATIONS
     if name is not None and name not in (names := kind_names("systems" if half == "system" else "noises")):
         text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
@@ -112,8 +113,7 @@ def _kind(half: Half, table: Any) -> type[Parametrised]:
     except ValueError as error:
         refuse([(("kind",), name, f"{error}; mend its package, or write another kind")])
         raise
-    known = set(table) if isinstance(table, dict) else set()
-    return max((kind, *kind.variants), key=lambda each: len(known & set(fields_of(each))))
+    return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))
 
 
 def kinds_of(data: Mapping[str, Any]) -> dict[Half, type[Parametrised]]:
@@ -124,7 +124,7 @@ def kinds_of(data: Mapping[str, Any]) -> dict[Half, type[Parametrised]]:
         for name in names_of(table) if half == "noise" else ():
             table = table[name]
         try:
-            found[half] = _kind(half, table)
+            found[half] = _kind(half, table_of(table))
         except ValidationError:
             continue
     return found
@@ -136,17 +136,17 @@ def sections_of(fields: Mapping[str, FieldInfo], data: Mapping[str, Any]) -> dic
     kinds: Mapping[str, type[Parametrised]] = kinds_of(data)  # type: ignore[assignment]
     for name, field in fields.items():
         section = "oscillator" if name == "system" and "system" not in data else name
-        found[section] = field
+        found[section], table = field, table_of(data.get(section))
         if name in kinds:
             found[section] = described = copy(field)
             described.annotation = kinds[name]
-            if name == "noise" and (names := names_of(data.get(section))):
+            if name == "noise" and (names := names_of(table)):
                 inner = copy(described)
                 described.annotation = _table_of(dict.fromkeys(names, inner))
-            elif name == "system" and isinstance(table := data.get(section), dict):
-                named = known if isinstance(known := table.get("parameters"), dict) else ()
+            elif name == "system":
+                named = table_of(table.get("parameters"))
                 described.annotation = _table_of({**dict.fromkeys(named, UNBOUNDED), **fields_of(kinds[name])})
-            if section == "system" or (isinstance(data.get(section), dict) and "kind" in data[section]):
+            if section == "system" or "kind" in table:
                 described.description, described.examples = f"{name} of a kind", [f"[{section}]"]
     return found
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from types import MappingProxyType
@@ -14,7 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from fpsolve.messages import is_control
-from fpsolve.model.faults import accepted, choices, fields_of
+from fpsolve.model.faults import accepted, choices, fields_of, written_path
 from fpsolve.model.parameters import example_of, meaning_of, parameter
 
 _OWN, _RANGE = "own sentence", "range"
@@ -144,22 +143,13 @@ def explain(
             misspelt.add((*path[:-1], *guess.split(".")))
     for path, detail in faults:
         if (detail["type"] != "missing" or path not in misspelt) and detail["msg"] != DEPENDENT:
-            yield path, _key(path), _sentence(path, dict(detail), fields, varied)
+            yield path, written_path(path), _sentence(path, dict(detail), fields, varied)
 
 
 def _known_keys(path: Path, fields: Mapping[str, FieldInfo]) -> list[str]:
     """The keys beside a path, and those of the tables among them."""
     beside = _beside(path[:-1], fields)[0]
     return [*beside, *(f"{name}.{key}" for name, field in beside.items() for key in fields_of(field.annotation))]
-
-
-def _key(path: Path) -> str:
-    """("expect", 0, "p") as expect[0].p."""
-    text = ""
-    for part in path:
-        quoted = str(part) if re.fullmatch(r"[\w-]+", str(part)) else json.dumps(part, ensure_ascii=False)
-        text += f"[{part}]" if type(part) is int else f".{quoted}" if text else quoted
-    return text
 
 
 def _sentence(

@@ -24,6 +24,7 @@ from fpsolve.errors import MeshError
 from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh, vertices_at
 from fpsolve.messages import is_control
+from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.quantity import Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
@@ -87,8 +88,9 @@ def flat(table: Mapping[str, Any], whole: Container[str] = (), section: str = ""
     result: dict[str, Any] = {}
     for name, item in table.items():
         key = section + name
-        is_section = isinstance(item, dict) and item and key not in whole and not item.keys() & RANGE
-        for each, value in (flat(item, whole, f"{key}.") if is_section else {key: item}).items():
+        inner = table_of(item)
+        is_section = inner and key not in whole and not inner.keys() & RANGE
+        for each, value in (flat(inner, whole, f"{key}.") if is_section else {key: item}).items():
             if each in result:
                 raise ValueError(f"{each} stands twice, once with quotes and once without; remove one of them")
             result[each] = value
@@ -154,9 +156,14 @@ class Moments(Section):
     rtol: Annotated[float, parameter("wanted relative error", "rtol = 1e-8", gt=1e-13, lt=1)] = 1e-8
 
     @property
+    def is_range(self) -> bool:
+        """Whether p is a range, of which the file states the ends alone."""
+        return isinstance(self.p, Sweep)
+
+    @property
     def values(self) -> FloatArray:
         """All p, in the file's order."""
-        return self.p.values if isinstance(self.p, Sweep) else np.array(self.p)
+        return self.p.values if self.is_range else np.array(self.p)  # type: ignore[union-attr]
 
     @cached_property
     def increasing(self) -> tuple[float, ...]:
@@ -261,7 +268,7 @@ def _ordinate(value: Any) -> Any:
     names = get_args(DrawnName)
     if isinstance(value, MomentAt) or value in names:
         return value
-    if isinstance(value, dict) and value.keys() == {"moment"} and is_number(value["moment"]):
+    if table_of(value).keys() == {"moment"} and is_number(value["moment"]):
         return MomentAt(moment=float(value["moment"]))
     raise ValueError(
         f"got {shown_with_kind(value, but=str)}; must be one of {quoted(names)}, or {{ moment = p }} with a finite "

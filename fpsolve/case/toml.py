@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.errors import CaseError, Fault
@@ -133,27 +133,34 @@ class _Scanner:
             self._take(_STRING if self._peek() in ("'", '"') else _SCALAR)
 
 
+class Place(NamedTuple):
+    """Where a key stands: its line, or the `--set` or other option that gave it."""
+
+    line: int | None = None
+    typed: str = ""
+
+
 @dataclass
 class Document:
     """The data of a TOML file and of the command line's changes to it.
 
     Attributes:
         data: what `tomllib` made of it.
-        places: the line of each dotted key, or the `--set` or other option that gave it.
+        places: where each dotted key stands.
         faults: what is wrong with the changes.
         text: the file as it was read.
     """
 
     data: dict[str, Any]
-    places: dict[str, int | str]
+    places: dict[str, Place]
     faults: list[Fault] = field(default_factory=list)
     text: str = ""
 
     def fault(self, path: Sequence[str | int], key: str, sentence: str) -> Fault:
         """A fault at the place of this path, or of the nearest table around it that has one."""
         around = (self.places.get(dotted(path[:end])) for end in range(len(path), 0, -1))
-        place = next((each for each in around if each is not None), None)
-        return Fault(f"{place}: {key}", None, sentence) if isinstance(place, str) else Fault(key, place, sentence)
+        place = next((each for each in around if each is not None), Place())
+        return Fault(f"{place.typed}: {key}" if place.typed else key, place.line, sentence)
 
     def override(self, text: str, typed: str) -> None:
         """Apply one `key=value` of the command line, with what was typed; what is wrong with it joins the faults."""
@@ -179,9 +186,9 @@ class Document:
         else:
             inside = dotted(path) + "."
             self.places = {key: place for key, place in self.places.items() if not key.startswith(inside)}
-            self.places[dotted(path)] = typed
+            self.places[dotted(path)] = Place(typed=typed)
             for end in range(1, len(path)):
-                self.places.setdefault(dotted(path[:end]), typed)
+                self.places.setdefault(dotted(path[:end]), Place(typed=typed))
 
 
 def _quoted_if_bare(text: str) -> str:
@@ -215,7 +222,8 @@ def read_document(
     """
     try:
         text = read_text(Path(path), _WORDS)
-        document = Document(_loads(text), dict(_Scanner(text).scan().lines), text=text)
+        data, lines = _loads(text), _Scanner(text).scan().lines
+        document = Document(data, {key: Place(line) for key, line in lines.items()}, text=text)
     except Unreadable as error:
         raise CaseError(str(path), [Fault("", error.line, error.sentence)]) from None
     except RecursionError:

@@ -32,7 +32,7 @@ from fpsolve.case.messages import (
 )
 from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.case.sections import MAX_MOMENTS, MOST_NAMED, FigureSection, Sweep, Value, Values, flat, same
-from fpsolve.model.faults import accepted, choices
+from fpsolve.model.faults import accepted, choices, table_of
 from fpsolve.model.parameters import STRICT, meaning_of
 from fpsolve.model.quantity import Quantity
 
@@ -228,7 +228,7 @@ def _column(key: str, values: Any, field: FieldInfo, columns: Columns) -> Iterat
                 text = f"got {shown_with_kind(value)}; must be one of {quoted(texts)};{nearest(value, texts)}"
                 yield (key, i), value, f"{text} write one of them"
         columns[key] = tuple(values)
-    elif isinstance(values, dict) and values:
+    elif table_of(values):
         yield from _range(key, values, field, columns)
     else:
         try:

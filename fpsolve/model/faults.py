@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -45,7 +46,7 @@ class TableError(ValueError):
     """
 
     def __init__(self, text: str, *path: str | int) -> None:
-        place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+        place = written_path(path)
         super().__init__(f"{place}: {text}" if place else text)
         self.text, self.path = text, path
 
@@ -128,6 +129,20 @@ def choices(annotation: Any) -> list[str]:
 def fields_of(annotation: Any) -> Mapping[str, FieldInfo]:
     """The fields of a model, or of a kind of system or noise, as in a table of a case file; of others nothing."""
     return {**getattr(annotation, "__pydantic_fields__", {}), **getattr(annotation, "stated", {})}
+
+
+def table_of(value: Any) -> Mapping[str, Any]:
+    """A value of a case file that is a table; an empty one where it is none."""
+    return value if isinstance(value, dict) else {}
+
+
+def written_path(path: Iterable[str | int]) -> str:
+    """("expect", 0, "p") as expect[0].p."""
+    text = ""
+    for part in path:
+        key = str(part) if re.fullmatch(r"[\w-]+", str(part)) else json.dumps(part, ensure_ascii=False)
+        text += f"[{part}]" if isinstance(part, int) else f".{key}" if text else key
+    return text
 
 
 def _noun(annotation: Any, plural: str = "") -> str:

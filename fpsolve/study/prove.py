@@ -11,7 +11,6 @@ from functools import cached_property, partial
 from typing import Any, cast
 
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import Sweep
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.messages import Code, Message
@@ -94,7 +93,7 @@ class Plan:
     @cached_property
     def _orders(self) -> list[str]:
         """All p as decimals: as the case states them, or of a range the floats as they stand."""
-        if isinstance(self.case.moments.p, Sweep):
+        if self.case.moments.is_range:
             return [str(Decimal(p)) for p in self.case.p.tolist()]
         return [decimal_of(p, self._literals[ORDERS]) for p in self.case.p.tolist()]
 

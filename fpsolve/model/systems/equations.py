@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from fpsolve.arrays import FloatArray, identity, one, real_number, shown
 from fpsolve.messages import Code, Message, is_control
 from fpsolve.model.expressions import ExpressionError, Form, constant, log_of, name_fault, names_in, summands
-from fpsolve.model.faults import TableError
+from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
 from fpsolve.model.quantity import Quantity
@@ -171,7 +171,7 @@ class EquationSystem(System):
             must = "must be one, as several noises at once are not known yet"
             raise TableError(f"got {len(self.noises)} noises; {must}; keep one of them", "noises")
         for name, section in self.noises:
-            if not re.fullmatch(r"noise(\.[A-Za-z0-9_-]+)?", section if isinstance(section, str) else ""):
+            if not re.fullmatch(r"noise(\.[A-Za-z0-9_-]+)?", str(section)):
                 must = 'must be the name of a section, "noise" or, for example, "noise.axial"'
                 raise TableError(f"got {shown(section)}; {must}; rename it", "noises", name)
             if not any(name in names_in(text) for text in self._texts()):
@@ -200,8 +200,7 @@ class EquationSystem(System):
     @classmethod
     def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
         """Besides what is `stated`, keys of parameters, whose values these replace, as `--set` writes them."""
-        known = table.get("parameters")
-        return isinstance(known, dict) and key in known
+        return key in table_of(table.get("parameters"))
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> EquationSystem:
@@ -326,7 +325,7 @@ class EquationSystem(System):
         """Which of the variables is 0 at a wall. Raises `TableError`."""
         x, v = self.variables
         at = self.walls[number].at
-        match = re.fullmatch(r"\s*(\w+)\s*=\s*0(?:\.0*)?\s*", at) if isinstance(at, str) else None
+        match = re.fullmatch(r"\s*(\w+)\s*=\s*0(?:\.0*)?\s*", str(at))
         if match is None or match[1] not in self.variables:
             must = f'must be "{x} = 0" or "{v} = 0"; jumps on other rays are for PlaneSystem in Python'
             raise TableError(f'got {shown(at)}; {must}; write, for example, at = "{x} = 0"', "walls", number, "at")

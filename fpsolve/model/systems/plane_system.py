@@ -170,8 +170,10 @@ class PlaneSystem(System):
             ValueError: a parameter is not a finite number or is called epsilon, or as `PlaneSystem`.
         """
         for name, value in named.items():
-            if isinstance(value, str | bool) or not math.isfinite(value):
-                raise ValueError(f"got {name} = {value!r}; must be a finite number")
+            try:
+                real_number(value, name)
+            except ValueError:
+                raise ValueError(f"got {name} = {value!r}; must be a finite number") from None
         terms, jumps = _parts(build, named)
         return cls(terms, jumps, epsilon, build, tuple((name, float(value)) for name, value in named.items()))
 
