@@ -167,7 +167,11 @@ class Noise(Parametrised):
         raise NotImplementedError
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
-        """What the paths of a simulation start from: ξ from the stationary law, or the numbers of states."""
+        """What paths of a simulation start from, by the stationary law: ξ, or the numbers of states, shape (size,).
+
+        Of noise that is no Markov process by itself it has more rows, shape (numbers, size): ξ, and what else its
+        future depends on.
+        """
         return self.sample(size, rng)
 
     def step(self, h: float, bias: float = 0.0) -> Any:
@@ -177,8 +181,9 @@ class Noise(Parametrised):
 
         Returns:
             A named tuple of numbers whose class has a static method `draw(step, xi, xi_mean, xi_end, push, rng)` that
-            numba can compile: it draws the mean and the end of the noise in one step that begins at `xi`, all of shape
-            (n,), and adds ∫f(ξ) dt to `push` where there may be a bias. Kinds without it are not simulated.
+            numba can compile: it draws the mean and the end of ξ in one step that begins at `xi`, all of shape (n,),
+            and adds ∫f(ξ) dt to `push` where there may be a bias. Where `start` has more rows so has `xi`: its step
+            moves all of them but the first, ξ, which its caller sets to the end. Kinds without it are not simulated.
         """
         raise NotImplementedError
 

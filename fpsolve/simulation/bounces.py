@@ -9,7 +9,7 @@ A step of length h draws the noise at its end and its mean over the step. Then t
 integrates the motion in the frame that rotates with ω (Lawson's method), so that the free flight is exact. An impact
 is sought within the step, to the precision of floating point, and the rest of the step follows after the bounce.
 
-State: x, u and ξ of each path, arrays of shape (n,), changed in place. The coefficients are the `Motion` of an
+State: x, u and that of the noise of each path, see `motions`, changed in place. The coefficients are the `Motion` of an
 oscillator and the `step` of a noise.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from fpsolve.simulation.compiled import compiled, inlined
 from fpsolve.simulation.kernels import CHUNK
-from fpsolve.simulation.motions import draw
+from fpsolve.simulation.motions import drawn
 
 _ANGLE, _GROWTH = 0.5, 0.125
 """A step with a larger ω h or |g| h is taken in parts: the first could hide impacts, the second costs accuracy."""
@@ -145,21 +145,19 @@ def advance(m, noise, h, x, u, xi, push, steps, rng):  # type: ignore[no-untyped
 
     Args:
         m, noise: a `Motion` and the `step` of a noise of this h.
-        x, u, xi: the state of the paths, shape (n,).
+        x, u, xi: the state of the paths, and that of their noise.
         push: room for as many numbers.
         rng: a `numpy.random.Generator`.
     """
-    mean, end = np.empty(CHUNK), np.empty(CHUNK)
+    mean, rise = np.empty(CHUNK), np.empty(CHUNK)
     x_end, u_end, is_plain = np.empty(CHUNK), np.empty(CHUNK), np.empty(CHUNK, np.bool_)
     impacts = 0
     for first in range(0, x.size, CHUNK):
         last = min(first + CHUNK, x.size)
-        xs, us, xis, pushes, n = x[first:last], u[first:last], xi[first:last], push[first:last], last - first
+        xs, us, xis, pushes, n = x[first:last], u[first:last], xi[..., first:last], push[first:last], last - first
         for _ in range(steps):
-            draw(noise, xis, mean[:n], end[:n], pushes, rng)
-            for i in range(n):
-                xis[i], end[i] = end[i], 0.5 * (end[i] - xis[i])
-            impacts += move(m, h, xs, us, mean[:n], end[:n], x_end, u_end, is_plain)
+            drawn(noise, xis, mean[:n], rise[:n], pushes, rng)
+            impacts += move(m, h, xs, us, mean[:n], rise[:n], x_end, u_end, is_plain)
     return impacts
 
 

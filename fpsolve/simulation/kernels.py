@@ -1,7 +1,7 @@
 """All paths of a batch, compiled: their steps, their growth, their weights, and how they are drawn anew.
 
-What moves them is a motion of `motions` and the `step` of the kind of noise. State: x, u and ξ of each path, or the
-number of its state, arrays of shape (n,), changed in place.
+What moves them is a motion of `motions` and the `step` of the kind of noise. State: x, u and that of the noise of each
+path, see `motions`, changed in place.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def advance(m, noise, h, x, u, xi, log_norm, push, steps, interval, rng):  # typ
 
     Args:
         m, noise: a motion and the `step` of a noise of this h.
-        x, u, xi: the state of the paths, shape (n,).
+        x, u, xi: the state of the paths, and that of their noise.
         log_norm: ln ‖(x, u)‖ that has been taken out of the state; after every `interval` steps, and at the end, it
             takes in what the state has grown by, and the state has the norm 1 again.
         push: takes in ∫f(ξ) dt, see `draw`.
@@ -52,7 +52,7 @@ def advance(m, noise, h, x, u, xi, log_norm, push, steps, interval, rng):  # typ
     crossed = 0
     for first in range(0, x.size, CHUNK):
         part = slice(first, min(first + CHUNK, x.size))
-        xs, us, xis, logs, pushes = x[part], u[part], xi[part], log_norm[part], push[part]
+        xs, us, xis, logs, pushes = x[part], u[part], xi[..., part], log_norm[part], push[part]
         for step in range(1, steps + 1):
             crossed += _move(m, noise, h, xs, us, xis, logs, pushes, room, rng)  # type: ignore[no-untyped-call]
             if step % interval == 0 or step == steps:
@@ -139,6 +139,6 @@ def _resample(x, u, xi, log_weights, ancestors, rng):  # type: ignore[no-untyped
             reached += weights[k]
         chosen[i] = k
         mark += spacing
-    x[:], u[:], xi[:], ancestors[:] = x[chosen], u[chosen], xi[chosen], ancestors[chosen]
+    x[:], u[:], xi[..., :], ancestors[:] = x[chosen], u[chosen], xi[..., chosen], ancestors[chosen]
     log_weights[:] = 0
     return largest + math.log(spacing)

@@ -15,8 +15,9 @@ stands in A₀: a scheme of strong order 3/2 and weak order 2.
 Under a chain the motion between two jumps of ξ is exp(A t), and these come after exponential times: nothing is left
 out.
 
-State: x, u and ξ of each path, or the number of its state, arrays of shape (n,) changed in place. A matrix is stored as
-half its trace t and the rest ((p, q), (r, −p)), whose square is p² + qr times one.
+State: x, u and that of the noise of each path, ξ or the number of a state, arrays of shape (n,) changed in place; of
+noise with more numbers a row for each, shape (numbers, n), ξ being the first. A matrix is stored as half its trace t
+and the rest ((p, q), (r, −p)), whose square is p² + qr times one.
 """
 
 from __future__ import annotations
@@ -65,6 +66,25 @@ def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
     _draw(step, xi, xi_mean, xi_end, push, rng)  # type: ignore[no-untyped-call]
 
 
+def _first_row(state):  # type: ignore[no-untyped-def]
+    """ξ of the state of a noise; this is what numba replaces."""
+    raise NotImplementedError
+
+
+@overload(_first_row)
+def _first_row_by_shape(state):  # type: ignore[no-untyped-def]
+    return (lambda state: state) if state.ndim == 1 else (lambda state: state[0])
+
+
+@compiled
+def drawn(step, state, xi_mean, xi_rise, push, rng):  # type: ignore[no-untyped-def]
+    """Move the state of a noise by one step, in which ξ is about mean + rise (2t/h − 1)."""
+    draw(step, state, xi_mean, xi_rise, push, rng)
+    xi = _first_row(state)  # type: ignore[no-untyped-call]
+    for i in range(xi.size):
+        xi[i], xi_rise[i] = xi_rise[i], 0.5 * (xi_rise[i] - xi[i])
+
+
 class DrivenMotion(NamedTuple):
     """A₀, A₁, [A₀, A₁] and [A₁, [A₁, A₀]] as rows (t, p, q, r), shape (4, 4)."""
 
@@ -77,16 +97,14 @@ class DrivenMotion(NamedTuple):
 
         Args:
             m, noise: this, and the `step` of a diffusion or of white noise.
-            x, u, xi: the state of the paths, shape (n,).
+            x, u, xi: the state of the paths, and that of their noise.
             log_norm: takes in what the norm has grown by beyond that of the state.
             push: takes in ∫f(ξ) dt, see `draw`.
             room: for 5 numbers of each path.
             rng: a `numpy.random.Generator`.
         """
         mean, rise = room[0, : x.size], room[1, : x.size]
-        draw(noise, xi, mean, rise, push, rng)
-        for i in range(x.size):
-            xi[i], rise[i] = rise[i], 0.5 * (rise[i] - xi[i])
+        drawn(noise, xi, mean, rise, push, rng)
         return step_driven(m, h, x, u, mean, rise, log_norm, room[2], room[3], room[4])
 
 

@@ -141,7 +141,7 @@ def obstacles(
 def starting_state(
     noise: Noise, paths: int, rng: np.random.Generator, amplitude: float = 1.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """x, u and ξ, or the number of its state, of paths of one amplitude, with uniform phases and stationary noise.
+    """x, u and the state of the noise, of paths of one amplitude, with uniform phases and stationary noise.
 
     The phases are in front of the wall, where they stand for all.
     """

@@ -1,6 +1,7 @@
 """Sample paths: free flight and bounces in closed form, the Zhuravlev map, the laws of the noise."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -10,12 +11,12 @@ from scipy.integrate import quad_vec
 from scipy.stats import kstest
 
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck, linear_step
 from fpsolve.model.systems.vibro_impact import Motion, VibroImpactOscillator
 from fpsolve.simulation.bounces import move
 from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.kernels import advance
-from fpsolve.simulation.motions import draw
+from fpsolve.simulation.motions import draw, drawn
 from fpsolve.simulation.setup import default_step, largest_step
 from tests.conftest import FIG1_NOISE, UNIT_NOISE, sampled
 
@@ -169,6 +170,37 @@ def test_transition_of_ornstein_uhlenbeck_noise(a):
     assert step.kick**2 == pytest.approx(var_end, rel=1e-12)
     assert step.kick * step.mean1 == pytest.approx(covariance, rel=1e-12)
     assert step.mean1**2 + step.mean2**2 == pytest.approx(var_mean, rel=1e-9)
+
+
+class SummedStep(NamedTuple):
+    """Ornstein-Uhlenbeck noise with ∫ξ dt in a second row."""
+
+    decay: float
+    kick: float
+    h: float
+
+    @staticmethod
+    def draw(step, xi, xi_mean, xi_end, push, rng):
+        for i in range(xi_end.size):
+            xi_end[i] = step.decay * xi[0, i] + step.kick * rng.standard_normal()
+            xi_mean[i] = 0.5 * (xi[0, i] + xi_end[i])
+            xi[1, i] += step.h * xi_mean[i]
+
+
+def test_a_noise_may_have_more_numbers_than_its_value():
+    """The first row is ξ, which ends where the step says; the others are the noise's own."""
+    known = linear_step(1.0, 0.5, 0.1, 0.0)
+    step, n = SummedStep(known.decay, known.kick, 0.1), 8
+    mean, rise, push = np.zeros((3, n))
+    state, numbers = np.zeros((2, n)), np.random.default_rng(5).standard_normal((20, n))
+    xi, total, rng = np.zeros(n), np.zeros(n), np.random.default_rng(5)
+    for number in numbers:
+        drawn(step, state, mean, rise, push, rng)
+        end = known.decay * xi + known.kick * number
+        np.testing.assert_array_equal(state[0], end)
+        np.testing.assert_allclose(mean - rise, xi, atol=1e-15)
+        total, xi = total + 0.05 * (xi + end), end
+        np.testing.assert_allclose(state[1], total, atol=1e-15)
 
 
 def noise_after(noise, xi, time, rng, h=None, bias=0.0):
