@@ -25,6 +25,11 @@ Parameters = Mapping[str, float | str]
 """Parameters of a problem by their keys, such as "noise.D0"."""
 
 
+def written(value: float | str, style: str = "g") -> str:
+    """The value of a parameter for the eye: a number in a format, a text as it is."""
+    return value if isinstance(value, str) else f"{value:{style}}"
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Something that is computed of a problem, or that this depends on: a row of the table in `model.quantity`.
@@ -75,10 +80,8 @@ class Quantity:
 
     def stated(self, value: float | str) -> str:
         r"""A value of it in a figure: "$D_0$ = 0.1/time", "impact = delta"."""
-        if isinstance(value, str):
-            return f"{self.shown} = {value}"
         unit = "" if self.unit in ("1", "unknown") else f" {typeset(self.unit)}"
-        return f"{self.shown} = {value:g}{unit.removeprefix(' 1')}"
+        return f"{self.shown} = {written(value)}{unit.removeprefix(' 1')}"
 
     @property
     def _plain(self) -> Quantity:

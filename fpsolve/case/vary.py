@@ -32,6 +32,7 @@ from fpsolve.case.messages import (
 )
 from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.case.sections import MAX_MOMENTS, MOST_NAMED, FigureSection, Sweep, Value, Values, flat, same
+from fpsolve.data import written
 from fpsolve.model.faults import accepted, choices, table_of
 from fpsolve.model.parameters import STRICT, meaning_of
 from fpsolve.model.quantity import Quantity
@@ -116,11 +117,6 @@ def map_key(figure: FigureSection, vary: Vary) -> str | None:
     key = vary.crossing(figure.x)
     is_map = key is not None and (len(vary.values(key)) > MOST_NAMED if figure.map is None else figure.map)
     return key if is_map else None
-
-
-def written(value: Value, style: str = "g") -> str:
-    """A value of a varied key for the eye: a number in a format, a text as it is."""
-    return value if isinstance(value, str) else f"{value:{style}}"
 
 
 def short_names(keys: Iterable[str]) -> list[str]:

@@ -7,7 +7,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, wraps
+from functools import cached_property, lru_cache, wraps
 from inspect import signature
 from textwrap import wrap
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_numbers, shown
-from fpsolve.data import plain_unit
+from fpsolve.data import plain_unit, written
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message
 from fpsolve.model.frame import Frame, normal_frame
@@ -294,7 +294,7 @@ def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str
 
 def _valued(parameter: Parameter) -> str:
     """The value of a parameter with its unit."""
-    text = parameter.value if isinstance(parameter.value, str) else f"{parameter.value:g}"
+    text = written(parameter.value)
     return text if parameter.quantity.unit in ("1", "unknown") else f"{text} ({plain_unit(parameter.quantity.unit)})"
 
 
@@ -394,6 +394,24 @@ def _signed(function: Any, at: int) -> Any:
     ]
     function.__signature__ = made.replace(parameters=[*old[:at], *halves, *old[at + 1 :]])
     return function
+
+
+def kept(most: int) -> Callable[[Callable[P, R_co]], Callable[P, R_co]]:
+    """Keep so many values of a function of problems; none where the user's own motion or noise cannot be hashed."""
+
+    def keeping(function: Callable[P, R_co]) -> Callable[P, R_co]:
+        known: Any = lru_cache(most)(function)
+
+        @wraps(function)
+        def value(*args: P.args, **kwargs: P.kwargs) -> R_co:
+            try:
+                return known(*args, **kwargs)
+            except TypeError:
+                return function(*args, **kwargs)
+
+        return value
+
+    return keeping
 
 
 def problem_first(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[Any, ...]:

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from fpsolve import __version__
 from fpsolve.case.case import Case
-from fpsolve.case.vary import written
+from fpsolve.data import written
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.files import write_text
 from fpsolve.output.screen import Cell, Column, Grid, Screen

@@ -16,7 +16,8 @@ from rich.text import Text
 
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.vary import short_names, written
+from fpsolve.case.vary import short_names
+from fpsolve.data import written
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import (
     BY_JUMP,

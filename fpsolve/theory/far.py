@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ import scipy.linalg
 from fpsolve.arrays import finite
 from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem
+from fpsolve.model.problem import Problem, kept
 from fpsolve.theory.frozen import FURTHEST, FrozenNoise, eigenvalues_at, frozen_noise
 
 NEAR = 4.0
@@ -90,14 +89,11 @@ def outlook(problem: Problem, p: float) -> Outlook:
     """Where to look for the largest eigenvalue besides ξ = 0: nowhere but for algebraic tails and p ≠ 0."""
     if p == 0 or not problem.noise.has_algebraic_tails:
         return Outlook()
-    try:
-        return _kept(problem, p)
-    except TypeError:  # a motion or a noise of the user's own that cannot be hashed
-        return _kept.__wrapped__(problem, p)
+    return _outlook(problem, p)
 
 
-@lru_cache(maxsize=64)
-def _kept(problem: Problem, p: float) -> Outlook:
+@kept(64)
+def _outlook(problem: Problem, p: float) -> Outlook:
     frozen = frozen_noise(problem)
     assert frozen is not None
     z, _ = frozen.peaks(p)

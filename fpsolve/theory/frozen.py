@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
-from fpsolve.model.problem import Problem
+from fpsolve.model.problem import Problem, kept
 
 SAMPLES = 1001
 LARGEST_P = 25.0
@@ -99,14 +98,7 @@ class FrozenNoise:
         return -0.5 * float(np.interp(z, self.z, self._slope))
 
 
+@kept(8)
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
     """The `FrozenNoise` of a problem; None for a chain, which holds its states."""
-    if problem.noise.has_states:
-        return None
-    try:
-        return _kept(problem)
-    except TypeError:  # a motion or a noise of the user's own that cannot be hashed
-        return FrozenNoise(problem)
-
-
-_kept = lru_cache(maxsize=8)(FrozenNoise)
+    return None if problem.noise.has_states else FrozenNoise(problem)

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,7 @@ from fpsolve.model.plane import (
     turning,
     written_coefficient,
 )
-from fpsolve.model.problem import Problem
+from fpsolve.model.problem import Problem, kept
 
 WEAK = 0.05
 """Share of the terms of Eq. (37) that the orders beyond may have."""
@@ -115,19 +114,13 @@ class SecondOrder:
         return Scale(sum(map(abs, self.linear_terms)), self.quadratic)
 
 
+@kept(8)  # a set asks for it five times: scales, columns and notes
 def second_order(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) of a problem.
 
     Raises:
         NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in the noise.
     """
-    try:
-        return _kept(problem)
-    except TypeError:  # a motion or a noise of the user's own that cannot be hashed
-        return _second_order(problem)
-
-
-def _second_order(problem: Problem) -> SecondOrder:
     system, noise = problem.motion, problem.noise
     steady, driven = matrix_at(system, 0.0, slice(0, 1)), np.zeros((2, 2))
     for term in system.terms if has_mean(problem) else ():
@@ -162,10 +155,6 @@ def _second_order(problem: Problem) -> SecondOrder:
         )
     )
     return SecondOrder(tuple(map(float, parts)), quadratic, half_turns, float(sum(log_factors)))
-
-
-_kept = lru_cache(maxsize=8)(_second_order)
-"""A set asks for it five times: scales, columns and notes."""
 
 
 def second_order_or_none(problem: Problem) -> SecondOrder | None:
