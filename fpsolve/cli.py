@@ -34,7 +34,9 @@ CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130,
 
 app = App(
     name="fpsolve",
-    help="""Moment Lyapunov exponents of a vibro-impact oscillator under coloured noise, by finite elements.
+    help="""Moment Lyapunov exponents of linear systems in the plane under coloured or white noise, by finite elements.
+
+    A case file states a vibro-impact oscillator, [oscillator], or any other linear system as equations, [system].
 
     Example: fpsolve run cases/fig1.toml
 
@@ -48,7 +50,7 @@ app = App(
 UNITS = "Units: omega in rad/time, c1 in 1/time, D0 in 1/time, tau0 in time"
 Cases = Annotated[list[Path], Parameter(help="Case files.", consume_multiple=True, negative="")]
 ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True, negative="")]
-SET = f"Another value for a key of the case, e.g. oscillator.omega=2.0. {UNITS}."
+SET = f"Another value for a key of the case, e.g. oscillator.omega=2.0 or system.zeta=0.1. {UNITS}."
 Overrides = Annotated[list[str] | None, Parameter(name="--set", help=SET, negative="")]
 
 

@@ -171,6 +171,13 @@ def test_what_refers_to_other_p_can_be_left_out(capsys):
     assert main([*command, *(f"--set={remedy}" for remedy in remedies)]) == 0
 
 
+def test_the_help_tells_of_every_linear_system(capsys):
+    assert main(["--help"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "linear systems in the plane under coloured or white noise" in told
+    assert "[system]" in told
+
+
 @pytest.mark.parametrize("command", ["run", "check", "simulate"])
 def test_the_help_names_the_units(command, capsys):
     assert main([command, "--help"]) == 0
