@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.drawing import QUARTERS, SIZE, STYLE, draw_colours, label_axes
+from fpsolve.drawing import COLOURS, QUARTERS, SIZE, STYLE, add_legend, draw_colours, label_axes
 from fpsolve.signals import signals_held
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ LINES = (
 RIM = ("0", "pi/2", "pi", "3 pi/2", "2 pi")
 """Words at the quarters of the rim, in ASCII."""
 RED = "#C8102E"
+MOST_LINES = 10
+"""Lines that a legend names."""
 NEXT_TO_ZERO = 0.05
 """A least value below this share of the maximum is drawn as 0, which rounding and small errors miss."""
 Label = tuple[str, FloatArray, str]
@@ -80,6 +82,7 @@ class Surface:
         title: in which p and Λ(p) are.
         lines: of parameters.
         impacts: the phases at which the function jumps.
+        is_lines: whether ξ has these values alone, so that there is a line for each and no surface.
     """
 
     phi: FloatArray
@@ -90,6 +93,7 @@ class Surface:
     title: str
     lines: Sequence[str]
     impacts: Sequence[float]
+    is_lines: bool = False
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -125,7 +129,7 @@ def can_render() -> bool:
 
 
 def flat_picture(surface: Surface, cmap: str) -> Picture:
-    """The function in colours over the plane, by matplotlib."""
+    """The function in colours over the plane, or as lines, by matplotlib."""
     content = BytesIO()
     flat_figure(surface, cmap).savefig(content, format="png", dpi=150)
     return Picture(content.getvalue())
@@ -141,14 +145,30 @@ def flat_figure(surface: Surface, cmap: str) -> Figure:
     with rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.add_subplot()
-        draw_colours(axes, surface.phi.ravel(), surface.xi, surface.values.T, about["values"], **style)
+        if surface.is_lines:
+            _draw_lines(axes, surface)
+        else:
+            draw_colours(axes, surface.phi.ravel(), surface.xi, surface.values.T, about["values"], **style)
         for impact in surface.impacts:
             axes.axvline(impact, color=RED, linewidth=1.2)
         axes.set_xticks(*QUARTERS)
-        label_axes(axes, about["phi"], about["xi"])
+        label_axes(axes, about["phi"], about["values" if surface.is_lines else "xi"])
         figure.suptitle(surface.title, parse_math=False)
         axes.set_title("\n".join(surface.lines), fontsize=9, parse_math=False)
     return figure
+
+
+def _draw_lines(axes: Any, surface: Surface) -> None:
+    """A line over φ for each value of the noise, with a gap where the function jumps."""
+    phi = np.pad(surface.phi, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
+    for number, xi in enumerate(surface.xi):
+        blocks = surface.values[:, number].reshape(surface.phi.shape)
+        values = np.pad(blocks, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
+        axes.plot(phi, values, color=COLOURS[number % len(COLOURS)], linewidth=1.6, label=rf"$\xi$ = {xi:g}")
+    axes.set_xlim(0, 2 * math.pi)
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    if 1 < surface.xi.size <= MOST_LINES:
+        add_legend(axes)
 
 
 def picture_in_space(surface: Surface, cmap: str, *, cylinder: bool) -> Picture:

@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
-from fpsolve.drawing import QUARTERS, draw_plane
+from fpsolve.drawing import QUARTERS, add_legend, coloured, draw_plane, label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import growth_rate, phase_speed
 from fpsolve.model.quantity import NOISE, PHASE, density_unit
+from fpsolve.surfaces import MOST_LINES
 
 if TYPE_CHECKING:
     import xarray
@@ -39,6 +40,7 @@ class Density(Result):
         name: what it is a density of, and at which p.
         noise: what ξ is, with its unit.
         parameters: of the problem, by keys such as "noise.D0".
+        has_states: whether the noise has these ξ alone; the density is then per radian.
     """
 
     phi: FloatArray
@@ -49,10 +51,12 @@ class Density(Result):
     name: str = "density of phase and noise"
     noise: Quantity = NOISE
     parameters: Mapping[str, float | str] = field(default_factory=dict)
+    has_states: bool = False
 
     def to_xarray(self) -> xarray.Dataset:
         """The density over φ and ξ, and the weights for integrals."""
-        density = Quantity("density", "ρ", "density", unit=density_unit(self.noise), dims=("phi", "xi"))
+        unit = "1/rad" if self.has_states else density_unit(self.noise)
+        density = Quantity("density", "ρ", "density", unit=unit, dims=("phi", "xi"))
         coordinates = {PHASE: self.phi, self.noise: self.xi}
         for axis, weights in ((PHASE, self.phi_weights), (self.noise, self.xi_weights)):
             words = "weight of the rule for integrals"
@@ -60,6 +64,15 @@ class Density(Result):
         return dataset(self.name, "finite elements", {density: self.values}, coordinates, self.parameters)
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+        axes.set_xticks(*QUARTERS)
+        if self.has_states:
+            for xi, values in zip(self.xi, self.values.T, strict=True):
+                axes.plot(self.phi, values, **{"linewidth": 1.6, "label": rf"$\xi$ = {xi:g}", **coloured(axes, kwargs)})
+            axes.set(xlim=(0, 2 * np.pi), ylim=(0, None))
+            label_axes(axes, found.phi.attrs, found.density.attrs)
+            if 1 < self.xi.size <= MOST_LINES:
+                add_legend(axes)
+            return
         draw_plane(axes, found.density, **{"shading": "gouraud", **kwargs})
         axes.set_xticks(*QUARTERS)
         seen = self.xi[self.xi_marginal() > UNSEEN * self.xi_marginal().max()]
@@ -170,5 +183,5 @@ def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Densit
     phi, values, phi_weights = phi[order], values[order], np.tile(weights, turns)[order]
     total, problem = phi_weights @ values @ at.measure, pair.generator.problem
     words = "tilted" if name == "product" else "adjoint" if pair.p else "stationary"
-    about = f"{words} density at p = {pair.p:g}", problem.noise_quantity, problem.values
+    about = f"{words} density at p = {pair.p:g}", problem.noise_quantity, problem.values, problem.noise.has_states
     return Density(phi, at.xi, phi_weights, at.measure, values / total, *about)

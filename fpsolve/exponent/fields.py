@@ -3,7 +3,8 @@
 The nodes are those of Lagrange quadrilaterals on the full circle, x = φ, y = ξ. They show the elements' polynomials,
 not an interpolation through shared nodes: nodes are doubled at every φ-line of the mesh and carry the one-sided limits
 there, so that the jump T(φ⁻) = R^p T(φ⁺) of an impact is seen. A half circle is repeated, as everything in Eq. (19) is
-π-periodic, and its cells are cut at φ = 0 and 2π.
+π-periodic, and its cells are cut at φ = 0 and 2π. Where the noise has states there is a strip for each,
+around y = 1 for the first, y = 2 for the second; white noise has one.
 """
 
 from __future__ import annotations
@@ -11,12 +12,11 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
-from fpsolve.errors import OutputError
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.model.problem import parameter_lines
 from fpsolve.model.quantity import PHASE, Quantity, density_unit
@@ -111,23 +111,22 @@ class Nodes:
 
     @classmethod
     def of(cls, pair: PrincipalPair, finer: int = 1) -> Nodes:
-        """Nodes that show a pair, or so many times more either way; P_s in the adjoint asks for low quadrilaterals.
-
-        Raises:
-            OutputError: the noise has states.
-        """
-        space, lines = pair.space, _z_lines(pair)
+        """Nodes that show a pair, or so many times more either way; P_s in the adjoint asks for low quadrilaterals."""
+        space = pair.space
         degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
         order = min(MAX_ORDER, max(degrees))
-        # P_s is shown by quadrilaterals as high as a noise unit, or higher in algebraic tails
-        has_tails, inner = pair.generator.problem.noise.has_algebraic_tails, np.minimum(abs(lines[:-1]), abs(lines[1:]))
-        tall = math.ceil(np.max(np.diff(lines) / np.maximum(1.0, inner / 6 if has_tails else 1.0)) - 1e-9)
         frame = pair.generator.problem.frame
         lines_of_phi = space.phi.lines if frame is None else frame.own_phase(space.phi.lines)
         starts = np.sort(np.mod(lines_of_phi[:-1], space.phi.span))
         starts = np.concatenate([starts + k * space.phi.span for k in range(space.phi.turns)])
         breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
         phi = _nodes(breaks, order, finer * _parts(degrees[0], order))
+        if pair.generator.problem.noise.has_states:
+            return Strips(phi, _nodes(np.arange(0.5, space.xi.size + 1), order, 1), 1.0, order)
+        lines = _z_lines(pair)
+        # P_s is shown by quadrilaterals as high as a noise unit, or higher in algebraic tails
+        has_tails, inner = pair.generator.problem.noise.has_algebraic_tails, np.minimum(abs(lines[:-1]), abs(lines[1:]))
+        tall = math.ceil(np.max(np.diff(lines) / np.maximum(1.0, inner / 6 if has_tails else 1.0)) - 1e-9)
         z = _nodes(lines, order, finer * max(tall, _parts(pair.generator.chosen.noise.degree, order)))
         return cls(phi, z, pair.generator.problem.noise.standard_deviation, order)
 
@@ -139,8 +138,6 @@ class Nodes:
     def seen(self, pair: PrincipalPair) -> Nodes:
         """The same where the tilted density, or that of the noise, is not negligible."""
         noise = pair.generator.problem.noise
-        if noise.has_states:  # of which there are no nodes
-            return self
         densities = self.fields(pair).product.max(axis=0), noise.density(self.unit * self.z)
         living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
         return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
@@ -161,22 +158,49 @@ class Nodes:
 
     def samples(self, pair: PrincipalPair) -> Samples:
         """The functions of ξ at the nodes."""
-        return _on_a_line(pair).at(self.z)
+        axis: Any = pair.space.xi
+        found: Samples = axis.at(self.z)
+        return found
 
     def points(self) -> FloatArray:
         """(φ, ξ, 0), φ slowest, shape (points, 3)."""
         phi, xi = np.meshgrid(self.phi.ravel(), self.unit * self.z, indexing="ij")
         return np.stack([phi.ravel(), xi.ravel(), np.zeros(phi.size)], axis=1)
 
+    @property
+    def _rows(self) -> Any:
+        """Where cells begin among the nodes of ξ."""
+        return np.arange(0, self.z.size - 1, self.order)
+
     def cells(self) -> Any:
         """Points of each quadrilateral in VTK's order, shape (cells, (order + 1)²)."""
         k, (blocks, nodes) = self.order, self.phi.shape
         columns = (np.arange(blocks)[:, None] * nodes + np.arange(0, nodes - 1, k)).ravel()
-        corners = columns[:, None] * self.z.size + np.arange(0, self.z.size - 1, k)
+        corners = columns[:, None] * self.z.size + self._rows
         inner = range(1, k)
         edges = [*((i, 0) for i in inner), *((k, j) for j in inner), *((i, k) for i in inner), *((0, j) for j in inner)]
         i, j = np.transpose([(0, 0), (k, 0), (k, k), (0, k), *edges, *((i, j) for j in inner for i in inner)])
         return corners.reshape(-1, 1) + i * self.z.size + j
+
+
+class Strips(Nodes):
+    """The same for the states of a noise: a strip for each, z their numbers from 1 on, half a unit to either side."""
+
+    @property
+    def z(self) -> FloatArray:
+        return 0.8 * self.z_cells.ravel() + 0.2 * self.z_cells.mean(axis=1).repeat(self.z_cells.shape[1])
+
+    def seen(self, pair: PrincipalPair) -> Strips:
+        """All of them."""
+        return self
+
+    def samples(self, pair: PrincipalPair) -> Samples:
+        at, states = pair.space.xi.samples(), np.arange(self.z_cells.shape[0]).repeat(self.z_cells.shape[1])
+        return Samples(*(each[states] for each in at))
+
+    @property
+    def _rows(self) -> Any:
+        return np.arange(0, self.z.size, self.order + 1)
 
 
 def _z_lines(pair: PrincipalPair) -> FloatArray:
@@ -184,8 +208,8 @@ def _z_lines(pair: PrincipalPair) -> FloatArray:
 
     Outside it P_s and the tilted density are below `FAINT` of their largest values.
     """
-    xi, noise = _on_a_line(pair), pair.generator.problem.noise
-    if pair.generator.chosen.noise.lines.size or noise.has_states:
+    xi, noise = cast("LineAxis", pair.space.xi), pair.generator.problem.noise
+    if pair.generator.chosen.noise.lines.size:
         return pair.generator.chosen.noise.lines
     end = noise.half_width / noise.standard_deviation
     reach = min(end, 12.0 + abs(xi.center))
@@ -195,13 +219,6 @@ def _z_lines(pair: PrincipalPair) -> FloatArray:
     lower, upper = max(math.floor(seen[0]), -end), min(math.ceil(seen[-1]), end)
     inside = np.arange(math.floor(lower) + 1, math.ceil(upper))
     return np.concatenate([[lower], inside[(inside > lower + 0.1) & (inside < upper - 0.1)], [upper]])
-
-
-def _on_a_line(pair: PrincipalPair) -> LineAxis:
-    """The functions of ξ of a pair. Raises `OutputError` where the noise has states."""
-    if pair.generator.problem.noise.has_states:
-        raise OutputError("noise with states makes no surface over (phi, xi); look at T for each state instead")
-    return pair.space.xi
 
 
 def _parts(degree: int, order: int) -> int:
@@ -219,7 +236,7 @@ class EigenfunctionPlot:
     """A mixin of a `PrincipalPair`."""
 
     def plot(self, field: Field = "T", *, cylinder: bool = False, cmap: str = "viridis") -> Picture:
-        """Draw an eigenfunction, or the tilted density, over phase and noise.
+        """Draw an eigenfunction, or the tilted density, over phase and noise; for noise with states a line for each.
 
         In space by pyvista where this machine can render, which takes some seconds to find out the first time; else in
         the plane by matplotlib.
@@ -231,9 +248,10 @@ class EigenfunctionPlot:
 
         Raises:
             ValueError: there is no such field.
-            OutputError: the noise has states.
         """
         surface = surface_of(self, field)  # type: ignore[arg-type]
+        if surface.is_lines:
+            return flat_picture(surface, cmap)
         if can_render():
             return picture_in_space(surface, cmap, cylinder=cylinder)
         if cylinder:
@@ -246,21 +264,24 @@ class EigenfunctionPlot:
 
 
 def surface_of(pair: PrincipalPair, field: str) -> Surface:
-    """A function of a pair where it is not negligible, with its words. Raises `ValueError`, `OutputError`."""
+    """A function of a pair where it is not negligible, with its words. Raises `ValueError`."""
     if field not in FIELDS:
         raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
     (name, quantity), problem = FIELDS[field], pair.generator.problem
-    nodes, noise = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity
-    unit = quantity.unit if name == "right" else density_unit(noise)
+    nodes, noise, is_lines = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity, problem.noise.has_states
+    unit = quantity.unit if name == "right" else "1/rad" if is_lines else density_unit(noise)
+    xi = pair.space.xi.support if is_lines else nodes.unit * nodes.z
+    values = getattr(nodes.fields(pair), name)
     about = {"phi": PHASE.attributes, "xi": noise.attributes, "values": {**quantity.attributes, "units": unit}}
     rays = {(jump.phase + turn) % (2 * math.pi) for jump in problem.system.jumps for turn in (0, math.pi)}
     return Surface(
         phi=nodes.phi,
-        xi=nodes.unit * nodes.z,
-        values=getattr(nodes.fields(pair), name),
+        xi=xi,
+        values=values[:, :: nodes.order + 1] if is_lines else values,
         about=about,
         name=quantity.symbol,
         title=f"p = {pair.p:g}, Λ(p) = {round(pair.value, 14) + 0.0:.6g} (1/time)",
         lines=parameter_lines(problem.parameters),
         impacts=sorted(rays),
+        is_lines=is_lines,
     )

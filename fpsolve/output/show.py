@@ -127,25 +127,28 @@ def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
     """The surface with its impact lines, labels and colours, and the words above and below it."""
     source, limits = scaled(strip(reader, p), chosen.field, p)
     bounds = source.GetDataInformation().GetBounds()
-    marked = simple.Calculator(Input=source, ResultArrayName="wall", Function="abs(cos(coordsX))")
+    facts = servermanager.Fetch(reader).GetFieldData()
+    impacts = impacts_of(facts)
+    nearest = "*".join(f"abs(coordsX - {phi!r})" for phi in impacts) or "1"
+    marked = simple.Calculator(Input=source, ResultArrayName="wall", Function=nearest)
     if chosen.cylinder:
         shape = cylinder(marked, limits, bounds)
     else:
         shape = simple.WarpByScalar(Input=marked, Scalars=["POINTS", "scaled"])
     display = simple.Show(shape, view)
     if chosen.cylinder:
-        label_cylinder(view, shape, bounds)
+        label_cylinder(view, shape, bounds, impacts, along_y(facts))
     else:
-        label_box(view, display, limits, bounds)
+        label_box(view, display, limits, bounds, impacts, along_y(facts))
 
-    # both edges of the surface at the impact lines, where cos phi = 0
+    # both edges of the surface at the impact lines
     facets = simple.ExtractSurface(Input=shape, NonlinearSubdivisionLevel=SUBDIVISION)
     edges = simple.FeatureEdges(Input=facets, BoundaryEdges=1, FeatureEdges=0, NonManifoldEdges=0, ManifoldEdges=0)
-    paint_line(between(edges, "wall", 0, 1e-6, p), view, display.Scale, RED)
+    if impacts:
+        paint_line(between(edges, "wall", 0, 1e-6, p), view, display.Scale, RED)
     paint(display, view, limits, SYMBOLS[chosen.field])
 
     # the varied parameters, p and Lambda(p), or the name of what has no p; below, the other parameters
-    facts = servermanager.Fetch(reader).GetFieldData()
     of_p = '"p = %g     Lambda(p) = %.6g (1/time)" % (p[0], round(float(Lambda[0]), 14) + 0.0)'
     head = repr("stationary density (p = 0)") if chosen.field == "stationary_density" else of_p
     if facts.GetAbstractArray("varied"):
@@ -153,6 +156,19 @@ def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
     annotate(reader, view, head, "Upper Center", 36)
     if facts.GetAbstractArray("held"):
         annotate(reader, view, "held.GetValue(0)", "Lower Center", 26)
+
+
+def impacts_of(facts: Any) -> list[float]:
+    """The phases at which T jumps, as the files say; those of a wall at x = 0 where they do not."""
+    if not facts.GetAbstractArray("impacts"):
+        return [QUARTER, 3 * QUARTER]
+    words = facts.GetAbstractArray("impacts").GetValue(0)
+    return [] if words == "none" else [float(each) for each in words.split()]
+
+
+def along_y(facts: Any) -> str:
+    """What stands along y: the noise with its unit, or its states."""
+    return facts.GetAbstractArray("along_y").GetValue(0) if facts.GetAbstractArray("along_y") else "noise xi (1/time)"
 
 
 def annotate(reader: Any, view: Any, expression: str, place: str, size: int) -> None:
@@ -208,7 +224,9 @@ def paint_line(lines: Any, view: Any, scale: list[float], colour: tuple[float, f
     display.Ambient, display.Diffuse, display.AmbientColor = 1, 0, colour
 
 
-def label_box(view: Any, display: Any, limits: tuple[float, float], bounds: tuple[float, ...]) -> None:
+def label_box(
+    view: Any, display: Any, limits: tuple[float, float], bounds: tuple[float, ...], impacts: list[float], noise: str
+) -> None:
     """A box of pleasing shape, with ticks and titles along its edges, and a red line at each impact up its back."""
     low, high = (*bounds[:4:2], limits[0]), (*bounds[1:4:2], limits[1])
     axes = view.AxesGrid
@@ -216,7 +234,12 @@ def label_box(view: Any, display: Any, limits: tuple[float, float], bounds: tupl
     display.Scale = axes.DataScale = scale
     axes.Visibility, axes.AxesToLabel = 1, 5  # the height on the left, and xi
     axes.UseCustomBounds, axes.CustomBounds = 1, [end[i] * scale[i] for i in range(3) for end in (low, high)]
-    axes.XTitle, axes.YTitle, axes.ZTitle = "", "noise xi (1/time)          ", ""
+    along, *states = noise.split("; ")
+    axes.XTitle, axes.YTitle, axes.ZTitle = "", f"{along}          ", ""
+    if not noise.startswith("noise xi"):
+        axes.YTitle, axes.YAxisUseCustomLabels, axes.YAxisLabels = "" if states else axes.YTitle, 1, []
+    for number, words in enumerate(states, start=1):
+        caption(view, words, [low[0] - 0.05 * BOX[0], number * scale[1], low[2] * scale[2]], "Right")
     for axis in "XYZ":
         setattr(axes, f"{axis}TitleFontSize", 30)
         setattr(axes, f"{axis}LabelFontSize", 24)
@@ -227,23 +250,29 @@ def label_box(view: Any, display: Any, limits: tuple[float, float], bounds: tupl
         caption(view, words, [ends[2][i] * scale[i] for i in range(3)], "Left")
     name = [2.2 * QUARTER, edge - 9 * tick, floor]
     caption(view, "phase phi (rad)", [name[i] * scale[i] for i in range(3)], "Left")
-    for phi in (QUARTER, 3 * QUARTER):
+    for phi in impacts:
         ends = [[phi, high[1], limit] for limit in limits]
         paint_line(simple.Line(Point1=ends[0], Point2=ends[1]), view, scale, RED)
         caption(view, "impact", [*(ends[1][i] * scale[i] for i in (0, 1)), ends[1][2] * scale[2] + 0.04], "Left", RED)
 
 
-def label_cylinder(view: Any, shape: Any, bounds: tuple[float, ...]) -> None:
+def label_cylinder(view: Any, shape: Any, bounds: tuple[float, ...], impacts: list[float], noise: str) -> None:
     """phi around the upper rim, xi at both ends, on the side that has no colour bar."""
     view.AxesGrid.Visibility = 0
     points = servermanager.Fetch(shape).GetPoints()
     nodes = [points.GetPoint(i) for i in range(points.GetNumberOfPoints())]
-    for k, words in enumerate(("phase phi = 0", "impact: pi/2", "pi", "impact: 3 pi/2")):
-        colour = RED if k % 2 else BLACK
+    for k, words in enumerate(("phase phi = 0", "pi/2", "pi", "3 pi/2")):
+        is_impact = any(abs(phi - k * QUARTER) < 1e-6 for phi in impacts)
+        colour, words = (RED, f"impact: {words}") if is_impact else (BLACK, words)
         place = beside(nodes, k * QUARTER, LENGTH, FRONT if k > 1 else 0)
         caption(view, words, place, "Right" if k in (1, 2) else "Left", colour)
-    for xi, at in ((bounds[2], 0.0), (bounds[3], LENGTH)):
-        caption(view, f"noise xi = {xi:.3g} (1/time)", beside(nodes, 1.5 * QUARTER, at, FRONT), "Right")
+    (name, _, unit), (_, *states), (bottom, top) = noise.partition(" ("), noise.split("; "), bounds[2:4]
+    marks = [(words, LENGTH * (k - 0.4 - bottom) / (top - bottom)) for k, words in enumerate(states, start=1)]
+    if name.startswith("noise xi"):
+        unit = f" ({unit}" if unit else ""
+        marks = [(f"{name} = {bottom:.3g}{unit}", 0.0), (f"{name} = {top:.3g}{unit}", LENGTH)]
+    for words, at in marks:
+        caption(view, words, beside(nodes, 1.5 * QUARTER, at, FRONT), "Right")
 
 
 def beside(nodes: list[tuple[float, ...]], angle: float, at: float, least: float) -> list[float]:

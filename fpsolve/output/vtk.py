@@ -1,10 +1,12 @@
 """Eigenfunctions and densities as ParaView files: Lagrange quadrilaterals on the full circle, x = φ, y = ξ.
 
-A file shows the elements' polynomials at their `Nodes`; its field data name the curve.
+A file shows the elements' polynomials at their `Nodes`; its field data name the curve. Where the noise has
+states, y is the number of the state, each a strip.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -16,6 +18,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
+from fpsolve.data import plain_unit
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import Nodes, xi_marginal
 from fpsolve.files import write_text
@@ -24,6 +27,8 @@ from fpsolve.signals import signals_held
 from fpsolve.study.results import SimulatedCurve, Solved
 
 CURVES = "curves.pvd"
+MOST_STATES = 8
+"""States of the noise that a picture names."""
 Facts = Mapping[str, float | str]
 
 
@@ -39,7 +44,8 @@ def write_eigenfunctions(
 
     Point data: `T`; `T_adjoint`, T*; `tilted_density`, T T*; `stationary_density`, T* at p = 0; `z` = ξ/std.
     T, which ParaView shows first, has mean 1 over P_s(ξ)/2π, see `fields`, and is cut off beyond e^±600;
-    ∫T T* dφ dξ = 1. Field data: `p`; `Lambda`, Λ(p); each of the parameters; and in words, with units, `varied`, those
+    ∫T T* dφ dξ = 1. Where the noise has states `z` is the number of one, and densities are per radian.
+    Field data: `p`; `Lambda`, Λ(p); each of the parameters; and in words, with units, `varied`, those
     that are varied, and `held`, the others.
 
     Args:
@@ -99,7 +105,7 @@ def write_functions(solved: Solved, curve: Curve, folder: Path) -> None:
     """Write the eigenfunctions of a curve; with the first curve the stationary density too."""
     if solved.stationary is None:
         return
-    about = ({**curve.parameters, "curve": float(curve.number)}, curve.varied)
+    about = ({**curve.parameters, "curve": float(curve.number), **_frame(curve.problem)}, curve.varied)
     if curve.number == 1:
         write_density(folder / "density.vtu", solved.stationary, *about)
     if solved.eigenpairs:
@@ -191,6 +197,19 @@ def _facts(parameters: Facts, varied: Collection[str], problem: Problem) -> Fact
     known = {key: each._replace(value=parameters[key]) for key, each in problem.parameters.items() if key in parameters}
     words = {"varied": parameter_words(known, varied), "held": "\n".join(parameter_lines(known, varied))}
     return {**parameters, **{name: text.replace("²", "^2") for name, text in words.items() if text}}
+
+
+def _frame(problem: Problem) -> Facts:
+    """What pictures say of the axes: where T jumps, in radians, and what stands along y."""
+    turns = {round((jump.phase + turn) % (2 * math.pi), 12) for jump in problem.system.jumps for turn in (0, math.pi)}
+    noise, unit = problem.noise, plain_unit(problem.noise_quantity.unit).replace("²", "^2")
+    along = "noise xi" if unit in ("1", "unknown") else f"noise xi ({unit})"
+    if noise.has_states:
+        states = [] if noise.is_white else [f"xi = {each:g}" for each in noise.reached]
+        along = "; ".join(
+            ["white noise" if noise.is_white else "states", *(states if len(states) <= MOST_STATES else ())]
+        )
+    return {"impacts": " ".join(f"{turn:.12g}" for turn in sorted(turns)) or "none", "along_y": along}
 
 
 def _name(stem: str, p: float) -> str:

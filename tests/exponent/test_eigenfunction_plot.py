@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from fpsolve import surfaces
-from fpsolve.errors import OutputError
 from fpsolve.exponent.fields import FIELDS, fields, surface_of
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -153,9 +151,6 @@ def test_a_constant_has_a_picture():
 def test_what_cannot_be_drawn_is_refused(pair):
     with pytest.raises(ValueError, match="got field = 'density'; must be one of 'T', 'T_adjoint', 'tilted_density'"):
         pair.plot("density")
-    states = ExponentSolver(Problem(FIG1, MarkovChain.telegraph(amplitude=0.5, rate=1.0))).pair(1.0)
-    with pytest.raises(OutputError, match="noise with states"):
-        states.plot()
 
 
 def test_solving_loads_nothing_that_draws():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pyvista
+from vtkmodules.vtkCommonDataModel import vtkLagrangeQuadrilateral
 
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -27,3 +28,15 @@ def written(folder, solver, moments=MOMENTS, **options):
     pairs = [solver.pair(p) for p in moments]
     _, *files = write_eigenfunctions(folder, pairs, solver.pair(0.0), **options)
     return {float(grid.field_data["p"][0]): grid for grid in map(pyvista.read, files)}
+
+
+def integral(grid, name):
+    """∫ of the Lagrange polynomials of an array, or of given values, their nodes numbered by VTK's own function."""
+    values = grid[name] if isinstance(name, str) else name
+    k = round(np.sqrt(grid.cell_connectivity.size / grid.n_cells)) - 1
+    order = [vtkLagrangeQuadrilateral.PointIndexFromIJK(i, j, [k, k]) for i in range(k + 1) for j in range(k + 1)]
+    nodes = grid.cell_connectivity.reshape(grid.n_cells, -1)[:, order]
+    t = np.arange(k + 1) / k
+    rule = np.linalg.solve(np.vander(t, increasing=True).T, 1 / np.arange(1, k + 2))
+    areas = np.prod(np.ptp(grid.points[nodes], axis=1)[:, :2], axis=1)
+    return areas @ values[nodes] @ np.outer(rule, rule).ravel()

@@ -3,21 +3,29 @@
 import json
 from collections import Counter
 
+import numpy as np
 import pytest
+import pyvista
 from matplotlib.figure import Figure
 
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve.analysis import stationary_density
 from fpsolve.case.vary import short_names
 from fpsolve.data import plain_unit
 from fpsolve.drawing import is_math, plain_numbers, typeset
 from fpsolve.exponent import ExponentSolver, critical_impact_factor, critical_restitution, impact_rate
+from fpsolve.exponent.fields import surface_of
 from fpsolve.messages import Code
 from fpsolve.model import MarkovChain, ParametricOscillator, Telegraph, VibroImpactOscillator, White, noise_kind
 from fpsolve.model.kinds import NOISES
 from fpsolve.output.figures import draw
 from fpsolve.output.tables import write_results
 from fpsolve.output.terminal import print_results, varied_columns
-from tests.solving import case_in, solve_case
+from fpsolve.output.vtk import write_eigenfunctions, write_functions
+from fpsolve.surfaces import flat_figure
+from fpsolve.workflow import run
+from tests.output.eigenfunctions import integral
+from tests.solving import case_in, solve_case, solve_sets
 
 OWN = """
 title = "mine"
@@ -30,6 +38,7 @@ noises = { load = "noise.axial" }
 kind = "KIND"
 """
 KINDS = {"telegraph": "a = 0.5\nk = 1.0\n", "white": "s = 0.5\n", "ornstein-uhlenbeck": "alpha = 1.0\nsigma = 0.5\n"}
+CHAIN = MarkovChain([0.4, -0.5, 0.4], [[-1.0, 0.4, 0.6], [0.2, -0.5, 0.3], [0.0, 2.0, -2.0]])
 MOMENTS = "[moments]\np = [1.0, 2.0, 4.0]\n"
 PLANE = """
 title = "two rays"
@@ -42,6 +51,32 @@ kind = "telegraph"
 a = 0.5
 k = 1.0
 """
+
+
+RATES = np.array([[0.0, 1.0], [-1.0, -0.2]]), np.array([[0.0, 0.0], [-1.0, 0.0]])
+"""Of ẍ + 0.2ẋ + (1 + ξ)x = 0, without the noise and with it."""
+
+
+def form_of(noise):
+    """Λ(2), and T(φ, ξ_i) = eᵀM_i e up to a factor, from AᵢᵀMᵢ + MᵢAᵢ + Σⱼ qᵢⱼMⱼ = ΛMᵢ, for white noise + s²BᵀMB."""
+    (still, driven), one = RATES, np.eye(2)
+    matrices = [still + each * driven for each in noise.states]
+    blocks = [np.kron(each.T, one) + np.kron(one, each.T) for each in matrices]
+    if noise.is_white:
+        blocks[0] = blocks[0] + noise.s**2 * np.kron(driven.T, driven.T)
+    count = len(blocks)
+    total = np.kron(np.array(noise.rates), np.eye(4))
+    for i, block in enumerate(blocks):
+        total[4 * i : 4 * i + 4, 4 * i : 4 * i + 4] += block
+    values, vectors = np.linalg.eig(total)
+    at = int(np.argmax(values.real))
+    forms = vectors[:, at].real.reshape(count, 2, 2)
+
+    def form(phi):
+        e = np.stack([np.cos(phi), -np.sin(phi)], axis=1)
+        return np.einsum("ia,sab,ib->is", e, forms, e)
+
+    return values[at].real, form
 
 
 def own(kind):
@@ -172,6 +207,58 @@ def test_every_ray_has_its_rate_in_the_summary(tmp_path, capsys):
         assert ray["critical_restitution"] is None
     print_results(case, results)
     assert "φ = 0.3:" in "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize("noise", [Telegraph(a=0.5, k=1.0), White(s=0.5), CHAIN], ids=lambda noise: noise.kind)
+def test_eigenfunctions_of_noise_with_states_are_strips(noise, tmp_path):
+    """T of p = 2 is a quadratic form; T T* is a density; the number of a state is y."""
+    solver = ExponentSolver(Problem(ParametricOscillator(stiffness=1.0, damping=0.1), noise))
+    _, *files = write_eigenfunctions(tmp_path, [solver.pair(2.0)], solver.pair(0.0))
+    [grid] = map(pyvista.read, files)
+    value, form = form_of(noise)
+    assert grid.field_data["Lambda"][0] == pytest.approx(value, rel=1e-9)
+    state = np.round(grid.points[:, 1]).astype(int) - 1
+    assert sorted(set(state)) == list(range(len(noise.states)))
+    expected = form(grid.points[:, 0])[np.arange(state.size), state]
+    np.testing.assert_allclose(grid["T"] / grid["T"].max(), expected / expected[grid["T"].argmax()], atol=1e-6)
+    for name in ("tilted_density", "stationary_density"):
+        assert integral(grid, name) == pytest.approx(0.8, abs=1e-4)  # a strip is 0.8 wide
+
+
+def test_eigenfunctions_of_white_noise_are_written(tmp_path):
+    text = (
+        own("white")
+        + 'interpretation = "ito"\n[moments]\np = [2.0]\n[output]\neigenfunctions = [2.0]\nfigure = false\n'
+    )
+    run(case_in(tmp_path, text), tmp_path)
+    facts = pyvista.read(tmp_path / "test/eigenfunctions/p+2.0.vtu").field_data
+    assert facts["along_y"][0] == "white noise"
+    assert facts["impacts"][0] == "none"
+    assert (tmp_path / "test/density.vtu").is_file()
+
+
+def test_files_say_where_the_impacts_are(tmp_path):
+    case = case_in(tmp_path, PLANE + "[moments]\np = [2.0]\n")
+    [solved] = solve_sets(case)
+    write_functions(solved, solved.result.curve, tmp_path)
+    facts = pyvista.read(tmp_path / "eigenfunctions/p+2.0.vtu").field_data
+    assert [float(each) for each in facts["impacts"][0].split()] == pytest.approx(
+        [0.3, np.pi / 2, np.pi + 0.3, 1.5 * np.pi], abs=1e-11
+    )
+    assert facts["along_y"][0] == "states; xi = -0.5; xi = 0.5"
+
+
+@pytest.mark.parametrize("noise", [Telegraph(a=0.5, k=1.0), White(s=0.5)], ids=lambda noise: noise.kind)
+def test_python_draws_lines_for_states(noise):
+    solver = ExponentSolver(Problem(ParametricOscillator(stiffness=1.0, damping=0.1, restitution=0.8), noise))
+    assert solver.pair(2.0).plot().png.startswith(b"\x89PNG")
+    figure = flat_figure(surface_of(solver.pair(2.0), "T"), "viridis")
+    lines = [line for line in figure.axes[0].lines if line.get_label().startswith(r"$\xi$")]
+    assert len(lines) == len(noise.states)
+    assert figure.axes[0].get_ylabel().startswith("eigenfunction")
+    axes = stationary_density(solver.pair(0.0)).plot(Figure().subplots())
+    assert len(axes.lines) == len(noise.states)
+    assert axes.get_ylabel() == "density (1/rad)"
 
 
 def test_parameters_without_a_derivative_are_named(tmp_path):

@@ -10,7 +10,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import pyvista
-from vtkmodules.vtkCommonDataModel import vtkLagrangeQuadrilateral
 
 from fpsolve.case.case import load_case
 from fpsolve.exponent.eigen import principal_pair
@@ -25,7 +24,7 @@ from fpsolve.study import solve
 from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.oracles.perturbation import first_order_eigenfunction
-from tests.output.eigenfunctions import HARD, MESHES, MOMENTS, written
+from tests.output.eigenfunctions import HARD, MESHES, MOMENTS, integral, written
 
 ROOT = Path(__file__).parents[2]
 NO_FIGURE = "output.figure=false"
@@ -50,18 +49,6 @@ def sides(grid, phi, name):
         points = points[np.abs(grid.points[points, 0] - phi) < 1e-9]
         found.append(grid[name][points[np.argsort(grid.points[points, 1])]])
     return found
-
-
-def integral(grid, name):
-    """∫ of the Lagrange polynomials of an array, or of given values, their nodes numbered by VTK's own function."""
-    values = grid[name] if isinstance(name, str) else name
-    k = round(np.sqrt(grid.cell_connectivity.size / grid.n_cells)) - 1
-    order = [vtkLagrangeQuadrilateral.PointIndexFromIJK(i, j, [k, k]) for i in range(k + 1) for j in range(k + 1)]
-    nodes = grid.cell_connectivity.reshape(grid.n_cells, -1)[:, order]
-    t = np.arange(k + 1) / k
-    rule = np.linalg.solve(np.vander(t, increasing=True).T, 1 / np.arange(1, k + 2))
-    areas = np.prod(np.ptp(grid.points[nodes], axis=1)[:, :2], axis=1)
-    return areas @ values[nodes] @ np.outer(rule, rule).ravel()
 
 
 @pytest.mark.parametrize("phi", [np.pi / 2, 3 * np.pi / 2])
