@@ -254,7 +254,8 @@ def solve_sensitivities(
     solves = dict(zip(RECORDS, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
     problem, values = solver.problem, solver.problem.values
-    keys = [f"{problem.system.noise_section}.{name}" for name in problem.noise.one_sided]
+    noises = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)
+    keys = [f"{section}.{name}" for section, noise in noises for name in noise.one_sided]
     one_sided = [Message(Code.ONE_SIDED, key=key, value=values[key]) for key in keys if key in along]
     return Sensitivities(
         theta={key: by.theta for key, by in along.items()},

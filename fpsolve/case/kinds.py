@@ -1,12 +1,13 @@
 """[system] and [noise] of a case: objects of the kinds that they name, and their parameters.
 
 [oscillator] is [system] with kind = "vibro-impact", [system] without a kind one of equations where it states some;
-[noise] without a kind is that of Eqs. (7)-(8), reduced or not. [noise.axial] is a noise that [system] calls so.
+[noise] without a kind is that of Eqs. (7)-(8), reduced or not. [noise.axial] is a noise that [system] calls so; there
+may be several.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import lru_cache
 from typing import Any, Literal
@@ -18,6 +19,7 @@ from pydantic_core import InitErrorDetails
 from fpsolve.case.messages import UNBOUNDED, Refusal, details_of, nearest, refuse, shown_with_kind
 from fpsolve.model.faults import TableError, fields_of, table_of
 from fpsolve.model.kinds import kind_names, noise_kind, system_kind
+from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import STRICT, Parametrised
 from fpsolve.model.problem import Problem
 
@@ -40,15 +42,17 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
         return _made(half, table)
     names, system = names_of(table), info.data.get("system")
     if system is not None:
-        refuse(_misnamed(names, system.noise_section))
+        refuse(_misnamed(names, system.noise_sections))
     if not names:
         return _made(half, table)
+    made, faults = dict[str, Any](), list[InitErrorDetails]()
     for name in names:
         try:
-            made = _made(half, table[name])
+            made[name] = _made(half, table[name])
         except ValidationError as error:
-            refuse([], details_of(error, name))
-    return made
+            faults += details_of(error, name)
+    refuse([], faults)
+    return noises_of(made)
 
 
 def names_of(table: Any) -> list[str]:
@@ -57,15 +61,21 @@ def names_of(table: Any) -> list[str]:
     return [*tables] if all(isinstance(each, dict) for each in tables.values()) else []
 
 
-def _misnamed(names: list[str], section: str) -> Iterator[Refusal]:
-    """Noises that the system does not name; the one that it names, if it is missing."""
-    wanted = section.partition(".")[2]
+def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
+    """Noises that the system does not name; those that it names, if they are missing."""
+    wanted = [section.partition(".")[2] for section in sections]
+    told = f"the noise of the system, which is {sections[0]}"
+    if len(sections) > 1:
+        told = f"one of the noises of the system, which are {', '.join(sections)}"
     for name in names:
-        if name != wanted:
-            text = f"is not the noise of the system, which is {section};{nearest(name, [wanted])}"
+        if name not in wanted:
+            text = f"is not {told};{nearest(name, wanted)}"
             yield (name,), name, f"{text} rename or remove it, or name it in noises of [system]"
-    if wanted and not names:
-        yield (), None, f"is not the noise of the system, which is {section}; write [{section}], or name this in noises"
+    if wanted != [""] and not names:
+        stated = " and ".join(f"[{section}]" for section in sections)
+        yield (), None, f"is not {told}; write {stated}, or name this in noises"
+    elif missing := [section for section, name in zip(sections, wanted, strict=True) if name not in names and names]:
+        yield (), None, f"lacks {' and '.join(missing)}; add a section for each, or leave it out of noises of [system]"
 
 
 def _made(half: Half, table: Mapping[str, Any]) -> Parametrised:
@@ -116,33 +126,36 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
     return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))
 
 
-def kinds_of(data: Mapping[str, Any]) -> dict[Half, type[Parametrised]]:
-    """The kinds that the tables of a case name, as far as there are such."""
-    found = dict[Half, type[Parametrised]]()
+def kinds_of(data: Mapping[str, Any]) -> dict[str, type[Parametrised]]:
+    """The kinds that the tables of a case name, by their sections, as far as there are such."""
+    found = dict[str, type[Parametrised]]()
     for half in USUAL:
         table = data.get(half, data.get("oscillator") if half == "system" else None)
-        for name in names_of(table) if half == "noise" else ():
-            table = table[name]
-        try:
-            found[half] = _kind(half, table_of(table))
-        except ValidationError:
-            continue
+        names = names_of(table) if half == "noise" else []
+        for section, each in [(f"{half}.{name}", table_of(table)[name]) for name in names] or [(half, table)]:
+            try:
+                found[section] = _kind(half, table_of(each))
+            except ValidationError:
+                continue
     return found
 
 
 def sections_of(fields: Mapping[str, FieldInfo], data: Mapping[str, Any]) -> dict[str, FieldInfo]:
     """The fields of a case with the kinds that its tables name, and [system] by its name in the file."""
     found = dict[str, FieldInfo]()
-    kinds: Mapping[str, type[Parametrised]] = kinds_of(data)  # type: ignore[assignment]
+    kinds = kinds_of(data)
     for name, field in fields.items():
         section = "oscillator" if name == "system" and "system" not in data else name
         found[section], table = field, table_of(data.get(section))
-        if name in kinds:
+        of_names = {each: kinds.get(f"noise.{each}") for each in names_of(table)} if name == "noise" else {}
+        if name in kinds or any(of_names.values()):
             found[section] = described = copy(field)
-            described.annotation = kinds[name]
-            if name == "noise" and (names := names_of(table)):
-                inner = copy(described)
-                described.annotation = _table_of(dict.fromkeys(names, inner))
+            described.annotation = kinds.get(name)
+            if of_names:
+                inner = {each: copy(described) for each in of_names}
+                for each, kind in of_names.items():
+                    inner[each].annotation = kind
+                described.annotation = _table_of(inner)
             elif name == "system":
                 named = table_of(table.get("parameters"))
                 described.annotation = _table_of({**dict.fromkeys(named, UNBOUNDED), **fields_of(kinds[name])})
@@ -164,14 +177,20 @@ def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[
         context: with the kinds that the tables name.
     """
     found = dict[str, FieldInfo]()
+    kinds: Mapping[str, type[Parametrised]] = context.get("kinds", {})
     for half in USUAL:
-        made = valid.get(half)
-        kind = context.get("kinds", {}).get(half) or (None if made is None else type(made))
-        if kind is None or (made is None and not kind.fields()):
+        stated = {section: kind for section, kind in kinds.items() if section.partition(".")[0] == half}
+        sections = valid["system"].noise_sections if half == "noise" and "system" in valid else [*stated]
+        made = [] if half not in valid else [valid[half]] if half == "system" else [*valid[half].parts.values()]
+        if not sections or len(sections) not in (len(made), len(stated)):
             return None
-        names = made.values if made is not None else {**kind.fields(), **kind.words}
-        section = valid["system"].noise_section if half == "noise" and "system" in valid else kind.section
-        found |= {f"{section}.{name}": fields_of(kind).get(name, UNBOUNDED) for name in names}
+        for k, section in enumerate(sections):
+            kind = type(made[k]) if made else [*stated.values()][k]
+            if not made and not kind.fields():
+                return None
+            names = made[k].values if made else {**kind.fields(), **kind.words}
+            section = kind.section if half == "system" else section
+            found |= {f"{section}.{name}": fields_of(kind).get(name, UNBOUNDED) for name in names}
     return found
 
 
@@ -191,7 +210,6 @@ def varying(problem: Problem) -> Callable[[Mapping[str, float | str]], Problem]:
         of_half = {section: list[tuple[str, float | str]]() for section in problem.sections}
         for key, value in varied.items():
             of_half[key.rpartition(".")[0]].append((key, value))
-        system, noise = (half(section, tuple(values)) for section, values in of_half.items())
-        return Problem(system, noise)
+        return problem.made_of([half(section, tuple(values)) for section, values in of_half.items()])
 
     return at

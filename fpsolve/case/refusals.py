@@ -122,7 +122,9 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
 
 def _misfit(mesh: CylinderMesh, valid: Known) -> str:
     """Why the mesh does not serve some noise, or nothing; those of one law in noise units are judged once."""
-    judged, base, section = set[tuple[object, ...]](), valid["noise"], valid["system"].noise_section
+    judged, base, section = set[tuple[object, ...]](), valid["noise"], valid["system"].noise_sections[0]
+    if len(base.parts) > 1:
+        return "a mesh is for one noise, but there are several; leave it out, and one is chosen for each p"
     for varied in valid["vary"].among([f"{section}.{name}" for name in base.values]):
         noise = base.at({key.rpartition(".")[2]: value for key, value in varied.items()})
         shaping = {f"{section}.{name}": noise.values[name] for name in (*noise.shaped_by, *noise.words)}
@@ -248,7 +250,7 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
             noise = problem.at(corner).noise
             if noise.has_algebraic_tails and noise.tails_beyond is not None:
                 limit, most, remedy = noise.tails_beyond
-                key = f"{problem.system.noise_section}.{limit}"
+                key = f"{problem.system.noise_sections[0]}.{limit}"
                 stops = {name: axis.stop for name, axis in zip("xy", axes, strict=True) if axis.key == key}
                 highest = max(float(problem.values[key]), *stops.values())
                 text = (

@@ -30,7 +30,7 @@ from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import STRICT, parameter
-from fpsolve.model.plane import System, phase_speed
+from fpsolve.model.plane import System, Xi, phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.far import Place, far_places, grows_far_out, outlook
 from fpsolve.theory.frozen import FURTHEST, frozen_noise
@@ -221,7 +221,7 @@ class NearPlace:
 
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
-        side = p or (-1.0 if self.problem.noise.has_algebraic_tails else 1.0)  # where Λ is finite
+        side = p or (-1.0 if self.problem.coloured.has_algebraic_tails else 1.0)  # where Λ is finite
         q = math.copysign(SMALL_P, side)
         try:
             return self.solution(q, tolerance)
@@ -276,7 +276,7 @@ class NearPlace:
             return True
         if corners(self.problem, p):
             return False
-        away = abs(frozen.tilt(frozen.center(p)) - part.slope * p) if self.problem.noise.may_tilt else 0.0
+        away = abs(frozen.tilt(frozen.center(p)) - part.slope * p) if self.problem.coloured.may_tilt else 0.0
         return away <= MOST_TILT_AWAY
 
 
@@ -446,7 +446,7 @@ class _Search:
         size, elapsed = chosen.size, self.countdown.elapsed
         cost = max(SECONDS_PER_UNKNOWN, (elapsed - self.last[0]) / max(self.last[1], 1) ** 1.5 if self.last[1] else 0.0)
         seconds = elapsed + cost * size**1.5
-        if not self.last[1] and self.place.problem.noise.longest_jump > MAX_BAND:
+        if not self.last[1] and self.place.problem.coloured.longest_jump > MAX_BAND:
             seconds += SECONDS_PER_CUBE * size**3
         if size > self.place.budget.unknowns:
             self.stop(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=self.place.budget.unknowns))
@@ -485,10 +485,17 @@ class _Search:
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Discretisation:
     """A first discretisation, small, for a tilted density around some z; None for where slow noise carries it."""
-    noise, system, digits = problem.noise, problem.motion, -math.log10(rtol)
+    noise, system, digits = problem.coloured, problem.motion, -math.log10(rtol)
     frozen = frozen_noise(problem)
-    if frozen is None:  # the noise has states
-        return Discretisation(_phase(system, noise.reached, digits), (States(noise.reached.size),))
+    if frozen is None:  # the noise has states, or there are several
+        known = noise.parts.values()
+        typical = [
+            each.reached if each.has_states else np.array([-1, 1]) * min(2 * each.standard_deviation, each.half_width)
+            for each in known
+        ]
+        count = round(digits / 2) + 3
+        parts = [States(each.reached.size) if each.has_states else Polynomials(count) for each in known]
+        return Discretisation(_phase(system, problem.at_values(typical), digits), tuple(parts))
     unit, center = noise.standard_deviation, frozen.center(p) if center is None else center
     end = noise.half_width / unit
     phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
@@ -507,15 +514,15 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
 
 def first_far(problem: Problem, place: Place, rtol: float) -> Discretisation:
     """A first discretisation, with cells even in ln |ξ|, for a place far out."""
-    digits, unit = -math.log10(rtol), problem.noise.standard_deviation
-    fall = abs(np.subtract(*_log_density(problem.noise, np.array([place.lower, place.upper]))))
+    digits, unit = -math.log10(rtol), problem.coloured.standard_deviation
+    fall = abs(np.subtract(*_log_density(problem.coloured, np.array([place.lower, place.upper]))))
     cells = max(FEWEST_CELLS, math.ceil(fall / FALL_PER_CELL))
     lines = place.lower * np.exp(math.log(place.upper / place.lower) * np.linspace(0, 1, cells + 1))
     phase = _phase(problem.motion, unit * lines[[0, -1]], digits, 1)
     return Discretisation(phase, (Cells(lines, round(2 + digits / 2), is_killed=True),))
 
 
-def _phase(system: System, xi: FloatArray, digits: float, more: int = 0) -> PhaseCells:
+def _phase(system: System, xi: Xi, digits: float, more: int = 0) -> PhaseCells:
     """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
 
     There are more where the speed of the phase changes much for some of the ξ.
@@ -534,7 +541,7 @@ def _phase(system: System, xi: FloatArray, digits: float, more: int = 0) -> Phas
 
 def widened(generator: Generator) -> Discretisation:
     """That of a generator on an interval `WIDER` times as wide, or far out a cell wider, for algebraic tails."""
-    chosen, lines, noise = generator.chosen, generator.chosen.noise.lines, generator.problem.noise
+    chosen, lines, noise = generator.chosen, generator.chosen.noise.lines, generator.problem.coloured
     if not (lines.size and noise.has_algebraic_tails):
         return chosen
     if chosen.is_killed:
@@ -547,7 +554,7 @@ def widened(generator: Generator) -> Discretisation:
 def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation:
     """A discretisation on which every cell should lack no more than its share of the tolerance."""
     pair, share = solution.pair, SHARE * tolerance
-    chosen, noise = pair.generator.chosen, pair.generator.problem.noise
+    chosen, noise = pair.generator.chosen, pair.generator.problem.coloured
     new = chosen.refined(solution.effects, share, stages < FREE_STAGES)
     if chosen.noise.lines.size:
         lower, upper = solution.truncation
@@ -570,7 +577,7 @@ def other_center(pair: PrincipalPair) -> float | None:
     told, and only the larger eigenvalue is Λ. For algebraic tails see `other_places`.
     """
     frozen = frozen_noise(pair.generator.problem)
-    if frozen is None or pair.generator.problem.noise.has_algebraic_tails:
+    if frozen is None or pair.generator.problem.coloured.has_algebraic_tails:
         return None
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
@@ -611,7 +618,7 @@ def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tupl
         if places:
             z = math.sqrt(places[0].lower * places[0].upper) * math.copysign(1, places[0].lower)
         if z is not None:
-            has_tails = pair.generator.problem.noise.has_algebraic_tails
+            has_tails = pair.generator.problem.coloured.has_algebraic_tails
             return (Message(Code.CARRIED_ELSEWHERE, p=pair.p, has_tails=has_tails, z=z, remedy=Remedy.REACH),)
     return ()
 

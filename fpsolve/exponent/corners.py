@@ -80,7 +80,7 @@ def corners(problem: Problem, p: float, center: float | None = None) -> list[Cor
     Args:
         center: about the mean z of the tilted density; None for that where slow noise carries the moment.
     """
-    noise, system = problem.noise, problem.motion
+    noise, system = problem.coloured, problem.motion
     jumps = [jump for jump in system.jumps if jump.log_factor and not is_steady(system, jump)]
     if not jumps or noise.has_states or (frozen := frozen_noise(problem)) is None:
         return []

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -281,7 +281,7 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
         rounding += _rounding_of_entries(generator, pencil, x, y) / norm
     if generator.keeps_constants:
         forcing, total = generator.matrix(p, orders=slice(1, None)), weight @ x
-        of_noise = space.product([space.phi.constant, space.xi.generator_of_one()])
+        of_noise = _of_noises(space)
         doubtful = abs(x) + generator.loss * abs(x - constant)
         bound = _EPS * float((constant @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total)
         if bound < rounding:
@@ -301,6 +301,16 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
     )
 
 
+def _of_noises(space: TensorSpace) -> FloatArray:
+    """⟨L_ξ T, 1⟩ for every function T, L_ξ the generator of all noises, shape (size,)."""
+    noises, total = space.axes[1:], np.zeros(space.size)
+    for k, own in enumerate(noises):
+        others = [axis.generator_of_one() if axis is own else axis.matrix(one) @ axis.constant for axis in noises]
+        if np.any(others[k]) or len(noises) == 1:
+            total = total + space.product([space.phi.constant, *others])
+    return total
+
+
 def length(vector: FloatArray) -> float:
     """Its Euclidean norm."""
     return math.sqrt(vector @ vector)
@@ -311,14 +321,16 @@ def _sign_defects(space: TensorSpace, x: FloatArray, y: FloatArray) -> tuple[flo
 
     T T* looks where the tilted density lives: a strong tilt hides the sign change of another pair from P_s.
     """
-    right, left = (space.evaluate(v, space.phi.inner_values, space.xi.values) for v in (x, y))
-    tilted = np.abs(right * left) * space.xi.measure
+    noises = space.axes[1:]
+    right, left = (space.evaluate(v, space.phi.inner_values, *(axis.values for axis in noises)) for v in (x, y))
+    measure = reduce(np.multiply.outer, (axis.measure for axis in noises))
+    tilted = np.abs(right * left) * measure
 
     def share(values: FloatArray) -> float:
         negative = values <= 0
         if not negative.any():
             return 0.0
-        sizes = np.abs(values) * space.xi.measure, tilted
+        sizes = np.abs(values) * measure, tilted
         return max(float(np.sum(size[negative]) / np.sum(size)) for size in sizes)
 
     return share(right), share(left)

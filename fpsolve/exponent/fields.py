@@ -90,7 +90,7 @@ def xi_marginal(pair: PrincipalPair, at_xi: Samples) -> FloatArray:
 def noise_marginal(pair: PrincipalPair) -> tuple[FloatArray, FloatArray]:
     """z and the ξ-marginal of the tilted density at the points of a rule, times their measure."""
     at = pair.space.xi.samples()
-    return at.xi / pair.generator.problem.noise.standard_deviation, np.abs(xi_marginal(pair, at)) * at.measure
+    return at.xi / pair.generator.problem.coloured.standard_deviation, np.abs(xi_marginal(pair, at)) * at.measure
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +125,11 @@ class Nodes:
             return Strips(phi, _nodes(np.arange(0.5, space.xi.size + 1), order, 1), 1.0, order)
         lines = _z_lines(pair)
         # P_s is shown by quadrilaterals as high as a noise unit, or higher in algebraic tails
-        has_tails, inner = pair.generator.problem.noise.has_algebraic_tails, np.minimum(abs(lines[:-1]), abs(lines[1:]))
-        tall = math.ceil(np.max(np.diff(lines) / np.maximum(1.0, inner / 6 if has_tails else 1.0)) - 1e-9)
+        noise, inner = pair.generator.problem.coloured, np.minimum(abs(lines[:-1]), abs(lines[1:]))
+        widest = np.maximum(1.0, inner / 6 if noise.has_algebraic_tails else 1.0)
+        tall = math.ceil(np.max(np.diff(lines) / widest) - 1e-9)
         z = _nodes(lines, order, finer * max(tall, _parts(pair.generator.chosen.noise.degree, order)))
-        return cls(phi, z, pair.generator.problem.noise.standard_deviation, order)
+        return cls(phi, z, noise.standard_deviation, order)
 
     @property
     def z(self) -> FloatArray:
@@ -137,7 +138,7 @@ class Nodes:
 
     def seen(self, pair: PrincipalPair) -> Nodes:
         """The same where the tilted density, or that of the noise, is not negligible."""
-        noise = pair.generator.problem.noise
+        noise = pair.generator.problem.coloured
         densities = self.fields(pair).product.max(axis=0), noise.density(self.unit * self.z)
         living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
         return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
@@ -208,7 +209,7 @@ def _z_lines(pair: PrincipalPair) -> FloatArray:
 
     Outside it P_s and the tilted density are below `FAINT` of their largest values.
     """
-    xi, noise = cast("LineAxis", pair.space.xi), pair.generator.problem.noise
+    xi, noise = cast("LineAxis", pair.space.xi), pair.generator.problem.coloured
     if pair.generator.chosen.noise.lines.size:
         return pair.generator.chosen.noise.lines
     end = noise.half_width / noise.standard_deviation

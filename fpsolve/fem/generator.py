@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,17 @@ from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
-from fpsolve.model.plane import angular_frequency, crosses_both_ways, growth_rate, phase_speed
+from fpsolve.model.plane import (
+    Harmonics,
+    angular_frequency,
+    crosses_both_ways,
+    growth_rate,
+    is_steady,
+    matrix_at,
+    phase_speed,
+    stretching,
+    turning,
+)
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 KEPT_SPACES = 16
@@ -62,10 +73,10 @@ class Generator:
 
     def __init__(self, problem: Problem, chosen: Discretisation | CylinderMesh) -> None:
         if isinstance(chosen, CylinderMesh):
-            chosen = Discretisation.on(chosen, problem.noise, problem.frame)
+            chosen = Discretisation.on(chosen, problem.coloured, problem.frame)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
         self.phi = PhaseAxis(chosen.phase.lines, chosen.phase.degrees)
-        if problem.noise.has_states:
+        if any(noise.has_states for noise in problem.noise.parts.values()):
             self.phi.slowest = LEFT_BY_STATES
         self._spaces: dict[float, TensorSpace] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
@@ -89,7 +100,8 @@ class Generator:
         if key not in self._spaces:
             if len(self._spaces) >= KEPT_SPACES:
                 del self._spaces[next(iter(self._spaces))]
-            self._spaces[key] = TensorSpace([self.phi, self.chosen.noise.axis(self.problem.noise, p)])
+            pairs = zip(self.chosen.noises, self.problem.coloured.parts.values(), strict=True)
+            self._spaces[key] = TensorSpace([self.phi, *(part.axis(noise, p) for part, noise in pairs)])
         return self._spaces[key]
 
     def at(self, p: float) -> Pencil:
@@ -118,21 +130,31 @@ class Generator:
 
     def changed(self, by: ParameterDerivative, p: float, *, derivative: int = 0) -> KroneckerSum:
         """The matrix of ∂/∂θ dᵏL/dpᵏ, the functions of φ and ξ held; that of P_s, and so of `mass`, is in it."""
-        xi = self.space(p).xi
+        axes = self.space(p).axes[1:]
         if by not in self._changes:
             self._changes[by] = tuple(Terms(self.problem, self.space(0.0)).changed(by))
         sizes = [(term.of_p(p, derivative), term) for term in self._changes[by]]
-        parts = [(size * term.phase, xi.matrix(term.noises[0])) for size, term in sizes if size]
+        parts: list[tuple[Any, ...]] = [
+            (size * term.phase, *(axis.matrix(g) for axis, g in zip(axes, term.noises, strict=True)))
+            for size, term in sizes
+            if size
+        ]
         if by.noise is not None:
             phases = self._sum.phases(p, derivative)
-            parts += [(phase, xi.changed(by.noise, g)) for (g,), phase in phases.items()]
-        return KroneckerSum(parts or [(0.0 * self.phi.identity, xi.matrix(one))])
+            parts += [(phase, *self._changed(by, axes, noises)) for noises, phase in phases.items()]
+        return KroneckerSum(parts or [(0.0 * self.phi.identity, *(axis.matrix(one) for axis in axes))])
 
     def changed_mass(self, by: ParameterDerivative, p: float) -> KroneckerSum | None:
         """∂/∂θ of `mass`; None where the noise does not change."""
         if by.noise is None:
             return None
-        return KroneckerSum([(self.phi.identity, self.space(p).xi.changed(by.noise, one))])
+        axes = self.space(p).axes[1:]
+        return KroneckerSum([(self.phi.identity, *self._changed(by, axes, [one] * len(axes)))])
+
+    def _changed(self, by: ParameterDerivative, axes: Sequence[Any], noises: Sequence[Any]) -> Iterator[Any]:
+        """The factors of the noises of ∂/∂θ of a term, where one of them changes."""
+        for k, (axis, g) in enumerate(zip(axes, noises, strict=True)):
+            yield axis.changed(by.noise, g) if k == by.part else axis.matrix(g)
 
     @cached_property
     def _sum(self) -> TermSum:
@@ -163,32 +185,56 @@ class Generator:
         """A number right of Λ(p): the growth rate of E exp ∫ f(ξ) dt, f the supremum over φ of p q and of the jumps.
 
         The jumps are spread evenly over φ. Where states of a chain move the phase over a ray to and fro, each jump
-        between them may bring a jump more.
+        between them may bring a jump more. Several noises have a supremum each, beside that of what none drives.
         """
-        system, noise, space = self.problem.motion, self.problem.noise, self.space(p)
+        system, noise, axes = self.problem.motion, self.problem.coloured, self.space(p).axes[1:]
+        support = self.problem.at_values([axis.support for axis in axes])
 
         def fastest(xi: Any) -> Any:
             q, speed = growth_rate(system, xi), phase_speed(system, xi)
             gains = sum(max(0.0, p * jump.log_factor) for jump in system.jumps)
             return p * q.mean + abs(p) * q.amplitude + gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
 
-        if self.problem.diffusions:
-            return float(np.max(self._growth_of_one(p)))
-        if space.xi.size > MOST_FOR_A_BOUND:
-            growth = float(np.max(fastest(space.xi.support)))
+        if len(axes) == 1 and not self.problem.diffusions:
+            growth = self._growth_along(axes[0], fastest)
         else:
-            driven = space.xi.matrix(None) + space.xi.mass(fastest)
-            growth = float(np.max(scipy.linalg.eigvals(finite(driven), space.xi.matrix(one)).real))
+            growth = float(np.max(self._growth_of_one(p)))
+            for name, axis in zip(noise.parts, axes, strict=True):
+                if axis.size > 1:
+                    growth += self._growth_along(axis, partial(self._faster, p, name))
         for jump in system.jumps:
-            if noise.largest_jump_rate and crosses_both_ways(system, jump, space.xi.support):
+            if noise.largest_jump_rate and crosses_both_ways(system, jump, support):
                 growth += noise.largest_jump_rate * math.expm1(max(0.0, p * jump.log_factor))
         return growth
+
+    def _growth_along(self, axis: Any, f: Callable[[Any], Any]) -> float:
+        """That of E exp ∫ f(ξ) dt by one noise."""
+        if axis.size > MOST_FOR_A_BOUND:
+            return float(np.max(f(axis.support)))
+        driven = axis.matrix(None) + axis.mass(f)
+        return float(np.max(scipy.linalg.eigvals(finite(driven), axis.matrix(one)).real))
+
+    def _faster(self, p: float, name: str, xi: Any) -> Any:
+        """By how much a noise makes the supremum over φ of `_growth_of_one` larger at most."""
+        system, none = self.problem.motion, self.problem.at_values([np.zeros(1)] * len(self.problem.coloured.parts))
+        at = {**none, name: xi} if isinstance(none, dict) else xi
+        change = matrix_at(system, at).reshape(-1, 2, 2) - matrix_at(system, 0.0)
+        q, speed, c = stretching(change), turning(change), self._stretch
+        rate = Harmonics(q.mean + c * speed.mean, q.cosine + c * speed.cosine, q.sine + c * speed.sine)
+        gains = sum(max(0.0, p * jump.log_factor) for jump in system.jumps if not is_steady(system, jump))
+        return p * rate.mean + abs(p) * rate.amplitude + 2 * gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
+
+    @property
+    def _stretch(self) -> float:
+        """c = Σ ln R/π, by the way in which the phase passes each ray."""
+        speed = phase_speed(self.problem.motion, 0.0)
+        return float(sum(jump.log_factor * np.sign(speed(jump.phase)) for jump in self.problem.motion.jumps) / math.pi)
 
     def _growth_of_one(self, p: float) -> FloatArray:
         """e^{−pγ} L e^{pγ} 1 at some φ, γ′ = c such that jumps are spread evenly over φ: its supremum is above Λ(p)."""
         system, phi = self.problem.motion, np.linspace(0, math.pi, SAMPLES)
         q, speed = growth_rate(system, 0.0), phase_speed(system, 0.0)
-        c = sum(jump.log_factor * np.sign(speed(jump.phase)) for jump in system.jumps) / math.pi
+        c = self._stretch
         growth = p * (q(phi) + c * speed(phi))
         for each in self.problem.diffusions:
             size = system.epsilon ** (2 * each.order)

@@ -16,13 +16,15 @@ White noise by which dx has Bx ∘ dW adds ½ (h ∂φ + p q)² with h and q of 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.errors import MeshError
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.phase import by_rows
 from fpsolve.model.plane import (
@@ -30,6 +32,7 @@ from fpsolve.model.plane import (
     Harmonics,
     Jump,
     LinearMotion,
+    Xi,
     is_driven,
     phase_speed,
     written_coefficient,
@@ -37,6 +40,10 @@ from fpsolve.model.plane import (
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 ALL_ORDERS = slice(None)
+SEVERAL_OVER_RAY = (
+    "two noises with a density move the phase over the ray of a jump, for which nothing is solved; let one of them "
+    "leave the phase there alone"
+)
 
 
 @dataclass(frozen=True)
@@ -61,6 +68,20 @@ class OfMoment:
             return math.perm(self.n, derivative) * float(p) ** max(self.n - derivative, 0)
         parts = p**self.n * self.log_factor**derivative, self.n * derivative * self.log_factor ** max(derivative - 1, 0)
         return sum(parts) * math.exp(p * self.log_factor)
+
+
+@dataclass(frozen=True)
+class At:
+    """The coefficient that is 1 in the states of one value, and 0 in others.
+
+    Attributes:
+        value: ξ.
+    """
+
+    value: float
+
+    def __call__(self, xi: Any) -> Any:
+        return 1.0 * (np.asarray(xi) == self.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,31 +144,62 @@ class Terms:
     Args:
         problem: whose motion it is, and what white noise adds to it.
         space: the trial and test functions.
-        noise: the axis of the noise that drives it; the functions of others stand by.
+
+    Raises:
+        MeshError: several noises with values move the phase over the ray of a jump.
     """
 
-    def __init__(self, problem: Problem, space: TensorSpace, noise: int = 1) -> None:
+    def __init__(self, problem: Problem, space: TensorSpace) -> None:
         system = self.system = problem.motion
-        self._diffusions, self._count, self._noise = problem.diffusions, len(space.axes) - 1, noise
-        self.phi, self.xi = space.phi, space.axes[noise]
+        self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.axes[1:]
+        self._names = tuple(problem.coloured.parts)
         self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
-        is_exact = np.full(self._vertices.size, self.xi.is_local)  # where θ = |v|
+        self._has_states = [noise.has_states for noise in problem.coloured.parts.values()]
+        self._ends = problem.at_values([axis.support for axis in self.noises])
+        speed = self._speed_at_ends(self._vertices)
+        # where θ = |v|: a sum of products of functions of each noise is that of one, or of states
+        is_exact = np.full(self._vertices.size, all(axis.is_local for axis in self.noises))
         for ray in system.jumps:
             is_exact[self.phi.vertices_at(ray.phase)] = True
-        speed = phase_speed(system, self.xi.support[:, None])(self._vertices)
         # the sign of v at those of these vertices where it is the same for all ξ, otherwise 0
         direction = np.where(is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0), 0.0)
         self._is_exact, self._two_way = is_exact, np.flatnonzero(is_exact & (direction == 0))
         # nothing is left of the other side: where ξ is large that would count
         self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - by_rows(0.5 * direction, self._jump)
 
-    def _term(self, phase: Any, g: Coefficient | None, text: str, of_p: OfMoment = OfMoment(0), order: int = 0) -> Term:
-        noises = tuple(g if axis == self._noise else one for axis in range(1, self._count + 1))
-        return Term(order, of_p, phase, noises, text)
+    def _term(
+        self, phase: Any, g: Coefficient | None, text: str, of_p: OfMoment = OfMoment(0), order: int = 0, of: str = ""
+    ) -> Term:
+        """One with a function of the noise `of`, or of the first."""
+        at = self._names.index(of) if of in self._names else 0
+        return Term(order, of_p, phase, tuple(g if k == at else one for k in range(len(self.noises))), text)
+
+    def _terms(
+        self, phase: Any, f: Callable[[Xi], Any], text: str, of_p: OfMoment = OfMoment(0), order: int = 0
+    ) -> Iterator[Term]:
+        """Those with a function of all noises at once: one for each combination of the states of all but one."""
+        if len(self.noises) == 1:
+            yield Term(order, of_p, phase, (f,), text)
+            return
+        shape = np.shape(f(self._ends))
+        moving = [k for k, n in enumerate(shape) if n > 1 and np.any(np.ptp(f(self._ends), axis=k))]
+        free = next((k for k in moving if not self._has_states[k]), moving[0] if moving else 0)
+        others = [k for k in moving if k != free]
+        if any(not self._has_states[k] for k in others):
+            raise MeshError(SEVERAL_OVER_RAY)
+        for values in product(*(np.unique(self.noises[k].support) for k in others)):
+            held = {self._names[k]: value for k, value in zip(others, values, strict=True)}
+            noises: list[Coefficient] = [one] * len(shape)
+            noises[free] = lambda xi, held=held: f({**dict.fromkeys(self._names, 0.0), **held, self._names[free]: xi})
+            for k, value in zip(others, values, strict=True):
+                noises[k] = At(value)
+            yield Term(order, of_p, phase, tuple(noises), text)
 
     def whole(self) -> Iterator[Term]:
         """L(p) of Eq. (19)."""
-        yield self._term(self.phi.identity, None, "L_ξ, the generator of the noise")
+        for name in self._names:
+            text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
+            yield self._term(self.phi.identity, None, text, of=name)
         for term in self.system.terms:
             yield from self._driven(term)
         for each in self._diffusions:
@@ -158,13 +210,13 @@ class Terms:
             typical = np.where(self._is_exact, 0.0, self.typical_speed())
             yield self._term(-0.5 * jump.T @ by_rows(typical, jump), one, text)
         for j in self._two_way:
-            yield self._term(-0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(self._vertices[j])), text)
+            yield from self._terms(-0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(self._vertices[j])), text)
         for ray in self.system.jumps:
             text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
             change = OfMoment(0, ray.log_factor, is_change=True)
             for load, sign in self._loads(ray):
                 size, flux = self._flux(ray, sign)
-                yield self._term(size * load, flux, text, change, order=2)
+                yield from self._terms(size * load, flux, text, change, order=2)
 
     def changed(self, by: ParameterDerivative) -> Iterator[Term]:
         """∂L(p)/∂θ of the same terms where the motion and its jumps change with θ.
@@ -177,15 +229,15 @@ class Terms:
         for own, other in zip(self._diffusions, by.diffusions, strict=bool(by.diffusions)):
             yield from self._diffused(own, [(0.5, own, other), (0.5, other, own)])
         for j in self._two_way:
-            yield self._term(-0.5 * jump[[j]].T @ jump[[j]], self._faster(moved, float(self._vertices[j])), text)
+            yield from self._terms(-0.5 * jump[[j]].T @ jump[[j]], self._faster(moved, float(self._vertices[j])), text)
         for ray, slope in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
             change = OfMoment(0, ray.log_factor, is_change=True)
             for load, sign in self._loads(ray):
                 if slope:
                     size, flux = self._flux(ray, sign)
-                    yield self._term(slope * size * load, flux, text, OfMoment(1, ray.log_factor), order=2)
+                    yield from self._terms(slope * size * load, flux, text, OfMoment(1, ray.log_factor), order=2)
                 if by.terms:
-                    yield self._term(load, self._more_flux(moved, ray, sign), text, change, order=2)
+                    yield from self._terms(load, self._more_flux(moved, ray, sign), text, change, order=2)
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h ∂φ with the loads at the φ-vertices, and p q."""
@@ -194,10 +246,10 @@ class Terms:
         if not term.h.vanishes:
             loads = self._trace.T @ by_rows(term.h(self._vertices), self._jump)
             along = size * (self.phi.convection(term.h) + loads)
-            yield self._term(along, term.g, f"{text}{_written(term.h)} ∂φ", order=term.order)
+            yield self._term(along, term.g, f"{text}{_written(term.h)} ∂φ", order=term.order, of=term.noise)
         if not term.q.vanishes:
             along = size * self.phi.mass(term.q)
-            yield self._term(along, term.g, f"p {text}{_written(term.q)}", OfMoment(1), order=term.order)
+            yield self._term(along, term.g, f"p {text}{_written(term.q)}", OfMoment(1), term.order, term.noise)
 
     def _diffused(
         self, own: CoefficientMatrix, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]
@@ -213,15 +265,15 @@ class Terms:
 
     def typical_speed(self) -> FloatArray:
         """θ at the φ-vertices for the typical ξ, shape (m,)."""
-        xi, constant = self.xi, self.xi.constant
-        total = constant @ (xi.matrix(one) @ constant)
         steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
         for term in self.system.terms:
             speed = self.system.epsilon**term.order * term.h(self._vertices)
             if not is_driven(term.g):
                 steady += float(term.g(0.0)) * speed
             else:
-                square = xi.mass(lambda xi, g=term.g: g(xi) ** 2)
+                xi = self.noises[self._names.index(term.noise) if term.noise in self._names else 0]
+                constant, square = xi.constant, xi.mass(lambda xi, g=term.g: g(xi) ** 2)
+                total = constant @ (xi.matrix(one) @ constant)
                 driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
         return np.asarray(abs(steady) + driven)
 
@@ -229,32 +281,38 @@ class Terms:
         """A jump's loads beyond continuity: w(φ⁻) T(φ⁺) where the phase runs forward, 1, else w(φ⁺) T(φ⁻), −1."""
         at = self.phi.vertices_at(ray.phase)
         left, right = self.phi.left_trace[at], self.phi.right_trace[at]
-        speed = self._speed(ray.phase)(self.xi.support)
+        speed = self._speed(ray.phase)(self._ends)
         for load, sign in ((left.T @ right, 1), (right.T @ left, -1)):
             if np.any(sign * speed > 0):
                 yield load, sign
 
-    def _speed(self, phi: float) -> Coefficient:
+    def _speed_at_ends(self, phi: FloatArray) -> FloatArray:
+        """dφ/dt at the extremes of all noises, shape (extremes, len(phi))."""
+        speed = phase_speed(self.system, self._ends)
+        parts = (np.ravel(part)[:, None] for part in (speed.mean, speed.cosine, speed.sine))
+        return Harmonics(*parts)(phi)
+
+    def _speed(self, phi: float) -> Callable[[Xi], Any]:
         """dφ/dt at φ."""
         return lambda xi: phase_speed(self.system, xi)(phi)
 
-    def _size_of_speed(self, phi: float) -> Coefficient:
+    def _size_of_speed(self, phi: float) -> Callable[[Xi], Any]:
         """|dφ/dt| at φ."""
         return lambda xi: np.abs(phase_speed(self.system, xi)(phi))
 
-    def _faster(self, moved: LinearMotion, phi: float) -> Coefficient:
+    def _faster(self, moved: LinearMotion, phi: float) -> Callable[[Xi], Any]:
         """∂|dφ/dt|/∂θ at φ."""
         return lambda xi: np.sign(phase_speed(self.system, xi)(phi)) * phase_speed(moved, xi)(phi)
 
-    def _flux(self, ray: Jump, sign: int) -> tuple[float, Coefficient]:
+    def _flux(self, ray: Jump, sign: int) -> tuple[float, Callable[[Xi], Any]]:
         """max(± dφ/dt, 0) at the ray of a jump: a number, times a function of ξ."""
         at = self._speed(ray.phase)
-        speed = at(self.xi.support)
+        speed = np.ravel(at(self._ends))
         if np.ptp(speed) <= 1e-12 * np.max(np.abs(speed)):
             return abs(float(speed[0])), one
         return 1.0, lambda xi: np.maximum(sign * at(xi), 0)
 
-    def _more_flux(self, moved: LinearMotion, ray: Jump, sign: int) -> Coefficient:
+    def _more_flux(self, moved: LinearMotion, ray: Jump, sign: int) -> Callable[[Xi], Any]:
         """Its ∂/∂θ."""
         at = self._speed(ray.phase)
         return lambda xi: np.where(sign * at(xi) > 0, sign * phase_speed(moved, xi)(ray.phase), 0.0)

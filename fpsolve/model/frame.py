@@ -10,7 +10,7 @@ e = (cos φ, −sin φ), and ρ(φ) = |S⁻¹e(φ)|,
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -85,8 +85,7 @@ def normal_frame(
     drift: Sequence[CoefficientMatrix],
     diffusions: Sequence[CoefficientMatrix],
     epsilon: float,
-    deviation: float,
-    memory: float,
+    spread: Callable[[str], tuple[float, float]],
 ) -> Frame | None:
     """The frame in which the order 0 of a drift is growth and a uniform rotation; None where it does not rotate.
 
@@ -95,7 +94,7 @@ def normal_frame(
     Args:
         drift, diffusions: what moves the state along a path of ξ, and by white noise.
         epsilon: ε.
-        deviation, memory: the standard deviation of ξ and about how long it remembers its value.
+        spread: by the name of a noise the standard deviation of ξ and about how long it remembers its value.
     """
     numbers = _free(drift)
     if numbers[1] == -numbers[2] and numbers[0] == numbers[3]:
@@ -107,15 +106,16 @@ def normal_frame(
 
     def unevenness(terms: Sequence[CoefficientMatrix], whites: Sequence[CoefficientMatrix]) -> float:
         """The amplitudes of the waves of dφ/dt over its mean."""
-        total, driven, mean = 0.0, 0.0, 0.0
+        total, driven, mean = 0.0, dict[str, float](), 0.0
         for term in terms:
             size = epsilon**term.order
             if is_driven(term.g):
-                driven += size * deviation * float(abs(term.h.mean) + term.h.amplitude)
+                strength = size * spread(term.noise)[0] * float(abs(term.h.mean) + term.h.amplitude)
+                driven[term.noise] = driven.get(term.noise, 0.0) + strength
             else:
                 total += size * abs(float(term.g(0.0))) * float(term.h.amplitude)
                 mean += size * float(term.g(0.0)) * float(term.h.mean)
-        total += driven * min(1.0, driven * memory)
+        total += sum(each * min(1.0, each * spread(name)[1]) for name, each in driven.items())
         total += sum((epsilon**each.order * float(abs(each.h.mean) + each.h.amplitude)) ** 2 for each in whites)
         return total / max(abs(mean), 1e-300)
 

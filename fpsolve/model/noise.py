@@ -68,6 +68,11 @@ class Noise(Parametrised):
     of_xi: ClassVar[Sequence[str]] = ()
 
     @property
+    def parts(self) -> Mapping[str, Noise]:
+        """The independent noises that it is made of, by the names that terms have; here only itself."""
+        return {"": self}
+
+    @property
     @abstractmethod
     def standard_deviation(self) -> float:
         """Stationary standard deviation of ξ: one noise unit, z = ξ/std."""

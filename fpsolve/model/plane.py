@@ -26,6 +26,8 @@ from fpsolve.model.exact import ExactMotion
 from fpsolve.model.parameters import Parametrised
 
 Matrix = Sequence[Sequence[float]]
+Xi = ArrayLike | Mapping[str, ArrayLike]
+"""ξ, or with several noises that of each by its name."""
 SAMPLES = 4001
 """ξ among which the speed of the phase is seen to change its sign."""
 
@@ -168,6 +170,7 @@ class CoefficientMatrix:
         order: n ≥ 0, the power of ε.
         matrix: A, two rows of two numbers.
         g: a coefficient of ξ: any callable from arrays to arrays or numbers; one that pickles, so that results do.
+        noise: the name of that noise where there are several.
 
     Raises:
         ValueError: the matrix is not 2×2 and finite, or the order is negative.
@@ -176,6 +179,7 @@ class CoefficientMatrix:
     order: int
     matrix: Matrix
     g: Constant | Linear | Function = one
+    noise: str = ""
 
     def __post_init__(self) -> None:
         entries: FloatArray = np.zeros(0)
@@ -240,7 +244,8 @@ class System(Parametrised):
         terms: the terms of the motion, one at least.
         jumps: the rays at which the state is stretched.
         noise_unit: the unit of ξ.
-        noise_section: the section of a case file that states the noise, with which the keys of its parameters begin.
+        noise_sections: the sections of a case file that state the noises, with which the keys of their parameters
+            begin: "noise", or, for one that terms call axial, "noise.axial".
         impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
     """
 
@@ -281,8 +286,8 @@ class System(Parametrised):
         return None
 
     @property
-    def noise_section(self) -> str:
-        return "noise"
+    def noise_sections(self) -> Sequence[str]:
+        return ("noise",)
 
     @property
     def impact_parameter(self) -> str:
@@ -315,34 +320,39 @@ class LinearMotion(System):
 def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:
     """∂/∂ε of Σ ε^n g(ξ) A x, as terms."""
     return tuple(
-        CoefficientMatrix(term.order - 1, (term.order * np.array(term.matrix)).tolist(), term.g)
+        CoefficientMatrix(term.order - 1, (term.order * np.array(term.matrix)).tolist(), term.g, term.noise)
         for term in system.terms
         if term.order
     )
 
 
-def matrix_at(system: System, xi: ArrayLike, orders: slice = slice(None)) -> FloatArray:
-    """A(ξ) = Σ ε^n g(ξ) A over the terms of some orders, shape (*ξ.shape, 2, 2)."""
-    xi = np.asarray(xi, dtype=float)
-    total = np.zeros((*xi.shape, 2, 2))
+def matrix_at(system: System, xi: Xi, orders: slice = slice(None)) -> FloatArray:
+    """A(ξ) = Σ ε^n g(ξ) A over the terms of some orders, shape (*ξ.shape, 2, 2).
+
+    With several noises ξ is a mapping from their names to arrays, and its shape that of these broadcast together.
+    """
+    named = {name: np.asarray(each, dtype=float) for name, each in xi.items()} if isinstance(xi, Mapping) else {}
+    rest = np.zeros(np.broadcast_shapes(*(each.shape for each in named.values()))) if named else np.asarray(xi, float)
+    total = np.zeros((*rest.shape, 2, 2))
     wanted = range(1 + max((term.order for term in system.terms), default=0))[orders]
     for term in system.terms:
         if term.order in wanted:
-            total += system.epsilon**term.order * term.g(xi)[..., None, None] * np.array(term.matrix)
+            values = term.g(named.get(term.noise, rest))
+            total += system.epsilon**term.order * values[..., None, None] * np.array(term.matrix)
     return total
 
 
-def phase_speed(system: System, xi: ArrayLike) -> Harmonics:
+def phase_speed(system: System, xi: Xi) -> Harmonics:
     """dφ/dt at ξ as a function of φ: in Eq. (17) ω + ε h₁ξ + ε² h₂."""
     return turning(matrix_at(system, xi))
 
 
-def growth_rate(system: System, xi: ArrayLike) -> Harmonics:
+def growth_rate(system: System, xi: Xi) -> Harmonics:
     """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
     return stretching(matrix_at(system, xi))
 
 
-def crosses_both_ways(system: System, jump: Jump, xi: ArrayLike) -> bool:
+def crosses_both_ways(system: System, jump: Jump, xi: Xi) -> bool:
     """Whether the phase passes the ray of a jump forward for some of the ξ and backward for others."""
     speed = phase_speed(system, xi)(jump.phase)
     return bool(np.min(speed) < 0 < np.max(speed))

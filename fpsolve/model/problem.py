@@ -21,8 +21,19 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message
 from fpsolve.model.frame import Frame, normal_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import Parameter, Parametrised
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, combined, crosses_both_ways, turning
+from fpsolve.model.plane import (
+    CoefficientMatrix,
+    LinearMotion,
+    System,
+    Xi,
+    affine,
+    combined,
+    crosses_both_ways,
+    is_driven,
+    turning,
+)
 from fpsolve.model.quantity import NOISE, Quantity
 
 P = ParamSpec("P")
@@ -43,6 +54,7 @@ class ParameterDerivative:
         jumps: ∂ ln R/∂θ of each of the jumps of the motion; empty where none changes.
         noise: that of the noise; None where it does not change.
         diffusions: that of each of the `diffusions`; empty where none changes.
+        part: which of the `coloured` noises changes.
     """
 
     theta: float
@@ -50,6 +62,7 @@ class ParameterDerivative:
     jumps: tuple[float, ...] = ()
     noise: NoiseDerivative | None = None
     diffusions: tuple[CoefficientMatrix, ...] = ()
+    part: int = 0
 
 
 @dataclass(frozen=True)
@@ -58,22 +71,60 @@ class Problem:
 
     Attributes:
         system: `VibroImpactOscillator`, or a `PlaneSystem`.
-        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands, or a `MarkovChain`.
+        noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands, or a `MarkovChain`; several noises
+            as a mapping from the names that the terms have, or `Noises`.
 
     Raises:
         TypeError: one of them is something else.
-        ValueError: white noise would drive the system in a way that has no meaning, see `White.motion`.
+        ValueError: white noise would drive the system in a way that has no meaning, see `White.motion`; or the noises
+            are not those that the terms name.
     """
 
     system: System
     noise: Noise
 
     def __post_init__(self) -> None:
+        if isinstance(self.noise, Mapping):
+            object.__setattr__(self, "noise", noises_of(self.noise))
         for half, kind, needed in ((self.system, "motion", System), (self.noise, "noise", Noise)):
             if not isinstance(half, needed):
                 raise TypeError(f"got {shown(half)} as a {kind}; the first arguments must be an oscillator and a noise")
-        if self.noise.is_white:
+        wanted, given = self.system.noise_sections, self.noise.parts
+        if len(wanted) > 1 or len(given) > 1:
+            names = {term.noise for term in self.system.terms if is_driven(term.g)}
+            if names != set(given):
+                told = f"the terms name the noises {', '.join(map(shown, sorted(names)))}"
+                stated = ", ".join(map(shown, given)) if len(given) > 1 else "one without a name"
+                remedy = 'give one for each name, such as Problem(system, {"axial": ..., "lateral": ...})'
+                raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
+        if any(noise.is_white for noise in given.values()):
             _ = self._moved  # refuses what has no meaning
+
+    @cached_property
+    def coloured(self) -> Noise:
+        """What ξ is: the noise; of several those that have values, one noise or several, of white ones alone one."""
+        return self.noise if len(self.noise.parts) == 1 else self.noise.coloured  # type: ignore[attr-defined]
+
+    def named_noise(self, name: str) -> Noise:
+        """The noise that terms name so; with one noise that one, whatever its name."""
+        return self.noise.parts.get(name, self.noise)
+
+    def at_values(self, values: Sequence[FloatArray]) -> Xi:
+        """ξ of all combinations of some values of each of the `coloured` noises, as `matrix_at` takes it."""
+        if len(values) == 1:
+            return values[0]
+        return dict(zip(self.coloured.parts, np.meshgrid(*values, indexing="ij", sparse=True), strict=True))
+
+    @property
+    def reached(self) -> Xi:
+        """Values of ξ that go as far as the noise does where that matters, see `Noise.reached`."""
+        each = [noise.reached for noise in self.coloured.parts.values()]
+        return self.at_values(each if len(each) == 1 else [values[:: max(1, values.size // 20)] for values in each])
+
+    @property
+    def drift(self) -> System:
+        """What is left of the system beside white noise."""
+        return self._moved[0]
 
     @cached_property
     def _moved(self) -> tuple[System, Sequence[CoefficientMatrix]]:
@@ -84,7 +135,10 @@ class Problem:
         """The coordinates that it is solved in where these are not x itself."""
         drift, diffusions = self._moved
         return normal_frame(
-            drift.terms, diffusions, drift.epsilon, self.noise.standard_deviation, self.noise.correlation_time
+            drift.terms,
+            diffusions,
+            drift.epsilon,
+            lambda name: ((noise := self.named_noise(name)).standard_deviation, noise.correlation_time),
         )
 
     @cached_property
@@ -116,9 +170,11 @@ class Problem:
         if None in lines:
             matrices += [np.array(term.matrix) for term in drift.terms]
         else:
-            for share in zip(*(line for line in lines if line), strict=True):
-                sized = zip(share, drift.terms, strict=True)
-                matrices.append(sum(c * drift.epsilon**term.order * np.array(term.matrix) for c, term in sized))
+            parts = dict[str | None, Any]()  # what is steady, and what each noise drives
+            for line, term in zip(lines, drift.terms, strict=True):
+                for name, c in zip((None, term.noise), line or (), strict=True):
+                    parts[name] = parts.get(name, 0.0) + c * drift.epsilon**term.order * np.array(term.matrix)
+            matrices += parts.values()
         speeds = [speed for speed in map(turning, matrices) if abs(speed.mean) + speed.amplitude > 0]
         if not speeds:
             return 0.0
@@ -146,7 +202,7 @@ class Problem:
             terms = [CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))]
             for term in self.system.terms:
                 rate = float(term.q(phi)) if side > 0 else float(np.trace(np.array(term.matrix)) - term.q(phi))
-                terms.append(CoefficientMatrix(term.order, ((rate, 0.0), (0.0, rate)), term.g))
+                terms.append(CoefficientMatrix(term.order, ((rate, 0.0), (0.0, rate)), term.g, term.noise))
             found.append(Problem(LinearMotion(self.system.epsilon, tuple(terms)), self.noise))
         is_one = all(not term.h.mean and not term.h.amplitude for term in self.system.terms)
         return tuple(found[:1] if is_one else found)
@@ -158,14 +214,17 @@ class Problem:
         return (max(low, 0.0), high) if len(self.classes) > 1 else (low, high)
 
     @property
-    def halves(self) -> tuple[Parametrised, Parametrised]:
-        """The system and the noise."""
-        return self.system, self.noise
+    def halves(self) -> tuple[Parametrised, ...]:
+        """The system and the noise, or all noises."""
+        return (self.system, *self.noise.parts.values())
 
     @property
     def sections(self) -> Mapping[str, Parametrised]:
         """The system and the noise by what the keys of their parameters begin with, such as "noise.axial"."""
-        return {self.system.section: self.system, self.system.noise_section: self.noise}
+        parts = self.noise.parts
+        if len(parts) == 1:
+            return {self.system.section: self.system, self.system.noise_sections[0]: self.noise}
+        return {self.system.section: self.system, **{f"noise.{name}": noise for name, noise in parts.items()}}
 
     @property
     def values(self) -> Mapping[str, float | str]:
@@ -181,7 +240,7 @@ class Problem:
         for section, half in self.sections.items():
             for name, value in half.values.items():
                 quantity = _keyed(half.quantity_of(name), key := f"{section}.{name}")
-                if half is self.noise and name in self.noise.of_xi and self.system.noise_unit != RATE:
+                if half is not self.system and name in half.of_xi and self.system.noise_unit != RATE:  # type: ignore[attr-defined]
                     quantity = replace(quantity, unit="unknown")
                 found[key] = Parameter(value, quantity, type(half))
         signs = Counter(_sign(each.quantity) for each in found.values())
@@ -220,8 +279,13 @@ class Problem:
             if section not in known:
                 raise ValueError(f"got {key}; the parameters are {', '.join(self.values)}")
             new.setdefault(section, {})[name] = value
-        system, noise = (half.at(new[section]) if section in new else half for section, half in known.items())
-        return Problem(system, noise)  # type: ignore[arg-type]
+        return self.made_of([half.at(new[section]) if section in new else half for section, half in known.items()])
+
+    def made_of(self, halves: Sequence[Parametrised]) -> Problem:
+        """One of other values of what is in `sections`, in the same order."""
+        system, *noises = halves
+        made = noises[0] if len(noises) == 1 else dict(zip(self.noise.parts, noises, strict=True))
+        return Problem(system, made)  # type: ignore[arg-type]
 
     def derivative(self, key: str) -> ParameterDerivative:
         """∂/∂θ by one of the `differentiable` parameters. Raises `ValueError` for others."""
@@ -240,16 +304,17 @@ class Problem:
             theta = float(values[key])
             terms: Sequence[CoefficientMatrix] = ()
             jumps: Sequence[float] = ()
-            noise = None
-            if section != self.system.noise_section:
+            noise, part = None, section.removeprefix("noise.")
+            if section == self.system.section:
                 terms, jumps = self.system.derivative(name)
-            elif not self.noise.is_white:
-                noise = self.noise.derivative(name)
-            own = name if section == self.system.noise_section else ""
-            terms, diffusions = self.noise.changed_motion(self.system, terms, own)
+            elif not (own := self.named_noise(part)).is_white:
+                noise = own.derivative(name)
+            changed = "" if section == self.system.section else name if len(self.noise.parts) == 1 else f"{part}.{name}"
+            terms, diffusions = self.noise.changed_motion(self.system, terms, changed)
             if self.frame is not None:
                 terms, diffusions = ([self.frame.term(each) for each in part] for part in (terms, diffusions))
-            found[key] = ParameterDerivative(theta, tuple(terms), tuple(jumps), noise, tuple(diffusions))
+            axis = [*self.coloured.parts].index(part) if noise and len(self.coloured.parts) > 1 else 0
+            found[key] = ParameterDerivative(theta, tuple(terms), tuple(jumps), noise, tuple(diffusions), axis)
         return found
 
     @property
@@ -341,7 +406,7 @@ def refuse_infinite(problem: Problem, p: float) -> None:
         return
     if not any(p * jump.log_factor > math.log(2.0) for jump in system.jumps):
         return
-    xi, most = noise.reached, math.e if noise.has_states else 2.0
+    xi, most = problem.reached, math.e if noise.has_states else 2.0
     for jump in system.jumps:
         if p * jump.log_factor > math.log(most) and crosses_both_ways(system, jump, xi):
             raise NoSuchExponent(Message(Code.INFINITE_ON_RAY, p=p, phase=jump.phase, factor=most))

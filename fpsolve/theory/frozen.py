@@ -25,7 +25,7 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
     Where A(ξ) has real eigenvalues they are the rates; where the phase turns, their common real part and the jumps,
     each once in half a turn.
     """
-    a = matrix_at(problem.system, xi)
+    a = matrix_at(problem.drift, xi)
     half, square = 0.5 * (a[..., 0, 0] + a[..., 1, 1]), squared_frequency(a)
     root, turns = np.sqrt(np.abs(square)), square > 0
     turning = half + root / math.pi * sum(jump.log_factor for jump in problem.system.jumps)
@@ -54,11 +54,11 @@ class FrozenNoise:
     """
 
     def __init__(self, problem: Problem) -> None:
-        noise = problem.noise
+        noise = problem.coloured
         if noise.has_states:
             raise TypeError("noise with states is held in each of them; there is no z to look for")
         unit = noise.standard_deviation
-        furthest = 5 * LARGEST_P * unit * noise_strength(problem.system) * noise.correlation_time
+        furthest = 5 * LARGEST_P * unit * noise_strength(problem.drift) * noise.correlation_time
         self._is_heavy = noise.has_algebraic_tails
         end = FURTHEST if self._is_heavy else min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
         spread = max(np.log(end / 1e-2), 1.0)
@@ -100,5 +100,6 @@ class FrozenNoise:
 
 @kept(8)
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
-    """The `FrozenNoise` of a problem; None for a chain, which holds its states."""
-    return None if problem.noise.has_states else FrozenNoise(problem)
+    """The `FrozenNoise` of a problem; None for a chain, which holds its states, and for several noises."""
+    has_none = problem.coloured.has_states or len(problem.coloured.parts) > 1
+    return None if has_none else FrozenNoise(problem)

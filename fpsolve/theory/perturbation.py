@@ -121,16 +121,18 @@ def second_order(problem: Problem) -> SecondOrder:
     Raises:
         NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in the noise.
     """
-    system, noise = problem.motion, problem.noise
-    steady, driven = matrix_at(system, 0.0, slice(0, 1)), np.zeros((2, 2))
+    system, noises = problem.motion, problem.noise.parts
+    driven = {name: np.zeros((2, 2)) for name, noise in noises.items() if not (noise.is_white and len(noises) > 1)}
+    steady = matrix_at(system, 0.0, slice(0, 1))
     for term in system.terms if has_mean(problem) else ():
-        steady += noise.mean * (affine(term.g) or (0.0, 0.0))[1] * system.epsilon**term.order * np.array(term.matrix)
+        mean = problem.named_noise(term.noise).mean
+        steady += mean * (affine(term.g) or (0.0, 0.0))[1] * system.epsilon**term.order * np.array(term.matrix)
     frame, omega = _rotating_frame(steady)
     parts = [float(_growth(steady, frame).mean)]
     for term in system.terms:
         offset, slope = affine(term.g) or (math.nan, math.nan)
         if term.order == 1 and offset == 0:
-            driven += slope * np.array(term.matrix)
+            driven[term.noise if term.noise in driven else ""] += slope * np.array(term.matrix)
         elif term.order == slope == 0:
             continue
         elif term.order >= 2 and slope == 0:
@@ -140,7 +142,10 @@ def second_order(problem: Problem) -> SecondOrder:
                 f"perturbation theory is for motions whose noise enters as epsilon xi; a term of order {term.order} "
                 f"with g = {written_coefficient(term.g).strip() or 1} is not of that form"
             )
-    of_noise = [(_growth(driven, frame), noise.spectral_density(0.0), noise.spectral_density(2 * omega))]
+    of_noise = []
+    for name, matrix in driven.items():
+        density = problem.named_noise(name).spectral_density
+        of_noise.append((_growth(matrix, frame), density(0.0), density(2 * omega)))
     for each in problem.diffusions:
         if each.order != 1:
             raise NoPerturbationTheory(f"perturbation theory is for white noise of order 1, not {each.order}")
@@ -167,7 +172,7 @@ def second_order_or_none(problem: Problem) -> SecondOrder | None:
 
 def has_mean(problem: Problem) -> bool:
     """Whether the noise has a mean, beyond rounding."""
-    return abs(problem.noise.mean) > 1e-12 * problem.noise.standard_deviation
+    return any(abs(noise.mean) > 1e-12 * noise.standard_deviation for noise in problem.noise.parts.values())
 
 
 def perturbed_moments(problem: Problem, p: FloatArray) -> FloatArray:
@@ -207,6 +212,8 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
     second_order(problem)
     if has_mean(problem):
         raise NoPerturbationTheory(f"T₁ is for noise of mean 0, but it has {problem.noise.mean:g}")
+    if len(problem.noise.parts) > 1:
+        raise NoPerturbationTheory("T₁ is a function of one noise, but there are several")
     frame, omega = _rotating_frame(matrix_at(problem.system, 0.0, slice(0, 1)))
     if not np.array_equal(frame, np.eye(2)):
         raise NoPerturbationTheory("T₁ is for a uniform rotation; choose coordinates in which the order 0 is one")
@@ -225,19 +232,22 @@ def scale_of(problem: Problem) -> Scale:
     """
     if theory := second_order_or_none(problem):
         return theory.scale
-    system, noise = problem.motion, problem.noise
-    steady, driven = np.zeros((2, 2)), 0.0
+    system, steady, of_noises = problem.motion, np.zeros((2, 2)), dict[str, float]()
     for term in system.terms:
         size = system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
+        noise, driven = problem.named_noise(term.noise), 0.0
         if line := affine(term.g):
             at_mean = line[0] + (line[1] and line[1] * noise.mean)
             steady += system.epsilon**term.order * at_mean * np.array(term.matrix)
-            driven += size * (line[1] and abs(line[1]) * noise.standard_deviation)
+            driven = size * (line[1] and abs(line[1]) * noise.standard_deviation)
         else:
             typical = np.asarray(term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
-            driven += size * float(np.sqrt(np.mean(typical**2)))
+            driven = size * float(np.sqrt(np.mean(typical**2)))
+        of_noises[term.noise] = of_noises.get(term.noise, 0.0) + driven
     jumps = sum(abs(jump.log_factor) for jump in system.jumps) * angular_frequency(system) / math.pi
-    driven *= min(1.0, driven * noise.correlation_time)
+    driven = 0.0
+    for name, each in of_noises.items():
+        driven += each * min(1.0, each * problem.named_noise(name).correlation_time) if each else 0.0
     for each in problem.diffusions:
         h, q = (system.epsilon**each.order * float(abs(f.mean) + f.amplitude) for f in (each.h, each.q))
         driven += 0.5 * q * max(h, q)

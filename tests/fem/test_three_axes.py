@@ -21,15 +21,18 @@ NOISES = OrnsteinUhlenbeck(alpha=1.0, sigma=0.3), OrnsteinUhlenbeck(alpha=0.7, s
 
 
 def pencil(p, cells=4, degree=8, count=11):
-    """L(p) of ẍ + (0.1 + ξ₂)ẋ + (1 + ξ₁)x = 0: what ξ₁ terms with the rotation, and what ξ₂ terms."""
+    """L(p) of ẍ + (0.1 + ξ₂)ẋ + (1 + ξ₁)x = 0."""
     lines = np.linspace(np.pi / 2, 3 * np.pi / 2, cells + 1)
     phase = PhaseAxis(lines, np.full(cells, degree))
     space = TensorSpace([phase, *(PolynomialAxis(noise, count) for noise in NOISES)])
-    free = [CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))), CoefficientMatrix(1, ((0.0, 0.0), (0.0, -0.1)))]
-    first = Problem(PlaneSystem([*free, CoefficientMatrix(1, STIFFNESS, identity)]), NOISES[0])
-    second = Problem(PlaneSystem([CoefficientMatrix(1, DAMPING, identity)]), NOISES[1])
-    terms = [*Terms(first, space, 1).whole(), *Terms(second, space, 2).whole()]
-    return Pencil(p, space, TermSum(terms).matrix(space, p))
+    terms = [
+        CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))),
+        CoefficientMatrix(1, ((0.0, 0.0), (0.0, -0.1))),
+        CoefficientMatrix(1, STIFFNESS, identity, "axial"),
+        CoefficientMatrix(1, DAMPING, identity, "lateral"),
+    ]
+    problem = Problem(PlaneSystem(terms), dict(zip(("axial", "lateral"), NOISES, strict=True)))
+    return Pencil(p, space, TermSum(Terms(problem, space).whole()).matrix(space, p))
 
 
 def test_two_noises_against_the_moment_hierarchy():

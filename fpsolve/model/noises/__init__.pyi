@@ -4,6 +4,7 @@ from .non_gaussian import ReducedNoise as ReducedNoise
 from .ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .ornstein_uhlenbeck import OrnsteinUhlenbeckByDeviation as OrnsteinUhlenbeckByDeviation
 from .ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity as OrnsteinUhlenbeckByIntensity
+from .several import Noises as Noises
 from .sine_wiener import SineWiener as SineWiener
 from .telegraph import Telegraph as Telegraph
 from .white import Interpretation as Interpretation

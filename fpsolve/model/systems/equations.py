@@ -167,10 +167,13 @@ class EquationSystem(System):
                 raise TableError(f"got {shown(value)}; must be a finite number", "parameters", name) from None
             if name == EPSILON and not value > 0:
                 raise TableError(f"got {value:g}; must be > 0; epsilon = 1 is the unscaled system", "parameters", name)
-        if len(self.noises) != 1:
-            must = "must be one, as several noises at once are not known yet"
-            raise TableError(f"got {len(self.noises)} noises; {must}; keep one of them", "noises")
+        if not self.noises:
+            raise TableError("got no noise; must be one at least; write one into drift and name it here", "noises")
+        sections = [section for _, section in self.noises]
         for name, section in self.noises:
+            if sections.count(section) > 1 or (len(sections) > 1 and section == "noise"):
+                must = 'must have a section of its own, such as "noise.axial" and "noise.lateral"'
+                raise TableError(f"got {shown(section)}; each of several noises {must}; rename it", "noises", name)
             if not re.fullmatch(r"noise(\.[A-Za-z0-9_-]+)?", str(section)):
                 must = 'must be the name of a section, "noise" or, for example, "noise.axial"'
                 raise TableError(f"got {shown(section)}; {must}; rename it", "noises", name)
@@ -241,8 +244,8 @@ class EquationSystem(System):
         return [Message(Code.UNUSED, keys=unused)] if unused else []
 
     @property
-    def noise_section(self) -> str:
-        return self.noises[0][1]
+    def noise_sections(self) -> Sequence[str]:
+        return tuple(section for _, section in self.noises)
 
     @property
     def values(self) -> Mapping[str, float | str]:
@@ -289,6 +292,7 @@ class EquationSystem(System):
     def _terms_of(self, rates: tuple[Form, Form], at: int) -> tuple[CoefficientMatrix, ...]:
         """The terms of rates, of their values for `at` = 0, of their derivatives for 1."""
         has_orders = EPSILON in dict(self.named)
+        names = {name: section[6:] for name, section in self.noises} if len(self.noises) > 1 else {}
         matrices = dict[tuple[int, str], FloatArray]()
         for i, form in enumerate(rates):
             for (state, noise, power), series in form.parts.items():
@@ -296,7 +300,7 @@ class EquationSystem(System):
                 matrix = matrices.setdefault((order, noise), np.zeros((2, 2)))
                 matrix[i, self.variables.index(state)] += series[at]
         return tuple(
-            CoefficientMatrix(order, matrix.tolist(), identity if noise else one)
+            CoefficientMatrix(order, matrix.tolist(), identity if noise else one, names.get(noise, ""))
             for (order, noise), matrix in sorted(matrices.items(), key=lambda item: item[0])
             if at == 0 or matrix.any()
         )

@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from fpsolve.arrays import FloatArray, identity, one, real_number, shown
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
-from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
+from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon, is_driven
 from fpsolve.model.quantity import Quantity
 from fpsolve.model.systems.equations import EquationSystem, Wall
 
@@ -58,7 +58,10 @@ class StatedTerm(BaseModel):
         parameter("the matrix by which the state is multiplied", "matrix = [[0.0, 1.0], [-1.0, 0.0]]"),
     ]
     order: Annotated[int, parameter("the power of epsilon", "order = 0", ge=0)] = 0
-    noise: Annotated[bool, parameter("whether the noise multiplies it", "noise = true")] = False
+    noise: Annotated[
+        bool | Annotated[str, Field(pattern="[A-Za-z0-9_-]+")],
+        parameter("whether the noise multiplies it; of several noises the name of one", "noise = true"),
+    ] = False
     factor: Annotated[str, parameter("the parameter that multiplies it", 'factor = "damping"')] = ""
 
 
@@ -255,11 +258,17 @@ class PlaneSystem(System):
     def from_table(cls, table: Mapping[str, Any]) -> PlaneSystem:
         named = {name: value for name, value in table.items() if name not in cls.stated}
         terms = [
-            (each.factor, CoefficientMatrix(each.order, each.matrix, identity if each.noise else one))
-            for each in table["terms"]
+            (each.factor, CoefficientMatrix(each.order, each.matrix, identity if each.noise else one, name))
+            for each, name in ((each, each.noise if isinstance(each.noise, str) else "") for each in table["terms"])
         ]
         jumps = [Jump(each.phase, each.log_factor) for each in table.get("jumps", ())]
         return cls.of_terms(terms, jumps, **named)
+
+    @property
+    def noise_sections(self) -> Sequence[str]:
+        """As the terms name the noises."""
+        names = dict.fromkeys(term.noise for term in self.terms if is_driven(term.g))
+        return tuple(f"noise.{name}" if name else "noise" for name in names) or super().noise_sections
 
     @property
     def values(self) -> Mapping[str, float | str]:

@@ -1,0 +1,187 @@
+"""Several independent noises at once, each driving terms of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+from fpsolve.arrays import shown
+from fpsolve.messages import Message
+from fpsolve.model.noise import Noise
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, is_driven
+
+MOST_WITH_AXES = 2
+"""Noises that have values at most: each of them is a dimension more."""
+
+
+@dataclass(frozen=True)
+class Noises(Noise):
+    """Independent noises by the names that the terms of a system have, see `CoefficientMatrix`.
+
+    >>> from fpsolve import OrnsteinUhlenbeck
+    >>> from fpsolve.model.noises.white import White
+    >>> noises = Noises({"axial": OrnsteinUhlenbeck(alpha=1.0, sigma=0.3), "lateral": White(s=0.2)})
+    >>> noises.coloured.kind
+    'ornstein-uhlenbeck'
+
+    A function of all of them is one of as many variables as there are noises that have values; white ones have none.
+
+    Args:
+        named: a mapping from names to noises, or pairs of both; two noises or more.
+
+    Raises:
+        TypeError: one of them is no noise, or itself several.
+        ValueError: they are less than two, more than two have values, or one has algebraic tails.
+    """
+
+    named: tuple[tuple[str, Noise], ...]
+
+    may_tilt: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        given = self.named.items() if isinstance(self.named, Mapping) else self.named
+        pairs = tuple((name, noise) for name, noise in given)
+        object.__setattr__(self, "named", pairs)
+        for name, noise in pairs:
+            if not (isinstance(name, str) and name and isinstance(noise, Noise) and len(noise.parts) == 1):
+                raise TypeError(f"got {shown(noise)} as the noise {shown(name)}; must be one noise with a name")
+            if noise.has_algebraic_tails:
+                raise ValueError(
+                    f"the noise {name} has algebraic tails, which is solved for one noise alone; choose one with r0 <= "
+                    "1 beside another noise, or simulate it alone"
+                )
+        if len(dict(pairs)) < 2:
+            raise ValueError(f"got {len(pairs)} noises; must be two or more with names that differ")
+        valued = [name for name, noise in pairs if not noise.is_white]
+        if len(valued) > MOST_WITH_AXES:
+            raise ValueError(
+                f"the noises {', '.join(valued)} all have values, but functions of at most {MOST_WITH_AXES} noises are "
+                "solved for; make others white, or leave them out"
+            )
+
+    @cached_property
+    def parts(self) -> Mapping[str, Noise]:  # type: ignore[override]
+        return dict(self.named)
+
+    @cached_property
+    def coloured(self) -> Noise:
+        """What has values: one noise, or several; of white noises alone the first, whose value is always 0."""
+        valued = [(name, noise) for name, noise in self.named if not noise.is_white] or [self.named[0]]
+        return valued[0][1] if len(valued) == 1 else self if len(valued) == len(self.named) else Noises(tuple(valued))
+
+    @property
+    def _valued(self) -> Iterable[Noise]:
+        return self.coloured.parts.values()
+
+    @property
+    def values(self) -> Mapping[str, float | str]:
+        """The parameters of each, by keys such as "axial.alpha"."""
+        return {f"{name}.{key}": value for name, noise in self.named for key, value in noise.values.items()}
+
+    @property
+    def differentiable(self) -> Sequence[str]:
+        return [f"{name}.{key}" for name, noise in self.named for key in noise.differentiable]
+
+    @property
+    def remarks(self) -> Sequence[Message]:
+        return [remark for _, noise in self.named for remark in noise.remarks]
+
+    @property
+    def is_white(self) -> bool:  # type: ignore[override]
+        return all(noise.is_white for _, noise in self.named)
+
+    @property
+    def has_states(self) -> bool:  # type: ignore[override]
+        return all(noise.has_states for noise in self._valued)
+
+    @property
+    def mixes_slowly(self) -> bool:  # type: ignore[override]
+        return any(noise.mixes_slowly for _, noise in self.named)
+
+    @property
+    def approximates_spectrum(self) -> bool:  # type: ignore[override]
+        return any(noise.approximates_spectrum for _, noise in self.named)
+
+    @property
+    def standard_deviation(self) -> float:
+        """The largest of those that have one."""
+        return max(noise.standard_deviation for noise in self._valued)
+
+    @property
+    def correlation_time(self) -> float:
+        """The longest."""
+        return max(noise.correlation_time for _, noise in self.named)
+
+    @property
+    def relaxation_time(self) -> float:
+        """The longest."""
+        return max(noise.relaxation_time for _, noise in self.named)
+
+    def spectral_density(self, omega: float) -> float:
+        """Raises `NotImplementedError`: each has its own."""
+        raise NotImplementedError("several noises have a spectral density each, see `parts`")
+
+    @property
+    def is_bounded(self) -> bool:
+        return all(noise.is_bounded for noise in self._valued)
+
+    @property
+    def largest_jump_rate(self) -> float:
+        return sum(noise.largest_jump_rate for noise in self._valued)
+
+    @property
+    def longest_jump(self) -> int:
+        return max(noise.longest_jump for noise in self._valued)
+
+    @property
+    def is_simulated(self) -> bool:
+        return all(noise.is_simulated for _, noise in self.named)
+
+    @property
+    def largest_step(self) -> float:
+        return min(noise.largest_step for _, noise in self.named)
+
+    def check_existence(self, p: float) -> None:
+        for _, noise in self.named:
+            noise.check_existence(p)
+
+    def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
+        """The diffusions of all white ones, and what they leave of the drift, each in its own sense."""
+        drift, diffusions = list(_besides(system.terms, self.named)), list[CoefficientMatrix]()
+        for own, noise, _ in self._white_motions(system):
+            moved, more = noise.motion(own)
+            drift += moved.terms
+            diffusions += more
+        return LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions
+
+    def changed_motion(
+        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
+    ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
+        drift, diffusions = list(_besides(terms, self.named)), list[CoefficientMatrix]()
+        part, _, parameter = name.rpartition(".")
+        for own, noise, of in self._white_motions(system):
+            changed = [term for term in terms if is_driven(term.g) and term.noise == of]
+            less, more = noise.changed_motion(own, changed, parameter if part == of else "")
+            drift += less
+            diffusions += more
+        return drift, diffusions
+
+    def _white_motions(self, system: System) -> Iterable[tuple[System, Noise, str]]:
+        """For each white noise what it drives."""
+        for name, noise in self.named:
+            if noise.is_white:
+                own = tuple(term for term in system.terms if is_driven(term.g) and term.noise == name)
+                yield LinearMotion(system.epsilon, own, tuple(system.jumps)), noise, name
+
+
+def noises_of(named: Mapping[str, Noise]) -> Noise:
+    """A noise of a mapping from names: `Noises`, or the only one. Raises as `Noises`."""
+    return next(iter(named.values())) if len(named) == 1 else Noises(named)  # type: ignore[arg-type]
+
+
+def _besides(terms: Sequence[CoefficientMatrix], named: Sequence[tuple[str, Noise]]) -> Iterable[CoefficientMatrix]:
+    """The terms that no white noise drives."""
+    white = {name for name, noise in named if noise.is_white}
+    return (term for term in terms if not (is_driven(term.g) and term.noise in white))
