@@ -74,7 +74,8 @@ def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
     if wanted != [""] and not names:
         stated = " and ".join(f"[{section}]" for section in sections)
         yield (), None, f"is not {told}; write {stated}, or name this in noises"
-    elif missing := [section for section, name in zip(sections, wanted, strict=True) if name not in names and names]:
+    missing = [section for section, name in zip(sections, wanted, strict=True) if name not in names]
+    if missing and names and set(names) <= set(wanted):
         yield (), None, f"lacks {' and '.join(missing)}; add a section for each, or leave it out of noises of [system]"
 
 
