@@ -5,6 +5,10 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
 
 if "PYTEST_XDIST_WORKER" in os.environ:  # one worker for each processor: more threads would only wait for each other
     os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -82,6 +86,12 @@ def heed_signals() -> None:
     """For a process that is being started: nohup and a shell's & leave signals ignored, which it would inherit."""
     for name in ("SIGHUP", "SIGINT", "SIGTERM"):
         signal.signal(getattr(signal, name), signal.SIG_DFL)
+
+
+def started(code: str, *words: str, before: Callable[[], object] = heed_signals, **more: Any) -> subprocess.Popen[str]:
+    """A process of its own that runs code with these words; it heeds signals, whatever the parent does."""
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **more}
+    return subprocess.Popen([sys.executable, "-c", code, *words], **pipes, text=True, preexec_fn=before)
 
 
 def oracle_arguments(oscillator: VibroImpactOscillator, noise: OrnsteinUhlenbeck) -> dict[str, float]:

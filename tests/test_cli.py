@@ -23,7 +23,7 @@ from fpsolve.model.problem import Problem
 from fpsolve.output import figures
 from fpsolve.output.terminal import digits
 from fpsolve.study import solve
-from tests.conftest import FIG1, FIG1_NOISE, heed_signals, sampled
+from tests.conftest import FIG1, FIG1_NOISE, heed_signals, sampled, started
 from tests.test_workflow import DRAWN, HOPELESS, LEAN, TABLES, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -349,9 +349,7 @@ sys.exit(main(sys.argv[1:]))
 
 def begin(case, prepare=heed_signals):
     """A run in another process, which solves its first curve for as long as one likes."""
-    command = [sys.executable, "-c", LONG, "run", case]
-    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-    process = subprocess.Popen(command, **pipes, text=True, preexec_fn=prepare)
+    process = started(LONG, "run", case, before=prepare, stdin=subprocess.PIPE)
     try:
         assert process.stdout.readline() == "begun\n"
     except BaseException:

@@ -4,14 +4,12 @@ import json
 import os
 import random
 import signal
-import subprocess
-import sys
 import time
 
 import pytest
 
 from fpsolve.pool import processors
-from tests.conftest import heed_signals
+from tests.conftest import started
 from tests.solving import case_text
 
 VARIED = '[vary]\n"noise.D0" = { start = 0.5, stop = 1.6, num = 12 }\n'
@@ -28,15 +26,9 @@ def case(tmp_path):
     return path
 
 
-def started(case, out):
-    """A run in a process of its own that has begun; SIGINT is not ignored in it, whatever the parent does."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", CODE, "run", str(case), "--out", str(out)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=heed_signals,
-    )
+def begun(case, out):
+    """A run in a process of its own that has begun."""
+    process = started(CODE, "run", str(case), "--out", str(out))
     assert process.stdout.readline() == "begun\n"
     return process
 
@@ -63,14 +55,14 @@ def kept(folder):
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_killed_runs_leave_nothing_torn(case, tmp_path):
     for name in ("first", "whole"):  # the second does not wait for caches; signals must not come after the end
-        process, begun = started(case, tmp_path / name), time.monotonic()
+        process, start = begun(case, tmp_path / name), time.monotonic()
         process.communicate(timeout=120)
         assert process.returncode == 0
-    duration, whole = time.monotonic() - begun, contents(tmp_path / "whole" / "killed")
+    duration, whole = time.monotonic() - start, contents(tmp_path / "whole" / "killed")
     rng, out = random.Random(9), tmp_path / "out"
     for kind in (signal.SIGKILL, signal.SIGHUP, signal.SIGINT, signal.SIGTERM) * ROUNDS:
         before = kept(out / "killed")
-        process = started(case, out)
+        process = begun(case, out)
         time.sleep(rng.uniform(0.05, 0.7) * duration)
         process.send_signal(kind)
         _, said = process.communicate(timeout=60)
@@ -87,7 +79,7 @@ def test_killed_runs_leave_nothing_torn(case, tmp_path):
             assert found == [curve for curve in whole[0] if curve in found]
             if kind != signal.SIGKILL and len(done) > len(before):  # what a worker finished last is told the next time
                 assert left["done"] >= len(done) - processors()
-    process = started(case, out)
+    process = begun(case, out)
     process.communicate(timeout=120)
     assert process.returncode == 0
     assert contents(out / "killed") == whole

@@ -23,7 +23,7 @@ from fpsolve.pool import cluster
 from fpsolve.study import solve
 from fpsolve.workflow import run_case
 from fpsolve.workflow.sets import SOLVED_RECORDS
-from tests.conftest import heed_signals, sampled
+from tests.conftest import heed_signals, sampled, started
 from tests.solving import case_text
 
 SIZE = 6
@@ -59,12 +59,9 @@ def whole(folder):
     return folder / "whole"
 
 
-def started(folder, out, *options, before=heed_signals):
+def begun(folder, out, *options, before=heed_signals):
     """A run in a process of its own."""
-    return subprocess.Popen(
-        [sys.executable, "-c", MAIN, "run", "sweep.toml", "--out", out, *options],
-        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=before,
-    )  # fmt: skip
+    return started(MAIN, "run", "sweep.toml", "--out", out, *options, before=before, cwd=folder)
 
 
 def run(folder, out, *options):
@@ -127,7 +124,7 @@ def test_killed_again_and_again(place):
     out, killed = "killed", 0
     for _ in range(5):
         done = len(lines(place, out))
-        process = started(place, out, "--jobs", "2")
+        process = begun(place, out, "--jobs", "2")
         wait_for_records(place, out, done + 4, process)
         killed += process.poll() is None
         process.kill()
@@ -153,7 +150,7 @@ def limited():
 
 @pytest.mark.slow
 def test_a_full_disk(place):
-    process = started(place, "full", "--jobs", "1", before=limited)
+    process = begun(place, "full", "--jobs", "1", before=limited)
     _, said = process.communicate(timeout=120)
     assert process.returncode == 2
     assert "cannot be written" in said
@@ -207,7 +204,7 @@ def test_a_changed_parameter_solves_only_what_it_changes(place):
 
 @pytest.mark.slow
 def test_an_interrupt_keeps_what_is_solved(place):
-    process = started(place, "interrupted", "--jobs", "2")
+    process = begun(place, "interrupted", "--jobs", "2")
     folder = place / "interrupted/sweep" / SOLVED_RECORDS
     wait_for_records(place, "interrupted", 4, process)
     process.send_signal(signal.SIGINT)
@@ -237,7 +234,7 @@ def apart():
 def test_what_a_terminal_sends_to_all_ends_a_run_in_one_sentence(place, kind, code):
     """Ctrl-C, and a terminal that is closed."""
     out = f"terminal-{code}"
-    process = started(place, out, "--jobs", "2", before=apart)
+    process = begun(place, out, "--jobs", "2", before=apart)
     wait_for_records(place, out, 1, process)
     os.killpg(process.pid, kind)
     _, said = process.communicate(timeout=60)
@@ -260,7 +257,7 @@ def children(process):
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds processes as Linux tells them")
 def test_a_killed_worker_costs_its_batch_only(place):
-    process = started(place, "orphan", "--jobs", "2")
+    process = begun(place, "orphan", "--jobs", "2")
     wait_for_records(place, "orphan", 4, process)
     os.kill(children(process)[0], signal.SIGKILL)
     said = process.communicate(timeout=120)
@@ -270,7 +267,7 @@ def test_a_killed_worker_costs_its_batch_only(place):
 
 @pytest.mark.slow
 def test_workers_end_with_a_run_that_is_killed(place):
-    process = started(place, "left", "--jobs", "2")
+    process = begun(place, "left", "--jobs", "2")
     wait_for_records(place, "left", 1, process)
     workers = children(process)
     assert len(workers) == 2
@@ -313,7 +310,7 @@ def dask_cluster(count=2):
 def test_a_cluster_gives_the_same_results(place):
     pytest.importorskip("distributed")
     with dask_cluster() as (address, workers, _):
-        process = started(place, "cluster", "--scheduler", address)
+        process = begun(place, "cluster", "--scheduler", address)
         wait_for_records(place, "cluster", 4, process)
         workers[0].kill()
         said = process.communicate(timeout=120)
@@ -343,7 +340,7 @@ def test_a_cluster_works_for_one_case_after_the_other(place):
 def test_a_scheduler_that_dies_is_told_in_one_sentence(place):
     pytest.importorskip("distributed")
     with dask_cluster(1) as (address, _, scheduler):
-        process = started(place, "headless", "--scheduler", address)
+        process = begun(place, "headless", "--scheduler", address)
         wait_for_records(place, "headless", 1, process)
         scheduler.kill()
         _, said = process.communicate(timeout=120)

@@ -5,7 +5,6 @@ import math
 import os
 import re
 import signal
-import subprocess
 import sys
 import time
 from dataclasses import replace
@@ -23,7 +22,7 @@ from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.proofs import print_proofs
 from fpsolve.proofs.certificate import Certificate, Enclosure
 from fpsolve.study.prove import CurveProof, Plan
-from tests.conftest import heed_signals
+from tests.conftest import started
 from tests.oracles import fourier_hermite
 from tests.proofs.case import CASE
 
@@ -264,13 +263,7 @@ def test_what_an_interrupted_run_has_proven_is_kept(case, tmp_path, kind, code):
         "import fpsolve.proofs.questions as questions, time; "
         "questions.ExponentSolver = lambda *_, **__: (print('slow', flush=True), time.sleep(60)); print(",
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", slow, "prove", case, "--jobs", "1"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=heed_signals,
-    )
+    process = started(slow, "prove", case, "--jobs", "1")
     assert [process.stdout.readline() for _ in range(2)] == ["begun\n", "slow\n"]
     time.sleep(0.1)
     process.send_signal(kind)
