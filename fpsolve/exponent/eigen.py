@@ -4,8 +4,8 @@ For a real shift σ > Λ the resolvent (σ − L)⁻¹ is a positive operator wh
 seen from the right, Λ is the nearest eigenvalue. From there, or quicker from the pair at a neighbouring p,
 two-sided Rayleigh quotient iteration converges cubically. That it found the principal pair is checked by the one
 property that no other pair has: T > 0 and T* > 0 (Perron-Frobenius; one of the two is enough), as far as a mesh can
-tell. It cannot where slow noise has two places between which it hardly ever passes; `NearPlace` looks at both, and
-for noise with states every search begins on the right.
+tell. It cannot where slow noise has two places between which it hardly ever passes; `NearPlace` looks at both. Nor can
+it for noise with states, or where the phase rests, so that every search begins on the right there.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.factors import Factors, one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.theory.frozen import eigenvalues_at
+from fpsolve.model.problem import Problem
+from fpsolve.theory.frozen import eigenvalues_at, frozen_noise
 
 BACKWARD_ERROR_GOAL = 1e-14
 BACKWARD_ERROR_LIMIT = 1e-11
@@ -114,7 +115,7 @@ def principal_pair(
         lambda: _carried(pairs, pencil, generator) if pairs else _simplest(pencil, generator),
         lambda: _from_the_right(pencil, generator, clock),
     ]
-    if generator.problem.noise.mixes_slowly:  # states that hardly mix have a positive pair each
+    if is_doubtful := _has_other_positive(generator.problem, p, pairs or ()):
         searches.reverse()
     found: list[PrincipalPair] = []
     for search in searches:
@@ -123,7 +124,8 @@ def principal_pair(
         except NotConverged:  # the other searches may still find it
             continue
         pair = _pair(generator, pencil, rayleigh_iteration(pencil, *vectors, clock))
-        if pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= SURELY_POSITIVE:
+        most = POSITIVE if is_doubtful else SURELY_POSITIVE
+        if pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= most:
             break
         found.append(pair)
     else:
@@ -132,13 +134,27 @@ def principal_pair(
             limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
             told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=min(pair.sign_defects), **limits)
             raise NotConverged(told, pair, Remedy.BOTH_AXES)
-    # states may hardly mix, or the phase not leave a ray: then other pairs have a positive T, or T*, too
-    if generator.problem.noise.mixes_slowly and generator.size <= SURVEYED_UNKNOWNS:
-        rightmost = spectrum(pair.generator, pair.p, 1)[0]
-        if rightmost.real - pair.value > 1e-6 * max(abs(rightmost), generator.unit_rate):
-            told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost.real, value=pair.value)
+    if is_doubtful:
+        others = [each.value for each in found if each.residual <= BACKWARD_ERROR_LIMIT]
+        if generator.problem.noise.mixes_slowly and generator.size <= SURVEYED_UNKNOWNS:
+            others.append(float(spectrum(generator, p, 1)[0].real))
+        rightmost = max(others, default=pair.value)
+        if rightmost - pair.value > 1e-6 * max(abs(rightmost), generator.unit_rate):
+            told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
             raise NotConverged(told, pair, Remedy.PHASE)
     return pair
+
+
+def _has_other_positive(problem: Problem, p: float, pairs: Sequence[PrincipalPair]) -> bool:
+    """Whether other pairs may seem to have T > 0, too, and none of those to start from is at p.
+
+    States that hardly mix have a pair each. Where the phase rests, between weak noise, T is about |x|^(p−k) |v|^k for
+    the k-th pair, x along the faster mode and v along the other: for even k its sign does not change.
+    """
+    if problem.noise.mixes_slowly:
+        return True
+    frozen = frozen_noise(problem)
+    return frozen is not None and frozen.rests(p) and all(pair.p != p for pair in pairs)
 
 
 def spectrum(generator: Generator, p: float, k: int = 10) -> Any:

@@ -88,6 +88,10 @@ class FrozenNoise:
             return float(peaks[np.argmin(np.abs(peaks))]) if peaks.size else 0.0
         return float(self.z[np.argmax(self.rate(p))])
 
+    def rests(self, p: float) -> bool:
+        """Whether the phase does not turn at the largest F."""
+        return not self._turns[np.argmax(self.rate(p))]
+
     def at_the_ends(self, p: float) -> float:
         """The larger F of the outermost z."""
         rate = self.rate(p)
