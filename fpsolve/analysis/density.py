@@ -140,6 +140,8 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     rate = growth_rate(system, at.xi)(phi)
     for each in problem.diffusions:  # ½ h q′, by which q ∘ dW has a mean
         rate = rate + 0.5 * system.epsilon ** (2 * each.order) * each.h(phi) * each.q.slope(phi)
+    for struck in problem.impulses:
+        rate = rate + struck.rate * np.log(struck.stretched(phi)[0])
     density = space.evaluate(pair.left, space.phi.values, at.values) * at.weight / at.factor
     growth = space.turns * float(space.phi.weights @ (rate * density) @ at.measure)
     table = space.table(pair.left)

@@ -137,8 +137,10 @@ class Generator:
         parts: list[tuple[Any, ...]] = [
             (size * term.phase, *(axis.matrix(g) for axis, g in zip(axes, term.noises, strict=True)))
             for size, term in sizes
-            if size
+            if size and not term.phase_at
         ]
+        ones = tuple(axis.matrix(one) for axis in axes)
+        parts += [(term.phase_at(p, derivative), *ones) for term in self._changes[by] if term.phase_at]
         if by.noise is not None:
             phases = self._sum.phases(p, derivative)
             parts += [(phase, *self._changed(by, axes, noises)) for noises, phase in phases.items()]
@@ -168,7 +170,7 @@ class Generator:
     @cached_property
     def loss(self) -> float:
         """About how many times its rounding elimination may harm T − 1: the size of the free transport over a rate."""
-        orders = ALL_ORDERS if self.problem.diffusions else slice(0, 1)
+        orders = ALL_ORDERS if self.problem.diffusions or self.problem.impulses else slice(0, 1)
         free = self.matrix(0.0, orders=orders).terms[0][0]
         return 30 * float(abs(free).sum(axis=0).max()) / self.unit_rate
 
@@ -178,7 +180,7 @@ class Generator:
         if self.chosen.is_killed:
             return False
         free = [term for term in self.problem.motion.terms if term.order == 0]
-        is_weak = all(each.order for each in self.problem.diffusions)
+        is_weak = all(each.order for each in self.problem.diffusions) and not self.problem.impulses
         return is_weak and all(term.h.amplitude == 0 and term.q.vanishes for term in free)
 
     def upper_bound(self, p: float) -> float:
@@ -195,7 +197,7 @@ class Generator:
             gains = sum(max(0.0, p * jump.log_factor) for jump in system.jumps)
             return p * q.mean + abs(p) * q.amplitude + gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
 
-        if len(axes) == 1 and not self.problem.diffusions:
+        if len(axes) == 1 and not (self.problem.diffusions or self.problem.impulses):
             growth = self._growth_along(axes[0], fastest)
         else:
             growth = float(np.max(self._growth_of_one(p)))
@@ -234,10 +236,14 @@ class Generator:
         """e^{−pγ} L e^{pγ} 1 at some φ, γ′ = c such that jumps are spread evenly over φ: its supremum is above Λ(p)."""
         system, phi = self.problem.motion, np.linspace(0, math.pi, SAMPLES)
         q, speed = growth_rate(system, 0.0), phase_speed(system, 0.0)
-        c = self._stretch
+        c, ray = self._stretch, system.jumps[0].phase if system.jumps else 0.0
         growth = p * (q(phi) + c * speed(phi))
         for each in self.problem.diffusions:
             size = system.epsilon ** (2 * each.order)
             rate, slope = each.q(phi) + c * each.h(phi), each.q.slope(phi) + c * each.h.slope(phi)
             growth += 0.5 * size * (p * each.h(phi) * slope + (p * rate) ** 2)
+        for struck in self.problem.impulses:
+            stretch, end = struck.stretched(phi)
+            turn = np.mod(end - ray, math.pi) - np.mod(phi - ray, math.pi)  # never over a ray
+            growth += struck.rate * np.expm1(p * (np.log(stretch) + c * turn))
         return np.asarray(growth + 1e-3 * np.max(np.abs(growth)))

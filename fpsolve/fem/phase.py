@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,11 +13,13 @@ from scipy.sparse import csr_matrix, diags, issparse
 from fpsolve.arrays import FloatArray, one
 from fpsolve.fem.axis import Axis
 from fpsolve.fem.mesh import vertices_at
-from fpsolve.fem.polynomials import legendre, orthonormal
-from fpsolve.model.plane import CoefficientMatrix, Harmonics
+from fpsolve.fem.polynomials import gauss_legendre, legendre, orthonormal
+from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, ImpulseDerivative, changed_exponential
 
 PENALTY = 2.0
 """η of the interior penalty method times size/(degree + 1)²."""
+STRIPS, MORE_POINTS = 32, 8
+"""Of an impulse: parts of the domain before and after it, in which a rule of Gauss has points beyond the degree."""
 MAX_DENSE_UNKNOWNS = 600
 """Matrices of φ, and of ξ, are NumPy arrays for so many unknowns, and sparse beyond."""
 
@@ -57,6 +60,7 @@ class PhaseAxis(Axis):
             for side, shift in ((0, 0), (1, 1))
         )
         self.jump = self.right_trace - self.left_trace
+        self._strikes: dict[Impulse, tuple[Any, ...]] = {}
 
     def vertices_at(self, phase: float) -> Any:
         """The indices of the φ-lines lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
@@ -106,6 +110,51 @@ class PhaseAxis(Axis):
         )
         first, second, last = (self._assembled(blocks) for blocks in cells)
         return first + loads[0], second + loads[1], last
+
+    def impulses(self, of: Impulse, p: float, derivative: int = 0) -> Any:
+        """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
+        at, end, weights, stretch, _ = self._struck(of)
+        logs = np.log(stretch)
+        return self._kept(at.T @ diags(weights * np.exp(p * logs) * logs**derivative) @ end)
+
+    def changed_impulses(self, of: Impulse, by: ImpulseDerivative, p: float, derivative: int = 0) -> Any:
+        """The same, differentiated by θ of which B depends."""
+        at, end, weights, stretch, points = self._struck(of)
+        logs = np.log(stretch)
+        e = np.stack([np.cos(points), -np.sin(points)])
+        (x, u), (dx, du) = (matrix @ e for matrix in (of.matrix, changed_exponential(of.exponent, by.exponent)))
+        size = weights * np.exp(p * logs)
+        longer = (x * dx + u * du) / stretch**2 * (p * logs**derivative + derivative * logs ** max(derivative - 1, 0))
+        turned = (u * dx - x * du) / stretch**2 * logs**derivative
+        slope = end @ csr_matrix(self.convection(Harmonics(1.0, 0.0, 0.0)))
+        return self._kept(at.T @ (diags(size * longer) @ end + diags(size * turned) @ slope))
+
+    def _kept(self, matrix: Any) -> Any:
+        """An array where matrices of φ are."""
+        return matrix if self.size > MAX_DENSE_UNKNOWNS else matrix.toarray()
+
+    def _struck(self, of: Impulse) -> tuple[Any, ...]:
+        """The functions at the points of a rule and where an impulse takes them, weights, |exp(B)e|, and the points."""
+        if of not in self._strikes:
+            points, middles, weights = self._rule_of(of)
+            stretch, end = of.stretched(points)
+            _, inside = of.stretched(middles)
+            first = self.lines[0]
+            end, inside = (first + np.mod(phi - first, self.span) for phi in (end, inside))
+            functions = (csr_matrix(self.at(*where)) for where in ((points, middles), (end, inside)))
+            self._strikes[of] = *functions, weights, stretch, points
+        return self._strikes[of]
+
+    def _rule_of(self, of: Impulse) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Points of a rule between the lines and those phases that an impulse takes to lines, middles, and weights."""
+        first, back = self.lines[0], replace(of, exponent=(-np.array(of.exponent)).tolist())
+        even = first + self.span * np.arange(STRIPS) / STRIPS
+        _, before = back.stretched(np.concatenate([even, self.lines[:-1]]))
+        cuts = np.unique(np.concatenate([even, self.lines, first + np.mod(before - first, self.span)]))
+        local, weights = gauss_legendre(int(self.degrees.max()) + MORE_POINTS)
+        sizes = np.diff(cuts)[:, None]
+        middles = np.repeat(0.5 * (cuts[:-1] + cuts[1:]), local.size)
+        return (cuts[:-1, None] + sizes * local).ravel(), middles, (sizes * weights).ravel()
 
     @cached_property
     def _mean_slope(self) -> Any:

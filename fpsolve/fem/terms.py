@@ -10,7 +10,8 @@ is its size for the typical ξ, |Σ ε^n h| over what no noise drives + Σ ε^n 
 makes the load that of R^p T(φ⁺) − T(φ⁻), on w(φ⁻), as the phase runs forward, or of T(φ⁺) − R^p T(φ⁻), on w(φ⁺): an
 impact is exactly a point load, for which θ must be |v|.
 
-White noise by which dx has Bx ∘ dW adds ½ (h ∂φ + p q)² with h and q of B, see `PhaseAxis.diffusion`.
+White noise by which dx has Bx ∘ dW adds ½ (h ∂φ + p q)² with h and q of B, see `PhaseAxis.diffusion`. Impulses
+exp(B) add their rate times |exp(B)e|^p T(ψ) − T, ψ being where they take φ, see `PhaseAxis.impulses`.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ from fpsolve.fem.phase import by_rows
 from fpsolve.model.plane import (
     CoefficientMatrix,
     Harmonics,
+    Impulse,
+    ImpulseDerivative,
     Jump,
     LinearMotion,
     Xi,
@@ -94,6 +97,8 @@ class Term:
         phase: the matrix of φ.
         noises: for each noise the g of ∫P_s g u v, or None for its generator, ∫P_s v L_ξ u.
         text: the term as a reader would write it.
+        phase_at: gives the k-th derivative of the matrix of φ by p, from p and k, where that is no coefficient times
+            one matrix; `phase` is then 0.
     """
 
     order: int
@@ -101,6 +106,7 @@ class Term:
     phase: Any
     noises: tuple[Coefficient | None, ...]
     text: str
+    phase_at: Callable[[float, int], Any] | None = None
 
 
 class TermSum:
@@ -108,13 +114,18 @@ class TermSum:
 
     def __init__(self, terms: Iterable[Term]) -> None:
         sums: dict[Any, dict[tuple[int, OfMoment], Any]] = {}
+        self._others = list[tuple[Any, int, Callable[[float, int], Any]]]()
         for term in terms:
+            if term.phase_at:
+                self._others.append((term.noises, term.order, term.phase_at))
+                continue
             parts, key = sums.setdefault(term.noises, {}), (term.order, term.of_p)
             parts[key] = parts[key] + term.phase if key in parts else term.phase
         (noises, first), *_ = sums.items()
         self._nothing = {(one,) * len(noises): 0.0 * next(iter(first.values()))}
         self._parts = [(noises, [(*key, phase) for key, phase in parts.items()]) for noises, parts in sums.items()]
-        self._orders = range(1 + max(order for parts in sums.values() for order, _ in parts))
+        orders = [order for parts in sums.values() for order, _ in parts] + [order for _, order, _ in self._others]
+        self._orders = range(1 + max(orders))
 
     def phases(self, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> dict[Any, Any]:
         """For each function of the noises the matrix of φ; the first is that of 1."""
@@ -126,6 +137,9 @@ class TermSum:
                     total = size * phase if total is None else total + size * phase
             if total is not None:
                 phases[noises] = total
+        for noises, order, phase_at in self._others:
+            if order in wanted:
+                phases[noises] = phases[noises] + phase_at(p, derivative)
         return phases
 
     def matrix(self, space: TensorSpace, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
@@ -152,7 +166,7 @@ class Terms:
     def __init__(self, problem: Problem, space: TensorSpace) -> None:
         system = self.system = problem.motion
         self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.axes[1:]
-        self._names = tuple(problem.coloured.parts)
+        self._names, self._impulses = tuple(problem.coloured.parts), problem.impulses
         self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
         self._has_states = [noise.has_states for noise in problem.coloured.parts.values()]
         self._ends = problem.at_values([axis.support for axis in self.noises])
@@ -204,6 +218,8 @@ class Terms:
             yield from self._driven(term)
         for each in self._diffusions:
             yield from self._diffused(each, [(0.5, each, each)])
+        for struck in self._impulses:
+            yield self._struck(struck)
         # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
         text, jump = "upwind loads between cells", self._jump
         if not np.all(self._is_exact):
@@ -228,6 +244,8 @@ class Terms:
             yield from self._driven(term)
         for own, other in zip(self._diffusions, by.diffusions, strict=bool(by.diffusions)):
             yield from self._diffused(own, [(0.5, own, other), (0.5, other, own)])
+        for struck, moved_by in zip(self._impulses, by.impulses, strict=bool(by.impulses)):
+            yield self._struck(struck, moved_by)
         for j in self._two_way:
             yield from self._terms(-0.5 * jump[[j]].T @ jump[[j]], self._faster(moved, float(self._vertices[j])), text)
         for ray, slope in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
@@ -262,6 +280,21 @@ class Terms:
         text = f"½ (h ∂φ + p q)² of white noise, h = {_written(own.h)}, q = {_written(own.q)}"
         for power, total in enumerate(totals):
             yield self._term(total, one, ("", "p ", "p² ")[power] + text, OfMoment(power), order)
+
+    def _struck(self, of: Impulse, by: ImpulseDerivative | None = None) -> Term:
+        """An impulse, or ∂/∂θ of it."""
+
+        def phase_at(p: float, derivative: int) -> Any:
+            rate = of.rate if by is None else by.rate
+            total = 0.0 if by is None else of.rate * self.phi.changed_impulses(of, by, p, derivative)
+            if rate:
+                total = total + rate * self.phi.impulses(of, p, derivative)
+                total = total if derivative else total - rate * self.phi.identity
+            return total
+
+        stretch = ", ".join(f"{size:.3g}" for size in np.linalg.svd(of.matrix, compute_uv=False))
+        text = f"{of.rate:.6g} (|Me|^p T(ψ) − T) of impulses M, which stretch by {stretch}"
+        return Term(1, OfMoment(0), 0.0, (one,) * len(self.noises), text, phase_at)
 
     def typical_speed(self) -> FloatArray:
         """θ at the φ-vertices for the typical ξ, shape (m,)."""

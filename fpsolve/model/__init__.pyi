@@ -7,6 +7,7 @@ from .noises.non_gaussian import ReducedNoise as ReducedNoise
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByDeviation as OrnsteinUhlenbeckByDeviation
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity as OrnsteinUhlenbeckByIntensity
+from .noises.poisson import Poisson as Poisson
 from .noises.several import Noises as Noises
 from .noises.sine_wiener import SineWiener as SineWiener
 from .noises.telegraph import Telegraph as Telegraph

@@ -13,14 +13,24 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, combined, is_driven, rotating_coordinates
+from fpsolve.model.plane import (
+    CoefficientMatrix,
+    Impulse,
+    ImpulseDerivative,
+    LinearMotion,
+    System,
+    combined,
+    is_driven,
+    rotating_coordinates,
+)
 
 MOST_PARTS = 1000
+T = TypeVar("T", Impulse, ImpulseDerivative)
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,10 @@ class Frame:
     def term(self, term: CoefficientMatrix) -> CoefficientMatrix:
         """The same term for y, S⁻¹AS."""
         return replace(term, matrix=(self._inverse @ np.array(term.matrix) @ self._array).tolist())
+
+    def exponent(self, of: T) -> T:
+        """An impulse, or its derivative, for y."""
+        return replace(of, exponent=(self._inverse @ np.array(of.exponent) @ self._array).tolist())
 
     def motion(self, system: System) -> System:
         """The same system for y, the terms of order 0 that no noise drives as one."""

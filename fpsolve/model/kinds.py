@@ -28,6 +28,7 @@ NOISES: Mapping[str, str] = {
     "ornstein-uhlenbeck": "ornstein_uhlenbeck:OrnsteinUhlenbeck",
     "sine-wiener": "sine_wiener:SineWiener",
     "white": "white:White",
+    "poisson": "poisson:Poisson",
     "telegraph": "telegraph:Telegraph",
     "markov-chain": "markov_chain:MarkovChain",
 }

@@ -20,7 +20,7 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.exact import ExactLaw
 from fpsolve.model.parameters import Parametrised
-from fpsolve.model.plane import CoefficientMatrix, System
+from fpsolve.model.plane import CoefficientMatrix, Impulse, ImpulseDerivative, System
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class Noise(Parametrised):
         approximates_spectrum: whether `spectral_density` is that of a process which stands for this one.
         tails_beyond: the name of a parameter, the value above which P_s has algebraic tails, and what else to do.
         may_tilt: whether functions of ξ gain by a factor exp(s ξ), as where P_s falls to both sides.
-        is_white: whether it has no value but ξ dt = s dW; it then has one state, ξ = 0, and moves what it drives by
-            diffusion, see `motion`.
+        is_white: whether it has no value; it then has one state, ξ = 0, and moves what it drives by diffusion, see
+            `motion`, or by impulses.
         of_xi: the names of parameters whose unit is that of ξ, or made of it; it is stated for ξ in 1/time.
     """
 
@@ -211,6 +211,16 @@ class Noise(Parametrised):
     ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
         """∂/∂θ of `motion`, from that of the terms of the system, or by a parameter of the noise with this name."""
         return terms, ()
+
+    def impulses(self, system: System) -> Sequence[Impulse]:
+        """Those by which this noise multiplies the state of a system, independent of each other."""
+        return ()
+
+    def changed_impulses(
+        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
+    ) -> Sequence[ImpulseDerivative]:
+        """∂/∂θ of each of the `impulses`; arguments as in `changed_motion`."""
+        return ()
 
     @property
     def replaces(self) -> Noise | None:

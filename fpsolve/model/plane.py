@@ -14,11 +14,12 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import expm, expm_frechet
 from scipy.optimize import brentq
 
 from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, is_whole, one, real_array, real_number, shown
@@ -206,6 +207,65 @@ class CoefficientMatrix:
 
 
 @dataclass(frozen=True)
+class Impulse:
+    """x⁺ = exp(B) x⁻ at the times of a Poisson process.
+
+    Attributes:
+        rate: impulses in a unit of time.
+        exponent: B, shape (2, 2).
+    """
+
+    rate: float
+    exponent: Matrix
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "exponent", tuple(map(tuple, self.exponent)))
+
+    @cached_property
+    def matrix(self) -> FloatArray:
+        """exp(B)."""
+        return _exponential(self.exponent)
+
+    def stretched(self, phi: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """|exp(B)e| of a unit vector e at φ, and the φ that it comes to."""
+        x, u = np.tensordot(self.matrix, _direction(phi), 1)
+        return np.hypot(x, u), np.arctan2(-u, x)
+
+    def keeps(self, phi: float) -> bool:
+        """Whether a ray stays where it is."""
+        e = _direction(phi)
+        x, u = np.array(self.exponent) @ e
+        return abs(float(x * e[1] - u * e[0])) <= 1e-12 * float(np.linalg.norm(self.exponent))
+
+    @property
+    def strength(self) -> float:
+        """|ln| of what it multiplies ‖x‖ by, at most."""
+        return float(np.max(np.abs(np.log(np.linalg.svd(self.matrix, compute_uv=False)))))
+
+
+@dataclass(frozen=True)
+class ImpulseDerivative:
+    """∂/∂θ of an `Impulse`: of its rate and of B."""
+
+    rate: float
+    exponent: Matrix
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "exponent", tuple(map(tuple, self.exponent)))
+
+
+@lru_cache(maxsize=64)
+def _exponential(exponent: Matrix) -> FloatArray:
+    return np.asarray(expm(np.array(exponent)))
+
+
+@lru_cache(maxsize=64)
+def changed_exponential(exponent: Matrix, change: Matrix) -> FloatArray:
+    """∂ exp(B) for ∂B, shape (2, 2)."""
+    return np.asarray(expm_frechet(np.array(exponent), np.array(change), compute_expm=False))
+
+
+@dataclass(frozen=True)
 class Jump:
     """x⁺ = R x⁻ where the phase passes φ or φ + π, in either direction.
 
@@ -315,6 +375,32 @@ class LinearMotion(System):
     epsilon: float
     terms: tuple[CoefficientMatrix, ...]
     jumps: tuple[Jump, ...] = ()
+
+
+def _direction(phi: ArrayLike) -> FloatArray:
+    """e at φ, shape (2, *φ.shape)."""
+    return np.stack([np.cos(phi), -np.sin(phi)])
+
+
+def split_by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[list[CoefficientMatrix], FloatArray]:
+    """Terms without what a noise that has no value multiplies, and the sum of that, with the powers of ε.
+
+    Raises:
+        ValueError: a coefficient is no a + bξ.
+    """
+    steady, driven = [], np.zeros((2, 2))
+    for term in terms:
+        line = affine(term.g)
+        if line is None:
+            raise ValueError(
+                f"white noise has no value, so that g = {written_coefficient(term.g).strip()} of it has no meaning; "
+                "g must be a + b*xi"
+            )
+        offset, slope = line
+        if offset:
+            steady.append(CoefficientMatrix(term.order, (offset * np.array(term.matrix)).tolist()))
+        driven += slope * system.epsilon**term.order * np.array(term.matrix)
+    return steady, driven
 
 
 def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:

@@ -25,6 +25,8 @@ from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import Parameter, Parametrised
 from fpsolve.model.plane import (
     CoefficientMatrix,
+    Impulse,
+    ImpulseDerivative,
     LinearMotion,
     System,
     Xi,
@@ -54,6 +56,7 @@ class ParameterDerivative:
         jumps: ∂ ln R/∂θ of each of the jumps of the motion; empty where none changes.
         noise: that of the noise; None where it does not change.
         diffusions: that of each of the `diffusions`; empty where none changes.
+        impulses: that of each of the `impulses`; empty where none changes.
         part: which of the `coloured` noises changes.
     """
 
@@ -62,6 +65,7 @@ class ParameterDerivative:
     jumps: tuple[float, ...] = ()
     noise: NoiseDerivative | None = None
     diffusions: tuple[CoefficientMatrix, ...] = ()
+    impulses: tuple[ImpulseDerivative, ...] = ()
     part: int = 0
 
 
@@ -98,7 +102,7 @@ class Problem:
                 remedy = 'give one for each name, such as Problem(system, {"axial": ..., "lateral": ...})'
                 raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
         if any(noise.is_white for noise in given.values()):
-            _ = self._moved  # refuses what has no meaning
+            _ = self._moved, self._struck  # refuses what has no meaning
 
     @cached_property
     def coloured(self) -> Noise:
@@ -131,6 +135,10 @@ class Problem:
         return self.noise.motion(self.system)
 
     @cached_property
+    def _struck(self) -> Sequence[Impulse]:
+        return self.noise.impulses(self.system)
+
+    @cached_property
     def frame(self) -> Frame | None:
         """The coordinates that it is solved in where these are not x itself."""
         drift, diffusions = self._moved
@@ -154,6 +162,11 @@ class Problem:
         return diffusions if self.frame is None else [self.frame.term(each) for each in diffusions]
 
     @cached_property
+    def impulses(self) -> Sequence[Impulse]:
+        """What multiplies the state at random times, in the same coordinates."""
+        return self._struck if self.frame is None else [self.frame.exponent(each) for each in self._struck]
+
+    @cached_property
     def invariant_ray(self) -> float | None:
         """φ of a ray that the phase never leaves, nor reaches, whatever the noise does; None where there is none."""
         drift, diffusions = self._moved
@@ -166,7 +179,7 @@ class Problem:
             )
             if abs(b - c) > math.hypot(a - d, b + c) * (1 + 1e-12):
                 return None
-        matrices = [np.array(each.matrix) for each in diffusions]
+        matrices = [np.array(each.matrix) for each in diffusions] + [each.matrix for each in self._struck]
         if None in lines:
             matrices += [np.array(term.matrix) for term in drift.terms]
         else:
@@ -310,11 +323,15 @@ class Problem:
             elif not (own := self.named_noise(part)).is_white:
                 noise = own.derivative(name)
             changed = "" if section == self.system.section else name if len(self.noise.parts) == 1 else f"{part}.{name}"
+            impulses = self.noise.changed_impulses(self.system, terms, changed)
             terms, diffusions = self.noise.changed_motion(self.system, terms, changed)
             if self.frame is not None:
                 terms, diffusions = ([self.frame.term(each) for each in part] for part in (terms, diffusions))
+                impulses = [self.frame.exponent(each) for each in impulses]
             axis = [*self.coloured.parts].index(part) if noise and len(self.coloured.parts) > 1 else 0
-            found[key] = ParameterDerivative(theta, tuple(terms), tuple(jumps), noise, tuple(diffusions), axis)
+            found[key] = ParameterDerivative(
+                theta, tuple(terms), tuple(jumps), noise, tuple(diffusions), tuple(impulses), axis
+            )
         return found
 
     @property

@@ -17,7 +17,7 @@ from fpsolve.model.noise import Noise
 from fpsolve.pool import processors
 from fpsolve.simulation.coefficients import Coefficients
 from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
-from fpsolve.simulation.motions import DrivenMotion, SwitchedMotion
+from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
 from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator, starting_state
 
 _PORTION_SECONDS = 0.1
@@ -45,7 +45,7 @@ class Plan:
     """
 
     known: Coefficients
-    motion: DrivenMotion | SwitchedMotion
+    motion: DrivenMotion | SwitchedMotion | StruckMotion
     noise_step: Any
     step: float
     p: FloatArray

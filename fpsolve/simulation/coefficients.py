@@ -11,7 +11,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System, affine, is_steady, matrix_at, squared_frequency
-from fpsolve.simulation.motions import DrivenMotion, Rays, SwitchedMotion
+from fpsolve.simulation.motions import DrivenMotion, Rays, StruckMotion, SwitchedMotion
 
 _FAR = 5.0
 """Standard deviations at which noise held to one side is compared with noise held to the other."""
@@ -35,6 +35,7 @@ class Coefficients:
             time.
         half_turn: π/ω; without rotation π times the time in which the direction of x is forgotten.
         rays: the lines of the jumps.
+        impulses: the matrices of impulses, shape (n, 2, 2); None without any.
     """
 
     noise: Noise
@@ -44,9 +45,17 @@ class Coefficients:
     fluctuation: float
     half_turn: float
     rays: Rays
+    impulses: FloatArray | None = None
 
-    def motion(self, h: float) -> DrivenMotion | SwitchedMotion:
+    @property
+    def is_exact(self) -> bool:
+        """Whether steps of any length leave nothing out."""
+        return self.steady.ndim == 3 or self.impulses is not None
+
+    def motion(self, h: float) -> DrivenMotion | SwitchedMotion | StruckMotion:
         """The numbers that move paths by a step of length h."""
+        if self.impulses is not None:
+            return StruckMotion(_rows(self.steady[None]), self.impulses, self.rays)
         if self.steady.ndim == 3:
             return SwitchedMotion(_rows(self.steady), self.rays)
         steady, driven = self.steady, self.driven
@@ -78,7 +87,11 @@ def coefficients(system: System, noise: Any) -> Coefficients:
     even = _even_coordinates(free)
     back = np.linalg.inv(even)
     free, steady, driven = even @ free @ back, even @ steady @ back, even @ driven @ back
-    if is_switched:
+    struck = noise.impulses(system)
+    impulses = even @ np.array([each.matrix for each in struck]) @ back if struck else None
+    if struck:
+        strength = fluctuation = math.sqrt(sum(each.rate * each.strength**2 for each in struck))
+    elif is_switched:
         around = steady - np.tensordot(noise.probabilities, steady, 1)
         strength = fluctuation = math.sqrt(noise.probabilities @ np.sum(around**2, axis=(1, 2)) / 2)
     else:
@@ -96,6 +109,7 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         fluctuation,
         math.pi / _rate(free, intensity),
         _rays(system, noise, even, steady),
+        impulses,
     )
 
 

@@ -13,7 +13,7 @@ the mean 3b²/(5h) + h²/30 (J. Foster, T. Lyons and H. Oberhauser, SIAM J. Nume
 stands in A₀: a scheme of strong order 3/2 and weak order 2.
 
 Under a chain the motion between two jumps of ξ is exp(A t), and these come after exponential times: nothing is left
-out.
+out. So it is between impulses, each of which multiplies the state.
 
 State: x, u and that of the noise of each path, ξ or the number of a state, arrays of shape (n,) changed in place; of
 noise with more numbers a row for each, shape (numbers, n), ξ being the first. A matrix is stored as half its trace t
@@ -118,6 +118,19 @@ class SwitchedMotion(NamedTuple):
     def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
         """As that of a `DrivenMotion`, with the `step` of a chain and the numbers of its states in the place of ξ."""
         return step_switched(m, noise, h, x, u, xi, log_norm, rng)
+
+
+class StruckMotion(NamedTuple):
+    """A as a row (t, p, q, r), shape (1, 4), and the matrices exp(B) of the impulses, shape (n, 2, 2)."""
+
+    matrices: FloatArray
+    impulses: FloatArray
+    rays: Rays
+
+    @staticmethod
+    def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
+        """As that of a `DrivenMotion`, with the law of impulses as the `step` of the noise."""
+        return step_struck(m, noise, h, x, u, log_norm, rng)
 
 
 _C = tuple(1 / math.factorial(2 * k) for k in range(9))
@@ -312,6 +325,37 @@ def step_switched(m, chain, h, x, u, states, log_norm, rng):  # type: ignore[no-
                 while row[k] < mark:
                     k += 1
         states[i] = k
+    return crossed
+
+
+@compiled
+def step_struck(m, law, h, x, u, log_norm, rng):  # type: ignore[no-untyped-def]
+    """Move paths by a time h, in place, with all impulses in it, and return how often they crossed lines.
+
+    Args:
+        m, law: a `StruckMotion` and the law of its impulses.
+        x, u: the state.
+        log_norm: takes in what the norm has grown by beyond that of the state.
+        rng: a `numpy.random.Generator`.
+    """
+    crossed = 0
+    for i in range(x.size):
+        left = h
+        while left > 0:
+            stay = rng.standard_exponential() / law.rate
+            x[i], u[i], log, count = _exact_flow(m, 0, min(stay, left), x[i], u[i])
+            crossed += count
+            left -= stay
+            if left > 0:
+                mark, k = rng.random(), 0
+                while law.reached[k] < mark:
+                    k += 1
+                (a, b), (c, d) = m.impulses[k]
+                x[i], u[i] = a * x[i] + b * u[i], c * x[i] + d * u[i]
+            norm = math.sqrt(x[i] * x[i] + u[i] * u[i])
+            log_norm[i] += log + math.log(norm)
+            x[i] /= norm
+            u[i] /= norm
     return crossed
 
 

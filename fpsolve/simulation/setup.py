@@ -68,10 +68,11 @@ def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
     """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
 
     For A₀ = ω((0, 1), (−1, 0)) + D and A₁ these are ω h ≤ ½, ‖D‖ h ≤ ⅛, ‖A₁‖ std(ξ) h ≤ ⅛, or under white noise
-    ‖A₁‖² h ≤ ⅛, and the `largest_step` of the noise. Under a chain, where a step is exact, it is 1/(2π) half-turns.
+    ‖A₁‖² h ≤ ⅛, and the `largest_step` of the noise. Under a chain or impulses, where a step is exact, it is 1/(2π)
+    half-turns.
     """
     known = coefficients(oscillator, noise)
-    if noise.has_states and not noise.is_white:
+    if known.is_exact:
         return 0.5 * known.half_turn / math.pi, "the frequency"
     turn = 0.5 * (known.steady[0, 1] - known.steady[1, 0])
     rest = float(np.linalg.norm(known.steady - turn * np.array([[0.0, 1.0], [-1.0, 0.0]]), 2))  # may underflow

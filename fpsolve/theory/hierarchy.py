@@ -2,8 +2,8 @@
 
 Without walls the functions √(p over k) x^(p−k) v^k are moved by ẋ = Ax with a matrix K(A) of size p + 1, which is the
 symmetric power of A: linear in A, and skew-symmetric for a rotation. White noises Bx ∘ dW add ½K(B)². Of a chain there
-is such a block in each state, and its rates couple them. Λ(p) is the largest real part of an eigenvalue, as ‖x‖^p is
-between two of the moments.
+is such a block in each state, and its rates couple them. Impulses exp(B) add their rate times exp K(B) − 1. Λ(p) is the
+largest real part of an eigenvalue, as ‖x‖^p is between two of the moments.
 """
 
 from __future__ import annotations
@@ -36,9 +36,13 @@ def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
     diffused = [
         _moved(problem.system.epsilon**each.order * np.array(each.matrix), order) for each in problem.diffusions
     ]
+    struck = np.zeros((order + 1, order + 1))
+    for impulse in problem.impulses:
+        gain = scipy.linalg.expm(_moved(np.array(impulse.exponent), order))
+        struck += impulse.rate * (gain - np.eye(order + 1))
     for i, matrix in enumerate(matrix_at(problem.motion, states)):
         here = slice(i * (order + 1), (i + 1) * (order + 1))
-        total[here, here] += _moved(matrix, order) + sum(0.5 * each @ each for each in diffused)
+        total[here, here] += _moved(matrix, order) + sum(0.5 * each @ each for each in diffused) + struck
     values, left, right = scipy.linalg.eig(total, left=True)
     at = int(np.argmax(values.real))
     condition = 1 / max(abs(np.vdot(left[:, at], right[:, at])), sys.float_info.epsilon)

@@ -122,6 +122,8 @@ def second_order(problem: Problem) -> SecondOrder:
         NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in the noise.
     """
     system, noises = problem.motion, problem.noise.parts
+    if problem.impulses:
+        raise NoPerturbationTheory("perturbation theory is for noise of small effects, not for impulses")
     driven = {name: np.zeros((2, 2)) for name, noise in noises.items() if not (noise.is_white and len(noises) > 1)}
     steady = matrix_at(system, 0.0, slice(0, 1))
     for term in system.terms if has_mean(problem) else ():
@@ -228,7 +230,8 @@ def scale_of(problem: Problem) -> Scale:
     """The scale of Λ(p): of perturbation theory, or where that does not apply of the sizes of the terms.
 
     Then constant terms, with the mean of the noise, count by the largest |Re| of an eigenvalue of theirs, noise of
-    strength c by c min(1, c τ), white noise by the largest ½(h q′ + q²) and ½q², jumps once in a half-turn.
+    strength c by c min(1, c τ), white noise by the largest ½(h q′ + q²) and ½q², jumps once in a half-turn, impulses
+    that stretch by e^s by their rate times s min(1, s).
     """
     if theory := second_order_or_none(problem):
         return theory.scale
@@ -251,6 +254,7 @@ def scale_of(problem: Problem) -> Scale:
     for each in problem.diffusions:
         h, q = (system.epsilon**each.order * float(abs(f.mean) + f.amplitude) for f in (each.h, each.q))
         driven += 0.5 * q * max(h, q)
+    driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in problem.impulses)
     return Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
 
 

@@ -5,6 +5,7 @@ rightmost eigenvalue is Λ(p).
 """
 
 import numpy as np
+from scipy.linalg import expm
 
 
 def rates_of_monomials(matrix, p):
@@ -43,6 +44,27 @@ def white_noise_exponent(drift, noises, p, interpretation="stratonovich"):
     moved = [rates_of_monomials(matrix, p) for matrix in noises]
     total = rates_of_monomials(drift, p) + 0.5 * sum(each @ each for each in moved)
     return float(np.max(np.linalg.eigvals(total).real))
+
+
+def impulses_exponent(drift, driven, rate, sizes, shares, p):
+    """Λ(p) where x is multiplied by M = exp(w A₁) at a rate: monomials (ax + by)^k (cx + dy)^(p−k) written out."""
+    total = rates_of_monomials(drift, p)
+    for size, share in zip(sizes, shares, strict=True):
+        (a, b), (c, d) = expm(size * np.asarray(driven, dtype=float))
+        struck = [
+            np.convolve(_powers([b, a], k), _powers([d, c], p - k))  # coefficients by the power of x
+            for k in range(p + 1)
+        ]
+        total += rate * share * (np.array(struck) - np.eye(p + 1))
+    return float(np.max(np.linalg.eigvals(total).real))
+
+
+def _powers(line, n):
+    """(line[0] y + line[1] x)ⁿ, by the power of x."""
+    found = np.ones(1)
+    for _ in range(n):
+        found = np.convolve(found, line)
+    return found
 
 
 def ornstein_uhlenbeck_exponent(steady, driven, alpha, deviation, p, polynomials):

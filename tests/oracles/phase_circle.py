@@ -1,4 +1,4 @@
-"""Λ(p) and λ of linear systems in the plane by Fourier series in the phase, under white noise, chains and OU noise.
+"""Λ(p) and λ of linear systems in the plane by Fourier series in the phase: white and OU noise, chains, impulses.
 
 With x = a (cos φ, −sin φ) a matrix A moves functions a^p T(φ) by X = h ∂φ + p q, h = e′ᵀA e, q = eᵀA e. Then Λ(p) is
 the rightmost eigenvalue of X₀ + ½ Σ X_k² for dx = A₀x dt + Σ A_k x∘dW_k, of X_i in state i plus the rates of a chain,
@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import expm
 from scipy.sparse.linalg import splu
 
 MOST_DENSE = 700
@@ -56,6 +57,31 @@ def ornstein_uhlenbeck(steady, driven, alpha, deviation, polynomials):
         total = sparse.kron(one, x0) + sparse.kron(xi, x1) + sparse.kron(resting, sparse.eye_array(2 * modes + 1))
         constant = np.kron(np.eye(1, polynomials)[0], _constant(modes))
         return total, sparse.kron(one, dx0) + sparse.kron(xi, dx1), constant
+
+    return made
+
+
+def impulses(drift, driven, rate, sizes, shares):
+    """The same where x is multiplied by M = exp(w A₁) at random times: rate (|Me|^p u(ψ) − u) at even points of φ.
+
+    A wall at φ = π/2 stays where it is, so that s(ψ) − s(φ) is smooth.
+    """
+
+    def made(p, modes, log_factor):
+        total, slope = _moved(drift, p, modes, log_factor)
+        waves = 2 * np.arange(-modes, modes + 1)
+        phi = math.pi / 2 + math.pi * (np.arange(waves.size) + 0.5) / waves.size
+        back = np.exp(-1j * np.outer(waves, phi)) / waves.size
+        for size, share in zip(sizes, shares, strict=True):
+            x, y = expm(size * np.asarray(driven, dtype=float)) @ [np.cos(phi), -np.sin(phi)]
+            psi = np.arctan2(-y, x)
+            rise = (np.mod(psi - math.pi / 2, math.pi) - (phi - math.pi / 2)) / math.pi
+            logs = np.log(np.hypot(x, y)) + (log_factor * rise if log_factor else 0.0)
+            struck = back @ (np.exp(p * logs)[:, None] * np.exp(1j * np.outer(psi, waves)))
+            longer = back @ ((logs * np.exp(p * logs))[:, None] * np.exp(1j * np.outer(psi, waves)))
+            total = total + rate * share * (sparse.csr_array(struck) - sparse.eye_array(waves.size))
+            slope = slope + rate * share * sparse.csr_array(longer)
+        return total.tocsr(), slope.tocsr(), _constant(modes)
 
     return made
 

@@ -10,7 +10,7 @@ from typing import ClassVar
 from fpsolve.arrays import shown
 from fpsolve.messages import Message
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, is_driven
+from fpsolve.model.plane import CoefficientMatrix, Impulse, ImpulseDerivative, LinearMotion, System, is_driven
 
 MOST_WITH_AXES = 2
 """Noises that have values at most: each of them is a dimension more."""
@@ -167,6 +167,19 @@ class Noises(Noise):
             drift += less
             diffusions += more
         return drift, diffusions
+
+    def impulses(self, system: System) -> Sequence[Impulse]:
+        return [each for own, noise, _ in self._white_motions(system) for each in noise.impulses(own)]
+
+    def changed_impulses(
+        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
+    ) -> Sequence[ImpulseDerivative]:
+        part, _, parameter = name.rpartition(".")
+        found = list[ImpulseDerivative]()
+        for own, noise, of in self._white_motions(system):
+            changed = [term for term in terms if is_driven(term.g) and term.noise == of]
+            found += noise.changed_impulses(own, changed, parameter if part == of else "")
+        return found
 
     def _white_motions(self, system: System) -> Iterable[tuple[System, Noise, str]]:
         """For each white noise what it drives."""

@@ -16,7 +16,7 @@ from fpsolve.model.exact import ExactLaw, white_law
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import SIZE, STRICT, parameter
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, written_coefficient
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, split_by_noise
 
 
 class Interpretation(StrEnum):
@@ -126,7 +126,7 @@ class White(Noise):
         Raises:
             ValueError: a coefficient is no a + bξ, or the noise moves the phase over the ray of a jump.
         """
-        drift, driven = _split(system, system.terms)
+        drift, driven = split_by_noise(system, system.terms)
         diffusions = [_term(system, self.s * driven, _order(system))] if driven.any() else []
         for jump, diffusion in ((jump, each) for jump in system.jumps for each in diffusions):
             if jump.log_factor and abs(float(diffusion.h(jump.phase))) > 1e-12 * diffusion.h.amplitude:
@@ -145,30 +145,13 @@ class White(Noise):
     def changed_motion(
         self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
     ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
-        _, driven = _split(system, system.terms)
-        drift, changed = _split(system, terms)
+        _, driven = split_by_noise(system, system.terms)
+        drift, changed = split_by_noise(system, terms)
         by_s = 1.0 if name == "s" else 0.0
         if self.interpretation == Interpretation.ITO:
             square = changed @ driven + driven @ changed
             drift.append(_term(system, -0.5 * self.s**2 * square - by_s * self.s * driven @ driven, 0))
         return drift, [_term(system, by_s * driven + self.s * changed, 0)] if driven.any() else []
-
-
-def _split(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[list[CoefficientMatrix], FloatArray]:
-    """The terms without what ξ multiplies, and the sum of that, with the powers of ε. Raises `ValueError`."""
-    steady, driven = [], np.zeros((2, 2))
-    for term in terms:
-        line = affine(term.g)
-        if line is None:
-            raise ValueError(
-                f"white noise has no value, so that g = {written_coefficient(term.g).strip()} of it has no meaning; "
-                "g must be a + b*xi"
-            )
-        offset, slope = line
-        if offset:
-            steady.append(CoefficientMatrix(term.order, (offset * np.array(term.matrix)).tolist()))
-        driven += slope * system.epsilon**term.order * np.array(term.matrix)
-    return steady, driven
 
 
 def _order(system: System) -> int:

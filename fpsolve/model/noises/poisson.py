@@ -1,0 +1,189 @@
+"""Impulses at the times of a Poisson process, each of which multiplies the state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, ClassVar, NamedTuple
+
+import numpy as np
+from pydantic import AfterValidator
+from pydantic.dataclasses import dataclass
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.faults import told_in_words
+from fpsolve.model.noise import Noise
+from fpsolve.model.parameters import SIZE, STRICT, parameter
+from fpsolve.model.plane import (
+    CoefficientMatrix,
+    Impulse,
+    ImpulseDerivative,
+    LinearMotion,
+    System,
+    split_by_noise,
+)
+
+
+class PoissonStep(NamedTuple):
+    """The law of the impulses, which come after exponential times: no step is made.
+
+    Attributes:
+        rate: of all.
+        reached: the probability that one is among the first j + 1, shape (n,).
+    """
+
+    rate: float
+    reached: FloatArray
+
+
+def _sizes(sizes: tuple[float, ...]) -> tuple[float, ...]:
+    if not sizes or not any(sizes):
+        raise ValueError("one size at least must differ from 0")
+    return sizes
+
+
+def _weights(weights: tuple[float, ...]) -> tuple[float, ...]:
+    if any(each < 0 for each in weights) or (weights and not sum(weights) > 0):
+        raise ValueError("weights must be >= 0, and one of them > 0")
+    return weights
+
+
+@told_in_words
+@dataclass(frozen=True, config=STRICT)
+class Poisson(Noise):
+    """Impulses ξ = Σ w_j δ(t − t_j), t_j a Poisson process, w_j independent: x of ẋ = (A₀ + ξA₁)x jumps by exp(w_j A₁).
+
+    That is the limit of short pulses with the area w_j, whatever their form (S. I. Marcus, IEEE Trans. Inf. Theory 24,
+    1978). The spectral density is rate ⟨w²⟩ at all frequencies, the mean rate ⟨w⟩.
+
+    >>> Poisson(rate=2.0, sizes=(-0.5, 0.5)).spectral_density(1.0)
+    0.5
+
+    Args:
+        rate: impulses in a unit of time, 1e-15 to 1e15.
+        sizes: the w that an impulse may have, in the unit of ξ times time.
+        weights: how likely each size is, ≥ 0, as shares of their sum; all alike if none are given.
+
+    Raises:
+        ParameterError: a number is out of its range, or there are not as many weights as sizes.
+    """
+
+    rate: Annotated[float, parameter("impulses in a unit of time", "rate = 1.0", r"$\kappa$", "1/time", **SIZE)]
+    sizes: Annotated[
+        tuple[float, ...],
+        parameter("sizes of the impulses", "sizes = [-1.0, 1.0]", "$w$", "1", strict=False),
+        AfterValidator(_sizes),
+    ]
+    weights: Annotated[
+        tuple[float, ...],
+        parameter("how likely each size is; all alike if omitted", "weights = [0.5, 0.5]", strict=False),
+        AfterValidator(_weights),
+    ] = ()
+
+    kind: ClassVar[str] = "poisson"
+    is_white: ClassVar[bool] = True
+    mixes_slowly: ClassVar[bool] = True
+    has_states: ClassVar[bool] = True
+    states: ClassVar[Sequence[float]] = (0.0,)
+    rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)
+
+    def __post_init__(self) -> None:
+        if self.weights and len(self.weights) != len(self.sizes):
+            raise ValueError(f"got {len(self.weights)} weights for {len(self.sizes)} sizes; must be as many")
+
+    @property
+    def shares(self) -> FloatArray:
+        """How likely each size is, shape (n,)."""
+        weights = np.array(self.weights or np.ones(len(self.sizes)), dtype=float)
+        return np.asarray(weights / weights.sum())
+
+    @property
+    def mean(self) -> float:
+        """rate ⟨w⟩; each impulse is taken as it is, so that nothing more is added to the drift."""
+        return 0.0
+
+    @property
+    def standard_deviation(self) -> float:
+        return math.inf
+
+    @property
+    def correlation_time(self) -> float:
+        return 0.0
+
+    def spectral_density(self, omega: float) -> float:
+        """S(ω) = rate ⟨w²⟩, of what differs from the mean."""
+        return self.rate * float(self.shares @ np.square(self.sizes))
+
+    @property
+    def probabilities(self) -> FloatArray:
+        return np.ones(1)
+
+    @property
+    def reached(self) -> FloatArray:
+        return np.zeros(1)
+
+    relaxation_time = correlation_time
+
+    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """0: it has no value."""
+        return np.zeros(size)
+
+    def step(self, h: float, bias: float = 0.0) -> PoissonStep:
+        """The impulses in any time, without a bias."""
+        return PoissonStep(self.rate, np.append(np.cumsum(self.shares)[:-1], 1.0))
+
+    @property
+    def largest_step(self) -> float:
+        """∞: no step is made."""
+        return math.inf
+
+    def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
+        """The motion between impulses. Raises `ValueError` where a coefficient is no a + bξ."""
+        drift, _ = split_by_noise(system, system.terms)
+        return LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), ()
+
+    def impulses(self, system: System) -> Sequence[Impulse]:
+        """One for each size.
+
+        Raises:
+            ValueError: they move the ray of a jump, or multiply the state by more than floating-point numbers hold.
+        """
+        _, driven = split_by_noise(system, system.terms)
+        if not driven.any():
+            return ()
+        if float(np.linalg.norm(driven, 2)) * max(map(abs, self.sizes)) > LARGEST:
+            raise ValueError(f"an impulse multiplies the state by up to e^{LARGEST:g} or more; use smaller sizes")
+        found = [
+            Impulse(self.rate * float(share), (size * driven).tolist())
+            for size, share in zip(self.sizes, self.shares, strict=True)
+            if size and share
+        ]
+        for jump in system.jumps:
+            for each in found:
+                if jump.log_factor and not each.keeps(jump.phase):
+                    raise ValueError(
+                        f"impulses move the state over the ray of a jump, {jump.phase:.6g}; let them drive a term that "
+                        "leaves the phase there alone"
+                    )
+        return found
+
+    def changed_motion(
+        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
+    ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
+        return split_by_noise(system, terms)[0], ()
+
+    def changed_impulses(
+        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
+    ) -> Sequence[ImpulseDerivative]:
+        _, changed = split_by_noise(system, terms)
+        by_rate = 1.0 / self.rate if name == "rate" else 0.0
+        sizes = [size for size, share in zip(self.sizes, self.shares, strict=True) if size and share]
+        known = self.impulses(system)
+        return [
+            ImpulseDerivative(by_rate * each.rate, (size * changed).tolist())
+            for each, size in zip(known, sizes[: len(known)], strict=True)
+        ]
+
+
+LARGEST = 100.0
+"""ln of what an impulse may multiply the state by."""
