@@ -188,7 +188,7 @@ def typeset(unit: str) -> str:
 
 def title_of(attributes: Mapping[str, Any]) -> str:
     r"""A variable on an axis, from its attributes: "largest Lyapunov exponent $\lambda$ (1/time)"."""
-    unit = "" if attributes["units"] == "1" else f"({typeset(attributes['units'])})"
+    unit = "" if attributes["units"] in ("1", "unknown") else f"({typeset(attributes['units'])})"
     return " ".join(part for part in (attributes["long_name"], attributes.get("symbol", ""), unit) if part)
 
 
@@ -336,7 +336,8 @@ def finish(axes: Axes, **kwargs: Any) -> None:
     low, high = axes.get_ylim()
     if low < 0 < high:
         mark_zero(axes)
-    if "label" in kwargs or len(set(axes.get_legend_handles_labels()[1])) > 1:
+    labels = set(axes.get_legend_handles_labels()[1])
+    if ("label" in kwargs and labels) or len(labels) > 1:
         add_legend(axes)
 
 

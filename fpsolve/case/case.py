@@ -122,7 +122,11 @@ class Case(Section):
     system: Annotated[
         InstanceOf[System],
         BeforeValidator(partial(half_of, "system")),
-        parameter("Eq. (3)", "[oscillator]", validation_alias=AliasChoices("oscillator", "system")),
+        parameter(
+            "Eq. (3)",
+            "[oscillator], or [system] for your own equation",
+            validation_alias=AliasChoices("oscillator", "system"),
+        ),
     ]
     noise: Annotated[
         InstanceOf[Noise], BeforeValidator(partial(half_of, "noise")), parameter("Eqs. (7)-(8)", "[noise]")

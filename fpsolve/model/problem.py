@@ -92,7 +92,7 @@ class Problem:
             object.__setattr__(self, "noise", noises_of(self.noise))
         for half, kind, needed in ((self.system, "motion", System), (self.noise, "noise", Noise)):
             if not isinstance(half, needed):
-                raise TypeError(f"got {shown(half)} as a {kind}; the first arguments must be an oscillator and a noise")
+                raise TypeError(f"got {shown(half)} as a {kind}; the first arguments must be a system and a noise")
         wanted, given = self.system.noise_sections, self.noise.parts
         if len(wanted) > 1 or len(given) > 1:
             names = {term.noise for term in self.system.terms if is_driven(term.g)}
@@ -511,6 +511,6 @@ def problem_first(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[Any, .
     halves = list(args[:2])
     for name in ("oscillator", "noise")[len(halves) :]:
         if name not in kwargs:
-            raise TypeError(f"{name} is missing; the first arguments must be an oscillator and a noise, or a Problem")
+            raise TypeError(f"{name} is missing; the first arguments must be a system and a noise, or a Problem")
         halves.append(kwargs.pop(name))
     return (Problem(*halves), *args[2:])

@@ -174,8 +174,10 @@ def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, s
     style: dict[str, Any] = {"cmap": ListedColormap(_TINTS), "vmin": -0.5, "vmax": len(_TINTS) - 0.5}
     axes.pcolormesh(x.value(edges), y.value(edges), tints.T, rasterized=True, **style)
     letters, small = iter(ascii_lowercase), dict[str, str]()
-    middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15"}
+    middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15", "zorder": 4}
     for number, each in enumerate(regions.each):
+        tint = _TINTS[min(unstable[number], len(_TINTS) - 1)]
+        middle["bbox"] = {"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85}  # over a closed form
         name = each.name.replace("δ_p", r"$\delta_p$")
         parts = name.split(", ")
         narrow = [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]

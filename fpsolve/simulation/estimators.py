@@ -132,7 +132,8 @@ class MonteCarlo(Result):
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
         style = {"label": f"{found.attrs['method']} ± 2 standard errors", **kwargs}
-        draw_dots(axes, found.p.values, found.moment.values, found.moment_error.values, **style)
+        if found.moment.notnull().any():
+            draw_dots(axes, found.p.values, found.moment.values, found.moment_error.values, **style)
         label_axes(axes, found.p.attrs, found.moment.attrs)
         finish(axes, **style)
 

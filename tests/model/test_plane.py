@@ -115,7 +115,7 @@ def test_problems_are_made_of_a_motion_and_a_noise(wrong):
     noise = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=0.1)
     for halves, kind in (((wrong, noise), "motion"), ((oscillator, wrong), "noise")):
-        with pytest.raises(TypeError, match=rf"^got .* as a {kind}; the first arguments must be an oscillator and"):
+        with pytest.raises(TypeError, match=rf"^got .* as a {kind}; the first arguments must be a system and"):
             Problem(*halves)
 
 

@@ -22,6 +22,8 @@ from fpsolve.output.figures import draw
 from fpsolve.output.tables import write_results
 from fpsolve.output.terminal import print_results, varied_columns
 from fpsolve.output.vtk import write_eigenfunctions, write_functions
+from fpsolve.simulation import MonteCarlo
+from fpsolve.simulation.estimators import MomentEstimate
 from fpsolve.surfaces import flat_figure
 from fpsolve.workflow import run
 from tests.output.eigenfunctions import integral
@@ -138,6 +140,25 @@ def test_powers_in_units_are_typeset(unit, drawn, said):
     assert typeset(unit) == drawn
     assert is_math(drawn)
     assert plain_unit(unit) == said
+
+
+def test_a_unit_that_is_not_known_is_left_out(tmp_path):
+    case = case_in(tmp_path, own("white") + MOMENTS)
+    assert case.about("system.k").title == "system.k"
+    assert case.about("noise.axial.s").title == r"intensity of white noise ${s}_{\mathrm{axial}}$"
+
+
+def test_a_simulation_without_estimates_has_no_legend():
+    nothing = (MomentEstimate(2.0, None, None, "direct", 10.0),)
+    found = MonteCarlo(nothing, 0.0, 0.1, 0.0, 0.1, paths=32, time=1.0, step=0.1, seed=0, impacts=0, warnings=())
+    axes = found.plot(Figure().subplots())
+    assert not axes.containers
+
+
+def test_the_name_of_the_noise_is_asked_for(tmp_path):
+    text = own("white").replace('noises = { load = "noise.axial" }\n', "").replace("[noise.axial]", "[noise]")
+    with pytest.raises(Exception, match=r'or name the noise, noises = \{ load = "noise" \}'):
+        case_in(tmp_path, text + MOMENTS)
 
 
 @pytest.mark.parametrize(("start", "stop"), [(1.0, 4.0), (2.0, 8.0), (0.9, 4.5), (1.0, 2.0), (0.3, 0.5)])

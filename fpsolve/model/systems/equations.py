@@ -177,8 +177,11 @@ class EquationSystem(System):
             if not re.fullmatch(r"noise(\.[A-Za-z0-9_-]+)?", str(section)):
                 must = 'must be the name of a section, "noise" or, for example, "noise.axial"'
                 raise TableError(f"got {shown(section)}; {must}; rename it", "noises", name)
-            if not any(name in names_in(text) for text in self._texts()):
-                raise TableError(f"{name} is in no rate; write it into drift, or remove it", "noises", name)
+            used = frozenset[str]().union(*map(names_in, self._texts()))
+            if name not in used:
+                others = sorted(used.difference(self.variables, dict(self.named)))
+                named = f', or name the noise, noises = {{ {others[0]} = "{section}" }}' if others else ", or remove it"
+                raise TableError(f"{name} is in no rate; write it into drift{named}", "noises", name)
         if not self.terms:
             raise TableError("no rate has a term; write terms with the variables", "drift")
         jumps = self.jumps
