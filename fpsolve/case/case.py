@@ -203,7 +203,11 @@ class Case(Section):
     def shown(self) -> FloatArray:
         """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread, or none."""
         wanted = self.output.eigenfunctions
-        if EIGENFUNCTIONS not in self.output.quantities or self.leaves_out_eigenfunctions:
+        if (
+            EIGENFUNCTIONS not in self.output.quantities
+            or self.leaves_out_eigenfunctions
+            or not self.problem.is_on_cylinder
+        ):
             wanted = ()
         return _spread(self.p) if wanted is None else np.array([self.p[np.argmin(np.abs(self.p - p))] for p in wanted])
 

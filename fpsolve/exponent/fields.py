@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
+from fpsolve.errors import OutputError
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.model.problem import parameter_lines
 from fpsolve.model.quantity import PHASE, Quantity, density_unit
@@ -62,7 +63,11 @@ def fields(pair: PrincipalPair, phi: FloatArray, at_phi: Any, at_xi: Samples) ->
     """T, T* and T T* at φ from the values of the φ-elements there and samples of the functions of ξ.
 
     T has mean 1 over P_s(ξ)/2π; with a tilt beyond `MOST_TILT`, which leaves T there to rounding, over P_s exp(2s z).
+    Raises `OutputError` where several noises have values.
     """
+    if not pair.generator.problem.is_on_cylinder:
+        several = "functions of the phase and of several noises are no surface and no lines over the phase"
+        raise OutputError(f"{several}; make all of these noises white but one")
     space, xi, frame = pair.space, pair.space.xi, pair.generator.problem.frame
     mean, stretch, density = 1.0, np.ones(1), np.ones(1)
     if frame is not None or 0 < abs(xi.tilt) <= MOST_TILT:

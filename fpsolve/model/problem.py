@@ -109,6 +109,11 @@ class Problem:
         """What ξ is: the noise; of several those that have values, one noise or several, of white ones alone one."""
         return self.noise if len(self.noise.parts) == 1 else self.noise.coloured  # type: ignore[attr-defined]
 
+    @property
+    def is_on_cylinder(self) -> bool:
+        """Whether functions of it are of φ and of one ξ, so that they make a surface, or a line for each state."""
+        return len(self.coloured.parts) == 1
+
     def named_noise(self, name: str) -> Noise:
         """The noise that terms name so; with one noise that one, whatever its name."""
         return self.noise.parts.get(name, self.noise)

@@ -89,7 +89,7 @@ class Numerics:
 def everything(case: Case, number: int = 1) -> Wanted:
     """What [output] names as `quantities`, of the curve with a number; the density goes with what is drawn of it."""
     names = set(case.output.quantities)
-    draws, has_moments = EIGENFUNCTIONS in names, MOMENT.name in names
+    draws, has_moments = EIGENFUNCTIONS in names and case.problem.is_on_cylinder, MOMENT.name in names
     slopes = tuple(case.differentiated) if has_moments else ()
     return Wanted(
         case.p if has_moments else np.zeros(0),

@@ -9,10 +9,11 @@ import pyvista
 from matplotlib.figure import Figure
 
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
-from fpsolve.analysis import stationary_density
+from fpsolve.analysis import stationary_density, tilted_density
 from fpsolve.case.vary import short_names
 from fpsolve.data import plain_unit
 from fpsolve.drawing import is_math, plain_numbers, typeset
+from fpsolve.errors import OutputError
 from fpsolve.exponent import ExponentSolver, critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.exponent.fields import surface_of
 from fpsolve.messages import Code
@@ -20,7 +21,7 @@ from fpsolve.model import MarkovChain, ParametricOscillator, Telegraph, VibroImp
 from fpsolve.model.kinds import NOISES
 from fpsolve.output.figures import draw
 from fpsolve.output.tables import write_results
-from fpsolve.output.terminal import print_results, varied_columns
+from fpsolve.output.terminal import note_missing, print_results, varied_columns
 from fpsolve.output.vtk import write_eigenfunctions, write_functions
 from fpsolve.simulation import MonteCarlo
 from fpsolve.simulation.estimators import MomentEstimate
@@ -256,6 +257,42 @@ def test_eigenfunctions_of_white_noise_are_written(tmp_path):
     assert facts["along_y"][0] == "white noise"
     assert facts["impacts"][0] == "none"
     assert (tmp_path / "test/density.vtu").is_file()
+
+
+SEVERAL = """
+title = "two noises"
+[system]
+variables = ["x", "v"]
+drift = ["v", "-(1 + a + b)*x - 0.2*v"]
+noises = { a = "noise.a", b = "noise.b" }
+[noise.a]
+kind = "telegraph"
+a = 0.3
+k = 1.0
+[noise.b]
+kind = "telegraph"
+a = 0.2
+k = 2.0
+[moments]
+p = [2.0]
+[output]
+quantities = ["moment", "eigenfunctions"]
+"""
+
+
+def test_eigenfunctions_of_several_noises_with_values_are_refused_in_words(tmp_path, capsys):
+    case = case_in(tmp_path, SEVERAL)
+    [solved] = solve_sets(case)
+    assert not solved.eigenpairs
+    assert solved.stationary is None
+    note_missing(case, monte_carlo=False)
+    assert "no eigenfunctions are written, as those of several noises" in " ".join(capsys.readouterr().err.split())
+    pair = ExponentSolver(case.problem).pair(2.0)
+    for draw_it in (pair.plot, lambda: tilted_density(pair)):
+        with pytest.raises(OutputError, match="make all of these noises white but one"):
+            draw_it()
+    assert max(Counter(signs(case.problem)).values()) == 1
+    assert case.about("noise.b.k").shown == r"${k}_{\mathrm{b}}$"
 
 
 def test_files_say_where_the_impacts_are(tmp_path):

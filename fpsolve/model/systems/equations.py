@@ -179,7 +179,7 @@ class EquationSystem(System):
                 raise TableError(f"got {shown(section)}; {must}; rename it", "noises", name)
             used = frozenset[str]().union(*map(names_in, self._texts()))
             if name not in used:
-                others = sorted(used.difference(self.variables, dict(self.named)))
+                others = sorted(used.difference(self.variables, dict(self.named), dict(self.noises)))
                 named = f', or name the noise, noises = {{ {others[0]} = "{section}" }}' if others else ", or remove it"
                 raise TableError(f"{name} is in no rate; write it into drift{named}", "noises", name)
         if not self.terms:
