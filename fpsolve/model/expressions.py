@@ -153,6 +153,12 @@ FUNCTIONS: Mapping[str, Callable[[Series], Series]] = {
     "sqrt": lambda series: _real_power(series, 0.5),
 }
 RESERVED = (*CONSTANTS, *FUNCTIONS)
+_STEPS: Mapping[str, Callable[[Form, Form], Form]] = {
+    "Add": Form.plus,
+    "Sub": lambda total, form: total.plus(form, -1.0),
+    "Mult": Form.times,
+    "Div": lambda total, form: total.times(form.of(_inverse)),
+}
 
 
 @dataclass(frozen=True)
@@ -229,11 +235,8 @@ class _Reader(ast.NodeVisitor):
         self._level -= 1
         return made
 
-    def _source(self, node: Any) -> str:
-        return self._line[node.col_offset : node.end_col_offset]
-
-    def _written(self, node: ast.AST) -> str:
-        source = self._source(node)
+    def _written(self, node: Any) -> str:
+        source = self._line[node.col_offset : node.end_col_offset]
         return source if len(source) <= 60 else f"{source[:57]}..."
 
     def generic_visit(self, node: ast.AST) -> _Node:
@@ -286,7 +289,7 @@ class _Reader(ast.NodeVisitor):
         return _Node(self._written(node), lambda walk: walk.power(walk.value(base), power))
 
     def visit_Call(self, node: ast.Call) -> _Node:
-        name = self._source(node.func)
+        name = self._written(node.func)
         if name not in FUNCTIONS:
             remedy = f"the functions are {' and '.join(FUNCTIONS)}; write * for products"
             raise ExpressionError(f"has {self._written(node)}, which calls no known function; {remedy}")
@@ -380,18 +383,9 @@ class _Walk:
 
     def chain(self, parts: Sequence[tuple[str, _Node]]) -> Form:
         """A sum or a product. Raises `_Unsuitable`."""
-        total = Form({})
-        for sign, each in parts:
-            form = self.value(each)
-            match sign:
-                case "":
-                    total = form
-                case "Add" | "Sub":
-                    total = total.plus(form, 1.0 if sign == "Add" else -1.0)
-                case "Mult":
-                    total = total.times(form)
-                case _:
-                    total = total.times(form.of(_inverse))
+        total = self.value(parts[0][1])
+        for sign, each in parts[1:]:
+            total = _STEPS[sign](total, self.value(each))
         return total
 
     def power(self, base: Form, power: float) -> Form:
