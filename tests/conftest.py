@@ -63,7 +63,7 @@ LONGEST = (
 )
 """Files that begin first, so that no processor is left with a long one while the others have nothing to do."""
 
-gc.disable()  # what is collected stays: to look through it again and again took a quarter of the time
+gc.disable()  # what is collected stays, so that looking through it again finds nothing
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -122,7 +122,7 @@ def wait_for_records(place, out, count, process):
 def test_killed_again_and_again(place):
     """At most one set for each worker is solved twice, and the result is that of an undisturbed run."""
     out, killed = "killed", 0
-    for _ in range(5):
+    for _ in range(3):
         done = len(lines(place, out))
         process = begun(place, out, "--jobs", "2")
         wait_for_records(place, out, done + 4, process)

@@ -321,12 +321,11 @@ def test_a_cusp_does_not_hang():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("longest", [LONGEST, 0.1])
-def test_steps_do_not_jump_to_a_neighbour(longest):
+def test_steps_do_not_jump_to_a_neighbour():
     """sin(12 π u) = 0.1 v has 12 lines, closer than the longest step."""
     number, w = 12, 12 * math.pi
     of = field(lambda u, v: (np.sin(w * u) - 0.1 * v, w * np.cos(w * u), -0.1))
-    branches = [branch for branch in lines(of, nodes=17, longest=longest) if length(branch) > 0.5]
+    branches = [branch for branch in lines(of, nodes=17, longest=0.1) if length(branch) > 0.5]
     assert len(branches) == number
     for branch in branches:
         u, v = branch.at.T
@@ -348,7 +347,7 @@ def test_two_close_lines_are_both_found(gap, longest):
 
 @pytest.mark.slow
 def test_nested_circles():
-    radii = np.array([0.05, 0.1, 0.12, 0.3, 0.32, 0.45])
+    radii = np.array([0.05, 0.1, 0.12, 0.3])
 
     def value(u, v):
         r = math.hypot(u - 0.5, v - 0.5)

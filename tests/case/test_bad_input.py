@@ -105,10 +105,9 @@ TOO_MANY = f"[{', '.join(f'0.{i:06}' for i in range(1, 100_002))}]"
 @pytest.mark.slow
 def test_too_long_lists(tmp_path: Path) -> None:
     text = GOOD + f"[monte_carlo]\np = {TOO_MANY}\n"
-    for start in ("p = [-1.0, 1.0, 2.0]", '"noise.D0" = [0.1, 0.5]', "eigenfunctions = [1.0]"):
-        text = text.replace(start, f"{start.partition(' =')[0]} = {TOO_MANY}")
+    text = text.replace('"noise.D0" = [0.1, 0.5]', f'"noise.D0" = {TOO_MANY}')
     faults = {fault.key: fault for fault in refused(write(tmp_path, text)).faults}
-    assert faults.keys() == {"moments.p", 'vary."noise.D0"', "output.eigenfunctions", "monte_carlo.p"}
+    assert faults.keys() == {'vary."noise.D0"', "monte_carlo.p"}
     for fault in faults.values():
         assert fault.sentence == "lists 100001 numbers; must be at most 100000; list fewer"
         assert fault.line
@@ -180,8 +179,9 @@ def test_any_parameters_in_their_ranges_give_a_case_or_messages(
         assert all(0 < length < math.inf for length in lengths)
 
 
-@pytest.mark.parametrize("parts", sampled(300, 3000))
-@pytest.mark.parametrize("start", ["vary", "a", "mesh.file"])
+@pytest.mark.parametrize(
+    ("start", "parts"), sampled(("vary", 300), ("a", 300), ("mesh.file", 300), ("mesh.file", 3000), keep=3)
+)
 def test_very_long_dotted_key(tmp_path: Path, start: str, parts: int) -> None:
     long = f"{start}{'.a' * parts} = 1"
     path = write(tmp_path, f"{long}\n{without(start.partition('.')[0]) if start != 'a' else GOOD}")

@@ -35,7 +35,7 @@ def legend(figure):
 @pytest.mark.parametrize(
     "title", ["Short", "A title so long that it fills all of the line above the axes, and more", "A\nB"]
 )
-@pytest.mark.parametrize("scale", [1e-2, 1e-4, 1e-7])
+@pytest.mark.parametrize("scale", [1e-2, 1e-7])
 def test_title_is_clear_of_the_power_of_ten(drawn, tmp_path, title, scale):
     picture(tmp_path, series(scale=scale / 10), title=title)
     (axes,) = drawn[0].axes
