@@ -160,27 +160,6 @@ def assert_picture(file):
     assert np.unique((picture * 255).astype(int) @ [65536, 256, 1]).size > 300
 
 
-@pytest.mark.parametrize(
-    ("arguments", "picture"),
-    sampled(
-        (["--cylinder", "--field", "tilted_density"], "eigenfunctions-tilted_density-cylinder.png"),
-        (["--field", "T_adjoint"], "eigenfunctions-T_adjoint.png"),
-        (["--cylinder", "--p", "2", "--output", "cylinder.png"], "cylinder.png"),
-    ),
-)
-def test_show_script(paraview, results, arguments, picture):
-    """Every field and shape has a picture of its own."""
-    before = {file: file.read_bytes() for file in results.rglob("*.[pv][vt][du]")}
-    for old in results.glob("*.png"):
-        old.unlink()
-    done = paraview(results, "show.py", *arguments)
-    assert done.returncode == 0, done.stderr
-    assert "p = 2: " in done.stdout
-    assert [file.name for file in results.glob("*.png")] == [picture]
-    assert_picture(results / picture)
-    assert {file: file.read_bytes() for file in before} == before
-
-
 @pytest.fixture
 def alone(display):
     """Runs a script in a process of its own."""
@@ -196,9 +175,12 @@ def alone(display):
 
 @pytest.mark.slow
 def test_show_script_as_a_command(alone, results):
-    done = alone(results, "show.py")
+    """The picture is named after the field, and what is read stays as it is."""
+    before = {file: file.read_bytes() for file in results.rglob("*.[pv][vt][du]")}
+    done = alone(results, "show.py", "--field", "T_adjoint", "--p", "2")
     assert (done.returncode, "p = 2: " in done.stdout) == (0, True), done.stderr
-    assert_picture(results / "eigenfunctions.png")
+    assert_picture(results / "eigenfunctions-T_adjoint.png")
+    assert {file: file.read_bytes() for file in before} == before
 
 
 @pytest.mark.parametrize("p", sampled("17", "1.9", "nan"))
@@ -214,8 +196,10 @@ WORDS = """
 import json, sys
 sys.argv = [{script!r}, *{arguments!r}]
 from paraview import servermanager, simple
-simple.SaveScreenshot = lambda *_, **__: None  # no one looks at it, nor at the picture on screen
-text = open({script!r}).read().replace("[1600, 1000]", "[160, 100]").replace("SUBDIVISION = 3", "SUBDIVISION = 1")
+text = open({script!r}).read()
+if not {is_looked_at!r}:  # neither at the file nor at the picture on screen
+    simple.SaveScreenshot = lambda *_, **__: None
+    text = text.replace("[1600, 1000]", "[160, 100]").replace("SUBDIVISION = 3", "SUBDIVISION = 1")
 exec(text, {{"__name__": "__main__", "__file__": {script!r}}})
 view, scene, found = simple.GetActiveView(), simple.GetAnimationScene(), []
 for time in {times!r}:
@@ -236,14 +220,18 @@ print(json.dumps(found))
 """
 
 
-def words(paraview, folder, *arguments, times=(0,)):
+def words(paraview, folder, *arguments, times=(0,), picture=None):
     """What show.py writes into a picture, at its own time and if need be at others: above and below it, its captions
-    with their places, the titles of the axes grid, and the lowest value of the colours."""
+    with their places, the titles of the axes grid, and the lowest value of the colours. A picture by the name that
+    show.py gives it is looked at, too."""
     script = folder / "words.py"
-    arguments = [*arguments, "--output", "words.png"]
-    script.write_text(WORDS.format(script=str(folder / "show.py"), arguments=arguments, times=times))
+    arguments = [*arguments, *([] if picture else ["--output", "words.png"])]
+    options = {"script": str(folder / "show.py"), "arguments": arguments, "times": times}
+    script.write_text(WORDS.format(**options, is_looked_at=bool(picture)))
     done = paraview(folder, script)
     assert done.returncode == 0, done.stderr
+    if picture:
+        assert_picture(folder / picture)
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -258,7 +246,7 @@ def named_results(tmp_path_factory):
 
 
 def test_words_of_the_picture(paraview, named_results):
-    [((title, parameters), captions, grid, lowest)] = words(paraview, named_results)
+    [((title, parameters), captions, grid, lowest)] = words(paraview, named_results, picture="eigenfunctions.png")
     assert title.startswith("noise.alpha = 1 (1/time)\np = 1 ")
     assert title.endswith(" (1/time)")
     assert 0 < lowest < 1
@@ -318,7 +306,8 @@ def test_show_script_refuses_a_curve_that_is_not_there(paraview, several_curves,
 @pytest.mark.slow
 def test_words_around_the_cylinder(paraview, named_results):
     """Near the rim, whose radius is between 1 and 1.5."""
-    [(_, captions, *_)] = words(paraview, named_results, "--cylinder")
+    options, picture = ["--cylinder", "--field", "tilted_density"], "eigenfunctions-tilted_density-cylinder.png"
+    [(_, captions, *_)] = words(paraview, named_results, *options, picture=picture)
     texts = [text for text, _ in captions]
     assert texts[:4] == ["phase phi = 0", "impact: pi/2", "pi", "impact: 3 pi/2"]
     assert len(texts) == 6
