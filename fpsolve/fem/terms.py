@@ -202,9 +202,14 @@ class Terms:
         if any(not self._has_states[k] for k in others):
             raise MeshError(SEVERAL_OVER_RAY)
         for values in product(*(np.unique(self.noises[k].support) for k in others)):
-            held = {self._names[k]: value for k, value in zip(others, values, strict=True)}
+            held = dict.fromkeys(self._names, 0.0)
+            held |= {self._names[k]: value for k, value in zip(others, values, strict=True)}
+
+            def of_free(xi: Any, held: dict[str, float] = held) -> Any:
+                return f({**held, self._names[free]: xi})
+
             noises: list[Coefficient] = [one] * len(shape)
-            noises[free] = lambda xi, held=held: f({**dict.fromkeys(self._names, 0.0), **held, self._names[free]: xi})
+            noises[free] = of_free
             for k, value in zip(others, values, strict=True):
                 noises[k] = At(value)
             yield Term(order, of_p, phase, tuple(noises), text)

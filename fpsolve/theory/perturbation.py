@@ -249,8 +249,8 @@ def scale_of(problem: Problem) -> Scale:
         of_noises[term.noise] = of_noises.get(term.noise, 0.0) + driven
     jumps = sum(abs(jump.log_factor) for jump in system.jumps) * angular_frequency(system) / math.pi
     driven = 0.0
-    for name, each in of_noises.items():
-        driven += each * min(1.0, each * problem.named_noise(name).correlation_time) if each else 0.0
+    for name, size in of_noises.items():
+        driven += size * min(1.0, size * problem.named_noise(name).correlation_time) if size else 0.0
     for each in problem.diffusions:
         h, q = (system.epsilon**each.order * float(abs(f.mean) + f.amplitude) for f in (each.h, each.q))
         driven += 0.5 * q * max(h, q)

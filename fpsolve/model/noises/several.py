@@ -62,7 +62,7 @@ class Noises(Noise):
             )
 
     @cached_property
-    def parts(self) -> Mapping[str, Noise]:  # type: ignore[override]
+    def parts(self) -> Mapping[str, Noise]:
         return dict(self.named)
 
     @cached_property
