@@ -22,7 +22,15 @@ from fpsolve.exponent.corners import corners, graded_more, resolving
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.fields import noise_marginal
-from fpsolve.fem.discretisation import MOST_DEGREE, Cells, Discretisation, NoisePart, PhaseCells, Polynomials, States
+from fpsolve.fem.discretisation import (
+    MOST_DEGREE,
+    Cells,
+    Discretisation,
+    NoisePart,
+    PhaseCells,
+    Polynomials,
+    first_part,
+)
 from fpsolve.fem.factors import MAX_BAND, MAX_DENSE_UNKNOWNS, one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
@@ -386,6 +394,8 @@ class _Search:
         start, problem = self.place.starts.get(self.p), self.place.problem
         if start is None or corners(problem, self.p):  # which lie elsewhere there
             return None
+        if _bases(start.pair.generator.problem) != _bases(problem):
+            return None
         try:
             generator = Generator(problem, self.place.trimmed(start, self.tolerance))
             return Solution(principal_pair(generator, self.p, start=start.pair))
@@ -487,15 +497,14 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
     """A first discretisation, small, for a tilted density around some z; None for where slow noise carries it."""
     noise, system, digits = problem.coloured, problem.motion, -math.log10(rtol)
     frozen = frozen_noise(problem)
-    if frozen is None:  # the noise has states, or there are several
+    if frozen is None:  # the noise has states, or a state of its own, or there are several
         known = noise.parts.values()
         typical = [
             each.reached if each.has_states else np.array([-1, 1]) * min(2 * each.standard_deviation, each.half_width)
             for each in known
         ]
-        count = round(digits / 2) + 3
-        parts = [States(each.reached.size) if each.has_states else Polynomials(count) for each in known]
-        return Discretisation(_phase(system, problem.at_values(typical), digits), tuple(parts))
+        phase = _phase(system, problem.at_values(typical), digits)
+        return Discretisation(phase, tuple(first_part(each, digits) for each in known))
     unit, center = noise.standard_deviation, frozen.center(p) if center is None else center
     end = noise.half_width / unit
     phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
@@ -563,6 +572,11 @@ def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation
             lacking = [float(np.sum(each.of_cells[each.at_corners])) for each in solution.effects if each]
             new = graded_more(solution.corners, new, [each / (CORNERS * tolerance) for each in lacking])
     return new if new.size > chosen.size or solution.error_by_modes <= tolerance else new.raised()
+
+
+def _bases(problem: Problem) -> list[str]:
+    """What the functions of each noise are made of."""
+    return [noise.basis for noise in problem.coloured.parts.values()]
 
 
 def _log_density(noise: Noise, z: FloatArray) -> FloatArray:

@@ -82,7 +82,7 @@ def corners(problem: Problem, p: float, center: float | None = None) -> list[Cor
     """
     noise, system = problem.coloured, problem.motion
     jumps = [jump for jump in system.jumps if jump.log_factor and not is_steady(system, jump)]
-    if not jumps or noise.has_states or (frozen := frozen_noise(problem)) is None:
+    if not jumps or (frozen := frozen_noise(problem)) is None:
         return []
     center = frozen.center(p) if center is None else center
     unit, ends = noise.standard_deviation, _interval(noise, center)

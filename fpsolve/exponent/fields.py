@@ -63,11 +63,9 @@ def fields(pair: PrincipalPair, phi: FloatArray, at_phi: Any, at_xi: Samples) ->
     """T, T* and T T* at φ from the values of the φ-elements there and samples of the functions of ξ.
 
     T has mean 1 over P_s(ξ)/2π; with a tilt beyond `MOST_TILT`, which leaves T there to rounding, over P_s exp(2s z).
-    Raises `OutputError` where several noises have values.
+    Raises `OutputError` where it depends on more than φ and ξ.
     """
-    if not pair.generator.problem.is_on_cylinder:
-        several = "functions of the phase and of several noises are no surface and no lines over the phase"
-        raise OutputError(f"{several}; make all of these noises white but one")
+    _refuse_more(pair)
     space, xi, frame = pair.space, pair.space.xi, pair.generator.problem.frame
     mean, stretch, density = 1.0, np.ones(1), np.ones(1)
     if frame is not None or 0 < abs(xi.tilt) <= MOST_TILT:
@@ -116,7 +114,12 @@ class Nodes:
 
     @classmethod
     def of(cls, pair: PrincipalPair, finer: int = 1) -> Nodes:
-        """Nodes that show a pair, or so many times more either way; P_s in the adjoint asks for low quadrilaterals."""
+        """Nodes that show a pair, or so many times more either way; P_s in the adjoint asks for low quadrilaterals.
+
+        Raises:
+            OutputError: T depends on more than φ and ξ.
+        """
+        _refuse_more(pair)
         space = pair.space
         degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
         order = min(MAX_ORDER, max(degrees))
@@ -209,6 +212,19 @@ class Strips(Nodes):
         return np.arange(0, self.z.size, self.order + 1)
 
 
+def _refuse_more(pair: PrincipalPair) -> None:
+    """Raises `OutputError` where T depends on more than φ and ξ."""
+    noise = pair.generator.problem.coloured
+    if len(noise.parts) > 1:
+        several = "functions of the phase and of several noises are no surface and no lines over the phase"
+        raise OutputError(f"{several}; make all of these noises white but one")
+    if not noise.is_drawn:
+        raise OutputError(
+            f"functions of the phase and of {noise.kind} noise, which is no Markov process by itself, are no surface "
+            "over phase and noise; look at Λ(p), or at densities of a simulation"
+        )
+
+
 def _z_lines(pair: PrincipalPair) -> FloatArray:
     """The lines of the ξ-cells; of polynomials the interval in which the noise lives along some paths, in noise units.
 
@@ -254,6 +270,7 @@ class EigenfunctionPlot:
 
         Raises:
             ValueError: there is no such field.
+            OutputError: T depends on more than φ and ξ.
         """
         surface = surface_of(self, field)  # type: ignore[arg-type]
         if surface.is_lines:

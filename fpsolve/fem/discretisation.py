@@ -16,6 +16,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
+from fpsolve.fem.circle import CircleAxis
 from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
 from fpsolve.model.frame import Frame
@@ -121,7 +122,7 @@ class NoisePart:
         is_killed: whether paths that leave the cells are killed.
     """
 
-    kind: ClassVar[Literal["polynomials", "cells", "states"]]
+    kind: ClassVar[Literal["polynomials", "cells", "states", "waves"]]
     lines: FloatArray
     degree: int
     slope: float
@@ -272,6 +273,31 @@ class States(NoisePart):
 
 
 @dataclass(frozen=True, eq=False)
+class Waves(Polynomials):
+    """Waves of the angle of the noise, two for each of their numbers, and 1.
+
+    Attributes:
+        count: the highest number.
+    """
+
+    kind = "waves"  # type: ignore[assignment]
+
+    @property
+    def size(self) -> int:
+        return 2 * self.count + 1
+
+    def axis(self, noise: Noise, p: float) -> CircleAxis:  # type: ignore[override]
+        return CircleAxis(noise, self.count)
+
+
+def first_part(noise: Noise, digits: float) -> NoisePart:
+    """A small one for so many digits, where no value of the noise is held."""
+    if noise.basis == "waves":
+        return Waves(round(digits / 2) + 4)
+    return States(noise.reached.size) if noise.has_states else Polynomials(round(digits / 2) + 3)
+
+
+@dataclass(frozen=True, eq=False)
 class Discretisation:
     """The functions of φ, and those of each noise.
 
@@ -288,12 +314,16 @@ class Discretisation:
         """The elements of a mesh, which is cut off at the end of the noise's support, in the coordinates of a frame.
 
         Raises:
-            MeshError: the mesh has lines where the noise has states, or none where it has a line.
+            MeshError: the mesh has lines where ξ is no diffusion by itself, or none where it is.
         """
-        if noise.has_states == bool(mesh.z_lines.size):
-            raise MeshError("noise with states needs a mesh without z_lines, and noise on a line one with them")
+        if noise.is_diffusion != bool(mesh.z_lines.size):
+            raise MeshError(
+                "noise with states, or with an angle, needs a mesh without z_lines, and noise on a line one with them"
+            )
         lines = mesh.phi_lines if frame is None else frame.phase(mesh.phi_lines)
         phase = PhaseCells(lines, np.full(mesh.phi_lines.size - 1, mesh.phi_degree))
+        if noise.basis == "waves":
+            return cls(phase, (Waves(mesh.xi_degree),))
         if noise.has_states:
             return cls(phase, (States(noise.reached.size),))
         mesh = mesh.within(noise.half_width / noise.standard_deviation)

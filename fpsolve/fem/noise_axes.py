@@ -181,11 +181,11 @@ class PolynomialAxis(LineAxis):
         self.constant = np.eye(1, count)[0]
 
     def mass(self, g: Coefficient = one) -> FloatArray:
-        return _form(self.values, self.measure if g == one else self.measure * g(self.unit * self.points))
+        return form(self.values, self.measure if g == one else self.measure * g(self.unit * self.points))
 
     def generator(self) -> FloatArray:
         """−½ ∫ P_s σ² (u′ + s u)(v′ + s v)."""
-        return -_form(self._slopes, self._flux)
+        return -form(self._slopes, self._flux)
 
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
         logs, a = change.log_density(self.unit * self.points), self.noise.end_exponent
@@ -194,9 +194,9 @@ class PolynomialAxis(LineAxis):
             logs = logs + change.end_exponent * (logarithm(x, a, x.size) - np.log1p(-(x**2)))
         logs = np.asarray(logs - self.measure @ logs)
         if g is not None:
-            return _form(self.values, self.measure * self.changed_weight(change, g, logs, self.points))
+            return form(self.values, self.measure * self.changed_weight(change, g, logs, self.points))
         own = 2 * (change.log_diffusion - change.log_scale) * self.matrix(None)
-        return own - _form(self._slopes, self._flux * logs)
+        return own - form(self._slopes, self._flux * logs)
 
     def generator_of_one(self) -> FloatArray:
         return np.asarray(-self.tilt * (self._flux @ self._slopes))
@@ -322,7 +322,7 @@ def _gegenbauer_rule(count: int, exponent: float) -> tuple[FloatArray, FloatArra
     return gegenbauer(count, exponent).rule()
 
 
-def _form(values: FloatArray, measure: FloatArray) -> FloatArray:
+def form(values: FloatArray, measure: FloatArray) -> FloatArray:
     """∫ of the products of functions, without what is zero but for rounding."""
     matrix = (values * measure[:, None]).T @ values
     matrix[np.abs(matrix) < 1e-13 * np.max(np.abs(matrix))] = 0.0

@@ -31,6 +31,7 @@ NOISES: Mapping[str, str] = {
     "poisson": "poisson:Poisson",
     "telegraph": "telegraph:Telegraph",
     "markov-chain": "markov_chain:MarkovChain",
+    "bounded": "bounded:Bounded",
 }
 
 

@@ -34,6 +34,7 @@ class NoiseDerivative:
         log_scale: ∂ ln c/∂θ of the length c that ξ is measured by; 0 where ξ itself is held.
         states: ∂ξ_i/∂θ of a chain; empty where none moves.
         rates: ∂Q/∂θ of a chain; empty where none changes.
+        turning: ∂ν/∂θ of a noise that is a function of an angle, with the speed ν.
     """
 
     log_diffusion: float = 0.0
@@ -42,6 +43,7 @@ class NoiseDerivative:
     log_scale: float = 0.0
     states: tuple[float, ...] = ()
     rates: tuple[tuple[float, ...], ...] = ()
+    turning: float = 0.0
 
 
 class Noise(Parametrised):
@@ -102,9 +104,27 @@ class Noise(Parametrised):
         return math.isfinite(self.moments[1])
 
     @property
-    def basis(self) -> Literal["polynomials", "cells", "states"]:
-        """What the functions of ξ are made of: orthogonal polynomials of P_s, cells of a line, or states."""
+    def basis(self) -> Literal["polynomials", "cells", "states", "waves"]:
+        """What the functions of the noise are made of: orthogonal polynomials of P_s, cells of a line, states, waves.
+
+        The waves are those of an angle, of which ξ is a function; the noise then states `nu`, `sigma` and `of_angle`.
+        """
         return "states" if self.has_states else "cells" if self.has_algebraic_tails else "polynomials"
+
+    @property
+    def is_diffusion(self) -> bool:
+        """Whether ξ by itself is a diffusion, so that b, σ and P_s tell all of it."""
+        return self.basis in ("polynomials", "cells")
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether T makes a picture: a surface over (φ, ξ), or a line for each state."""
+        return self.is_diffusion or self.has_states
+
+    @property
+    def is_random(self) -> bool:
+        """Whether more of it is random than where it starts."""
+        return True
 
     @property
     def shaped_by(self) -> Sequence[str]:

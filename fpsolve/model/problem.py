@@ -81,7 +81,7 @@ class Problem:
     Raises:
         TypeError: one of them is something else.
         ValueError: white noise would drive the system in a way that has no meaning, see `White.motion`; or the noises
-            are not those that the terms name.
+            are not those that the terms name; or nothing is random, as under a harmonic load alone.
     """
 
     system: System
@@ -103,6 +103,11 @@ class Problem:
                 raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
         if any(noise.is_white for noise in given.values()):
             _ = self._moved, self._struck  # refuses what has no meaning
+        if not self.noise.is_random:
+            raise ValueError(
+                "nothing but the start of this noise is random, and Λ(p) is p times the largest real part of Floquet's "
+                "exponents: take the multipliers of the equation over one period, or add noise that diffuses"
+            )
 
     @cached_property
     def coloured(self) -> Noise:
@@ -112,7 +117,7 @@ class Problem:
     @property
     def is_on_cylinder(self) -> bool:
         """Whether functions of it are of φ and of one ξ, so that they make a surface, or a line for each state."""
-        return len(self.coloured.parts) == 1
+        return len(self.coloured.parts) == 1 and self.coloured.is_drawn
 
     def named_noise(self, name: str) -> Noise:
         """The noise that terms name so; with one noise that one, whatever its name."""

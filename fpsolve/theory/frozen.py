@@ -47,7 +47,7 @@ class FrozenNoise:
     end)², and the gain is at most linear in ξ. Algebraic tails cost ~1/ξ² only, see `far`.
 
     Args:
-        problem: its noise must not be a chain.
+        problem: its noise must be a diffusion.
 
     Attributes:
         z: points on both sides, increasing, denser near 0, shape (n,).
@@ -55,8 +55,8 @@ class FrozenNoise:
 
     def __init__(self, problem: Problem) -> None:
         noise = problem.coloured
-        if noise.has_states:
-            raise TypeError("noise with states is held in each of them; there is no z to look for")
+        if not noise.is_diffusion:
+            raise TypeError("there is no z to look for where ξ is no diffusion by itself")
         unit = noise.standard_deviation
         furthest = 5 * LARGEST_P * unit * noise_strength(problem.drift) * noise.correlation_time
         self._is_heavy = noise.has_algebraic_tails
@@ -104,6 +104,5 @@ class FrozenNoise:
 
 @kept(8)
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
-    """The `FrozenNoise` of a problem; None for a chain, which holds its states, and for several noises."""
-    has_none = problem.coloured.has_states or len(problem.coloured.parts) > 1
-    return None if has_none else FrozenNoise(problem)
+    """The `FrozenNoise` of a problem; None where ξ is no diffusion by itself, and for several noises."""
+    return FrozenNoise(problem) if problem.coloured.is_diffusion else None

@@ -5,6 +5,7 @@ rightmost eigenvalue is Λ(p).
 """
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 
@@ -84,3 +85,38 @@ def sine_wiener_exponent(steady, driven, amplitude, sigma, p, harmonics):
     total += amplitude * np.kron(rates_of_monomials(driven, p), sine)
     total -= np.kron(np.eye(p + 1), 0.5 * sigma**2 * np.diag(k.astype(float) ** 2))
     return float(np.max(np.linalg.eigvals(total).real))
+
+
+def bounded_exponent(steady, driven, mu, nu, sigma, p, harmonics, white=None):
+    """Λ(p) of dx = (A₀ + μ cos θ A₁) x dt + Bx∘dW₂, dθ = ν dt + σ dW: monomials times exp(ikθ), |k| ≤ harmonics.
+
+    Of eigenvalues that are multiples of iν apart, as for σ = 0, the largest real one is meant: cut off, others of them
+    come to lie a little to its right.
+    """
+    k = np.arange(-harmonics, harmonics + 1)
+    one, cosine = np.eye(k.size), 0.5 * (np.eye(k.size, k=1) + np.eye(k.size, k=-1))
+    total = np.kron(rates_of_monomials(steady, p), one) + mu * np.kron(rates_of_monomials(driven, p), cosine)
+    if white is not None:
+        moved = rates_of_monomials(white, p)
+        total += 0.5 * np.kron(moved @ moved, one)
+    values = np.linalg.eigvals(total + np.kron(np.eye(p + 1), np.diag(1j * nu * k - 0.5 * sigma**2 * k**2)))
+    return float(np.max(values[np.abs(values.imag) < 1e-6 * (nu + sigma**2)].real))
+
+
+def harmonic_exponent(steady, driven, mu, nu, p, white=None):
+    """The same for σ = 0, by the multipliers of the periodic linear equations of the monomials."""
+    fixed, moving = rates_of_monomials(steady, p), mu * rates_of_monomials(driven, p)
+    if white is not None:
+        moved = rates_of_monomials(white, p)
+        fixed = fixed + 0.5 * moved @ moved
+    size, period = p + 1, 2 * np.pi / nu
+    found = solve_ivp(
+        lambda t, y: ((fixed + np.cos(nu * t) * moving) @ y.reshape(size, size)).ravel(),
+        (0.0, period),
+        np.eye(size).ravel(),
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-15,
+    )
+    multipliers = np.linalg.eigvals(found.y[:, -1].reshape(size, size))
+    return float(np.log(np.max(np.abs(multipliers))) / period)

@@ -1,4 +1,4 @@
-"""Λ(p) and λ of linear systems in the plane by Fourier series in the phase: white and OU noise, chains, impulses.
+"""Λ(p) and λ of linear systems in the plane by Fourier series in φ: white, OU and bounded noise, chains, impulses.
 
 With x = a (cos φ, −sin φ) a matrix A moves functions a^p T(φ) by X = h ∂φ + p q, h = e′ᵀA e, q = eᵀA e. Then Λ(p) is
 the rightmost eigenvalue of X₀ + ½ Σ X_k² for dx = A₀x dt + Σ A_k x∘dW_k, of X_i in state i plus the rates of a chain,
@@ -82,6 +82,22 @@ def impulses(drift, driven, rate, sizes, shares):
             total = total + rate * share * (sparse.csr_array(struck) - sparse.eye_array(waves.size))
             slope = slope + rate * share * sparse.csr_array(longer)
         return total.tocsr(), slope.tocsr(), _constant(modes)
+
+    return made
+
+
+def bounded(steady, driven, mu, nu, sigma, harmonics):
+    """The same for ẋ = (A₀ + μ cos θ A₁)x, dθ = ν dt + σ dW, in exp(ikθ), |k| ≤ harmonics."""
+    k = np.arange(-harmonics, harmonics + 1.0)
+    half = np.full(k.size - 1, 0.5 * mu)
+    cosine, one = sparse.diags_array([half, half], offsets=[1, -1]), sparse.eye_array(k.size)
+    turning = sparse.diags_array(1j * nu * k - 0.5 * sigma**2 * k**2)
+
+    def made(p, modes, log_factor):
+        (x0, dx0), (x1, dx1) = (_moved(matrix, p, modes, log_factor) for matrix in (steady, driven))
+        total = sparse.kron(one, x0) + sparse.kron(cosine, x1) + sparse.kron(turning, sparse.eye_array(2 * modes + 1))
+        constant = np.kron(np.eye(1, k.size, harmonics)[0], _constant(modes))
+        return total, sparse.kron(one, dx0) + sparse.kron(cosine, dx1), constant
 
     return made
 

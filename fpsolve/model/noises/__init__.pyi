@@ -1,3 +1,4 @@
+from .bounded import Bounded as Bounded
 from .markov_chain import MarkovChain as MarkovChain
 from .non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .non_gaussian import ReducedNoise as ReducedNoise

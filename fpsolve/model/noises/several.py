@@ -97,6 +97,14 @@ class Noises(Noise):
         return all(noise.has_states for noise in self._valued)
 
     @property
+    def is_diffusion(self) -> bool:
+        return self.coloured is not self and self.coloured.is_diffusion
+
+    @property
+    def is_random(self) -> bool:
+        return any(noise.is_random for _, noise in self.named)
+
+    @property
     def mixes_slowly(self) -> bool:  # type: ignore[override]
         return any(noise.mixes_slowly for _, noise in self.named)
 

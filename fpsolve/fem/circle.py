@@ -1,0 +1,74 @@
+"""Functions of the angle θ of a noise ξ(θ), dθ = ν dt + σ dW, on its circle, in its uniform law."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.fem.noise_axes import STEP, NoiseAxis, Samples, form
+from fpsolve.model.noise import NoiseDerivative
+
+MORE_POINTS = 64
+"""Of a rule of equidistant points, beyond four for each wave: it is exact for g(ξ(θ)) of that many harmonics."""
+
+
+class CircleAxis(NoiseAxis):
+    """The waves 1, √2 cos kθ, √2 sin kθ, k ≤ n, in this order: ½σ²∂² is diagonal, ν∂ couples the two of each k.
+
+    Where ξ = μ cos θ, that of ξ has two diagonals on each side.
+
+    Args:
+        noise: it states ν as `nu`, σ as `sigma`, and ξ(θ) as `of_angle`.
+        count: n.
+    """
+
+    is_local = False
+
+    def __init__(self, noise: Any, count: int) -> None:
+        super().__init__()
+        self.size, self.noise = 2 * count + 1, noise
+        self.modes = (np.arange(self.size) + 1) // 2
+        self.cells, self.constant = np.zeros(self.size, dtype=int), np.eye(1, self.size)[0]
+        points = 4 * count + MORE_POINTS
+        self.points: FloatArray = np.arange(points) * (2 * np.pi / points)
+        self.values, self.measure = self.values_at(self.points), np.full(points, 1 / points)
+        self._xi = noise.of_angle(self.points)
+        self.support = np.array([self._xi.min(), self._xi.max()])
+
+    def values_at(self, theta: FloatArray) -> FloatArray:
+        """The waves at any θ, shape (len(θ), size)."""
+        waves = np.sqrt(2) * np.exp(1j * np.outer(theta, self.modes))
+        values = np.where(np.arange(self.size) % 2, waves.real, waves.imag)
+        values[:, 0] = 1.0
+        return values
+
+    def mass(self, g: Coefficient = one) -> FloatArray:
+        return form(self.values, self.measure * g(self._xi)) if g != one else np.eye(self.size)
+
+    def generator(self) -> FloatArray:
+        """∫ v (ν∂ + ½σ²∂²) u."""
+        return self.noise.nu * self._turning() + self._diffusing()
+
+    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
+        if g is None:
+            return 2 * (change.log_diffusion - change.log_scale) * self._diffusing() + change.turning * self._turning()
+        slope = (g(self._xi * (1 + STEP)) - g(self._xi * (1 - STEP))) / (2 * STEP)
+        return form(self.values, self.measure * change.log_scale * slope)
+
+    def samples(self) -> Samples:
+        """At equidistant θ; weight and measure are those of θ."""
+        weight, turn = np.full(self.points.size, 0.5 / np.pi), 2 * np.pi
+        return Samples(self._xi, weight, turn * self.measure, self.values, np.ones(self.points.size))
+
+    def projection(self, other: CircleAxis) -> FloatArray:
+        return np.eye(self.size, other.size)
+
+    def _turning(self) -> FloatArray:
+        """∫ v ∂u."""
+        beside = np.where(np.arange(self.size - 1) % 2, self.modes[1:], 0.0)
+        return np.asarray(np.diag(beside, 1) - np.diag(beside, -1))
+
+    def _diffusing(self) -> FloatArray:
+        return np.diag(-0.5 * self.noise.sigma**2 * self.modes**2)

@@ -1,0 +1,128 @@
+"""Bounded noise: a wave whose phase turns steadily and diffuses; without the diffusion a harmonic load."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic.dataclasses import dataclass
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.faults import told_in_words
+from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.noises.sine_wiener import SineWiener
+from fpsolve.model.parameters import SIZE, STRICT, parameter
+
+
+@told_in_words
+@dataclass(frozen=True, config=STRICT)
+class Bounded(Noise):
+    """Bounded noise ξ = μ cos θ, dθ = ν dt + σ dW, θ₀ uniform: its correlation is ½μ² exp(−½σ²|t|) cos νt.
+
+    See W.-C. Xie, J. Sound Vib. 263, 2003. ξ has the law of sine-Wiener noise, but is no
+    Markov process by itself: functions of the noise are those of θ. With ν = 0 they are of ξ alone, and it is solved as
+    the sine-Wiener noise that it then is. With σ = 0 it is a harmonic load, ξ = μ cos(νt + θ₀).
+
+    >>> Bounded(mu=0.4, nu=2.0, sigma=0.5).standard_deviation ** 2  # ½μ²
+    0.08
+
+    Args:
+        mu: μ, 1e-15 to 1e15, in the unit of ξ.
+        nu: ν, 0 to 1e15, in rad/time.
+        sigma: σ, 0 to 1e15, in time^(-1/2).
+
+    Raises:
+        ParameterError: a parameter is not a finite number in its range.
+        ValueError: ν and σ are both 0.
+    """
+
+    mu: Annotated[float, parameter("amplitude", "mu = 0.4", r"$\mu$", "1/time", **SIZE)]
+    nu: Annotated[float, parameter("mean frequency", "nu = 2.0", r"$\nu$", "rad/time", ge=0.0, le=SIZE["le"])]
+    sigma: Annotated[
+        float,
+        parameter("intensity of the phase's noise", "sigma = 0.3", r"$\sigma$", "1/time^(1/2)", ge=0.0, le=SIZE["le"]),
+    ]
+
+    kind: ClassVar[str] = "bounded"
+    of_xi: ClassVar[Sequence[str]] = ("mu",)
+    may_tilt: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        if not (self.nu or self.sigma):
+            raise ValueError("got nu = 0 and sigma = 0; ξ would rest; let nu or sigma be positive")
+
+    @cached_property
+    def _still(self) -> SineWiener:
+        """The noise of the same law whose phase does not turn."""
+        return SineWiener(self.mu, self.sigma)
+
+    @property
+    def basis(self) -> Literal["polynomials", "waves"]:
+        return "waves" if self.nu else "polynomials"
+
+    @property
+    def is_random(self) -> bool:
+        return self.sigma > 0
+
+    @property
+    def half_width(self) -> float:
+        return self.mu
+
+    @property
+    def end_exponent(self) -> float:
+        return -0.5
+
+    @property
+    def standard_deviation(self) -> float:
+        """μ/√2."""
+        return self.mu / math.sqrt(2)
+
+    @property
+    def correlation_time(self) -> float:
+        """2/σ², in which ξ forgets its phase; ∞ for a harmonic load."""
+        return 2 / self.sigma**2 if self.sigma else math.inf
+
+    relaxation_time = correlation_time
+
+    def spectral_density(self, omega: float) -> float:
+        """S(ω) = ½μ²σ²(ω² + ν² + ¼σ⁴)/((ω² − ν² − ¼σ⁴)² + σ⁴ω²), the sum of a peak at ν and one at −ν.
+
+        A harmonic load has no other frequency than ν.
+        """
+        half = 0.5 * self.sigma**2
+        if not half:
+            return math.inf if abs(omega) == self.nu else 0.0
+        sizes = [math.hypot(half, omega - side * self.nu) for side in (1, -1)]
+        return 0.5 * self.mu**2 * sum(half / size / size for size in sizes)
+
+    @property
+    def diffusion(self) -> float:
+        return self._still.diffusion
+
+    def squared_diffusion(self, xi: ArrayLike) -> FloatArray:
+        return self._still.squared_diffusion(xi)
+
+    def log_density(self, xi: ArrayLike) -> FloatArray:
+        return self._still.log_density(xi)
+
+    def holding_cost(self, xi: FloatArray) -> FloatArray:
+        return self._still.holding_cost(xi)
+
+    def of_angle(self, theta: FloatArray) -> FloatArray:
+        """ξ, of the shape of θ."""
+        return np.asarray(self.mu * np.cos(theta))
+
+    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+        return self.of_angle(rng.uniform(0, 2 * math.pi, size))
+
+    def derivative(self, name: str) -> NoiseDerivative:
+        """∂/∂μ stretches ξ, ∂/∂ν turns its phase, and ∂/∂σ is that of σ alone; Λ is even in ν and in σ."""
+        if name == "nu":
+            return NoiseDerivative(turning=1.0)
+        if name == "mu":
+            return NoiseDerivative(1 / self.mu, log_scale=1 / self.mu)
+        return NoiseDerivative(1 / self.sigma if self.sigma else 0.0)
