@@ -74,12 +74,20 @@ class Code(Enum):
     )
     INVARIANT_RAY = (
         "failure: Λ({p:g}) is not known: the phase never leaves the ray at {phase:.6g}, whatever the noise does"
-        "{has_jumps:?, and how often it passes a jump depends on the start; leave jumps out¦, so that for p < 0 it "
-        "depends on the start; choose p > 0}"
+        "{has_jumps:?, and how often it passes a jump depends on the start; leave jumps out¦, so that for p < -1 rare "
+        "cancellations count, which are not computed; choose p >= -1}"
     )
     NO_EIGENFUNCTION = (
         "failure: there is no positive eigenfunction at p = {p:g}: the phase never leaves the ray at {phase:.6g}, "
         "whatever the noise does; Λ(p) for p > 0 is the largest of that on the ray and of the distance from it"
+    )
+    NO_COMMON_RATE = (
+        "failure: Λ″(0) does not exist: λ is {value:.6g} on the ray that the phase never leaves and across it, so that "
+        "Λ″(p) jumps at p = 0"
+    )
+    INVARIANT_CLASSES = (
+        "note: the phase never leaves the ray at {phase:.6g}: λ on it is {along:.6g}, across it {across:.6g}; Λ(p) is "
+        "that of starts off such rays"
     )
     INFINITE_VARIANCE = (
         "failure: the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"

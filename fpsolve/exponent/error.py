@@ -141,10 +141,12 @@ class Solution:
     Attributes:
         pair: the principal pair.
         finer: that on a finer mesh, which measures the error of a given mesh: it may have few modes.
+        search: the error of the place among several problems where the value is the least.
     """
 
     pair: PrincipalPair
     finer: PrincipalPair | None = None
+    search: float = 0.0
 
     @cached_property
     def effects(self) -> tuple[ModeEffects | None, ...]:
@@ -184,7 +186,7 @@ class Solution:
 
     @cached_property
     def _other(self) -> float:
-        return sum(self.truncation) + self.pair.rounding
+        return sum(self.truncation) + self.pair.rounding + self.search
 
     @cached_property
     def corners(self) -> list[Corner]:

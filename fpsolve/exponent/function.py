@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import xarray
 
 SEARCH_INTERVAL: tuple[float, float] = (-20.0, 20.0)
+LEAST_SLOPE = 1e-100
 SHARE = 0.4
 """Of the tolerance of Λ(p)/p, that is left to the interpolation."""
 FEW_NODES = 5
@@ -268,6 +269,8 @@ def nonzero_root(
     for _ in range(60):
         tried.add(p)
         ratio, slope, error = solver.ratio(p)
+        if solver.classes:  # Λ(p)/p may be constant
+            slope = max(slope, LEAST_SLOPE)
         if not slope > 0:
             raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=solver.near.refinement)
         low, high = (p, high) if ratio < 0 else (low, p)
@@ -337,7 +340,7 @@ def solve_moments(
         next(reports, lambda: None)()
 
     result = None
-    if points.size > FEW_MOMENTS and not grows_far_out(solver.problem):
+    if points.size > FEW_MOMENTS and not (grows_far_out(solver.problem) or solver.classes):
         ends = float(points.min()), float(points.max())
         with suppress(NotConverged):
             function = MomentLyapunovFunction(solver.problem, ends, solver=solver, among=points, progress=report)

@@ -6,15 +6,16 @@ import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import minimize_scalar
 
-from fpsolve.arrays import FloatArray, real_number, shown
+from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
     import xarray
 
 HARDLY_FINITE = 1e-6
+NEAR_END, CLOSE = 1e-3, 1e-5
+"""Of a share between two classes: where the slope at its ends is looked at, and to what it is sought."""
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 
@@ -52,6 +55,26 @@ _KINDS: Sequence[tuple[str, Any, str]] = (
     ("budget", Budget, "a Budget"),
     ("rtol", Real, "a number such as 1e-8"),
 )
+
+
+@dataclass(frozen=True, eq=False)
+class InvariantClass:
+    """The growth on a ray that the phase never leaves, or of the distance from it.
+
+    Attributes:
+        phase: φ of the ray.
+        is_along: whether it is ‖x‖ on the ray, and not the distance from it.
+        lyapunov_exponent: its λ.
+        p: the moments, shape (n,).
+        value, error_estimate: its Λ(p), shape (n,).
+    """
+
+    phase: float
+    is_along: bool
+    lyapunov_exponent: Estimate
+    p: FloatArray
+    value: FloatArray
+    error_estimate: FloatArray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,6 +116,11 @@ class MomentLyapunov(Result):
     def pairs(self) -> tuple[PrincipalPair, ...]:
         """The eigenpairs, one for each p; solved now where Λ was interpolated. Raises `NotConverged`."""
         return tuple(self.solver.pair(float(p)) for p in self.p)
+
+    @property
+    def classes(self) -> tuple[InvariantClass, ...]:
+        """For a system whose phase never leaves a ray Λ(p) of each class, else nothing. Raises `NotConverged`."""
+        return self.solver.by_class(self.p)
 
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p), Λ′(p), their errors and residuals over p."""
@@ -192,8 +220,52 @@ class ExponentSolver:
         point = real_number(p, "p")
         refuse_infinite(self.problem, point)
         if self.classes:
-            return max((each.solution(point, tolerance) for each in self.classes), key=lambda each: each.pair.value)
+            found = [each.solution(point, tolerance) for each in self.classes]
+            if point < 0 and len(found) > 1:
+                return self._least(point, tolerance, *found)
+            return max(found, key=lambda each: each.pair.value)
         return self.place.solution(point, tolerance)
+
+    def _least(self, p: float, tolerance: Tolerance | None, *ends: Solution) -> Solution:
+        """Λ(p) = min G(pθ, p(1 − θ)) over 0 ≤ θ ≤ 1 for p < 0, from its values at θ = 1 and θ = 0.
+
+        With a and b the growth of ln ‖x‖ on the ray and across it, E exp(αa + βb) ~ exp(G(α, β) t), ‖x‖ grows as the
+        larger of e^a and e^b, so that Λ(p) = sup(min(pa, pb) − I(a, b)), I the rate function of large deviations;
+        min(pa, pb) is the least of p(θa + (1 − θ)b). G is convex in θ.
+        """
+
+        def at(share: float) -> Solution:
+            own: Any = {"rtol": self.rtol, "budget": self.budget, "countdown": self.countdown}
+            return ExponentSolver(self.problem.mixed(share), self.mesh, **own).solution(p, tolerance)
+
+        along, across = ends
+        for end, share in ((along, 1 - NEAR_END), (across, NEAR_END)):
+            if at(share).pair.value >= end.pair.value:
+                return end
+        tried = list(ends)
+
+        def value(share: float) -> float:
+            tried.append(at(share))
+            return tried[-1].pair.value
+
+        minimize_scalar(value, bounds=(0.0, 1.0), method="bounded", options={"xatol": CLOSE})
+        best, second = sorted(tried, key=lambda each: each.pair.value)[:2]
+        return replace(best, search=second.pair.value - best.pair.value)
+
+    def by_class(self, p: ArrayLike) -> tuple[InvariantClass, ...]:
+        """λ and Λ(p) of the `classes`; nothing where the phase leaves every ray. Raises `NotConverged`."""
+        points, found = real_numbers(p, "p", may_be_empty=True), []
+        phases = self.problem.invariant_rays
+        for number, each in enumerate(self.classes):
+            solutions = [each.solution(float(point)) for point in points]
+            value, error = (
+                np.array(column, dtype=float)
+                for column in ([one.pair.value for one in solutions], [one.error for one in solutions])
+            )
+            is_along = number < len(phases)
+            phase = phases[number] if is_along else phases[0]
+            found.append(InvariantClass(phase, is_along, each.lyapunov_exponent(), points, value, error))
+        return tuple(found)
 
     @cached_property
     def scales(self) -> Scale:
@@ -267,6 +339,10 @@ class ExponentSolver:
             NoSuchExponent: the variance grows faster than t.
             NotConverged: it is not resolved.
         """
+        if len(self.classes) > 1:
+            on, off = (each.lyapunov_exponent() for each in self.classes)
+            if abs(on.value - off.value) <= on.error_estimate + off.error_estimate:
+                raise NoSuchExponent(Message(Code.NO_COMMON_RATE, value=on.value))
         tail = variance_tail(self.problem)
         if tail < HARDLY_FINITE:
             raise NoSuchExponent(Message(Code.NO_VARIANCE_RATE))

@@ -176,9 +176,14 @@ class Problem:
         """What multiplies the state at random times, in the same coordinates."""
         return self._struck if self.frame is None else [self.frame.exponent(each) for each in self._struck]
 
-    @cached_property
+    @property
     def invariant_ray(self) -> float | None:
-        """φ of a ray that the phase never leaves, nor reaches, whatever the noise does; None where there is none."""
+        """The first of the `invariant_rays`; None where there is none."""
+        return next(iter(self.invariant_rays), None)
+
+    @cached_property
+    def invariant_rays(self) -> tuple[float, ...]:
+        """φ of rays that the phase never leaves, nor reaches, whatever the noise does; 0 alone where all rays are."""
         drift, diffusions = self._moved
         lines = [affine(term.g) for term in drift.terms]
         if None not in lines:  # most turn without noise: numbers are quicker than arrays
@@ -188,7 +193,7 @@ class Problem:
                 if line
             )
             if abs(b - c) > math.hypot(a - d, b + c) * (1 + 1e-12):
-                return None
+                return ()
         matrices = [np.array(each.matrix) for each in diffusions] + [each.matrix for each in self._struck]
         if None in lines:
             matrices += [np.array(term.matrix) for term in drift.terms]
@@ -200,41 +205,62 @@ class Problem:
             matrices += parts.values()
         speeds = [speed for speed in map(turning, matrices) if abs(speed.mean) + speed.amplitude > 0]
         if not speeds:
-            return 0.0
+            return (0.0,)
         first = speeds[0]
         if abs(first.mean) > first.amplitude * (1 + 1e-12):
-            return None
+            return ()
         middle = math.atan2(first.sine, first.cosine)
         away = math.acos(min(max(-first.mean / first.amplitude, -1.0), 1.0))
-        for phi in (0.5 * (middle + away), 0.5 * (middle - away)):
-            if all(abs(float(speed(phi))) <= 1e-12 * (abs(speed.mean) + speed.amplitude) for speed in speeds):
-                return phi % math.pi
-        return None
+        found = {0.5 * (middle + away) % math.pi, 0.5 * (middle - away) % math.pi}
+        limits = [1e-12 * (abs(speed.mean) + speed.amplitude) for speed in speeds]
+        return tuple(
+            phi
+            for phi in sorted(found)
+            if all(abs(float(speed(phi))) <= limit for speed, limit in zip(speeds, limits, strict=True))
+        )
 
     @cached_property
     def classes(self) -> tuple[Problem, ...]:
-        """For a system with an `invariant_ray` those of ‖x‖ on it, and of the distance from it; else nothing.
+        """For a system with an `invariant_ray` those of ‖x‖ on it, and of the distance from it; else nothing."""
+        if not self.invariant_rays:
+            return ()
+        is_one = all(not term.h.mean and not term.h.amplitude for term in self.system.terms)
+        return tuple(map(self.mixed, (1.0,) if is_one else (1.0, 0.0)))
+
+    def mixed(self, share: float) -> Problem:
+        """d ln a/dt = θ q + (1 − θ)(tr A − q), of the two `classes`, θ the share of the first.
 
         Both obey ȧ = q(ξ) a alone: with e on the ray q = eᵀAe, and tr A − q. They are given as x′ = (q(ξ) + J) x, as a
         uniform rotation leaves ‖x‖ alone.
         """
-        if (phi := self.invariant_ray) is None:
-            return ()
-        found = []
-        for side in (1.0, -1.0):
-            terms = [CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))]
-            for term in self.system.terms:
-                rate = float(term.q(phi)) if side > 0 else float(np.trace(np.array(term.matrix)) - term.q(phi))
-                terms.append(CoefficientMatrix(term.order, ((rate, 0.0), (0.0, rate)), term.g, term.noise))
-            found.append(Problem(LinearMotion(self.system.epsilon, tuple(terms)), self.noise))
-        is_one = all(not term.h.mean and not term.h.amplitude for term in self.system.terms)
-        return tuple(found[:1] if is_one else found)
+        phi = self.invariant_rays[0]
+
+        def rates(terms: Sequence[CoefficientMatrix]) -> list[CoefficientMatrix]:
+            found = []
+            for term in terms:
+                on_ray = float(term.q(phi))
+                rate = share * on_ray + (1 - share) * (float(np.trace(np.array(term.matrix))) - on_ray)
+                found.append(CoefficientMatrix(term.order, ((rate, 0.0), (0.0, rate)), term.g, term.noise))
+            return found
+
+        def motion(terms: Sequence[CoefficientMatrix]) -> LinearMotion:
+            turn = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))
+            return LinearMotion(self.system.epsilon, (turn, *terms))
+
+        terms = rates(self.system.terms)
+        if self._moved[1] and 0 < share < 1:  # what Itô's sense takes from the drift is not linear in the rates
+            drifts = rates(self._moved[0].terms), self.noise.motion(motion(terms))[0].terms
+            wanted, made = (
+                sum(self.system.epsilon**each.order * each.matrix[0][0] for each in part) for part in drifts
+            )
+            terms.append(CoefficientMatrix(0, ((wanted - made, 0.0), (0.0, wanted - made))))
+        return Problem(motion(terms), self.noise)
 
     @property
     def moments(self) -> tuple[float, float]:
         """The p for which Λ(p) is finite and known, as a closed interval."""
         low, high = self.noise.moments
-        return (max(low, 0.0), high) if len(self.classes) > 1 else (low, high)
+        return (max(low, -1.0), high) if len(self.classes) > len(self.invariant_rays) else (low, high)
 
     @property
     def halves(self) -> tuple[Parametrised, ...]:

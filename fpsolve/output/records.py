@@ -35,6 +35,7 @@ from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.exponent.quantities import BY_JUMP, INDICES
+from fpsolve.exponent.solver import InvariantClass
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Message, message_of
 from fpsolve.model.kinds import version_of
@@ -293,6 +294,7 @@ def fits(result: CurveResult, asked: Sequence[float]) -> bool:
         and result.estimates.keys() == INDICES.keys()
         and len(result.jumps) in (0, len(result.curve.problem.system.jumps))
         and all(each.keys() <= BY_JUMP.keys() for each in result.jumps)
+        and all(np.array_equal(each.p, found.p) and _is_finite(each, found.p.shape) for each in result.classes)
         and 0 <= result.seconds < math.inf
     )
     if is_whole and slopes is not None:
@@ -308,6 +310,15 @@ def fits(result: CurveResult, asked: Sequence[float]) -> bool:
             and all(map(math.isfinite, slopes.theta.values()))
         )
     return is_whole and not any(math.isinf(each.value) or each.error_estimate < 0 for each in indices)
+
+
+def _is_finite(each: InvariantClass, shape: tuple[int, ...]) -> bool:
+    """Whether the numbers of a class are, and of a shape."""
+    exponent = each.lyapunov_exponent
+    is_whole = all(
+        column.shape == shape and bool(np.isfinite(column).all()) for column in (each.value, each.error_estimate)
+    )
+    return is_whole and all(map(math.isfinite, (each.phase, exponent.value, exponent.error_estimate)))
 
 
 def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:

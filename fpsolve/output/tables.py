@@ -142,6 +142,23 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
             }
             for ray, of_ray in zip(result.curve.problem.system.jumps, result.jumps, strict=True)
         ]
+    if result.classes:
+        found["classes"] = [
+            {
+                "name": f"{'along' if each.is_along else 'across'} the ray at phi = {each.phase:.6g}",
+                "lyapunov_exponent": {
+                    "value": each.lyapunov_exponent.value,
+                    "error_estimate": each.lyapunov_exponent.error_estimate,
+                },
+                "moments": [
+                    {"p": p, "value": value, "error_estimate": error}
+                    for p, value, error in zip(
+                        each.p.tolist(), each.value.tolist(), each.error_estimate.tolist(), strict=True
+                    )
+                ],
+            }
+            for each in result.classes
+        ]
     if SENSITIVITIES in case.output.quantities:
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
     return {

@@ -15,6 +15,7 @@ from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE, Index
+from fpsolve.exponent.solver import InvariantClass
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, MOMENTS, P
 
@@ -78,6 +79,7 @@ class CurveResult(Result):
         notes: where the theories compared with are not valid.
         failures: why some p are missing, or with all p some indices.
         jumps: where a system has several, the `BY_JUMP` of each by their names, as `estimates`.
+        classes: where the phase never leaves a ray, λ and Λ(p) on it and across it.
         sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
         seconds: how long the processor took.
     """
@@ -90,6 +92,7 @@ class CurveResult(Result):
     notes: tuple[Message, ...] = ()
     failures: tuple[Failure, ...] = ()
     jumps: tuple[Mapping[str, Estimate | None], ...] = ()
+    classes: tuple[InvariantClass, ...] = ()
     sensitivities: Sensitivities | None = None
     seconds: float = 0.0
 

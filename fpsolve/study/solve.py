@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -29,7 +30,7 @@ from fpsolve.exponent.error import Absent, Estimate, Failure
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
 from fpsolve.exponent.function import solve_moments
 from fpsolve.exponent.quantities import BY_JUMP, INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
-from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov
+from fpsolve.exponent.solver import ExponentSolver, InvariantClass, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity, message_of
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns, Solved
@@ -143,6 +144,7 @@ def solve_curve(
     tries = {name: (INDICES[name].symbol, partial(INDICES[name].solve, solver, found.root)) for name in wanted.indices}
     estimates, missing = _solve_indices(tries, found)
     jumps, more = _solve_jumps(solver, wanted.indices, found)
+    classes = _solve_classes(solver, found.p)
     missing = [each for each in missing if wanted.is_stated or not each.tells_of(Code.NOT_ONE_RAY)] + more
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
@@ -161,6 +163,7 @@ def solve_curve(
         heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
         *found.notes,
         *curve.problem.remarks,
+        _told_of(classes),
         weak_noise_note(curve.problem, found.p, found.value),
         *of[Severity.NOTE],
         *(slopes.notes if slopes else ()),
@@ -197,6 +200,7 @@ def solve_curve(
         estimates=estimates,
         discretisation=_discretisation(solver),
         jumps=jumps,
+        classes=classes,
         warnings=(*found.warnings, *limits),
         sensitivities=slopes,
         notes=tuple(note for note in notes if note is not None),
@@ -283,6 +287,22 @@ def _solve_jumps(
         told.append({name: found[name] for name in wanted})
         messages += missing
     return tuple(told), messages
+
+
+def _solve_classes(solver: ExponentSolver, p: FloatArray) -> tuple[InvariantClass, ...]:
+    """λ and Λ(p) on a ray that the phase never leaves, and across it, where they converge."""
+    with suppress(NotConverged):
+        return solver.by_class(p)
+    return ()
+
+
+def _told_of(classes: Sequence[InvariantClass]) -> Message | None:
+    """That there are such classes, and their λ."""
+    if len(classes) < 2:
+        return None
+    along, across = classes
+    rates = {"along": along.lyapunov_exponent.value, "across": across.lyapunov_exponent.value}
+    return Message(Code.INVARIANT_CLASSES, phase=along.phase, **rates)
 
 
 def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:

@@ -1,0 +1,53 @@
+"""A case of a triangular system: what there is on the ray that the phase never leaves, and across it."""
+
+import json
+
+import numpy as np
+
+from fpsolve.case.case import load_case
+from fpsolve.output.records import record_of, result_of
+from fpsolve.output.tables import write_results
+from fpsolve.study.solve import Numerics, everything, solve_curve
+
+CASE = """
+title = "Triangular"
+[system]
+variables = ["x", "y"]
+drift = ["-0.3*x + 0.4*load*x", "0.5*x - 1.0*y - load*y"]
+noises = { load = "noise.axial" }
+[noise.axial]
+kind = "ornstein-uhlenbeck"
+alpha = 1.0
+standard_deviation = 0.5
+[moments]
+p = { start = -1.0, stop = 3.0, num = 5 }
+[output]
+quantities = ["moment", "lyapunov_exponent"]
+"""
+
+
+def test_both_classes_are_told_by_name_from_records_too(tmp_path):
+    """S(0) = 2 · 0.25: p(−0.3) + ¼p²·0.16 across the ray x = 0, and −p + ¼p² on it."""
+    path = tmp_path / "triangular.toml"
+    path.write_text(CASE, encoding="utf-8")
+    case = load_case(path)
+    [curve] = case.curves()
+    result = solve_curve(curve, everything(case), Numerics.of(case)).result
+    assert [str(note) for note in result.notes if "the ray at 1.5708: λ on it is -1, across it -0.3" in note]
+    summaries = []
+    for each in (result, result_of(json.loads(json.dumps(record_of(result))), curve)):
+        write_results(case, [each], tmp_path, {})
+        summaries += json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["curves"]
+    assert summaries[0] == summaries[1]
+    along, across = summaries[0]["classes"]
+    assert [each["name"] for each in (along, across)] == [
+        f"{how} the ray at phi = 1.5708" for how in ("along", "across")
+    ]
+    p, total = (np.array([row[name] for row in summaries[0]["moments"]]) for name in ("p", "value"))
+    for found, growth, strength in ((along, -1.0, 1.0), (across, -0.3, 0.4)):
+        assert abs(found["lyapunov_exponent"]["value"] - growth) < 1e-9
+        expected = p * growth + 0.25 * p**2 * strength**2
+        np.testing.assert_allclose([row["value"] for row in found["moments"]], expected, atol=1e-9)
+        assert [row["p"] for row in found["moments"]] == p.tolist()
+        assert np.all((total >= expected - 1e-9) | (p < 0))
+        assert np.all((total <= expected + 1e-9) | (p > 0))
