@@ -16,7 +16,7 @@ from rich.text import Text
 
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.vary import short_names
+from fpsolve.case.vary import map_key, short_names
 from fpsolve.data import written
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import (
@@ -467,7 +467,7 @@ def print_remarks(
 def shows_perturbed_moments(case: Case, count: int) -> bool:
     """Whether the table of so many curves or the figure shows Eq. (37)."""
     over_p = case.figure.x == "p" and (count <= MOST_TABLES or case.output.figure)
-    return over_p or (case.figure.moment is not None and case.output.figure)
+    return over_p or (case.figure.moment is not None and case.output.figure and not map_key(case.figure, case.vary))
 
 
 def print_remark(text: str, severity: Severity = Severity.NOTE) -> None:

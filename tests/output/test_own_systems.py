@@ -21,7 +21,7 @@ from fpsolve.model import MarkovChain, ParametricOscillator, Telegraph, VibroImp
 from fpsolve.model.kinds import NOISES
 from fpsolve.output.figures import draw
 from fpsolve.output.tables import write_results
-from fpsolve.output.terminal import note_missing, print_results, varied_columns
+from fpsolve.output.terminal import note_missing, print_results, shows_perturbed_moments, varied_columns
 from fpsolve.output.vtk import write_eigenfunctions, write_functions
 from fpsolve.simulation import MonteCarlo
 from fpsolve.simulation.estimators import MomentEstimate
@@ -211,6 +211,14 @@ def test_an_overdamped_motion_has_no_impacts():
     found = critical_impact_factor(ExponentSolver(Problem(system, Telegraph(a=0.5, k=1.0))))
     assert found.reason.code is Code.RARE_IMPACTS
     assert "as where the motion does not turn" in found.reason
+
+
+@pytest.mark.parametrize(("is_map", "is_shown"), [("true", False), ("false", True)])
+def test_a_map_shows_no_perturbation_theory(tmp_path, is_map, is_shown):
+    vary = '[vary]\n"system.k" = [1.0, 2.0]\n"noise.axial.s" = [0.1, 0.2, 0.3]\n'
+    figure = f'[figure]\nx = "system.k"\ny = {{ moment = 2.0 }}\nmap = {is_map}\n'
+    case = case_in(tmp_path, own("white") + MOMENTS + vary + figure)
+    assert shows_perturbed_moments(case, 6) == is_shown
 
 
 def test_every_ray_has_its_rate_in_the_summary(tmp_path, capsys):

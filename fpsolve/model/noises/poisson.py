@@ -68,7 +68,7 @@ class Poisson(Noise):
         ParameterError: a number is out of its range, or there are not as many weights as sizes.
     """
 
-    rate: Annotated[float, parameter("impulses in a unit of time", "rate = 1.0", r"$\kappa$", "1/time", **SIZE)]
+    rate: Annotated[float, parameter("impulses in a unit of time", "rate = 1.0", r"$\nu$", "1/time", **SIZE)]
     sizes: Annotated[
         tuple[float, ...],
         parameter("sizes of the impulses", "sizes = [-1.0, 1.0]", "$w$", "1", strict=False),
