@@ -7,6 +7,8 @@ rightmost eigenvalue is Λ(p).
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from scipy.sparse import csc_matrix, identity, kron
+from scipy.sparse.linalg import eigs
 
 
 def rates_of_monomials(matrix, p):
@@ -120,3 +122,40 @@ def harmonic_exponent(steady, driven, mu, nu, p, white=None):
     )
     multipliers = np.linalg.eigvals(found.y[:, -1].reshape(size, size))
     return float(np.log(np.max(np.abs(multipliers))) / period)
+
+
+def chain(matrix, states, rates):
+    """A Markov chain that drives A: its matrix, its own generator on moments, and ξ."""
+    return matrix, np.asarray(rates, dtype=float).T, np.diag(np.asarray(states, dtype=float))
+
+
+def gaussian(matrix, alpha, deviation, polynomials):
+    """Ornstein-Uhlenbeck noise that drives A, by so many normalised Hermite polynomials."""
+    ladder = np.diag(np.sqrt(np.arange(1.0, polynomials)), 1)
+    return matrix, -alpha * np.diag(np.arange(float(polynomials))), deviation * (ladder + ladder.T)
+
+
+def several_exponent(steady, coloured, white, p, first):
+    """Λ(p) of ẋ = (A₀ + Σ ξ_k A_k) x, with white noises as pairs (A, "stratonovich" or "ito") of A x dW.
+
+    Args:
+        steady, coloured, white: A₀; noises by `chain` and `gaussian`; white noises.
+        p: even.
+        first: about Λ(p), or somewhat larger; the eigenvalues around it are looked at.
+    """
+    total = csc_matrix(rates_of_monomials(steady, p))
+    for matrix, sense in white:
+        moved = rates_of_monomials(matrix, p)
+        total = total + 0.5 * moved @ moved
+        if sense == "ito":
+            total = total - 0.5 * rates_of_monomials(np.asarray(matrix) @ np.asarray(matrix), p)
+    driven = []
+    for matrix, own, xi in coloured:
+        size = own.shape[0]
+        driven = [kron(each, identity(size)) for each in driven]
+        driven.append(kron(kron(rates_of_monomials(matrix, p), identity(total.shape[0] // (p + 1))), xi))
+        total = kron(total, identity(size)) + kron(identity(total.shape[0]), own)
+    total = csc_matrix(sum(driven, total))
+    if total.shape[0] <= 400:
+        return float(np.max(np.linalg.eigvals(total.toarray()).real))
+    return float(np.max(eigs(total, 8, sigma=first, v0=np.ones(total.shape[0]))[0].real))
