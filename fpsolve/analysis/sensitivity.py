@@ -132,7 +132,7 @@ def changed_value(pair: PrincipalPair, by: ParameterDerivative) -> Estimate:
     x, y, turns = pair.right, pair.left, pair.space.turns
     factors = list(pair.generator.changed(by, pair.p).terms)
     if (mass := pair.generator.changed_mass(by, pair.p)) is not None:
-        factors += [(-pair.value * phase, noise) for phase, noise in mass.terms]
+        factors += [(-pair.value * phase, *noises) for phase, *noises in mass.terms]
     terms = [KroneckerSum([each]) for each in factors]
     parts = turns * np.array([y @ (term @ x) for term in terms])
     sizes = turns * np.array([abs(y) @ (abs(term) @ abs(x)) for term in terms])

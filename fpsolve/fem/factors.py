@@ -19,6 +19,8 @@ from fpsolve.fem.axis import KroneckerSum
 MAX_DENSE_UNKNOWNS = 350
 """Below it one dense matrix is the fastest."""
 MAX_BLOCK, MAX_BAND = 400, 6
+MAX_THICK_BLOCK = 2000
+"""The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 
 
 def one_thread() -> Any:
@@ -51,6 +53,11 @@ def factorised(operator: KroneckerSum) -> Factors:
     if operator.size <= MAX_DENSE_UNKNOWNS and not operator.is_sparse:
         return DenseFactors(operator.toarray())
     m, n = operator.halves
+    if not operator.is_sparse and len(operator.shape) == 3:
+        if operator.shape[1] > n:
+            return SwappedFactors(operator)
+        if m <= MAX_THICK_BLOCK and operator.band <= MAX_BAND < n:
+            return BlockFactors(operator)
     if not operator.is_sparse and m <= MAX_BLOCK and operator.band <= MAX_BAND < n:
         return BlockFactors(operator)
     return SparseFactors(operator)
@@ -110,6 +117,20 @@ class BlockFactors:
             if not transposed:
                 rest[i] = pivot.solve(rest[i])
         return rest.T.ravel()
+
+
+class SwappedFactors:
+    """Those of a sum of three factors with the two last ones exchanged."""
+
+    def __init__(self, operator: KroneckerSum) -> None:
+        self._shape = operator.shape
+        self._inner = factorised(KroneckerSum([(phase, last, first) for phase, first, last in operator.terms]))
+
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        phase, first, last = self._shape
+        swapped = b.reshape(phase, first, last).transpose(0, 2, 1).ravel()
+        found = self._inner.solve(swapped, transposed=transposed)
+        return found.reshape(phase, last, first).transpose(0, 2, 1).ravel()
 
 
 class SparseFactors:
