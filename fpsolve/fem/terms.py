@@ -192,8 +192,8 @@ class Terms:
         self, phase: Any, f: Callable[[Xi], Any], text: str, of_p: OfMoment = OfMoment(0), order: int = 0
     ) -> Iterator[Term]:
         """Those with a function of all noises at once: one for each combination of the states of all but one."""
-        if len(self.noises) == 1:
-            yield Term(order, of_p, phase, (f,), text)
+        if f == one or len(self.noises) == 1:
+            yield self._term(phase, f, text, of_p, order)
             return
         shape = np.shape(f(self._ends))
         moving = [k for k, n in enumerate(shape) if n > 1 and np.any(np.ptp(f(self._ends), axis=k))]

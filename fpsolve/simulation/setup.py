@@ -34,6 +34,8 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
         FpsolveError: they cannot.
     """
     system, noise = problem.system, problem.noise
+    if len(noise.parts) > 1:
+        raise FpsolveError("simulation is for one noise, but there are several; use the finite elements")
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")

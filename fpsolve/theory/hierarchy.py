@@ -8,6 +8,7 @@ largest real part of an eigenvalue, as ‖x‖^p is between two of the moments.
 
 from __future__ import annotations
 
+import math
 import sys
 
 import numpy as np
@@ -29,9 +30,11 @@ def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
         NoHierarchy: the equations do not close for this problem and this p, or are too many.
     """
     refuse_open_hierarchy(problem, p)
-    noise, order = problem.noise, int(p)
-    states = noise.reached  # ξ = 0 of white noise
-    rates = np.array(noise.rates)  # type: ignore[attr-defined]
+    noises, order, rates = problem.coloured.parts.values(), int(p), np.zeros((1, 1))
+    states = problem.at_values([noise.reached for noise in noises])  # ξ = 0 of white noise
+    for noise in noises:
+        own = np.array(noise.rates)  # type: ignore[attr-defined]
+        rates = np.kron(rates, np.eye(len(own))) + np.kron(np.eye(len(rates)), own)
     total = np.kron(rates.T, np.eye(order + 1))
     diffused = [
         _moved(problem.system.epsilon**each.order * np.array(each.matrix), order) for each in problem.diffusions
@@ -40,7 +43,7 @@ def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
     for impulse in problem.impulses:
         gain = scipy.linalg.expm(_moved(np.array(impulse.exponent), order))
         struck += impulse.rate * (gain - np.eye(order + 1))
-    for i, matrix in enumerate(matrix_at(problem.motion, states)):
+    for i, matrix in enumerate(matrix_at(problem.motion, states).reshape(-1, 2, 2)):
         here = slice(i * (order + 1), (i + 1) * (order + 1))
         total[here, here] += _moved(matrix, order) + sum(0.5 * each @ each for each in diffused) + struck
     values, left, right = scipy.linalg.eig(total, left=True)
@@ -51,10 +54,10 @@ def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
 
 def refuse_open_hierarchy(problem: Problem, p: float) -> None:
     """Refuse a problem whose moments of order p do not close, or are too many. Raises `NoHierarchy`."""
-    noise = problem.noise
+    noises = problem.coloured.parts.values()
     if not (p > 0 and p % 2 == 0):
         raise NoHierarchy(f"got p = {p:g}; the moments close for even p > 0 only; choose p = 2, 4, …")
-    if not noise.has_states:
+    for noise in (each for each in noises if not each.has_states):
         raise NoHierarchy(
             f"the moments close for white noise and for chains, but not for {noise.kind} noise, where each needs one "
             "with a higher power of the noise; compare with `fpsolve simulate`"
@@ -64,7 +67,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
             "the moments do not close where a wall changes the state, as that takes place at one phase; compare with "
             "`fpsolve simulate`, or without the wall"
         )
-    count = noise.reached.size * (int(p) + 1)
+    count = math.prod(noise.reached.size for noise in noises) * (int(p) + 1)
     if count > MOST:
         raise NoHierarchy(f"got p = {p:g}; its {count:.12g} equations are more than {MOST}; use a smaller p")
 

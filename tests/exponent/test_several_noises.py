@@ -1,0 +1,130 @@
+"""Several independent noises at once: against their moments, by hand and by differences, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve.analysis.sensitivity import solve_sensitivities
+from fpsolve.arrays import identity
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model import CoefficientMatrix, Jump, Noises, Poisson, SineWiener, Telegraph, White
+from fpsolve.theory.hierarchy import hierarchy_exponent
+from fpsolve.theory.perturbation import second_order
+from tests.oracles.moment_hierarchy import chain, gaussian, several_exponent
+from tests.random_several import compared
+
+RATES = "v", "-omega**2*x - 2*zeta*omega*v - load*x - sway*v"
+NAMES = {"load": "noise.axial", "sway": "noise.lateral"}
+GAUSSIAN = OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)
+STEADY, STIFFNESS, DAMPING = ((0.0, 1.0), (-1.0, -0.1)), ((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, -1.0))
+
+
+def beam(axial, lateral, **parameters):
+    system = PlaneSystem.of_equations(("x", "v"), RATES, {"omega": 1.0, "zeta": 0.05, **parameters}, noises=NAMES)
+    return Problem(system, {"axial": axial, "lateral": lateral})
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6, pytest.param(7, marks=pytest.mark.slow)])
+def test_random_systems_under_two_noises(seed):
+    _, value, expected, error, doubt, _, _ = compared(seed, 2.0, rtol=1e-6 if seed % 6 == 1 else 1e-8)
+    assert abs(value - expected) <= error + doubt
+
+
+def test_moments_of_two_and_four():
+    """To 1e-8, with chains and with white noise in both senses beside coloured noise."""
+    coloured = gaussian(STIFFNESS, 1.0, 0.3 / math.sqrt(2), 16)
+    second = chain(DAMPING, (-0.2, 0.2), ((-0.7, 0.7), (0.7, -0.7)))
+    for noise, law, white in (
+        (Telegraph(a=0.2, k=0.7), [coloured, second], []),
+        (White(s=0.2), [coloured], [(((0.0, 0.0), (0.0, -0.2)), "stratonovich")]),
+        (White(s=0.2, interpretation="ito"), [coloured], [(((0.0, 0.0), (0.0, -0.2)), "ito")]),
+    ):
+        solver = ExponentSolver(beam(GAUSSIAN, noise))
+        for p in (2, 4):
+            expected = several_exponent(STEADY, law, white, p, 0.0)
+            assert solver.solution(float(p)).pair.value == pytest.approx(expected, abs=1e-8)
+
+
+def test_the_hierarchy_of_chains_and_white_noise():
+    problem = beam(Telegraph(a=0.3, k=1.0), Telegraph(a=0.2, k=2.0))
+    laws = [chain(matrix, (-a, a), ((-k, k), (k, -k))) for matrix, a, k in ((STIFFNESS, 0.3, 1.0), (DAMPING, 0.2, 2.0))]
+    expected = several_exponent(STEADY, laws, [], 2, 0.0)
+    assert hierarchy_exponent(problem, 2.0)[0] == pytest.approx(expected, abs=1e-13)
+    assert ExponentSolver(problem).solution(2.0).pair.value == pytest.approx(expected, abs=1e-8)
+    struck = beam(Poisson(rate=1.0, sizes=(-0.3, 0.3)), White(s=0.2))
+    assert ExponentSolver(struck).solution(2.0).pair.value == pytest.approx(
+        hierarchy_exponent(struck, 2.0)[0], abs=1e-8
+    )
+
+
+def test_two_noises_of_one_term_are_one():
+    """Two white noises add up their intensities, and a noise that drives nothing else leaves the other alone."""
+    terms = [CoefficientMatrix(0, STEADY), *(CoefficientMatrix(1, STIFFNESS, identity, name) for name in "ab")]
+    both = Problem(PlaneSystem(terms), {"a": White(s=0.3), "b": White(s=0.4)})
+    one = Problem(PlaneSystem(terms[:2]), White(s=0.5))
+    found = [ExponentSolver(problem).solution(2.0).pair.value for problem in (both, one)]
+    assert found[0] == pytest.approx(found[1], abs=1e-12)
+    beside = Problem(PlaneSystem(terms), {"a": GAUSSIAN, "b": SineWiener(amplitude=1e-9, sigma=1.0)})
+    alone = Problem(PlaneSystem(terms[:2]), {"a": GAUSSIAN})
+    assert alone.noise == GAUSSIAN
+    found = [ExponentSolver(problem).solution(2.0).pair.value for problem in (beside, alone)]
+    assert found[0] == pytest.approx(found[1], abs=1e-10)
+
+
+def test_a_wall_beside_two_noises():
+    """The law of the wall is that of one noise where the other hardly acts."""
+    wall = [{"at": "x = 0", "restitution": 0.8}]
+    system = PlaneSystem.of_equations(("x", "v"), RATES, {"omega": 1.0, "zeta": 0.05}, noises=NAMES, walls=wall)
+    one = PlaneSystem.of_equations(
+        ("x", "v"), (RATES[0], RATES[1].replace(" - sway*v", "")), {"omega": 1.0, "zeta": 0.05},
+        noises={"load": "noise.axial"}, walls=wall,
+    )  # fmt: skip
+    expected = ExponentSolver(Problem(one, GAUSSIAN)).solution(2.0).pair.value
+    for weak in (White(s=1e-6), OrnsteinUhlenbeck(alpha=1.0, sigma=1e-6), Telegraph(a=1e-6, k=1.0)):
+        found = ExponentSolver(Problem(system, {"axial": GAUSSIAN, "lateral": weak})).solution(2.0)
+        assert found.pair.value == pytest.approx(expected, abs=1e-8)
+
+
+def test_parameters_of_each_noise():
+    problem = beam(GAUSSIAN, Telegraph(a=0.2, k=0.7))
+    assert [*problem.values][2:] == ["noise.axial.alpha", "noise.axial.sigma", "noise.lateral.a", "noise.lateral.k"]
+    solver = ExponentSolver(problem, rtol=1e-6)
+    slopes = solve_sensitivities(solver, np.array([2.0]), problem.derivatives(), indices=()).moments[0]
+    for key in problem.differentiable[1:]:
+        h = 1e-3 * problem.values[key]
+        above, below = (
+            ExponentSolver(problem.at({key: problem.values[key] + side * h}), rtol=1e-8).solution(2.0).pair.value
+            for side in (1, -1)
+        )
+        assert slopes[key].value == pytest.approx((above - below) / (2 * h), abs=1e-6)
+
+
+def test_second_orders_add_up():
+    """Λ − ε²Λ₂ falls like ε⁴, and Λ₂ is that of both noises less that of none."""
+    rates = "v", "-x - epsilon**2*0.1*v - epsilon*load*x - epsilon*sway*v"
+    rest = []
+    for epsilon in (0.05, 0.1):
+        system = PlaneSystem.of_equations(("x", "v"), rates, {"epsilon": epsilon}, noises=NAMES)
+        problem = Problem(system, {"axial": GAUSSIAN, "lateral": White(s=0.2)})
+        value = ExponentSolver(problem, rtol=1e-10).solution(2.0).pair.value
+        rest.append(value - second_order(problem).moment_exponent(2.0))
+    assert rest[1] / rest[0] == pytest.approx(16, rel=0.1)
+
+
+def test_what_several_noises_may_be():
+    with pytest.raises(ValueError, match="functions of at most 2 noises"):
+        Noises({name: OrnsteinUhlenbeck(alpha=1.0, sigma=0.1) for name in "abc"})
+    with pytest.raises(ValueError, match="algebraic tails"):
+        Noises({"a": NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.2), "b": GAUSSIAN})
+    with pytest.raises(TypeError, match="one noise with a name"):
+        Noises({"a": GAUSSIAN, "b": 0.1})
+    with pytest.raises(ValueError, match="the noises given are 'axial', 'sideways'"):
+        Problem(beam(GAUSSIAN, GAUSSIAN).system, {"axial": GAUSSIAN, "sideways": GAUSSIAN})
+    with pytest.raises(ValueError, match="one without a name"):
+        Problem(beam(GAUSSIAN, GAUSSIAN).system, GAUSSIAN)
+    turning = [CoefficientMatrix(1, ((0.0, 1.0), (0.0, 0.0)), identity, name) for name in "ab"]
+    system = PlaneSystem([CoefficientMatrix(0, STEADY), *turning], [Jump(math.pi / 2, -0.1)])
+    with pytest.raises(Exception, match="two noises with a density move the phase over the ray"):
+        ExponentSolver(Problem(system, {"a": GAUSSIAN, "b": GAUSSIAN})).solution(2.0)
