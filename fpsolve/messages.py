@@ -85,6 +85,10 @@ class Code(Enum):
         "failure: Λ″(0) does not exist: λ is {value:.6g} on the ray that the phase never leaves and across it, so that "
         "Λ″(p) jumps at p = 0"
     )
+    START_MATTERS = (
+        "note: Λ(p) for p < -1 depends on the start: the noise never moves the phase into a set around the slower "
+        "mode; what is given is that of starts there, for others it is smaller"
+    )
     INVARIANT_CLASSES = (
         "note: the phase never leaves the ray at {phase:.6g}: λ on it is {along:.6g}, across it {across:.6g}; Λ(p) is "
         "that of starts off such rays"

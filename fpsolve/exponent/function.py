@@ -19,7 +19,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget, misplaced
 from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, checked
-from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, missed
+from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, missed, of_the_start
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem, checked_moments, of_problem, of_problem_too
@@ -146,6 +146,7 @@ class MomentLyapunovFunction(Result):
             solver=self.solver,
             warnings=(*missed(self.solver, points, value, error), *misplaced(self.solver.mesh, self._pairs)),
             root=self.root(),
+            notes=of_the_start(self.solver, points),
         )
 
     def root(self) -> float | None:

@@ -314,7 +314,7 @@ class ExponentSolver:
             warnings=(*missed(self, found, value, errors), *misplaced(self.mesh, pairs)),
             failures=tuple(failures),
             rare=np.array([pair.p for pair in pairs if is_far_out(pair)]),
-            notes=carried_far_out(self, pairs),
+            notes=(*carried_far_out(self, pairs), *of_the_start(self, found)),
         )
 
     def estimate(self, solution: Solution) -> Estimate:
@@ -401,6 +401,16 @@ def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: Floa
     worst, remedy = int(np.argmax(shares)), Remedy.ROUNDING if solver.mesh is None else Remedy.MESH
     found = {"p": p[worst], "size": shares[worst]}
     return (Message(Code.RTOL_MISSED, rtol=solver.rtol, count=count, of=p.size, **found, remedy=remedy),)
+
+
+def of_the_start(solver: ExponentSolver, p: FloatArray) -> tuple[Message, ...]:
+    """That Λ(p) for p < −1 depends on it, or nothing.
+
+    On paths with singular values s₁ > s₂ of the matrix that moves x, starts in the cone of the faster mode grow as s₁,
+    and of those in that of the slower one a share s₂/s₁ stays there and grows as s₂: E s₁^p and E s₂^(p + 1)/s₁, which
+    are equal at p = −1.
+    """
+    return (Message(Code.START_MATTERS),) if np.any(p < -1) and solver.problem.has_cones else ()
 
 
 def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:

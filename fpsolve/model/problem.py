@@ -34,6 +34,7 @@ from fpsolve.model.plane import (
     combined,
     crosses_both_ways,
     is_driven,
+    phase_speed,
     turning,
 )
 from fpsolve.model.quantity import NOISE, Quantity
@@ -42,6 +43,8 @@ P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
 RATE = "1/time"
 """The unit of ξ for which those of parameters of noises are stated."""
+PHASES = 360
+"""At which it is seen which way the phase passes them."""
 LINE = 90
 """Letters of a line of parameters at most."""
 
@@ -218,6 +221,21 @@ class Problem:
             for phi in sorted(found)
             if all(abs(float(speed(phi))) <= limit for speed, limit in zip(speeds, limits, strict=True))
         )
+
+    @cached_property
+    def has_cones(self) -> bool:
+        """Whether the phase never enters some set, nor leaves another one: it passes some φ forward only, others back.
+
+        Bounded noise that hardly moves the two modes of a saddle does this: the sets are around the slower one, and
+        the faster one. Told for one noise.
+        """
+        noise = self.noise
+        if not noise.is_bounded or len(noise.parts) > 1 or self.diffusions or self.impulses or self.invariant_rays:
+            return False
+        speeds = phase_speed(self.motion, noise.reached)
+        phi = np.linspace(0, math.pi, PHASES, endpoint=False)
+        turns = [speeds(each) for each in phi]
+        return any(np.all(each > 0) for each in turns) and any(np.all(each < 0) for each in turns)
 
     @cached_property
     def classes(self) -> tuple[Problem, ...]:

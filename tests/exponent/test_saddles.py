@@ -5,7 +5,8 @@ import pytest
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem
 from fpsolve.arrays import identity
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import CoefficientMatrix, Problem
+from fpsolve.messages import Code
+from fpsolve.model import CoefficientMatrix, MarkovChain, Problem
 from fpsolve.model.noises import SineWiener
 from tests.conftest import sampled
 from tests.oracles.moment_hierarchy import ornstein_uhlenbeck_exponent, sine_wiener_exponent
@@ -36,3 +37,21 @@ def test_bounded_noise(steady):
     found = solver(steady, noise).solution(4.0)
     expected = sine_wiener_exponent(steady, ROTATION, noise.amplitude, noise.sigma, 4, 16)
     assert abs(found.pair.value - expected) <= found.error + 1e-10
+
+
+@pytest.mark.parametrize("noise", [SineWiener(amplitude=0.3, sigma=1.0), MarkovChain.telegraph(0.3, 1.0)])
+def test_starts_matter_below_minus_one(noise):
+    """A constant trace makes Λ even about −1, where another class takes over: that of starts around the slower mode."""
+    own = solver(SADDLE, noise)
+    found = own.moments([-3.0, -1.5, -0.5])
+    assert found.value[0] == pytest.approx(own.solution(1.0).pair.value, abs=1e-7)
+    assert found.value[1] == pytest.approx(found.value[2], abs=1e-7)
+    assert [note.code for note in found.notes] == [Code.START_MATTERS]
+    assert own.moments([-0.5]).notes == ()
+
+
+def test_phases_that_noise_turns_round_have_no_cones():
+    """|ξ| > 1 makes A a rotation; Gaussian noise is not bounded."""
+    assert not solver(SADDLE, SineWiener(amplitude=1.1, sigma=1.0)).problem.has_cones
+    assert solver(SADDLE, SineWiener(amplitude=0.9, sigma=1.0)).problem.has_cones
+    assert not solver(SADDLE, OrnsteinUhlenbeck(alpha=1.0, sigma=0.1)).problem.has_cones
