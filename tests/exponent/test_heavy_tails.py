@@ -271,7 +271,7 @@ def test_what_is_not_positive_is_no_value_of_heavy_tails(departure):
         moment_lyapunov(problem(0.5, 1.0, 1 + departure, 0.1, restitution=0.8, c1=1.0), -0.5)
 
 
-@pytest.mark.parametrize("seed", sampled(10, 6, 8, 14, 1, 94))
+@pytest.mark.parametrize("seed", sampled(10, 8, 94))
 def test_random_sets_next_to_gaussian_noise(seed):
     """A hundred, up to r₀ = 1.6: `python -m tests.random_heavy_tails`."""
     found = random_heavy_tails.outcome(seed)

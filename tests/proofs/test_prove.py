@@ -13,6 +13,7 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.proofs import objection, prove, prove_lyapunov_exponent, prove_stability_index, search
 from fpsolve.proofs.statement import statement_of
 from tests import random_proofs
+from tests.conftest import sampled
 
 FIG1 = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1, "D0": 1.0, "tau0": 0.5, "r0": 0.95}
 MIDDLE = {"omega": 1.3, "restitution": 0.75, "c1": -0.1, "epsilon": 0.5, "D0": 0.4, "tau0": 0.6, "r0": 0.9}
@@ -162,7 +163,7 @@ def test_numbers_that_are_none_are_refused(p, width):
         prove(problem(**FIG1), p, width=width)
 
 
-@pytest.mark.parametrize("seed", [103, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (102, 104, 105))])
+@pytest.mark.parametrize("seed", sampled(103, 104))
 def test_random_problems(seed):
     """A hundred others: `python -m tests.random_proofs`."""
     found = random_proofs.outcome(seed)
