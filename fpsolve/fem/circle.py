@@ -17,7 +17,8 @@ MORE_POINTS = 64
 class CircleAxis(NoiseAxis):
     """The waves 1, √2 cos kθ, √2 sin kθ, k ≤ n, in this order: ½σ²∂² is diagonal, ν∂ couples the two of each k.
 
-    Where ξ = μ cos θ, that of ξ has two diagonals on each side.
+    Where ξ = μ cos θ, that of ξ has two diagonals on each side. The two of each k are eliminated together: for
+    σ = 0 the pivot of one alone would be as singular as the problem with ξ = 0.
 
     Args:
         noise: it states ν as `nu`, σ as `sigma`, and ξ(θ) as `of_angle`.
@@ -30,6 +31,7 @@ class CircleAxis(NoiseAxis):
         super().__init__()
         self.size, self.noise = 2 * count + 1, noise
         self.modes = (np.arange(self.size) + 1) // 2
+        self.levels = [np.flatnonzero(self.modes == k) for k in range(count + 1)]
         self.cells, self.constant = np.zeros(self.size, dtype=int), np.eye(1, self.size)[0]
         points = 4 * count + MORE_POINTS
         self.points: FloatArray = np.arange(points) * (2 * np.pi / points)

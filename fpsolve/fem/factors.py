@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg.blas import dgemm, dtrsm
 from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse import identity
+from scipy.sparse import csr_matrix, identity
+from scipy.sparse.csgraph import shortest_path
 from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
@@ -21,6 +24,8 @@ MAX_DENSE_UNKNOWNS = 350
 MAX_BLOCK, MAX_BAND = 400, 6
 MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
+MAX_LEVEL = 0.2
+"""Share of the functions of the last axis that one level may have."""
 
 
 def one_thread() -> Any:
@@ -48,18 +53,28 @@ class Factors(Protocol):
         """x of A x = b, or of Aᵀx = b."""
 
 
-def factorised(operator: KroneckerSum) -> Factors:
-    """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted."""
+def factorised(operator: KroneckerSum, levels: Sequence[Any] = ()) -> Factors:
+    """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted.
+
+    Args:
+        operator: the sum.
+        levels: for each axis the functions that are eliminated together, see `Axis`; nothing where none are.
+    """
     if operator.size <= MAX_DENSE_UNKNOWNS and not operator.is_sparse:
         return DenseFactors(operator.toarray())
     m, n = operator.halves
-    if not operator.is_sparse and len(operator.shape) == 3:
-        if operator.shape[1] > n:
-            return SwappedFactors(operator)
-        if m <= MAX_THICK_BLOCK and operator.band <= MAX_BAND < n:
-            return BlockFactors(operator)
-    if not operator.is_sparse and m <= MAX_BLOCK and operator.band <= MAX_BAND < n:
+    if operator.is_sparse:
+        return SparseFactors(operator)
+    if len(operator.shape) == 3 and operator.shape[1] > n:
+        return SwappedFactors(operator, levels)
+    most = MAX_THICK_BLOCK if len(operator.shape) == 3 else MAX_BLOCK
+    own = levels[-1] if levels else None
+    if own is None and m <= most and operator.band <= MAX_BAND < n:
         return BlockFactors(operator)
+    if m <= MAX_BLOCK:
+        own = own or levels_of(operator)
+        if max(level.size for level in own) <= MAX_LEVEL * n:
+            return LevelFactors(operator, own)
     return SparseFactors(operator)
 
 
@@ -122,15 +137,63 @@ class BlockFactors:
 class SwappedFactors:
     """Those of a sum of three factors with the two last ones exchanged."""
 
-    def __init__(self, operator: KroneckerSum) -> None:
+    def __init__(self, operator: KroneckerSum, levels: Sequence[Any] = ()) -> None:
         self._shape = operator.shape
-        self._inner = factorised(KroneckerSum([(phase, last, first) for phase, first, last in operator.terms]))
+        swapped = KroneckerSum([(phase, last, first) for phase, first, last in operator.terms])
+        self._inner = factorised(swapped, levels and (levels[0], levels[2], levels[1]))
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         phase, first, last = self._shape
         swapped = b.reshape(phase, first, last).transpose(0, 2, 1).ravel()
         found = self._inner.solve(swapped, transposed=transposed)
         return found.reshape(phase, last, first).transpose(0, 2, 1).ravel()
+
+
+class LevelFactors:
+    """Block elimination over levels of the last axis, from the last on: its matrices only couple neighbours.
+
+    The unknowns of a level are its functions, each with all of the other axes.
+    """
+
+    def __init__(self, operator: KroneckerSum, levels: Sequence[Any]) -> None:
+        m, n = operator.halves
+        self._order = np.add.outer(np.concatenate(levels), n * np.arange(m)).ravel()
+        ends = np.cumsum([0, *(m * level.size for level in levels)])
+        self._parts = [slice(*pair) for pair in pairwise(ends.tolist())]
+        matrix = operator.tocsc()[:, self._order].tocsr()[self._order]
+        rows = [matrix[part] for part in self._parts]
+        self._up = [row[:, part] for row, part in zip(rows, self._parts[1:], strict=False)]
+        self._down = [row[:, part] for row, part in zip(rows[1:], self._parts, strict=False)]
+        self._pivots: list[DenseFactors] = []
+        for i in range(len(rows) - 1, -1, -1):
+            rest = rows[i][:, self._parts[i]].toarray(order="F")
+            if self._pivots:
+                rest -= self._up[i] @ self._pivots[-1].solve(self._down[i].toarray(order="F"))
+            self._pivots.append(DenseFactors(rest))
+        self._pivots.reverse()
+
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        up, down = self._up, self._down
+        if transposed:
+            up, down = ([each.T for each in side] for side in (down, up))
+        sorted_b = b[self._order]
+        rest = [sorted_b[part] for part in self._parts]
+        for i in range(len(rest) - 1, 0, -1):
+            rest[i - 1] -= up[i - 1] @ self._pivots[i].solve(rest[i], transposed=transposed)
+        for i, pivot in enumerate(self._pivots):
+            if i:
+                rest[i] -= down[i - 1] @ rest[i - 1]
+            rest[i] = pivot.solve(rest[i], transposed=transposed)
+        found = np.empty_like(b)
+        found[self._order] = np.concatenate(rest)
+        return found
+
+
+def levels_of(operator: KroneckerSum) -> list[Any]:
+    """The functions of the last axis by how many of its couplings lead to the first one."""
+    pattern = sum(abs(csr_matrix(last)) for _, last in operator.pairs)
+    distance = shortest_path(pattern + pattern.T, method="D", unweighted=True, indices=0)
+    return [np.flatnonzero(distance == d) for d in range(int(distance.max()) + 1)]
 
 
 class SparseFactors:

@@ -57,7 +57,7 @@ class Pencil:
 
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM: dense, by blocks along the last axis, or sparse."""
-        return factorised(self.matrix.shifted(shift))
+        return factorised(self.matrix.shifted(shift), [axis.levels for axis in self.space.axes])
 
 
 class Generator:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from fpsolve import moment_lyapunov, sensitivities
+from fpsolve import PlaneSystem, moment_lyapunov, sensitivities
 from fpsolve.arrays import identity
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.circle import CircleAxis
-from fpsolve.model import Bounded, ParametricOscillator, Problem, SineWiener, noise_kind
+from fpsolve.model import Bounded, CoefficientMatrix, ParametricOscillator, Problem, SineWiener, White, noise_kind
 from fpsolve.model.noise import NoiseDerivative
 from tests.conftest import sampled
 from tests.oracles import moment_hierarchy, phase_circle
@@ -117,6 +117,37 @@ def test_a_harmonic_load_alone_is_refused():
         of(sigma=0.0)
     with pytest.raises(ValueError, match="ξ would rest"):
         Bounded(1.0, 0.0, 0.0)
+
+
+def stochastic_mathieu(damping, mu, nu=2.0, sigma=0.0, s=0.3):
+    """ẍ + 2·damping·ẋ + (1 + μ cos νt + s Ẇ) x = 0, the phase of the load diffusing by σ."""
+    terms = [CoefficientMatrix(0, steady(damping)), *(CoefficientMatrix(1, DRIVEN, identity, name) for name in "lw")]
+    return Problem(PlaneSystem(terms), {"l": Bounded(mu, nu, sigma), "w": White(s)})
+
+
+@pytest.mark.parametrize(("damping", "mu", "expected"), [(0.05, 0.4, 0.1129960646376), (0.1, 0.3, -0.0352313732000)])
+def test_a_harmonic_load_and_white_noise(damping, mu, expected):
+    """Λ(2) by the multipliers of the moment equations, λ by Fourier series."""
+    solver, white = ExponentSolver(stochastic_mathieu(damping, mu)), [[0.0, 0.0], [-0.3, 0.0]]
+    found = solver.solution(2.0)
+    assert abs(found.pair.value - expected) < found.error + 1e-13 < 1e-8
+    at_four = moment_hierarchy.harmonic_exponent(steady(damping), DRIVEN, mu, 2.0, 4, white)
+    assert abs((found := solver.solution(4.0)).pair.value - at_four) < found.error + 1e-12 < 1e-8
+    exponent = solver.lyapunov_exponent()
+    made = phase_circle.bounded(steady(damping), DRIVEN, mu, 2.0, 0.0, 24, white)
+    assert abs(exponent.value - phase_circle.lyapunov_exponent(made, 60)) < exponent.error_estimate + 1e-12 < 1e-9
+
+
+def test_sensitivities_to_a_harmonic_load():
+    problem, white = stochastic_mathieu(0.05, 0.4, 1.9), [[0.0, 0.0], [-0.3, 0.0]]
+    [found] = sensitivities(problem, 2.0).moments
+
+    def of_load(mu, nu):
+        return moment_hierarchy.harmonic_exponent(steady(0.05), DRIVEN, mu, nu, 2, white)
+
+    assert found["noise.l.mu"].value == pytest.approx((of_load(0.4001, 1.9) - of_load(0.3999, 1.9)) / 2e-4, rel=1e-6)
+    assert found["noise.l.nu"].value == pytest.approx((of_load(0.4, 1.9001) - of_load(0.4, 1.8999)) / 2e-4, rel=1e-6)
+    assert found["noise.l.sigma"].value == 0
 
 
 @pytest.mark.parametrize("sigma", [0.03, 0.001])

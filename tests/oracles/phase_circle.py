@@ -86,8 +86,8 @@ def impulses(drift, driven, rate, sizes, shares):
     return made
 
 
-def bounded(steady, driven, mu, nu, sigma, harmonics):
-    """The same for ẋ = (A₀ + μ cos θ A₁)x, dθ = ν dt + σ dW, in exp(ikθ), |k| ≤ harmonics."""
+def bounded(steady, driven, mu, nu, sigma, harmonics, white=None):
+    """The same for dx = (A₀ + μ cos θ A₁)x dt + Bx∘dW₂, dθ = ν dt + σ dW, in exp(ikθ), |k| ≤ harmonics."""
     k = np.arange(-harmonics, harmonics + 1.0)
     half = np.full(k.size - 1, 0.5 * mu)
     cosine, one = sparse.diags_array([half, half], offsets=[1, -1]), sparse.eye_array(k.size)
@@ -96,8 +96,11 @@ def bounded(steady, driven, mu, nu, sigma, harmonics):
     def made(p, modes, log_factor):
         (x0, dx0), (x1, dx1) = (_moved(matrix, p, modes, log_factor) for matrix in (steady, driven))
         total = sparse.kron(one, x0) + sparse.kron(cosine, x1) + sparse.kron(turning, sparse.eye_array(2 * modes + 1))
-        constant = np.kron(np.eye(1, k.size, harmonics)[0], _constant(modes))
-        return total, sparse.kron(one, dx0) + sparse.kron(cosine, dx1), constant
+        slope = sparse.kron(one, dx0) + sparse.kron(cosine, dx1)
+        if white is not None:
+            x, dx = _moved(np.asarray(white, dtype=float), p, modes, log_factor)
+            total, slope = total + 0.5 * sparse.kron(one, x @ x), slope + 0.5 * sparse.kron(one, x @ dx + dx @ x)
+        return total, slope, np.kron(np.eye(1, k.size, harmonics)[0], _constant(modes))
 
     return made
 
