@@ -19,6 +19,7 @@ from fpsolve.errors import MeshError
 from fpsolve.fem.circle import CircleAxis
 from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
+from fpsolve.fem.pairs import PairAxis
 from fpsolve.model.frame import Frame
 from fpsolve.model.noise import Noise
 
@@ -122,7 +123,7 @@ class NoisePart:
         is_killed: whether paths that leave the cells are killed.
     """
 
-    kind: ClassVar[Literal["polynomials", "cells", "states", "waves"]]
+    kind: ClassVar[Literal["polynomials", "cells", "states", "waves", "pairs"]]
     lines: FloatArray
     degree: int
     slope: float
@@ -290,10 +291,30 @@ class Waves(Polynomials):
         return CircleAxis(noise, self.count)
 
 
+@dataclass(frozen=True, eq=False)
+class Pairs(Polynomials):
+    """Products of two Hermite polynomials.
+
+    Attributes:
+        count: above their total degree.
+    """
+
+    kind = "pairs"  # type: ignore[assignment]
+
+    @property
+    def size(self) -> int:
+        return self.count * (self.count + 1) // 2
+
+    def axis(self, noise: Noise, p: float) -> PairAxis:  # type: ignore[override]
+        return PairAxis(noise, self.count)
+
+
 def first_part(noise: Noise, digits: float) -> NoisePart:
     """A small one for so many digits, where no value of the noise is held."""
     if noise.basis == "waves":
         return Waves(round(digits / 2) + 4)
+    if noise.basis == "pairs":
+        return Pairs(round(digits / 2) + 3)
     return States(noise.reached.size) if noise.has_states else Polynomials(round(digits / 2) + 3)
 
 

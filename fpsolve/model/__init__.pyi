@@ -2,6 +2,7 @@ from .kinds import noise_kind as noise_kind
 from .kinds import system_kind as system_kind
 from .noise import Noise as Noise
 from .noises.bounded import Bounded as Bounded
+from .noises.filter import Filter as Filter
 from .noises.markov_chain import MarkovChain as MarkovChain
 from .noises.non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .noises.non_gaussian import ReducedNoise as ReducedNoise

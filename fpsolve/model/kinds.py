@@ -32,6 +32,7 @@ NOISES: Mapping[str, str] = {
     "telegraph": "telegraph:Telegraph",
     "markov-chain": "markov_chain:MarkovChain",
     "bounded": "bounded:Bounded",
+    "filter": "filter:Filter",
 }
 
 

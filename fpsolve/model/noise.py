@@ -35,6 +35,7 @@ class NoiseDerivative:
         states: ∂ξ_i/∂θ of a chain; empty where none moves.
         rates: ∂Q/∂θ of a chain; empty where none changes.
         turning: ∂ν/∂θ of a noise that is a function of an angle, with the speed ν.
+        drift: ∂M/∂θ of a noise that is a function of two linear ones; empty where it does not change.
     """
 
     log_diffusion: float = 0.0
@@ -44,6 +45,7 @@ class NoiseDerivative:
     states: tuple[float, ...] = ()
     rates: tuple[tuple[float, ...], ...] = ()
     turning: float = 0.0
+    drift: tuple[tuple[float, ...], ...] = ()
 
 
 class Noise(Parametrised):
@@ -104,10 +106,12 @@ class Noise(Parametrised):
         return math.isfinite(self.moments[1])
 
     @property
-    def basis(self) -> Literal["polynomials", "cells", "states", "waves"]:
+    def basis(self) -> Literal["polynomials", "cells", "states", "waves", "pairs"]:
         """What the functions of the noise are made of: orthogonal polynomials of P_s, cells of a line, states, waves.
 
         The waves are those of an angle, of which ξ is a function; the noise then states `nu`, `sigma` and `of_angle`.
+        Pairs are products of Hermite polynomials of u, du = −Mu dt + N dW with the stationary covariance 1 and
+        ξ = std u₁; the noise then states M as `drift_matrix`.
         """
         return "states" if self.has_states else "cells" if self.has_algebraic_tails else "polynomials"
 

@@ -1,4 +1,5 @@
 from .bounded import Bounded as Bounded
+from .filter import Filter as Filter
 from .markov_chain import MarkovChain as MarkovChain
 from .non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .non_gaussian import ReducedNoise as ReducedNoise
