@@ -57,6 +57,7 @@ class Noise(Parametrised):
         approximates_spectrum: whether `spectral_density` is that of a process which stands for this one.
         tails_beyond: the name of a parameter, the value above which P_s has algebraic tails, and what else to do.
         may_tilt: whether functions of ξ gain by a factor exp(s ξ), as where P_s falls to both sides.
+        has_peak: whether its spectral density may be largest, and very large, at a frequency of its own.
         is_white: whether it has no value; it then has one state, ξ = 0, and moves what it drives by diffusion, see
             `motion`, or by impulses.
         of_xi: the names of parameters whose unit is that of ξ, or made of it; it is stated for ξ in 1/time.
@@ -68,6 +69,7 @@ class Noise(Parametrised):
     approximates_spectrum: ClassVar[bool] = False
     tails_beyond: ClassVar[tuple[str, float, str] | None] = None
     may_tilt: ClassVar[bool] = True
+    has_peak: bool = False
     is_white: ClassVar[bool] = False
     of_xi: ClassVar[Sequence[str]] = ()
 

@@ -146,8 +146,16 @@ def second_order(problem: Problem) -> SecondOrder:
             )
     of_noise = []
     for name, matrix in driven.items():
-        density = problem.named_noise(name).spectral_density
-        of_noise.append((_growth(matrix, frame), density(0.0), density(2 * omega)))
+        noise, q = problem.named_noise(name), _growth(matrix, frame)
+        at_rest, at_twice = noise.spectral_density(0.0), noise.spectral_density(2 * omega)
+        most = 2 * noise.standard_deviation / system.epsilon  # that of ½S, as ln ‖x‖ grows at ε|q̂||ξ| at most
+        if noise.has_peak and not max(q.amplitude * at_twice, abs(q.mean) * at_rest) <= most:
+            raise NoPerturbationTheory(
+                f"perturbation theory is for noise of a band that is broad against its effect, but {noise.kind} noise "
+                f"has S(0) = {at_rest:.3g} and S({2 * omega:.3g}) = {at_twice:.3g} with the standard deviation "
+                f"{noise.standard_deviation:.3g}"
+            )
+        of_noise.append((q, at_rest, at_twice))
     for each in problem.diffusions:
         if each.order != 1:
             raise NoPerturbationTheory(f"perturbation theory is for white noise of order 1, not {each.order}")
@@ -216,6 +224,8 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
         raise NoPerturbationTheory(f"T₁ is for noise of mean 0, but it has {problem.noise.mean:g}")
     if len(problem.noise.parts) > 1:
         raise NoPerturbationTheory("T₁ is a function of one noise, but there are several")
+    if not problem.noise.is_drawn:
+        raise NoPerturbationTheory(f"T₁ is for noise that is a Markov process by itself, but not {problem.noise.kind}")
     frame, omega = _rotating_frame(matrix_at(problem.system, 0.0, slice(0, 1)))
     if not np.array_equal(frame, np.eye(2)):
         raise NoPerturbationTheory("T₁ is for a uniform rotation; choose coordinates in which the order 0 is one")

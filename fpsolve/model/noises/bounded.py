@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,30 @@ from fpsolve.model.faults import told_in_words
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.sine_wiener import SineWiener
 from fpsolve.model.parameters import SIZE, STRICT, parameter
+
+
+class TurningStep(NamedTuple):
+    """θ₁ = θ₀ + turn + kick ζ₁ and, of weak order 2, ξ̄ = μ fade cos θ̄, ζ normal.
+
+    θ̄ = ½(θ₀ + θ₁) + spread ζ₂ is the mean of θ over the step, and fade that of cos(θ − θ̄).
+    """
+
+    mu: float
+    turn: float
+    kick: float
+    spread: float
+    fade: float
+
+    @staticmethod
+    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+        """One step, see `Noise.step`; the rows of `xi` are ξ and θ."""
+        for i in range(xi_end.size):
+            start = xi[1, i]
+            end = start + step.turn + step.kick * rng.standard_normal()
+            middle = 0.5 * (start + end) + step.spread * rng.standard_normal()
+            xi[1, i] = end % (2 * math.pi)
+            xi_mean[i] = step.mu * step.fade * math.cos(middle)
+            xi_end[i] = step.mu * math.cos(end)
 
 
 @told_in_words
@@ -63,6 +87,10 @@ class Bounded(Noise):
     @property
     def basis(self) -> Literal["polynomials", "waves"]:
         return "waves" if self.nu else "polynomials"
+
+    @property
+    def has_peak(self) -> bool:  # type: ignore[override]
+        return self.nu > 0
 
     @property
     def is_random(self) -> bool:
@@ -118,6 +146,22 @@ class Bounded(Noise):
 
     def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
         return self.of_angle(rng.uniform(0, 2 * math.pi, size))
+
+    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """ξ and θ, shape (2, size)."""
+        theta = rng.uniform(0, 2 * math.pi, size)
+        return np.array([self.of_angle(theta), theta])
+
+    def step(self, h: float, bias: float = 0.0) -> TurningStep:
+        """Without a bias."""
+        kick = self.sigma * math.sqrt(h)
+        fade = math.exp(-(kick**2) / 12) * float(np.sinc(0.5 * self.nu * h / math.pi))
+        return TurningStep(self.mu, self.nu * h, kick, kick / math.sqrt(12), fade)
+
+    @property
+    def largest_step(self) -> float:
+        """A tenth of the times in which the phase diffuses by 1, and of those in which it turns by π."""
+        return min(0.1 / self.sigma**2 if self.sigma else math.inf, 0.1 * math.pi / self.nu if self.nu else math.inf)
 
     def derivative(self, name: str) -> NoiseDerivative:
         """∂/∂μ stretches ξ, ∂/∂ν turns its phase, and ∂/∂σ is that of σ alone; Λ is even in ν and in σ."""
