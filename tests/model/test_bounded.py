@@ -8,12 +8,17 @@ from scipy.integrate import simpson
 
 from fpsolve import PlaneSystem, moment_lyapunov, sensitivities
 from fpsolve.arrays import identity
+from fpsolve.errors import NoPerturbationTheory
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.circle import CircleAxis
 from fpsolve.model import Bounded, CoefficientMatrix, ParametricOscillator, Problem, SineWiener, White, noise_kind
 from fpsolve.model.noise import NoiseDerivative
+from fpsolve.simulation.motions import draw
+from fpsolve.theory.perturbation import second_order
+from tests import random_bounded
 from tests.conftest import sampled
 from tests.oracles import moment_hierarchy, phase_circle
+from tests.random_simulations import MOST, outcome
 
 DRIVEN = [[0.0, 0.0], [-1.0, 0.0]]
 
@@ -164,3 +169,43 @@ def test_fast_noise_is_white():
     sizes = np.array([64.0, 128.0, 256.0])
     gaps = [moment_lyapunov(of(mu=0.5 * s, sigma=s), 2.0).value[0] - white for s in sizes]
     assert -np.diff(np.log(np.abs(gaps))) / math.log(2) == pytest.approx(2.0, abs=0.02)
+
+
+def test_a_step_has_the_transition_of_the_noise(rng):
+    """Given θ₀: E ξ₁ = μ e^{−½σ²h} cos(θ₀ + νh), E ξ̄ is its mean over the step, and θ stays uniform."""
+    noise, h, n = Bounded(mu=0.8, nu=2.5, sigma=1.1), 0.05, 400_000
+    state, mean, end = np.array([np.full(n, 0.8 * math.cos(0.4)), np.full(n, 0.4)]), np.empty(n), np.empty(n)
+    draw(noise.step(h), state, mean, end, np.zeros(n), rng)
+    power = complex(-0.5 * 1.1**2, 2.5)
+    expected = 0.8 * np.exp(0.4j) * np.array([np.exp(power * h), (np.exp(power * h) - 1) / (power * h)])
+    assert end.mean() == pytest.approx(expected[0].real, abs=4 * end.std() / math.sqrt(n))
+    assert mean.mean() == pytest.approx(expected[1].real, abs=4 * mean.std() / math.sqrt(n) + 1e-6)
+    np.testing.assert_allclose(end, 0.8 * np.cos(state[1]), atol=1e-14)
+    state = noise.start(n, rng)
+    np.testing.assert_allclose(state[0], 0.8 * np.cos(state[1]), atol=1e-14)
+    draw(noise.step(1.0), state, mean, end, np.zeros(n), rng)
+    assert abs(np.exp(1j * state[1]).mean()) < 4 / math.sqrt(n)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_random_systems(seed):
+    """Sixty: `python -m tests.random_bounded`."""
+    solution, value, doubt, _ = random_bounded.compared(seed)
+    assert abs(solution.pair.value - value) <= solution.error + doubt
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_simulations(seed):
+    """Ten: `python -m tests.random_bounded simulate`."""
+    assert abs(outcome(random_bounded.problem_of(*random_bounded.drawn(seed)), paths=2048).deviation) < MOST
+
+
+def test_in_resonance_perturbation_theory_measures_no_errors():
+    """S(2ω) → ∞ as σ → 0, where ln ‖x‖ grows by no more than ½μ all the same."""
+    for sigma in (0.3, 1e-3):
+        scale = ExponentSolver(of(sigma=sigma)).scale(2.0)
+        assert 0.05 < scale < 1.0
+    with pytest.raises(NoPerturbationTheory, match="broad against its effect"):
+        second_order(of(sigma=0.3))
+    assert second_order(of(nu=5.0, sigma=0.1)).quadratic > 0
