@@ -224,6 +224,11 @@ class Noise(Parametrised):
         raise NotImplementedError
 
     @property
+    def marks(self) -> Sequence[float]:
+        """What numbers in `step` stand for: the values of states, or the sizes of impulses; nothing for others."""
+        return ()
+
+    @property
     def is_simulated(self) -> bool:
         """Whether this kind states a `step`."""
         return type(self).step is not Noise.step

@@ -175,7 +175,7 @@ class Population(_Paths):
         plan = self.plan
         bonus = 0.5 * (plan.noise.diffusion * self.bias) ** 2 * plan.step if self._is_biased else 0.0
         advance_population(
-            plan.motion, plan.noise.step(plan.step, self.bias), plan.step, *self.state, self._log_weights,
+            plan.motion, plan.known.noise_step(plan.step, self.bias), plan.step, *self.state, self._log_weights,
             self._ancestors, (self.p, self.bias, bonus), steps, self._interval, self._log_z, self.rng,
         )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System, affine, is_steady, matrix_at, squared_frequency
+from fpsolve.model.plane import System, affine, is_driven, is_steady, matrix_at, squared_frequency
 from fpsolve.simulation.motions import DrivenMotion, Rays, StruckMotion, SwitchedMotion
+from fpsolve.simulation.several import SplitMotion, drivers
 
 _FAR = 5.0
 """Standard deviations at which noise held to one side is compared with noise held to the other."""
@@ -64,13 +66,80 @@ class Coefficients:
             steady = steady + _UNRESOLVED * h * double
         return DrivenMotion(_rows(np.array([steady, driven, _commutator(steady, driven), double])), self.rays)
 
+    def noise_step(self, h: float, bias: float = 0.0) -> Any:
+        """The step of the noise, see `Noise.step`."""
+        return self.noise.step(h, bias)
+
     def spread(self, h: float) -> float:
         """The standard deviation of what the noise adds to ln‖x‖ in a time h that it takes no note of."""
         return self.fluctuation * (math.sqrt(h) if self.noise.is_white else h)
 
 
+@dataclass(frozen=True)
+class SplitCoefficients(Coefficients):
+    """A system as several noises move it; `driven` has a matrix for each, shape (noises, 2, 2), s with those of white.
+
+    Attributes:
+        sizes: the standard deviation of ‖A_k‖ξ_k of each; of white noise in a unit of time.
+    """
+
+    sizes: Sequence[tuple[float, bool]] = ()
+
+    @property
+    def is_exact(self) -> bool:
+        return False
+
+    def motion(self, h: float) -> SplitMotion:  # type: ignore[override]
+        return SplitMotion(_rows(np.concatenate([self.steady[None], self.driven])), self.rays)
+
+    def noise_step(self, h: float, bias: float = 0.0) -> Any:
+        return drivers(self.noise.parts, h)
+
+    def spread(self, h: float) -> float:
+        return math.sqrt(sum(size**2 * (h if is_white else h**2) for size, is_white in self.sizes))
+
+
+def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
+    """The matrices of a system under several noises."""
+    moved, _ = noise.motion(system)
+    steady, driven, sizes = np.zeros((2, 2)), list[FloatArray](), list[tuple[float, bool]]()
+    for term in moved.terms:
+        if line := affine(term.g):
+            steady += line[0] * system.epsilon**term.order * np.array(term.matrix)
+    even = _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)))
+    back, intensity = np.linalg.inv(even), 0.0
+    for name, part in noise.parts.items():
+        own = [term for term in system.terms if is_driven(term.g) and term.noise == name]
+        total = sum(
+            (line[1] * system.epsilon**term.order * np.array(term.matrix) for term in own if (line := affine(term.g))),
+            np.zeros((2, 2)),
+        )
+        size = float(np.linalg.norm(even @ total @ back, 2))
+        if part.is_white:
+            sizes.append((size * math.sqrt(part.spectral_density(0.0)), True))
+            driven.append(total if len(part.marks) else total * math.sqrt(part.spectral_density(0.0)))
+            intensity += sizes[-1][0] ** 2
+        else:
+            sizes.append((size * part.standard_deviation, False))
+            driven.append(total)
+            intensity += 2 * sizes[-1][0] ** 2 * part.correlation_time
+    free = even @ matrix_at(moved, 0.0, slice(0, 1)) @ back
+    return SplitCoefficients(
+        noise,
+        even @ steady @ back,
+        even @ np.array(driven) @ back,
+        0.0,
+        math.sqrt(intensity),
+        math.pi / _rate(free, intensity),
+        _rays(system, noise, even, even @ steady @ back),
+        sizes=sizes,
+    )
+
+
 def coefficients(system: System, noise: Any) -> Coefficients:
     """The matrices of a system under a noise that can be simulated."""
+    if len(noise.parts) > 1:
+        return split_coefficients(system, noise)
     moved, diffusions = noise.motion(system)
     is_switched = noise.has_states and not noise.is_white
     driven = np.zeros((2, 2))

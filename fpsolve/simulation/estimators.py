@@ -191,7 +191,7 @@ def simulate(
     plan = Plan(
         known=known,
         motion=known.motion(h),
-        noise_step=noise.step(h),
+        noise_step=known.noise_step(h),
         step=h,
         p=np.atleast_1d(np.array(p, dtype=float)),
         estimator=estimator,

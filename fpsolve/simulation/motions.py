@@ -315,7 +315,7 @@ def step_switched(m, chain, h, x, u, states, log_norm, rng):  # type: ignore[no-
         while left > 0:
             stay = rng.standard_exponential() / chain.leaving[k]
             t = min(stay, left)
-            x[i], u[i], log, count = _exact_flow(m, k, t, x[i], u[i])
+            x[i], u[i], log, count = exact_flow(m, k, t, x[i], u[i])
             log_norm[i] += log
             crossed += count
             left -= stay
@@ -343,7 +343,7 @@ def step_struck(m, law, h, x, u, log_norm, rng):  # type: ignore[no-untyped-def]
         left = h
         while left > 0:
             stay = rng.standard_exponential() / law.rate
-            x[i], u[i], log, count = _exact_flow(m, 0, min(stay, left), x[i], u[i])
+            x[i], u[i], log, count = exact_flow(m, 0, min(stay, left), x[i], u[i])
             crossed += count
             left -= stay
             if left > 0:
@@ -360,7 +360,7 @@ def step_struck(m, law, h, x, u, log_norm, rng):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _exact_flow(m, k, t, x, u):  # type: ignore[no-untyped-def]
+def exact_flow(m, k, t, x, u):  # type: ignore[no-untyped-def]
     """exp(A t) x: its direction, the growth of the norm beyond it, and the crossings, none of which is overlooked."""
     half_trace, p, q, r = m.matrices[k]
     square, log, turns = p * p + q * r, half_trace * t, 0

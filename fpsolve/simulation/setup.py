@@ -11,11 +11,13 @@ import numpy as np
 from fpsolve.arrays import FloatArray, is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System, affine, written_coefficient
+from fpsolve.model.plane import System, affine, is_steady, written_coefficient
 from fpsolve.model.problem import Problem, refuse_infinite
 from fpsolve.simulation.coefficients import coefficients
 
 Estimator = Literal["direct", "population"]
+SPLIT = 0.06
+"""The turn, growth or kick in one step at most where several noises move the state in turn."""
 BATCHES = 32
 """Independent sets of paths, from whose differences the errors are read."""
 PATHS, TRANSIENTS = 32_768, 64
@@ -34,13 +36,14 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
         FpsolveError: they cannot.
     """
     system, noise = problem.system, problem.noise
-    if len(noise.parts) > 1:
-        raise FpsolveError("simulation is for one noise, but there are several; use the finite elements")
+    if len(noise.parts) > 1 and any(jump.log_factor and not is_steady(system, jump) for jump in system.jumps):
+        told = "simulation of several noises is for walls over which none of them moves the phase"
+        raise FpsolveError(f"{told}; use the finite elements")
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")
     bent = [term.g for term in system.terms if affine(term.g) is None]
-    if bent and not noise.has_states:
+    if bent and (not noise.has_states or len(noise.parts) > 1):
         found = f"but one has g = {written_coefficient(bent[0]).strip()}"
         need = f"terms that are a + b*xi under a {type(noise).__name__}, {found}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")
@@ -78,6 +81,16 @@ def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
         return 0.5 * known.half_turn / math.pi, "the frequency"
     turn = 0.5 * (known.steady[0, 1] - known.steady[1, 0])
     rest = float(np.linalg.norm(known.steady - turn * np.array([[0.0, 1.0], [-1.0, 0.0]]), 2))  # may underflow
+    if len(noise.parts) > 1:
+        strengths = [SPLIT / (size**2 if is_white else size) for size, is_white in known.sizes if size]  # type: ignore[attr-defined]
+        split = {
+            "the frequency": 2 * SPLIT / abs(turn) if turn else math.inf,
+            "the damping": SPLIT / rest if rest else math.inf,
+            "the strength of the noise": min(strengths, default=math.inf),
+            "the correlation time of the noise": 0.2 * noise.largest_step,
+        }
+        reason = min(split, key=lambda name: split[name])
+        return split[reason], reason
     driven = float(np.linalg.norm(known.driven, 2))
     limits = {
         "the frequency": 0.5 / abs(turn) if turn else math.inf,

@@ -107,6 +107,10 @@ class Chain(Noise):
         return ChainStep(leaving, np.where(reached >= reached[:, -1:], 1.0, reached))
 
     @property
+    def marks(self) -> Sequence[float]:
+        return self.states
+
+    @property
     def largest_step(self) -> float:
         """∞: no step is made."""
         return math.inf

@@ -133,6 +133,10 @@ class Poisson(Noise):
         return PoissonStep(self.rate, np.append(np.cumsum(self.shares)[:-1], 1.0))
 
     @property
+    def marks(self) -> Sequence[float]:
+        return self.sizes
+
+    @property
     def largest_step(self) -> float:
         """∞: no step is made."""
         return math.inf

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from fpsolve.arrays import shown
+import numpy as np
+
+from fpsolve.arrays import FloatArray, shown
 from fpsolve.messages import Message
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import CoefficientMatrix, Impulse, ImpulseDerivative, LinearMotion, System, is_driven
@@ -142,6 +144,10 @@ class Noises(Noise):
     @property
     def longest_jump(self) -> int:
         return max(noise.longest_jump for noise in self._valued)
+
+    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """The states of all, row by row."""
+        return np.vstack([noise.start(size, rng) for _, noise in self.named])
 
     @property
     def is_simulated(self) -> bool:

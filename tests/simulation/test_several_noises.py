@@ -1,0 +1,89 @@
+"""Paths under several noises at once: the flow of each is exact, and all together agree with the elements."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, simulate
+from fpsolve.arrays import identity
+from fpsolve.errors import FpsolveError
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model import CoefficientMatrix, Jump, Poisson, Telegraph, White
+from fpsolve.simulation.coefficients import coefficients
+from fpsolve.simulation.kernels import advance
+from fpsolve.simulation.setup import default_step, starting_state
+from tests.exponent.test_several_noises import NAMES, RATES, beam
+
+GAUSSIAN = OrnsteinUhlenbeck(alpha=1.0, sigma=0.6)
+
+
+SLOW = pytest.mark.slow  # each kind is compiled anew
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [
+        pytest.param(White(s=0.4), marks=SLOW),
+        Telegraph(a=0.5, k=1.5),
+        pytest.param(Poisson(rate=2.0, sizes=(-0.3, 0.2)), marks=SLOW),
+    ],
+)
+def test_a_flow_alone_is_exact(noise):
+    """ẋ = ξx and ẏ = ηy: ln x and ln y are the integrals of the noises, with their means and variances."""
+    rates = "load*x", "sway*v"
+    system = PlaneSystem.of_equations(("x", "v"), rates, noises=NAMES)
+    noises = Problem(system, {"axial": GAUSSIAN, "lateral": noise}).noise
+    known, n, h = coefficients(system, noises), 20_000, 0.5
+    rng = np.random.default_rng(7)
+    x, u, state = np.ones(n), np.ones(n), noises.start(n, rng)
+    log_norm, push = np.zeros((2, n))
+    advance(known.motion(h), known.noise_step(h), h, x, u, state, log_norm, push, 4, 1, rng)
+    for values, law in ((np.log(x) + log_norm, GAUSSIAN), (np.log(u) + log_norm, noise)):
+        if law.is_white:
+            variance, mean = 2.0 * law.spectral_density(0.0), 2.0 * sum(law.marks) / max(len(law.marks), 1)
+            mean *= getattr(law, "rate", 0.0)
+        else:
+            tau = law.correlation_time
+            variance, mean = 2 * law.standard_deviation**2 * tau * (2.0 - tau * -math.expm1(-2.0 / tau)), 0.0
+        assert np.mean(values) == pytest.approx(mean, abs=4 * math.sqrt(variance / n))
+        assert np.var(values) == pytest.approx(variance, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [
+        Telegraph(a=0.3, k=0.7),
+        pytest.param(White(s=0.3, interpretation="ito"), marks=SLOW),
+        pytest.param(Poisson(rate=1.0, sizes=(-0.3, 0.3)), marks=SLOW),
+    ],
+)
+def test_exponents_agree_with_the_elements(noise):
+    problem = beam(GAUSSIAN, noise)
+    found = simulate(problem, 0.5, paths=1024, time=300.0, seed=3)
+    exact = ExponentSolver(problem, rtol=1e-6)
+    [moment] = found.estimates
+    assert abs(moment.value - exact.solution(0.5).pair.value) < 4 * moment.standard_error
+    assert abs(found.lyapunov_exponent - exact.lyapunov_exponent().value) < 4 * found.lyapunov_exponent_error
+
+
+def test_impacts_at_a_wall_are_counted():
+    wall = [{"at": "x = 0", "restitution": 0.9}]
+    system = PlaneSystem.of_equations(("x", "v"), RATES, {"omega": 1.0, "zeta": 0.0}, noises=NAMES, walls=wall)
+    noises = Problem(system, {"axial": White(s=1e-9), "lateral": White(s=1e-9)}).noise
+    rng, h = np.random.default_rng(1), default_step(system, noises)
+    known = coefficients(system, noises)
+    x, u, state = starting_state(noises, 8, rng)
+    log_norm, push = np.zeros((2, 8))
+    steps = round(20 * math.pi / h)
+    count = advance(known.motion(h), known.noise_step(h), h, x, u, state, log_norm, push, steps, 4, rng)
+    assert count == 8 * 20
+    np.testing.assert_allclose(log_norm, 20 * math.log(0.9), atol=1e-6)
+
+
+def test_noise_that_moves_the_phase_over_a_wall_is_refused():
+    free, moved = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.1), (0.0, 0.0))
+    terms = [CoefficientMatrix(0, free), *(CoefficientMatrix(1, moved, identity, name) for name in "ab")]
+    system = PlaneSystem(terms, [Jump(math.pi / 2, -0.1)])
+    with pytest.raises(FpsolveError, match="none of them moves the phase"):
+        simulate(Problem(system, {"a": GAUSSIAN, "b": Telegraph(a=0.1, k=1.0)}), 1.0)
