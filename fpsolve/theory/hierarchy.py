@@ -30,7 +30,8 @@ def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
         NoHierarchy: the equations do not close for this problem and this p, or are too many.
     """
     refuse_open_hierarchy(problem, p)
-    noises, order, rates = problem.coloured.parts.values(), int(p), np.zeros((1, 1))
+    noises, order = problem.coloured.parts.values(), int(p)
+    rates: FloatArray = np.zeros((1, 1))
     states = problem.at_values([noise.reached for noise in noises])  # ξ = 0 of white noise
     for noise in noises:
         own = np.array(noise.rates)  # type: ignore[attr-defined]
