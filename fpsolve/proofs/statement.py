@@ -136,6 +136,8 @@ def statement_of(problem: Problem, stated: Parameters | None = None) -> Statemen
     if stated is None:
         stated = {key: str(value) for key, value in linear_values(problem).items()}
     system, noise = problem.system, problem.noise
+    if len(noise.parts) > 1:
+        raise TypeError(f"got the noises {' and '.join(noise.parts)} at once; proofs are for one noise")
     is_told = is_ours(system) and system.exact_motion(_named(system, stated)) is not None
     is_law_told = is_ours(noise) and noise.exact_law(_named(noise, stated)) is not None
     motion, chain = None if is_told else MotionRecord.of(system), None if is_law_told else ChainRecord.of(noise)

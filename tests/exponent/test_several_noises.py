@@ -10,6 +10,7 @@ from fpsolve.analysis.sensitivity import solve_sensitivities
 from fpsolve.arrays import identity
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Jump, Noises, Poisson, SineWiener, Telegraph, White
+from fpsolve.proofs.statement import statement_of
 from fpsolve.theory.hierarchy import hierarchy_exponent
 from fpsolve.theory.perturbation import second_order
 from tests.oracles.moment_hierarchy import chain, gaussian, several_exponent
@@ -124,6 +125,8 @@ def test_what_several_noises_may_be():
         Problem(beam(GAUSSIAN, GAUSSIAN).system, {"axial": GAUSSIAN, "sideways": GAUSSIAN})
     with pytest.raises(ValueError, match="one without a name"):
         Problem(beam(GAUSSIAN, GAUSSIAN).system, GAUSSIAN)
+    with pytest.raises(TypeError, match="got the noises axial and lateral at once; proofs are for one noise"):
+        statement_of(beam(Telegraph(a=0.2, k=1.0), White(s=0.1)))
     turning = [CoefficientMatrix(1, ((0.0, 1.0), (0.0, 0.0)), identity, name) for name in "ab"]
     system = PlaneSystem([CoefficientMatrix(0, STEADY), *turning], [Jump(math.pi / 2, -0.1)])
     with pytest.raises(Exception, match="two noises with a density move the phase over the ray"):
