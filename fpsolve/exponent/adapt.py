@@ -41,7 +41,7 @@ from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import System, Xi, phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.far import Place, far_places, grows_far_out, outlook
-from fpsolve.theory.frozen import FURTHEST, frozen_noise
+from fpsolve.theory.frozen import FURTHEST, frozen_noise, steady_places
 
 LOOSE = 1e-3
 """Share of the rates within which a place is solved before it is compared with others."""
@@ -504,7 +504,13 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
             for each in known
         ]
         phase = _phase(system, problem.at_values(typical), digits)
-        return Discretisation(phase, tuple(first_part(each, digits) for each in known))
+        chosen = Discretisation(phase, tuple(first_part(each, digits) for each in known))
+        if noise.basis != "pairs":
+            return chosen
+        if center is None:
+            center = float(steady_places(problem, p)[0][0])
+        pull = noise.standard_deviation**2 * center / noise.spectral_density(0.0) if center else 0.0
+        return chosen.with_noise(replace(chosen.noise, slope=pull / p))
     unit, center = noise.standard_deviation, frozen.center(p) if center is None else center
     end = noise.half_width / unit
     phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
@@ -590,8 +596,12 @@ def other_center(pair: PrincipalPair) -> float | None:
     Between two such places slow noise hardly ever passes: each has its own pair with T > 0 as far as that can be
     told, and only the larger eigenvalue is Λ. For algebraic tails see `other_places`.
     """
-    frozen = frozen_noise(pair.generator.problem)
-    if frozen is None or pair.generator.problem.coloured.has_algebraic_tails:
+    frozen, noise = frozen_noise(pair.generator.problem), pair.generator.problem.coloured
+    if noise.basis == "pairs":
+        z, rate = steady_places(pair.generator.problem, pair.p)
+        far = (np.abs(z - pair.space.xi.center) > 5) & (rate > comparable(pair.value))
+        return float(z[far][0]) if np.any(far) else None
+    if frozen is None or noise.has_algebraic_tails:
         return None
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:

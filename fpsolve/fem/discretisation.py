@@ -297,6 +297,7 @@ class Pairs(Polynomials):
 
     Attributes:
         count: above their total degree.
+        slope: g/p of the factors that they carry, see `pairs`.
     """
 
     kind = "pairs"  # type: ignore[assignment]
@@ -306,7 +307,7 @@ class Pairs(Polynomials):
         return self.count * (self.count + 1) // 2
 
     def axis(self, noise: Noise, p: float) -> PairAxis:  # type: ignore[override]
-        return PairAxis(noise, self.count)
+        return PairAxis(noise, self.count, self.slope * p)
 
 
 def first_part(noise: Noise, digits: float) -> NoisePart:

@@ -36,6 +36,18 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
     return np.where(turns, turning, faster), np.where(turns, turning, slower), turns
 
 
+def steady_places(problem: Problem, p: float) -> tuple[FloatArray, FloatArray]:
+    """z at which paths that hold slow Gaussian noise grow the fastest, the best first, and the rates pG − ξ²/2S(0)."""
+    noise = problem.coloured
+    unit, spectrum = noise.standard_deviation, noise.spectral_density(0.0)
+    reach = 2 * abs(p) * noise_strength(problem.system) * spectrum
+    xi = reach * np.linspace(-1, 1, SAMPLES)
+    rate = p * eigenvalues_at(problem, xi)[0] - (xi**2 / (2 * spectrum) if spectrum else 0.0)
+    at = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
+    at = at[np.argsort(-rate[at])] if at.size else np.array([SAMPLES // 2])
+    return xi[at] / unit, rate[at]
+
+
 class FrozenNoise:
     """The growth rate F(z; p) of ‖x‖^p on paths that hold the noise at z, and where it is the largest.
 

@@ -119,6 +119,17 @@ def test_the_functions():
     np.testing.assert_allclose(axis.mass(lambda xi: xi**3), (values * (measure * g)[:, None]).T @ values, atol=1e-12)
 
 
+def test_the_factors_of_the_functions():
+    """(L + gu₁) e^{r·u} = ½g²S(0)/Var(ξ) e^{r·u}, also of the adjoint."""
+    axis, pull = PairAxis(MIXED, 5, 0.7), 0.7
+    driven = axis.generator() + pull / MIXED.standard_deviation * axis.mass(lambda xi: xi)
+    rate = 0.5 * pull**2 * MIXED.spectral_density(0.0) / MIXED.standard_deviation**2
+    for matrix in (driven, driven.T):
+        np.testing.assert_allclose(matrix[:, 0], rate * np.eye(axis.size)[0], atol=1e-12)
+    np.testing.assert_allclose(axis.generator_of_one(), axis.generator()[0], atol=0)
+    assert axis.mass(lambda xi: xi)[0, 0] == pytest.approx(axis.unit * axis.center, rel=1e-12)
+
+
 @pytest.mark.parametrize("noise", [MIXED, Filter(0.8, 2.5, 0.3, 0.0, -1.0), Filter(2.0, 1.0, 0.3, 1.0, 0.2)])
 def test_a_step_has_the_transition_of_the_filter(noise):
     """The flow and the covariance of (w₁, u₁, ū), from du = ωw dt and dw = −ω(u + 2ζw) dt + 2√(ζω) dW."""
@@ -203,8 +214,12 @@ def test_derivatives_of_the_mean_square():
 
 @pytest.mark.slow
 def test_sensitivities():
-    found = sensitivities(oscillator(MIXED), [2.0], rtol=1e-8)
-    assert len(found.parameters) == 8
+    problem = oscillator(MIXED)
+    found = sensitivities(problem, [2.0], rtol=1e-8).to_xarray()
+    pair = ExponentSolver(problem, rtol=1e-9).solution(2.0).pair
+    for key in ("omega", "zeta", "s", "c0", "c1"):
+        slope = found.moment_by_theta.sel(parameter=f"noise.{key}").item()
+        assert slope == pytest.approx(changed_value(pair, problem.derivative(f"noise.{key}")).value, abs=1e-8)
 
 
 def test_the_sign_of_the_output_has_no_part():
@@ -224,6 +239,20 @@ def test_random_filters(seed):
     """Twenty: `python -m tests.random_filters`."""
     solution, value, doubt, _ = random_filters.compared(seed)
     assert abs(solution.pair.value - value) <= solution.error + doubt
+
+
+@pytest.mark.slow
+def test_a_strong_slow_filter():
+    """The functions carry a factor, with which a twentieth of the unknowns does; and ∂Λ/∂θ where they do."""
+    solution, value, doubt, _ = random_filters.compared(20)
+    assert abs(solution.pair.value - value) <= solution.error + doubt
+    assert solution.pair.right.size < 6000
+    problem, h = random_filters.problem_of(*random_filters.drawn(20)), 1e-4
+    pair = ExponentSolver(problem, rtol=1e-9).solution(2.0).pair
+    for key in ("noise.omega", "noise.zeta", "noise.s", "noise.c0", "noise.c1"):
+        sides = [problem.at({key: problem.values[key] + side * h}) for side in (1, -1)]
+        more, less = (ExponentSolver(each, rtol=1e-9).solution(2.0).pair.value for each in sides)
+        assert changed_value(pair, problem.derivative(key)).value == pytest.approx((more - less) / (2 * h), rel=1e-4)
 
 
 @pytest.mark.slow
