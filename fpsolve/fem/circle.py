@@ -34,7 +34,7 @@ class CircleAxis(NoiseAxis):
         self.levels = [np.flatnonzero(self.modes == k) for k in range(count + 1)]
         self.cells, self.constant = np.zeros(self.size, dtype=int), np.eye(1, self.size)[0]
         points = 4 * count + MORE_POINTS
-        self.points: FloatArray = np.arange(points) * (2 * np.pi / points)
+        self.points = np.asarray(np.arange(points) * (2 * np.pi / points), dtype=float)
         self.values, self.measure = self.values_at(self.points), np.full(points, 1 / points)
         self._xi = noise.of_angle(self.points)
         self.support = np.array([self._xi.min(), self._xi.max()])

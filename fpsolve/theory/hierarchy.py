@@ -35,7 +35,7 @@ def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
     states = problem.at_values([noise.reached for noise in noises])  # ξ = 0 of white noise
     for noise in noises:
         own = np.array(noise.rates)  # type: ignore[attr-defined]
-        rates = np.kron(rates, np.eye(len(own))) + np.kron(np.eye(len(rates)), own)
+        rates = np.asarray(np.kron(rates, np.eye(len(own))) + np.kron(np.eye(len(rates)), own), dtype=float)
     total = np.kron(rates.T, np.eye(order + 1))
     diffused = [
         _moved(problem.system.epsilon**each.order * np.array(each.matrix), order) for each in problem.diffusions

@@ -237,14 +237,14 @@ def test_what_is_wrong_with_a_plane_system(tmp_path: Path, old: str, new: str, w
 
 
 def test_a_chain_from_a_file(tmp_path: Path) -> None:
-    """It has states and no surfaces over (φ, ξ)."""
+    """Its eigenfunctions are strips over φ, one for each state."""
     noise = '[noise]\nkind = "markov-chain"\nstates = [-0.5, 0.5]\nrates = [[-1, 1], [1, -1]]\n'
     path = write(tmp_path, OSCILLATOR, noise, MOMENTS)
     case = load_case(path)
     assert case.noise == MarkovChain.telegraph(0.5, 1.0)
     assert case.oscillator == VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
     assert solved(path, tmp_path / "out")
-    assert not list((tmp_path / "out/kinds").glob("*.pvd"))
+    assert (tmp_path / "out/kinds/eigenfunctions.pvd").is_file()
 
 
 @pytest.mark.parametrize(
