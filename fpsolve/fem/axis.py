@@ -30,8 +30,8 @@ class Axis:
         nested: the matrix to coefficients of modes whose sums by degree are all functions of a lower degree; None where
             they are that already.
         turns: how often the axis fits on the full circle; 1 for noise.
-        levels: functions to be eliminated together, of which each level is coupled to its neighbours only; None where
-            every function can be by itself.
+        levels: functions to be eliminated together, of which each level is coupled to its neighbours only; empty where
+            the matrices tell them, None where every function can be by itself.
         slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
     """
 

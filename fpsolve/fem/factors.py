@@ -71,7 +71,7 @@ def factorised(operator: KroneckerSum, levels: Sequence[Any] = ()) -> Factors:
     own = levels[-1] if levels else None
     if own is None and m <= most and operator.band <= MAX_BAND < n:
         return BlockFactors(operator)
-    if m <= MAX_BLOCK:
+    if own is not None and m <= MAX_BLOCK:
         own = own or levels_of(operator)
         if max(level.size for level in own) <= MAX_LEVEL * n:
             return LevelFactors(operator, own)

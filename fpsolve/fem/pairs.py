@@ -30,7 +30,7 @@ class PairAxis(NoiseAxis):
         pull: g.
     """
 
-    is_local = False
+    is_local, levels = False, ()
 
     def __init__(self, noise: Any, count: int, pull: float = 0.0) -> None:
         super().__init__()
