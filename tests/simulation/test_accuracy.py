@@ -1,14 +1,12 @@
-"""How accurate simulations are: the order of the step, digits in seconds, and what they tell apart."""
+"""How accurate simulations are: digits, and what they tell apart; for orders of steps `python -m tests.agreement`."""
 
 import math
 
 import pytest
 
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.simulation import estimators
 from fpsolve.simulation.estimators import simulate
 from tests.agreement import cheap_step
-from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
+from tests.conftest import FIG1, FIG1_NOISE
 from tests.simulation.problems import REDUCED, STRONG, exact
 
 
@@ -32,35 +30,6 @@ def test_an_eighth_of_the_default_paths():
     estimate = simulate(STRONG, REDUCED, [1.0], estimator="population", paths=4096).estimates[0]
     assert estimate.standard_error < 2e-3 * reference
     assert abs(estimate.value - reference) < 4 * estimate.standard_error
-
-
-def biases(monkeypatch, oscillator, noise, p, steps, paths, time=None):
-    """Relative bias of Λ(p) and its standard error for each step."""
-    monkeypatch.setattr(estimators, "obstacles", lambda *_, **__: {})
-    reference = exact(oscillator, noise, [p])[0]
-    found = [
-        simulate(oscillator, noise, [p], estimator="population", paths=paths, time=time, step=step, seed=4).estimates[0]
-        for step in steps
-    ]
-    return [(estimate.value / reference - 1, estimate.standard_error / abs(reference)) for estimate in found]
-
-
-@pytest.mark.slow
-def test_weak_order_of_the_exact_noise(monkeypatch):
-    """Halving the step divides the bias by 4; the steps are eight and four times the largest that is allowed."""
-    noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.9)
-    (coarse, error), (fine, fine_error) = biases(monkeypatch, STRONG, noise, 3.0, (0.2, 0.1), 16384, 200.0)
-    assert abs(coarse) > 20 * error
-    assert abs(fine) > 5 * fine_error
-    assert coarse / fine == pytest.approx(4, abs=0.3 + 4 * (coarse / fine) * fine_error / fine)
-
-
-@pytest.mark.slow
-def test_weak_order_of_ornstein_uhlenbeck_noise(monkeypatch):
-    """The step is more than second order: from αh = 1.2 to 0.6 the bias falls by more than 4."""
-    (coarse, error), (fine, fine_error) = biases(monkeypatch, STRONG, UNIT_NOISE, 1.0, (1.2, 0.6), 4096)
-    assert abs(coarse) > 8 * error
-    assert abs(fine) < abs(coarse) / 4 + 3 * fine_error
 
 
 @pytest.mark.slow
