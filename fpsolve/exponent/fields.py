@@ -214,15 +214,8 @@ class Strips(Nodes):
 
 def _refuse_more(pair: PrincipalPair) -> None:
     """Raises `OutputError` where T depends on more than φ and ξ."""
-    noise = pair.generator.problem.coloured
-    if len(noise.parts) > 1:
-        several = "functions of the phase and of several noises are no surface and no lines over the phase"
-        raise OutputError(f"{several}; make all of these noises white but one")
-    if not noise.is_drawn:
-        raise OutputError(
-            f"functions of the phase and of {noise.kind} noise, which is no Markov process by itself, are no surface "
-            "over phase and noise; look at Λ(p), or at densities of a simulation"
-        )
+    if why := pair.generator.problem.no_picture:
+        raise OutputError(why)
 
 
 def _z_lines(pair: PrincipalPair) -> FloatArray:

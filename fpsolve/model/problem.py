@@ -120,7 +120,20 @@ class Problem:
     @property
     def is_on_cylinder(self) -> bool:
         """Whether functions of it are of φ and of one ξ, so that they make a surface, or a line for each state."""
-        return len(self.coloured.parts) == 1 and self.coloured.is_drawn
+        return not self.no_picture
+
+    @property
+    def no_picture(self) -> str:
+        """Why functions of it are neither; empty where they are."""
+        if len(self.coloured.parts) > 1:
+            several = "functions of the phase and of several noises are no surface and no lines over the phase"
+            return f"{several}; make all of these noises white but one"
+        if self.coloured.is_drawn:
+            return ""
+        return (
+            f"functions of the phase and of {self.coloured.kind} noise, which is no Markov process by itself, are no "
+            "surface over phase and noise; look at Λ(p), or at densities of a simulation"
+        )
 
     def named_noise(self, name: str) -> Noise:
         """The noise that terms name so; with one noise that one, whatever its name."""

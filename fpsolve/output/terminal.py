@@ -480,9 +480,8 @@ def note_missing(case: Case, *, monte_carlo: bool) -> None:
     """What a run leaves out: dots of a simulation that has none to give, eigenfunctions of too many curves."""
     if monte_carlo and case.figure.y == STABILITY_INDEX.name:
         print_remark(f"{case.name}: a simulation gives no stability index, so that the figure has no dots")
-    if case.output.asks_for_eigenfunctions and not case.problem.is_on_cylinder:
-        why = "no eigenfunctions are written, as those of several noises with values are no surface"
-        print_remark(f"{case.name}: {why}; make all but one white")
+    if case.output.asks_for_eigenfunctions and (why := case.problem.no_picture):
+        print_remark(f"{case.name}: no eigenfunctions are written: {why}")
     elif case.leaves_out_eigenfunctions:
         why = f"no eigenfunctions are written, as there are more than {MOST_DRAWN} curves"
         wanted = f"name the p that you want, as in [output] eigenfunctions = [{case.usual_p!r}]"

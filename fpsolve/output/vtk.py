@@ -207,7 +207,10 @@ def _frame(problem: Problem) -> Facts:
     if noise.has_states:
         states = [] if noise.is_white else [f"xi = {each:g}" for each in noise.reached]
         along = "; ".join(
-            ["white noise" if noise.is_white else "states", *(states if len(states) <= MOST_STATES else ())]
+            [
+                f"{noise.kind or 'white'} noise" if noise.is_white else "states",
+                *(states if len(states) <= MOST_STATES else ()),
+            ]
         )
     return {"impacts": " ".join(f"{turn:.12g}" for turn in sorted(turns)) or "none", "along_y": along}
 

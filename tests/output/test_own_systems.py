@@ -17,7 +17,15 @@ from fpsolve.errors import OutputError
 from fpsolve.exponent import ExponentSolver, critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.exponent.fields import surface_of
 from fpsolve.messages import Code
-from fpsolve.model import MarkovChain, ParametricOscillator, Telegraph, VibroImpactOscillator, White, noise_kind
+from fpsolve.model import (
+    Bounded,
+    MarkovChain,
+    ParametricOscillator,
+    Telegraph,
+    VibroImpactOscillator,
+    White,
+    noise_kind,
+)
 from fpsolve.model.kinds import NOISES
 from fpsolve.output.figures import draw
 from fpsolve.output.tables import write_results
@@ -294,13 +302,21 @@ def test_eigenfunctions_of_several_noises_with_values_are_refused_in_words(tmp_p
     assert not solved.eigenpairs
     assert solved.stationary is None
     note_missing(case, monte_carlo=False)
-    assert "no eigenfunctions are written, as those of several noises" in " ".join(capsys.readouterr().err.split())
+    assert "no eigenfunctions are written: functions of the phase and of several noises" in " ".join(
+        capsys.readouterr().err.split()
+    )
     pair = ExponentSolver(case.problem).pair(2.0)
     for draw_it in (pair.plot, lambda: tilted_density(pair)):
         with pytest.raises(OutputError, match="make all of these noises white but one"):
             draw_it()
     assert max(Counter(signs(case.problem)).values()) == 1
     assert case.about("noise.b.k").shown == r"${k}_{\mathrm{b}}$"
+
+
+def test_noise_without_a_picture_is_named():
+    problem = Problem(ParametricOscillator(stiffness=1.0, damping=0.1), Bounded(mu=0.4, nu=2.0, sigma=0.3))
+    assert problem.no_picture.startswith("functions of the phase and of bounded noise")
+    assert not Problem(problem.system, White(s=0.5)).no_picture
 
 
 def test_files_say_where_the_impacts_are(tmp_path):
