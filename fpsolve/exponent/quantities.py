@@ -107,10 +107,10 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
         NotConverged: λ or N is not resolved.
         ValueError: there is no such jump.
     """
-    system, noise = solver.problem.system, solver.problem.noise
+    system = solver.problem.system
     if (number := _ray(solver, jump)) is None:
         return _not_one_ray(solver)
-    if not is_steady(system, ray := system.jumps[number]) and crosses_both_ways(system, ray, noise.reached):
+    if not is_steady(system, ray := system.jumps[number]) and crosses_both_ways(system, ray, solver.problem.reached):
         return Absent(Message(Code.NO_RESTITUTION))
     log = _critical_log_factor(solver, number)
     if not log:

@@ -11,6 +11,7 @@ from fpsolve.arrays import identity
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Jump, Poisson, White, noise_kind
 from fpsolve.model.systems.parametric import ParametricOscillator
+from fpsolve.simulation.coefficients import coefficients
 from fpsolve.theory.hierarchy import hierarchy_exponent
 from tests.oracles import moment_hierarchy, phase_circle
 
@@ -134,6 +135,14 @@ def test_sensitivity_to_what_the_impulses_multiply():
         moment_hierarchy.impulses_exponent(FREE, [[0.0, 0.0], [-c, 0.0]], *law) for c in (0.8 + 1e-4, 0.8 - 1e-4)
     )
     assert found["system.c"].value == pytest.approx((ahead - behind) / 2e-4, rel=1e-7)
+
+
+def test_sizes_of_nothing_change_nothing():
+    """Neither those that are 0 nor those that never come, where the simulation draws one of all."""
+    plain, more = Poisson(rate=1.0, sizes=(0.5,)), Poisson(rate=2.0, sizes=(0.0, -3.0, 0.5), weights=(1.0, 0.0, 1.0))
+    assert lyapunov_exponent(of(more)).value == pytest.approx(lyapunov_exponent(of(plain)).value, abs=1e-12)
+    _, impulses, _ = coefficients(of(more).system, more).motion(0.1)
+    assert len(impulses) == len(more.step(0.1).reached) == 3
 
 
 def test_they_are_not_proven():

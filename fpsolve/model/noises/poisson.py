@@ -147,7 +147,7 @@ class Poisson(Noise):
         return LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), ()
 
     def impulses(self, system: System) -> Sequence[Impulse]:
-        """One for each size.
+        """One for each size, in their order, by which the simulation draws them.
 
         Raises:
             ValueError: they move the ray of a jump, or multiply the state by more than floating-point numbers hold.
@@ -160,7 +160,6 @@ class Poisson(Noise):
         found = [
             Impulse(self.rate * float(share), (size * driven).tolist())
             for size, share in zip(self.sizes, self.shares, strict=True)
-            if size and share
         ]
         for jump in system.jumps:
             for each in found:
@@ -181,11 +180,9 @@ class Poisson(Noise):
     ) -> Sequence[ImpulseDerivative]:
         _, changed = split_by_noise(system, terms)
         by_rate = 1.0 / self.rate if name == "rate" else 0.0
-        sizes = [size for size, share in zip(self.sizes, self.shares, strict=True) if size and share]
-        known = self.impulses(system)
         return [
             ImpulseDerivative(by_rate * each.rate, (size * changed).tolist())
-            for each, size in zip(known, sizes[: len(known)], strict=True)
+            for each, size in zip(self.impulses(system), self.sizes, strict=False)  # none where nothing is driven
         ]
 
 
