@@ -133,14 +133,11 @@ class Generator:
         axes = self.space(p).axes[1:]
         if by not in self._changes:
             self._changes[by] = tuple(Terms(self.problem, self.space(0.0)).changed(by))
-        sizes = [(term.of_p(p, derivative), term) for term in self._changes[by]]
         parts: list[tuple[Any, ...]] = [
-            (size * term.phase, *(axis.matrix(g) for axis, g in zip(axes, term.noises, strict=True)))
-            for size, term in sizes
-            if size and not term.phase_at
+            (phase, *(axis.matrix(g) for axis, g in zip(axes, term.noises, strict=True)))
+            for term in self._changes[by]
+            if (phase := term.at(p, derivative)) is not None
         ]
-        ones = tuple(axis.matrix(one) for axis in axes)
-        parts += [(term.phase_at(p, derivative), *ones) for term in self._changes[by] if term.phase_at]
         if by.noise is not None:
             phases = self._sum.phases(p, derivative)
             parts += [(phase, *self._changed(by, axes, noises)) for noises, phase in phases.items()]

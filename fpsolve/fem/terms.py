@@ -108,6 +108,13 @@ class Term:
     text: str
     phase_at: Callable[[float, int], Any] | None = None
 
+    def at(self, p: float, derivative: int = 0) -> Any:
+        """The k-th derivative by p of the matrix of φ with its coefficient; None where that is 0."""
+        if self.phase_at:
+            return self.phase_at(p, derivative)
+        size = self.of_p(p, derivative)
+        return size * self.phase if size else None
+
 
 class TermSum:
     """A sum of terms, in which those with the same functions of the noises, order and coefficient are added up once."""

@@ -281,3 +281,41 @@ class Noise(Parametrised):
         low, high = self.moments
         if not low <= p <= high:
             raise NoSuchExponent(Message(Code.INFINITE, p=p, low=low, high=high, remedy=Remedy.REDUCTION))
+
+
+class Memoryless(Noise):
+    """Noise that has no value, see `is_white`: to solvers a chain that rests in its only state, ξ = 0."""
+
+    is_white: ClassVar[bool] = True
+    mixes_slowly: ClassVar[bool] = True
+    has_states: ClassVar[bool] = True
+    states: ClassVar[Sequence[float]] = (0.0,)
+    rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)
+
+    @property
+    def standard_deviation(self) -> float:
+        return math.inf
+
+    @property
+    def correlation_time(self) -> float:
+        return 0.0
+
+    relaxation_time = correlation_time
+
+    @property
+    def probabilities(self) -> FloatArray:
+        """Of the states, shape (1,)."""
+        return np.ones(1)
+
+    @property
+    def reached(self) -> FloatArray:
+        return np.zeros(1)
+
+    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """0: it has no value."""
+        return np.zeros(size)
+
+    @property
+    def largest_step(self) -> float:
+        """∞: it is drawn exactly."""
+        return math.inf

@@ -245,10 +245,9 @@ class Problem:
         noise = self.noise
         if not noise.is_bounded or len(noise.parts) > 1 or self.diffusions or self.impulses or self.invariant_rays:
             return False
-        speeds = phase_speed(self.motion, noise.reached)
         phi = np.linspace(0, math.pi, PHASES, endpoint=False)
-        turns = [speeds(each) for each in phi]
-        return any(np.all(each > 0) for each in turns) and any(np.all(each < 0) for each in turns)
+        turns = phase_speed(self.motion, noise.reached)(phi[:, None])
+        return bool(np.any(np.all(turns > 0, axis=1)) and np.any(np.all(turns < 0, axis=1)))
 
     @cached_property
     def classes(self) -> tuple[Problem, ...]:

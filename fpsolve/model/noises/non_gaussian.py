@@ -318,7 +318,6 @@ class ReducedNoise(TreatedNoise, GaussianNoise):
     r0: Annotated[Departure, Field(lt=math.nextafter(5 / 3, 0))]  # at which 5 - 3 r0 is 0 already
 
     kind: ClassVar[str] = "ou-reduction"
-    of_xi: ClassVar[Sequence[str]] = ("D0",)
     words: ClassVar[Mapping[str, str]] = {"treatment": "ou-reduction"}
 
     @property

@@ -74,6 +74,8 @@ class GaussianNoise(Noise):
     alpha: float
     sigma: float
 
+    of_xi: ClassVar[Sequence[str]] = ("D0", "sigma", "standard_deviation")
+
     @property
     def diffusion(self) -> float:
         return self.sigma
@@ -138,7 +140,6 @@ class OrnsteinUhlenbeckByIntensity(GaussianNoise):
     tau0: Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
-    of_xi: ClassVar[Sequence[str]] = ("D0", "sigma", "standard_deviation")
 
     @property
     def alpha(self) -> float:  # type: ignore[override]
@@ -181,7 +182,6 @@ class OrnsteinUhlenbeckByDeviation(GaussianNoise):
     )
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
-    of_xi: ClassVar[Sequence[str]] = ("D0", "sigma", "standard_deviation")
 
     @property
     def sigma(self) -> float:  # type: ignore[override]
@@ -218,7 +218,6 @@ class OrnsteinUhlenbeck(GaussianNoise):
     sigma: Annotated[float, parameter("intensity of its white noise", "", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)]
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
-    of_xi: ClassVar[Sequence[str]] = ("D0", "sigma", "standard_deviation")
     variants: ClassVar[Sequence[type[Noise]]] = (OrnsteinUhlenbeckByIntensity, OrnsteinUhlenbeckByDeviation)
 
     @classmethod

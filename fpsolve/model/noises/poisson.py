@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
@@ -12,7 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import told_in_words
-from fpsolve.model.noise import Noise
+from fpsolve.model.noise import Memoryless
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import (
     CoefficientMatrix,
@@ -50,7 +49,7 @@ def _weights(weights: tuple[float, ...]) -> tuple[float, ...]:
 
 @told_in_words
 @dataclass(frozen=True, config=STRICT)
-class Poisson(Noise):
+class Poisson(Memoryless):
     """Impulses ξ = Σ w_j δ(t − t_j), t_j a Poisson process, w_j independent: x of ẋ = (A₀ + ξA₁)x jumps by exp(w_j A₁).
 
     That is the limit of short pulses with the area w_j, whatever their form (S. I. Marcus, IEEE Trans. Inf. Theory 24,
@@ -81,11 +80,6 @@ class Poisson(Noise):
     ] = ()
 
     kind: ClassVar[str] = "poisson"
-    is_white: ClassVar[bool] = True
-    mixes_slowly: ClassVar[bool] = True
-    has_states: ClassVar[bool] = True
-    states: ClassVar[Sequence[float]] = (0.0,)
-    rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)
 
     def __post_init__(self) -> None:
         if self.weights and len(self.weights) != len(self.sizes):
@@ -102,31 +96,9 @@ class Poisson(Noise):
         """rate ⟨w⟩; each impulse is taken as it is, so that nothing more is added to the drift."""
         return 0.0
 
-    @property
-    def standard_deviation(self) -> float:
-        return math.inf
-
-    @property
-    def correlation_time(self) -> float:
-        return 0.0
-
     def spectral_density(self, omega: float) -> float:
         """S(ω) = rate ⟨w²⟩, of what differs from the mean."""
         return self.rate * float(self.shares @ np.square(self.sizes))
-
-    @property
-    def probabilities(self) -> FloatArray:
-        return np.ones(1)
-
-    @property
-    def reached(self) -> FloatArray:
-        return np.zeros(1)
-
-    relaxation_time = correlation_time
-
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
-        """0: it has no value."""
-        return np.zeros(size)
 
     def step(self, h: float, bias: float = 0.0) -> PoissonStep:
         """The impulses in any time, without a bias."""
@@ -135,11 +107,6 @@ class Poisson(Noise):
     @property
     def marks(self) -> Sequence[float]:
         return self.sizes
-
-    @property
-    def largest_step(self) -> float:
-        """∞: no step is made."""
-        return math.inf
 
     def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
         """The motion between impulses. Raises `ValueError` where a coefficient is no a + bξ."""

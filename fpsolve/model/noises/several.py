@@ -174,10 +174,8 @@ class Noises(Noise):
         self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
     ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
         drift, diffusions = list(_besides(terms, self.named)), list[CoefficientMatrix]()
-        part, _, parameter = name.rpartition(".")
-        for own, noise, of in self._white_motions(system):
-            changed = [term for term in terms if is_driven(term.g) and term.noise == of]
-            less, more = noise.changed_motion(own, changed, parameter if part == of else "")
+        for noise, change in self._white_changes(system, terms, name):
+            less, more = noise.changed_motion(*change)
             drift += less
             diffusions += more
         return drift, diffusions
@@ -188,12 +186,17 @@ class Noises(Noise):
     def changed_impulses(
         self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
     ) -> Sequence[ImpulseDerivative]:
+        changes = self._white_changes(system, terms, name)
+        return [each for noise, change in changes for each in noise.changed_impulses(*change)]
+
+    def _white_changes(
+        self, system: System, terms: Sequence[CoefficientMatrix], name: str
+    ) -> Iterable[tuple[Noise, tuple[System, Sequence[CoefficientMatrix], str]]]:
+        """For each white noise what it drives, which of the terms, and the name if it is one of its parameters."""
         part, _, parameter = name.rpartition(".")
-        found = list[ImpulseDerivative]()
         for own, noise, of in self._white_motions(system):
             changed = [term for term in terms if is_driven(term.g) and term.noise == of]
-            found += noise.changed_impulses(own, changed, parameter if part == of else "")
-        return found
+            yield noise, (own, changed, parameter if part == of else "")
 
     def _white_motions(self, system: System) -> Iterable[tuple[System, Noise, str]]:
         """For each white noise what it drives."""

@@ -8,13 +8,12 @@ from enum import StrEnum
 from fractions import Fraction
 from typing import Annotated, ClassVar, NamedTuple
 
-import numpy as np
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.exact import ExactLaw, white_law
 from fpsolve.model.faults import told_in_words
-from fpsolve.model.noise import Noise
+from fpsolve.model.noise import Memoryless
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, split_by_noise
 
@@ -52,7 +51,7 @@ class WhiteStep(NamedTuple):
 
 @told_in_words
 @dataclass(frozen=True, config=STRICT)
-class White(Noise):
+class White(Memoryless):
     """White noise ξ dt = s dW, of the spectral density S = s² at all frequencies.
 
     A system ẋ = (A₀ + ξ A₁) x is dx = A₀x dt + s A₁x ∘ dW, or in Itô's sense with s A₁x dW, which is the former with
@@ -79,46 +78,14 @@ class White(Noise):
 
     kind: ClassVar[str] = "white"
     of_xi: ClassVar[Sequence[str]] = ("s",)
-    is_white: ClassVar[bool] = True
-    mixes_slowly: ClassVar[bool] = True
-    has_states: ClassVar[bool] = True
-    states: ClassVar[Sequence[float]] = (0.0,)
-    rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)
-
-    @property
-    def standard_deviation(self) -> float:
-        return math.inf
-
-    @property
-    def correlation_time(self) -> float:
-        return 0.0
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) = s²."""
         return self.s**2
 
-    @property
-    def probabilities(self) -> FloatArray:
-        return np.ones(1)
-
-    @property
-    def reached(self) -> FloatArray:
-        return np.zeros(1)
-
-    relaxation_time = correlation_time
-
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
-        """0: it has no value."""
-        return np.zeros(size)
-
     def step(self, h: float, bias: float = 0.0) -> WhiteStep:
         """That of dW, without a bias; s is with the matrix that it drives."""
         return WhiteStep(1 / math.sqrt(h), math.sqrt(3 / h))
-
-    @property
-    def largest_step(self) -> float:
-        """∞: it is drawn exactly."""
-        return math.inf
 
     def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
         """The drift in the sense of Stratonovich, and s A of the term that the noise drives, as one matrix.
