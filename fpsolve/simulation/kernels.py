@@ -1,5 +1,7 @@
 """All paths of a batch, compiled: their steps, their growth, their weights, and how they are drawn anew.
 
+Sums and assignments are loops: those of whole arrays take numba seconds to compile, most for words of their errors.
+
 What moves them is a motion of `motions` and the `step` of the kind of noise. State: x, u and that of the noise of each
 path, see `motions`, changed in place.
 """
@@ -70,13 +72,17 @@ def add_windows(log_norm, starts, number, p, log_sums, log_squares):  # type: ig
     for j in range(starts.shape[0]):
         if number % (1 << j) == 0:
             for k in range(p.size):
-                exponents = p[k] * (log_norm - starts[j])
-                largest = exponents.max()
-                weights = np.exp(exponents - largest)
-                log_sums[j, k] = np.logaddexp(log_sums[j, k], largest + math.log(weights.sum()))
-                square = (weights * weights).sum()
-                log_squares[j, k] = np.logaddexp(log_squares[j, k], 2 * largest + math.log(square))
-            starts[j] = log_norm
+                largest, total, squares = -math.inf, 0.0, 0.0
+                for i in range(log_norm.size):
+                    largest = max(largest, p[k] * (log_norm[i] - starts[j, i]))
+                for i in range(log_norm.size):
+                    weight = math.exp(p[k] * (log_norm[i] - starts[j, i]) - largest)
+                    total += weight
+                    squares += weight * weight
+                log_sums[j, k] = np.logaddexp(log_sums[j, k], largest + math.log(total))
+                log_squares[j, k] = np.logaddexp(log_squares[j, k], 2 * largest + math.log(squares))
+            for i in range(log_norm.size):
+                starts[j, i] = log_norm[i]
 
 
 @compiled
@@ -88,9 +94,11 @@ def advance_population(  # type: ignore[no-untyped-def]
     p, bias, bonus = exponents
     while done < steps:
         count = min(interval, steps - done)
-        log_norm[:], push[:] = 0, 0
-        advance(m, noise, h, x, u, xi, log_norm, push, count, RENORMALISED, rng)
-        log_weights += p * log_norm + bias * push + bonus * count
+        for i in range(x.size):
+            log_norm[i], push[i] = 0.0, 0.0
+        advance(m, noise, h, x, u, xi, log_norm, push, count, np.int64(RENORMALISED), rng)  # else compiled for this 4
+        for i in range(x.size):
+            log_weights[i] += p * log_norm[i] + bias * push[i] + bonus * count
         log_z[0] += _resample(x, u, xi, log_weights, ancestors, rng)
         done += count
 
@@ -99,11 +107,16 @@ def advance_population(  # type: ignore[no-untyped-def]
 def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: ignore[no-untyped-def]
     """Add a slice of a population to its `TALLIES`, and begin the next one; returns the growth of ln Z in it."""
     n = log_weights.size
-    largest = log_weights.max()
+    largest = _largest(log_weights)
     shares = np.zeros(n)
     for i in range(n):
         shares[ancestors[i]] += math.exp(log_weights[i] - largest)
-    now = log_z[0] + largest + math.log(shares.sum() / n)
+    total, squares = 0.0, 0.0
+    for i in range(n):
+        total += shares[i]
+        squares += shares[i] * shares[i]
+        ancestors[i] = i
+    now = log_z[0] + largest + math.log(total / n)
     growth = now - log_z[1]
     excess, record = growth - expected, tallies[0]
     if record.count == 0:
@@ -114,10 +127,9 @@ def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: igno
     record.count += 1
     record.excess += excess
     record.squares += excess * excess
-    record.effective += shares.sum() ** 2 / (shares * shares).sum()
+    record.effective += total**2 / squares
     record.last = excess
     log_z[1] = now
-    ancestors[:] = np.arange(n)
     return growth
 
 
@@ -125,10 +137,13 @@ def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: igno
 def _resample(x, u, xi, log_weights, ancestors, rng):  # type: ignore[no-untyped-def]
     """Draw the paths anew if their weights differ too much, systematically; returns ln of the mean weight."""
     n = x.size
-    largest = log_weights.max()
-    weights = np.exp(log_weights - largest)
-    total = weights.sum()
-    if total * total >= _RESAMPLED * n * (weights * weights).sum():
+    largest = _largest(log_weights)
+    weights, total, squares = np.empty(n), 0.0, 0.0
+    for i in range(n):
+        weights[i] = math.exp(log_weights[i] - largest)
+        total += weights[i]
+        squares += weights[i] * weights[i]
+    if total * total >= _RESAMPLED * n * squares:
         return 0.0
     chosen = np.empty(n, np.int64)
     spacing = total / n
@@ -139,6 +154,27 @@ def _resample(x, u, xi, log_weights, ancestors, rng):  # type: ignore[no-untyped
             reached += weights[k]
         chosen[i] = k
         mark += spacing
-    x[:], u[:], xi[..., :], ancestors[:] = x[chosen], u[chosen], xi[..., chosen], ancestors[chosen]
-    log_weights[:] = 0
+    _choose(x, chosen)
+    _choose(u, chosen)
+    _choose(ancestors, chosen)
+    for numbers in xi.reshape(-1, n):
+        _choose(numbers, chosen)
+    for i in range(n):
+        log_weights[i] = 0.0
     return largest + math.log(spacing)
+
+
+@compiled
+def _choose(values, chosen):  # type: ignore[no-untyped-def]
+    """The values with these numbers, in place."""
+    old = values.copy()
+    for i in range(values.size):
+        values[i] = old[chosen[i]]
+
+
+@compiled
+def _largest(values):  # type: ignore[no-untyped-def]
+    largest = -math.inf
+    for i in range(values.size):
+        largest = max(largest, values[i])
+    return largest

@@ -257,7 +257,9 @@ def _in_parts(m, h, x, u, mean, rise):  # type: ignore[no-untyped-def]
     rays, log, crossed = m.rays, 0.0, 0
     largest = 0.0
     for xi in (mean - rise, mean + rise):
-        p, q, r = m.matrices[0, 1:] + xi * m.matrices[1, 1:]
+        p = m.matrices[0, 1] + xi * m.matrices[1, 1]
+        q = m.matrices[0, 2] + xi * m.matrices[1, 2]
+        r = m.matrices[0, 3] + xi * m.matrices[1, 3]
         largest = max(largest, p * p + 0.5 * (q * q + r * r))
     size = h * math.sqrt(largest / _LIMIT)
     if not size < _MOST_PARTS:
