@@ -5,7 +5,8 @@ seen from the right, Λ is the nearest eigenvalue. From there, or quicker from t
 two-sided Rayleigh quotient iteration converges cubically. That it found the principal pair is checked by the one
 property that no other pair has: T > 0 and T* > 0 (Perron-Frobenius; one of the two is enough), as far as a mesh can
 tell. It cannot where slow noise has two places between which it hardly ever passes; `NearPlace` looks at both. Nor can
-it for noise with states, or where the phase rests, so that every search begins on the right there.
+it for noise with states, or where the phase rests, so that every search begins on the right there, or at the pair of
+a neighbouring p and must reach its tangent: Λ is convex.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ POSITIVE = 1e-2
 """T, or T*, is taken for positive where no more than this share of it has the wrong sign, the least of all found."""
 SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
+DOUBT = 1e-3
+"""Share of its terms by which a tangent of Λ may lie too high: the errors of its p."""
 _EPS = float(np.finfo(float).eps)
 REFINEMENTS = 3
 """Of T′, by each of which its error falls to 1e-6 of a rate over the gap of the spectrum."""
@@ -115,6 +118,7 @@ def principal_pair(
         lambda: _carried(pairs, pencil, generator) if pairs else _simplest(pencil, generator),
         lambda: _from_the_right(pencil, generator, clock),
     ]
+    least = _tangents(generator.problem, p, pairs or ())
     if is_doubtful := _has_other_positive(generator.problem, p, pairs or ()):
         searches.reverse()
     found: list[PrincipalPair] = []
@@ -125,7 +129,8 @@ def principal_pair(
             continue
         pair = _pair(generator, pencil, rayleigh_iteration(pencil, *vectors, clock))
         most = POSITIVE if is_doubtful else SURELY_POSITIVE
-        if pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= most:
+        is_found = pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= most
+        if is_found and (pair.value >= least or search is searches[-1]):
             break
         found.append(pair)
     else:
@@ -146,7 +151,7 @@ def principal_pair(
 
 
 def _has_other_positive(problem: Problem, p: float, pairs: Sequence[PrincipalPair]) -> bool:
-    """Whether other pairs may seem to have T > 0, too, and none of those to start from is at p.
+    """Whether other pairs may seem to have T > 0, too, and there is none to start from.
 
     States that hardly mix have a pair each. Where the phase rests, between weak noise, T is about |x|^(p−k) |v|^k for
     the k-th pair, x along the faster mode and v along the other: for even k its sign does not change.
@@ -154,7 +159,14 @@ def _has_other_positive(problem: Problem, p: float, pairs: Sequence[PrincipalPai
     if problem.noise.mixes_slowly:
         return True
     frozen = frozen_noise(problem)
-    return frozen is not None and frozen.rests(p) and all(pair.p != p for pair in pairs)
+    return frozen is not None and frozen.rests(p) and not pairs
+
+
+def _tangents(problem: Problem, p: float, pairs: Sequence[PrincipalPair]) -> float:
+    """What Λ(p) is at least, as it is convex, by the pairs of this problem at other p; −∞ where there is none."""
+    own = (pair for pair in pairs if pair.generator.problem is problem and pair.p != p)
+    values = ((pair.value, pair.derivative * (p - pair.p)) for pair in own)
+    return max((start + rise - DOUBT * (abs(start) + abs(rise)) for start, rise in values), default=-math.inf)
 
 
 def spectrum(generator: Generator, p: float, k: int = 10) -> Any:

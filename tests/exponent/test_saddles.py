@@ -1,9 +1,14 @@
 """Saddles under weak noise: the phase hardly leaves the faster mode, and other pairs seem to have a positive T."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
+from scipy.sparse.linalg import eigs
 
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem
 from fpsolve.arrays import identity
+from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code
 from fpsolve.model import CoefficientMatrix, MarkovChain, Problem
@@ -29,6 +34,19 @@ def test_gaussian_noise(steady, rate, deviation):
     found = solver(steady, OrnsteinUhlenbeck(alpha=rate, sigma=deviation * (2 * rate) ** 0.5)).solution(4.0)
     expected = ornstein_uhlenbeck_exponent(steady, ROTATION, rate, deviation, 4, 24)
     assert abs(found.pair.value - expected) <= found.error + 1e-8
+
+
+def test_a_neighbour_does_not_lead_to_another_pair():
+    """From a p beside it, with the vectors of |x|²|v|², which seem positive: the value misses the tangent of Λ."""
+    beside = solver(SADDLE, OrnsteinUhlenbeck(alpha=0.1, sigma=0.01 * 0.2**0.5)).solution(3.9).pair
+    matrix, mass = beside.generator.matrix(4.0).tocsc(), beside.generator.space(4.0).mass.tocsc()
+    start = np.ones(beside.right.size)
+    (value,), right = eigs(matrix, k=1, M=mass, sigma=1e-4, v0=start)
+    _, left = eigs(matrix.T, k=1, M=mass.T, sigma=1e-4, v0=start)
+    assert abs(value) < 0.01  # that of |x|⁴ is near 4
+    other = replace(beside, right=right[:, 0].real, left=left[:, 0].real)
+    found = principal_pair(beside.generator, 4.0, start=other)
+    assert found.value == pytest.approx(ornstein_uhlenbeck_exponent(SADDLE, ROTATION, 0.1, 0.01, 4, 24), abs=1e-8)
 
 
 @pytest.mark.parametrize("steady", [SADDLE, SKEW_SADDLE])
