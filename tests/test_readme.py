@@ -17,7 +17,7 @@ def test_the_blocks_of_python_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     numbers = "output={ figure = false, quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"
     fpsolve.run(fpsolve.load_case(README.parent / "cases/fig1.toml", [numbers]))  # as the README does above them
-    text = README.read_text(encoding="utf-8").replace("paths=4096", "paths=64")
+    text = README.read_text(encoding="utf-8").replace("paths=4096", "paths=64, time=100.0")
     text = re.sub(r"( = boundary\(.*)\)\n", r"\1, nodes=5)\n", text)  # which takes a fifth of the time
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert len(blocks) >= 4
