@@ -32,13 +32,20 @@ def path(tmp_path_factory):
     return path
 
 
-@pytest.fixture(scope="module")
-def folder(path):
-    """Of a scan with fewer nodes than usual, which takes a third of the time."""
-    out = path.parent / "results"
+@pytest.fixture(scope="module", autouse=True)
+def few_nodes():
+    """Scans with fewer nodes than usual, which take a fifth of the time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("fpsolve.analysis.stability.NODES", 7)
-        assert main(["chart", str(path), "--out", str(out), "--jobs", "1"]) == 0
+        patch.setattr("fpsolve.study.chart.NODES", 7)
+        patch.setattr("fpsolve.study.chart.CLOSED_FORM_NODES", 31)
+        yield
+
+
+@pytest.fixture(scope="module")
+def folder(path):
+    out = path.parent / "results"
+    assert main(["chart", str(path), "--out", str(out), "--jobs", "1"]) == 0
     return out / "plane"
 
 
@@ -132,10 +139,10 @@ def test_a_line_that_does_not_cross_the_frame_is_said_so(path, tmp_path, capsys)
 
 @pytest.mark.slow
 def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
-    calls = iter(range(200))
+    calls = iter(range(80))
 
     def progress(**_):
-        if next(calls) == 180:  # in the scan for the second line
+        if next(calls) == 60:  # in the scan for the second line
             raise KeyboardInterrupt
 
     watch = Watch(bar=lambda phase: nullcontext(progress if phase.total else lambda: None))
@@ -157,8 +164,8 @@ def test_a_phase_for_the_scans_and_one_for_the_points(path, tmp_path):
 
     override = ["chart.zero=['lyapunov_exponent']", "chart.x.at=[]"]
     chart = chart_case(load_case(path, override), tmp_path, watch=Watch(bar=bar))
-    assert totals == {"scan": 169, "lines": None}
-    assert counts == {"scan": 169, "lines": chart.lines[0].branches[0].x.size}
+    assert totals == {"scan": 49, "lines": None}
+    assert counts == {"scan": 49, "lines": chart.lines[0].branches[0].x.size}
 
 
 @pytest.mark.slow
@@ -180,8 +187,8 @@ def test_progress_and_rows_are_those_of_the_whole_chart(path):
         return map(function, rows)
 
     *partial, whole = solve_chart(case, progress=lambda: nodes.append(1), stepped=lambda: points.append(1), map=noting)
-    assert given == [3 * 13]
-    assert len(nodes) == chart_work(case) == 3 * 13**2
+    assert given == [3 * 7]
+    assert len(nodes) == chart_work(case) == 3 * 7**2
     assert len(points) == sum(branch.x.size for line in whole.lines for branch in line.branches)  # none has a fold
     assert [len(chart.lines) for chart in partial] == [1, 1, 1, 2, 2, 2, 3, 3, 3]
     assert not any(chart.remarks for chart in partial)  # "no line was found" where none is traced yet

@@ -32,8 +32,10 @@ def test_every_case_meets_its_expectations_within_the_stated_error(path):
 
 
 @pytest.mark.slow
-def test_the_chart_of_white_noise():
+def test_the_chart_of_white_noise(monkeypatch):
     """The mean square is neutral on s² = 4b."""
+    monkeypatch.setattr("fpsolve.analysis.stability.NODES", 7)
+    monkeypatch.setattr("fpsolve.study.chart.CLOSED_FORM_NODES", 7)
     path = next(path for path in CASES if path.stem == "white_noise_chart")
     *_, chart = solve_chart(load_case(path, ["chart.zero=[{ moment = 2.0 }]"]))
     [line] = chart.lines
