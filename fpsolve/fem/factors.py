@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from itertools import pairwise
 from typing import Any, Protocol
@@ -26,6 +27,8 @@ MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 MAX_LEVEL = 0.2
 """Share of the functions of the last axis that one level may have."""
+LARGEST_GROWTH = 1e3
+"""Of the entries, by the norm of all, in an elimination that does not exchange rows of different levels."""
 
 
 def one_thread() -> Any:
@@ -74,7 +77,9 @@ def factorised(operator: KroneckerSum, levels: Sequence[Any] = ()) -> Factors:
     if own is not None and m <= MAX_BLOCK:
         own = own or levels_of(operator)
         if max(level.size for level in own) <= MAX_LEVEL * n:
-            return LevelFactors(operator, own)
+            for each in (own, paired(own)):
+                with suppress(SingularMatrix):
+                    return LevelFactors(operator, each)
     return SparseFactors(operator)
 
 
@@ -152,7 +157,8 @@ class SwappedFactors:
 class LevelFactors:
     """Block elimination over levels of the last axis, from the last on: its matrices only couple neighbours.
 
-    The unknowns of a level are its functions, each with all of the other axes.
+    The unknowns of a level are its functions, each with all of the other axes. Raises `SingularMatrix` where that of
+    one level alone is: functions of what noise moves only by way of others.
     """
 
     def __init__(self, operator: KroneckerSum, levels: Sequence[Any]) -> None:
@@ -169,6 +175,8 @@ class LevelFactors:
             rest = rows[i][:, self._parts[i]].toarray(order="F")
             if self._pivots:
                 rest -= self._up[i] @ self._pivots[-1].solve(self._down[i].toarray(order="F"))
+            if not np.abs(rest).max() < LARGEST_GROWTH * operator.norm:
+                raise SingularMatrix("the pivot of a level is singular")
             self._pivots.append(DenseFactors(rest))
         self._pivots.reverse()
 
@@ -194,6 +202,12 @@ def levels_of(operator: KroneckerSum) -> list[Any]:
     pattern = sum(abs(csr_matrix(last)) for _, last in operator.pairs)
     distance = shortest_path(pattern + pattern.T, method="D", unweighted=True, indices=0)
     return [np.flatnonzero(distance == d) for d in range(int(distance.max()) + 1)]
+
+
+def paired(levels: Sequence[Any]) -> list[Any]:
+    """Two levels in one, the last two, and so on."""
+    count = len(levels)
+    return [np.concatenate(levels[max(end - 2, 0) : end]) for end in range(2 - count % 2, count + 1, 2)]
 
 
 class SparseFactors:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, kron, random
 
+from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, BlockFactors, DenseFactors, SparseFactors, factorised
+from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, BlockFactors, DenseFactors, LevelFactors, SparseFactors, factorised
 
 
 def banded(rng, n, band):
@@ -68,3 +69,21 @@ def test_a_singular_matrix_gives_its_null_vector():
         found = kind(KroneckerSum([(phase, np.eye(2))])).solve(np.ones(6))
         assert np.all(np.isfinite(found))
         assert abs(found[0]) > 1e10 * abs(found[-1])
+
+
+def test_levels_that_are_singular_alone_go_in_pairs(rng):
+    """As those of a filter do: noise damps one of two functions, and turns them into each other."""
+    count = 40
+    noise = np.diag(np.arange(count) % 2 - 1.0) + np.diag(np.sqrt(np.arange(1.0, count)), 1)
+    noise -= np.diag(np.sqrt(np.arange(1.0, count)), -1)
+    phase = rng.standard_normal((12, 12)) - 8.0 * np.eye(12)
+    phase[0] = 0.0
+    operator = KroneckerSum([(phase, np.eye(count)), (np.eye(12), noise)])
+    levels = [np.array([k]) for k in range(count)]
+    with pytest.raises(SingularMatrix):
+        LevelFactors(operator, levels)
+    found, b = factorised(operator, [None, levels]), rng.standard_normal(operator.size)
+    assert isinstance(found, LevelFactors)
+    matrix = operator.toarray()
+    np.testing.assert_allclose(found.solve(b), np.linalg.solve(matrix, b), rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(found.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-9, atol=1e-11)
