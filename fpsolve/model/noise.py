@@ -133,6 +133,11 @@ class Noise(Parametrised):
         return True
 
     @property
+    def period(self) -> float:
+        """After which it repeats itself for ever; 0 where it does not."""
+        return 0.0
+
+    @property
     def shaped_by(self) -> Sequence[str]:
         """The names of the parameters on which the law of ξ in noise units depends, more than on its words."""
         return tuple(name for name in self.values if name not in self.words)

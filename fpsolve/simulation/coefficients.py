@@ -122,7 +122,7 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
         else:
             sizes.append((size * part.standard_deviation, False))
             driven.append(total)
-            intensity += 2 * sizes[-1][0] ** 2 * part.correlation_time
+            intensity += 2 * sizes[-1][0] ** 2 * min(part.correlation_time, part.period or math.inf)
     free = even @ matrix_at(moved, 0.0, slice(0, 1)) @ back
     return SplitCoefficients(
         noise,

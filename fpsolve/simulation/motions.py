@@ -361,23 +361,44 @@ def step_struck(m, law, h, x, u, log_norm, rng):  # type: ignore[no-untyped-def]
     return crossed
 
 
-@compiled
+@inlined
 def exact_flow(m, k, t, x, u):  # type: ignore[no-untyped-def]
     """exp(A t) x: its direction, the growth of the norm beyond it, and the crossings, none of which is overlooked."""
+    return flow_on(m, k, exact_factors(m, k, t), x, u)
+
+
+@compiled
+def exact_factors(m, k, t):  # type: ignore[no-untyped-def]
+    """c, s, the growth of the norm and the half-turns of exp(A t) = ± e^growth (c + s B), B the rest of A."""
     half_trace, p, q, r = m.matrices[k]
-    square, log, turns = p * p + q * r, half_trace * t, 0
+    square, growth = p * p + q * r, half_trace * t
     if square < 0:  # it turns, and crosses each line once in every half-turn
         omega = math.sqrt(-square)
         turns = int(omega * t / math.pi)
         angle = omega * t - turns * math.pi
-        cosh, sinh = math.cos(angle), math.sin(angle) / omega
-    elif square > 0:
+        return math.cos(angle), math.sin(angle) / omega, growth, turns
+    if square > 0:
         rate = math.sqrt(square)
         fall = -math.expm1(-2 * rate * t)
-        log += rate * t
-        cosh, sinh = 1 - 0.5 * fall, 0.5 * fall / rate
-    else:
-        cosh, sinh = 1.0, t
+        return 1 - 0.5 * fall, 0.5 * fall / rate, growth + rate * t, 0
+    return 1.0, t, growth, 0
+
+
+@inlined
+def factors(m, k, t):  # type: ignore[no-untyped-def]
+    """The same, by series where it is small."""
+    half_trace, p, q, r = m.matrices[k]
+    square = (p * p + q * r) * t * t
+    if abs(square) > _LIMIT:
+        return exact_factors(m, k, t)
+    return _cosh(square), t * _sinh(square), half_trace * t, 0
+
+
+@compiled
+def flow_on(m, k, factors, x, u):  # type: ignore[no-untyped-def]
+    """The same of x by its factors."""
+    _, p, q, r = m.matrices[k]
+    cosh, sinh, log, turns = factors
     x1, u1 = (cosh + sinh * p) * x + sinh * q * u, sinh * r * x + (cosh - sinh * p) * u
     crossed = 0
     for j in range(m.rays.logs.size):

@@ -87,7 +87,7 @@ def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
             "the frequency": 2 * SPLIT / abs(turn) if turn else math.inf,
             "the damping": SPLIT / rest if rest else math.inf,
             "the strength of the noise": min(strengths, default=math.inf),
-            "the correlation time of the noise": 0.2 * noise.largest_step,
+            "the correlation time of the noise": noise.largest_step,
         }
         reason = min(split, key=lambda name: split[name])
         return split[reason], reason
@@ -107,18 +107,25 @@ def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
 
 
 def transient(oscillator: System, noise: Noise) -> float:
-    """The time after which ln E‖x‖^p grows like Λ(p) t: whole half-turns π/ω, at least two and eight correlation times.
+    """The time after which ln E‖x‖^p grows like Λ(p) t: at least two half-turns π/ω and eight correlation times.
 
-    In whole half-turns the oscillation cancels that the start from the stationary law leaves in weak noise.
+    It is a whole number of half-turns, in which the oscillation cancels that the start from the stationary law leaves
+    in weak noise; beside a harmonic load, with which the growth goes up and down for ever, a whole number of periods.
     """
-    half_turn = coefficients(oscillator, noise).half_turn
-    return half_turn * max(2, math.ceil(8 * noise.relaxation_time / half_turn))
+    half_turn, unit = coefficients(oscillator, noise).half_turn, _repeated(oscillator, noise)
+    relaxation_time = max((part.relaxation_time for part in noise.parts.values() if not part.period), default=0.0)
+    return unit * math.ceil(max(2 * half_turn, 8 * relaxation_time) / unit)
 
 
 def default_step(oscillator: System, noise: Noise) -> float:
-    """Half the largest step, or less, so that a half-turn π/ω is a whole number of steps."""
-    half_turn = coefficients(oscillator, noise).half_turn
-    return half_turn / math.ceil(half_turn / (0.5 * largest_step(oscillator, noise)[0]))
+    """Half the largest step, or less, so that a half-turn π/ω or a period is a whole number of steps."""
+    unit = _repeated(oscillator, noise)
+    return unit / math.ceil(unit / (0.5 * largest_step(oscillator, noise)[0]))
+
+
+def _repeated(oscillator: System, noise: Noise) -> float:
+    """The period of a harmonic load, without one a half-turn."""
+    return max(part.period for part in noise.parts.values()) or coefficients(oscillator, noise).half_turn
 
 
 def obstacles(

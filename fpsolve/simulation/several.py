@@ -21,7 +21,7 @@ from numba.extending import overload
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.simulation.compiled import compiled
-from fpsolve.simulation.motions import Rays, drawn, exact_flow
+from fpsolve.simulation.motions import Rays, drawn, exact_factors, factors, flow_on
 
 
 class Driver(NamedTuple):
@@ -170,14 +170,15 @@ def step_split(m, h, x, u, integrals, log_norm, rng):  # type: ignore[no-untyped
         rng: a `numpy.random.Generator`.
     """
     crossed, count = 0, integrals.shape[0]
+    half = exact_factors(m, 0, 0.5 * h)
     for i in range(x.size):
-        x1, u1, log, before = exact_flow(m, 0, 0.5 * h, x[i], u[i])
+        x1, u1, log, before = flow_on(m, 0, half, x[i], u[i])
         is_forward = rng.random() < 0.5
         for j in range(count):
             k = j if is_forward else count - 1 - j
-            x1, u1, more, _ = exact_flow(m, 1 + k, integrals[k, i], x1, u1)
+            x1, u1, more, _ = flow_on(m, 1 + k, factors(m, 1 + k, integrals[k, i]), x1, u1)
             log += more
-        x[i], u[i], more, after = exact_flow(m, 0, 0.5 * h, x1, u1)
+        x[i], u[i], more, after = flow_on(m, 0, half, x1, u1)
         log_norm[i] += log + more
         crossed += before + after
     return crossed

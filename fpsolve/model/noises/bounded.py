@@ -97,6 +97,11 @@ class Bounded(Noise):
         return self.sigma > 0
 
     @property
+    def period(self) -> float:
+        """2π/ν of a harmonic load."""
+        return 0.0 if self.sigma else 2 * math.pi / self.nu
+
+    @property
     def half_width(self) -> float:
         return self.mu
 
