@@ -7,15 +7,13 @@ end how many are beyond both, and the longest time.
 
 import math
 import sys
-import time
 
 import numpy as np
 
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
-from fpsolve.errors import FpsolveError
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Telegraph, White
+from tests.comparison import Comparison, comparison, report
 from tests.oracles.moment_hierarchy import chain, gaussian, several_exponent
 
 KINDS = (
@@ -59,33 +57,17 @@ def drawn(seed):
     return Problem(PlaneSystem(terms), noises), " and ".join(kinds), oracle
 
 
-def compared(seed, p, rtol=1e-8):
-    """What it is, Λ(p), the oracle's, the stated error, the oracle's doubt, the unknowns and the seconds."""
+def compared(seed: int, p: float, rtol: float = 1e-8) -> Comparison:
+    """Λ(p) by both."""
     problem, kinds, oracle = drawn(seed)
-    begun = time.process_time()
-    found = ExponentSolver(problem, rtol=rtol).solution(p)
-    seconds, value = time.process_time() - begun, found.pair.value
-    coarse, fine = (oracle(int(p), count, value + 1e-3) for count in COUNTS)
-    doubt = abs(fine - coarse) + 1e-12 * max(1.0, abs(fine))
-    return kinds, value, fine, found.error, doubt, found.pair.space.shape, seconds
+    return comparison(
+        kinds, problem, lambda value: tuple(oracle(int(p), count, value + 1e-3) for count in COUNTS), p, rtol
+    )
 
 
 def main(first: int = 1, last: int = 20, rtol: float = 1e-8) -> None:
     """Print what each system gives."""
-    beyond, longest = 0, 0.0
-    for seed in range(int(first), int(last) + 1):
-        for p in (2.0, 4.0):
-            try:
-                kinds, value, expected, error, doubt, shape, seconds = compared(seed, p, rtol)
-            except FpsolveError as failure:
-                print(f"{seed:4} {drawn(seed)[1]}: {failure}")
-                continue
-            off = abs(value - expected)
-            is_beyond = off > error + doubt
-            beyond, longest = beyond + is_beyond, max(longest, seconds)
-            told = f"{value:14.10f} off {off:.1e} stated {error:.1e} doubt {doubt:.1e}"
-            print(f"{seed:4} {kinds:40} p = {p:g} {told} {shape} {seconds:.2f} s{' !' * is_beyond}", flush=True)
-    print(f"{beyond} beyond the stated error; at most {longest:.2f} s")
+    report([(seed, p, rtol) for seed in range(int(first), int(last) + 1) for p in (2.0, 4.0)], compared)
 
 
 if __name__ == "__main__":

@@ -11,9 +11,8 @@ import numpy as np
 
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
-from fpsolve.errors import FpsolveError
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, SineWiener, Telegraph, White
+from tests.comparison import Comparison, comparison, report
 from tests.oracles import moment_hierarchy, phase_circle
 
 KINDS = ("white", "ito", "telegraph", "chain", "ornstein-uhlenbeck", "sine-wiener")
@@ -63,27 +62,15 @@ def random_chain(rng, size, rate):
     return MarkovChain(size * rng.uniform(-1, 1.5, count), rates - np.diag(np.diagonal(rates)))
 
 
-def compared(seed):
-    """What it is, Λ(2), the oracle's, the stated error and the oracle's doubt."""
-    problem, kind, (coarse, fine) = drawn(seed)
-    found = ExponentSolver(problem).solution(2.0)
-    return kind, found.pair.value, fine, found.error, abs(fine - coarse) + 1e-12 * max(1.0, abs(fine))
+def compared(seed: int) -> Comparison:
+    """Λ(2) by both."""
+    problem, kind, found = drawn(seed)
+    return comparison(kind, problem, lambda _: found)
 
 
 def main(first: int = 1, last: int = 200) -> None:
     """Print what each system gives."""
-    beyond = 0
-    for seed in range(first, last + 1):
-        try:
-            kind, value, expected, error, doubt = compared(seed)
-        except FpsolveError as failure:
-            print(f"{seed:4} {drawn(seed)[1]}: {failure}")
-            continue
-        off = abs(value - expected)
-        is_beyond = off > error + doubt
-        beyond += is_beyond
-        print(f"{seed:4} {kind:28} {value:14.10f} off {off:.1e} stated {error:.1e} doubt {doubt:.1e}{' !' * is_beyond}")
-    print(f"{beyond} of {last - first + 1} beyond the stated error")
+    report([(seed,) for seed in range(first, last + 1)], compared)
 
 
 if __name__ == "__main__":

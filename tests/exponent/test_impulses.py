@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import PlaneSystem, Problem, lyapunov_exponent, moment_lyapunov, prove, sensitivities, simulate
+from fpsolve import PlaneSystem, Problem, lyapunov_exponent, moment_lyapunov, prove, sensitivities
 from fpsolve.analysis.density import furstenberg_khasminskii
 from fpsolve.arrays import identity
 from fpsolve.exponent.solver import ExponentSolver
@@ -148,15 +148,3 @@ def test_sizes_of_nothing_change_nothing():
 def test_they_are_not_proven():
     with pytest.raises(TypeError, match="got Poisson"):
         prove(of(even()), 2.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("jumps", [(), (WALL,)])
-def test_the_simulation_agrees(jumps):
-    problem = of(Poisson(rate=1.0, sizes=(1.0, -0.5), weights=(1.0, 2.0)), jumps)
-    made = simulate(problem, [0.5, 1.0], estimator="population", paths=4096, seed=3)
-    found = moment_lyapunov(problem, [0.5, 1.0])
-    for estimate, value in zip(made.estimates, found.value, strict=True):
-        assert estimate.value == pytest.approx(value, abs=4 * estimate.standard_error)
-    exponent = lyapunov_exponent(problem).value
-    assert made.lyapunov_exponent == pytest.approx(exponent, abs=4 * made.lyapunov_exponent_error)

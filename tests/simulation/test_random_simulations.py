@@ -1,15 +1,30 @@
-"""A random linear system by simulation: a sample of `python -m tests.random_simulations`."""
+"""Random linear systems by simulation: a sample of `python -m tests.random_simulations`, one of each kind of path."""
 
 import math
 
-from tests.random_simulations import MOST, drawn, outcome
+import pytest
+
+from tests.conftest import sampled
+from tests.random_simulations import MOST, drawn, outcomes
+
+SEEDS = {
+    3: "ornstein-uhlenbeck",
+    220: "bounded",
+    224: "poisson",
+    242: "filter y'",
+    250: "telegraph and ornstein-uhlenbeck",
+    253: "poisson and ornstein-uhlenbeck",
+    237: "white and harmonic",
+}
 
 
-def test_a_random_system_is_simulated():
-    """Under Ornstein-Uhlenbeck noise, with a wall."""
-    kind, problem = drawn(3)
-    found = outcome(problem, paths=4096, transients=4)
-    assert kind == "ornstein-uhlenbeck"
-    assert problem.system.jumps
-    assert math.isfinite(found.deviation)
-    assert abs(found.deviation) < MOST
+@pytest.mark.parametrize("seed", sampled(*SEEDS))
+def test_a_random_system_is_simulated(seed):
+    """In the first a wall."""
+    kind, problem = drawn(seed)
+    found = outcomes(problem, paths=4096, transients=4)
+    assert kind == SEEDS[seed]
+    assert problem.system.jumps or seed != 3
+    for each in found:
+        assert math.isfinite(each.deviation)
+        assert abs(each.deviation) < MOST
