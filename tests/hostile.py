@@ -463,12 +463,12 @@ def tried(
 def main() -> int:
     """Print how all ended."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("kinds", nargs="*", default=list(KINDS), choices=list(KINDS))
+    parser.add_argument("kinds", nargs="*", choices=list(KINDS))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int)
     asked = parser.parse_args()
     failed = 0
-    for kind in asked.kinds:
+    for kind in asked.kinds or KINDS:
         start = time.monotonic()
         ended, wrong = tried(kind, asked.seed, asked.count or COUNTS[kind], print)
         failed += len(wrong)

@@ -65,7 +65,7 @@ def central(theta, key, value_at, step=STEPS[0]):
 
 
 def best_difference(theta, key, value_at, steps):
-    """That of two neighbouring steps which differ least, and by how much these and the errors of the values do.
+    """The finer of two neighbouring steps which differ least, and by how much these and the errors of the values do.
 
     `value_at` returns a value and its error.
     """
@@ -80,7 +80,7 @@ def best_difference(theta, key, value_at, steps):
     lost = 1.5 * max(errors) / (np.array(steps) * max(abs(theta[key]), 0.1))
     doubts = np.abs(np.diff(found)) + lost[:-1]
     k = int(np.argmin(doubts))
-    return found[k + 1], float(doubts[k])
+    return found[k], float(doubts[k])
 
 
 def main(first: int = 1, last: int = 100, kind: str = "light") -> None:
