@@ -65,7 +65,6 @@ def by_differences(case, p, value, phases=128):
         *sampled(
             (problem(0.5, 1.0, 1.1, 0.1), -0.1, 0.004209),
             (problem(0.5, 1.0, 1.1, 0.2, restitution=0.8, c1=0.1), -0.5, None),
-            (problem(0.5, 1.0, 1.1, 0.2), -0.5, 0.02688),
         )
     ],
 )

@@ -270,19 +270,17 @@ def test_when_it_is_a_map(drawn, tmp_path, count, more, is_map):
 
 
 @pytest.mark.slow
-def test_ten_thousand_curves_take_seconds(tmp_path):
-    case = case_of(tmp_path, ["vary.noise.D0={start=0.1, stop=3.0, num=10000}"])
+def test_thousands_of_curves_take_seconds(tmp_path):
+    case = case_of(tmp_path, ["vary.noise.D0={start=0.1, stop=3.0, num=2500}"])
     results = results_of(case)
     started = time.process_time()
     draw(case, results, [], tmp_path)
-    assert time.process_time() - started < 20  # some 4 where nothing else runs
-    assert (tmp_path / "figure.pdf").stat().st_size < 2_000_000
+    assert time.process_time() - started < 5  # some 1 where nothing else runs
+    assert (tmp_path / "figure.pdf").stat().st_size < 500_000
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(
-    "name", sampled("two", "map", "one", "nine", "over a parameter", "fifty over a parameter", keep=2)
-)
+@pytest.mark.parametrize("name", sampled("two", "map", "over a parameter", "fifty over a parameter", keep=2))
 @pytest.mark.parametrize("most", sampled(0, 1))
 def test_what_failed_leaves_a_figure(sound, tmp_path, name, most):
     """Also where nothing is solved, or one set alone."""

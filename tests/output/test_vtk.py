@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[2]
 NO_FIGURE = "output.figure=false"
 
 
-@pytest.fixture(scope="module", params=sampled(*MESHES))
+@pytest.fixture(scope="module", params=sampled(*list(MESHES)[:3]))
 def solver(request):
     return ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[request.param])
 
@@ -259,7 +259,7 @@ def test_stationary_pair_may_be_of_another_mesh(tmp_path):
     np.testing.assert_allclose(one, two, atol=1e-8)
 
 
-@pytest.mark.parametrize("degree", sampled(3, 1, 2, 5, 11))
+@pytest.mark.parametrize("degree", sampled(3, 1, 11))
 def test_any_degree(tmp_path, degree):
     solver = ExponentSolver(
         Problem(FIG1, UNIT_NOISE), make_mesh(phi_cells=9, phi_degree=degree, xi_cells=9, xi_degree=degree)

@@ -5,6 +5,7 @@ import functools
 import json
 import math
 from decimal import Decimal
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -221,8 +222,11 @@ def mutated(entry):
 
 @pytest.mark.parametrize("name", QUICK)
 def test_both_checkers_refuse_what_does_not_follow(name):
-    """Nearly all mutations fail at some sample; and these are refused."""
-    every = list(mutated(entry_of(name)))
+    """Nearly all mutations fail at some sample; and these are refused. Of lines of ξ, which take long, every third."""
+    entry = entry_of(name)
+    every = list(
+        islice(mutated(entry), 0, None, 3 if entry["certificate"]["basis"]["kind"] in ("core", "whole") else 1)
+    )
     broken = [(change, entry) for change, entry in every if violated(entry["certificate"])]
     assert len(broken) > 0.6 * len(every)
     for change, entry in broken:

@@ -1,6 +1,7 @@
 """Sample paths: free flight and bounces in closed form, the Zhuravlev map, the laws of the noise."""
 
 import math
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -212,8 +213,10 @@ def noise_after(noise, xi, time, rng, h=None, bias=0.0):
     return xi
 
 
-@pytest.mark.parametrize("origin", ["stationary", "zero"])
-@pytest.mark.parametrize("r0", sampled(0.5, 0.7, 0.95, 1.2, 0.0, keep=4))
+@pytest.mark.parametrize(
+    ("r0", "origin"),
+    sampled(*product((0.5, 0.7, 0.95, 1.2), ("zero", "stationary")), (0.0, "stationary"), keep=8),
+)
 def test_noise_has_its_stationary_law(r0, origin):
     """A Kolmogorov-Smirnov test of 1e5 independent paths against Eq. (9)."""
     noise = NonGaussianNoise(D0=0.8, tau0=1.3, r0=r0)
