@@ -1,4 +1,4 @@
-"""The command line, fpsolve run | check | simulate | chart | prove | mesh: runs a command, and says what went wrong."""
+"""The command line, fpsolve run | check | simulate | chart | prove | mesh | new | schema, and its messages."""
 
 from __future__ import annotations
 
@@ -143,6 +143,42 @@ def _drop_blocked_output() -> None:
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, stream.fileno())
             os.close(nowhere)
+
+
+@app.command
+def new(
+    name: Annotated[str, Parameter(help="A case that comes with fpsolve; all of them are listed if omitted.")] = "",
+    file: Annotated[Path | None, Parameter(help="The new file, or its folder; NAME.toml here if omitted.")] = None,
+) -> int:
+    """Copy a case that comes with fpsolve, to start from, or list these cases with what each is about.
+
+    The copy names fpsolve.schema.json beside it, by which editors complete and check it.
+
+    Example: fpsolve new fig1 my_case.toml
+    """
+    from fpsolve.workflow.shipped import copy_case, described_cases
+
+    if name:
+        print(f"written: {escaped(str(copy_case(name, file)))}")
+        return 0
+    described = described_cases()
+    for each, title in described.items():
+        print(f"{each:{max(map(len, described))}}  {title}")
+    return 0
+
+
+@app.command
+def schema() -> int:
+    """Print the JSON Schema of case files, by which editors complete and check them.
+
+    A case file names it in its first line, "#:schema fpsolve.schema.json", as Taplo and Even Better TOML read it.
+
+    Example: fpsolve schema > fpsolve.schema.json
+    """
+    from fpsolve.case.schema import schema_text
+
+    print(schema_text(), end="")
+    return 0
 
 
 @app.command

@@ -255,7 +255,8 @@ def _names(known: Sequence[str], must: str, unknown: str, *, may_be_empty: bool 
         refuse(wrong)
         return tuple(names)
 
-    return BeforeValidator(checked)
+    stated = Annotated[tuple[Literal[*known], ...], Field(min_length=0 if may_be_empty else 1)]  # type: ignore[valid-type]
+    return BeforeValidator(checked, json_schema_input_type=stated)
 
 
 class MomentAt(Section):
@@ -295,6 +296,7 @@ def _time_unit(value: Any) -> Any:
 
 
 Limits = Annotated[tuple[float, float], BeforeValidator(_limits)]
+UnitName = Annotated[str, Field(min_length=1, max_length=12)]
 _MARKS = quoted(get_args(MarkedName))
 
 
@@ -321,7 +323,9 @@ class FigureSection(Section):
         parameter("what is marked", 'mark = ["stability_index"]'),
     ] = ("stability_index",)
     time_unit: Annotated[
-        str, BeforeValidator(_time_unit), parameter("what the unit of time is called", 'time_unit = "s"')
+        str,
+        BeforeValidator(_time_unit, json_schema_input_type=UnitName),
+        parameter("what the unit of time is called", 'time_unit = "s"'),
     ] = "time"
 
     @property
@@ -440,12 +444,25 @@ def _zeros(value: Any) -> Any:
     return tuple(made)
 
 
+class IndexAt(Section):
+    """{ stability_index = p }: where δ_p has a value."""
+
+    stability_index: Annotated[float, parameter("value of the stability index", "stability_index = -1.0")]
+
+
+Zeros = Annotated[tuple[Literal["lyapunov_exponent"] | MomentAt | IndexAt, ...], Field(min_length=1)]
+
+
 class ChartSection(Section):
     """[chart]: a frame of two parameters, and the lines in it."""
 
     x: Annotated[ChartAxis, parameter("the abscissa", 'x = { key = "oscillator.omega", start = 0.3, stop = 5.0 }')]
     y: Annotated[ChartAxis, parameter("the ordinate", 'y = { key = "noise.D0", start = 0.01, stop = 2.0 }')]
-    zero: Annotated[tuple[Zero, ...], BeforeValidator(_zeros), parameter("what is zero on a line", _ZERO)]
+    zero: Annotated[
+        tuple[Zero, ...],
+        BeforeValidator(_zeros, json_schema_input_type=Zeros),
+        parameter("what is zero on a line", _ZERO),
+    ]
 
     @model_validator(mode="after")
     def _two_parameters(self) -> Self:
@@ -475,7 +492,7 @@ class Expectation(Section):
     source: Annotated[Text, parameter("where the value comes from", 'source = "Eq. (37), second order"')]
     where: Annotated[
         dict[str, Value],
-        BeforeValidator(_where),
+        BeforeValidator(_where, json_schema_input_type=dict[str, Value | dict[str, Value]]),
         parameter("which curves: some of the varied keys", 'where = { "noise.D0" = 1.0 }'),
     ] = Field(default_factory=dict)
 

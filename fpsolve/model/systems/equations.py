@@ -123,7 +123,12 @@ class EquationSystem(System):
         ),
         "parameters": stated_field(
             Annotated[
-                dict[str, Annotated[StatedParameter, BeforeValidator(_as_table)]],
+                dict[
+                    str,
+                    Annotated[
+                        StatedParameter, BeforeValidator(_as_table, json_schema_input_type=float | StatedParameter)
+                    ],
+                ],
                 parameter("the parameters by their names", "parameters = { omega = 1.0 }"),
             ],
             {},

@@ -1,0 +1,67 @@
+"""The cases that come with fpsolve, to start from: a wheel holds them, a copy of the repository has them beside it."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from fpsolve.case.messages import nearest, shown
+from fpsolve.case.schema import SCHEMA, schema_text
+from fpsolve.errors import FpsolveError
+from fpsolve.files import write_text
+
+_NAMED = re.compile(r"\A#:schema .*\n")
+"""The line by which a case names its schema."""
+
+
+@cache
+def shipped_cases() -> Mapping[str, Path]:
+    """The cases by their names, those of the paper's oscillator first."""
+    package = Path(str(files("fpsolve")))
+    folder = next(place for place in (package / "cases", package.parent / "cases") if place.is_dir())
+    return {path.stem: path for path in (*sorted(folder.glob("*.toml")), *sorted(folder.glob("systems/*.toml")))}
+
+
+def described_cases() -> dict[str, str]:
+    """The title of each case by its name."""
+    texts = ((name, path.read_text(encoding="utf-8")) for name, path in shipped_cases().items())
+    return {name: str(tomllib.loads(text)["title"]) for name, text in texts}
+
+
+def copy_case(name: str, target: Path | None = None) -> Path:
+    """Copy a case, with the mesh that it names, and beside it the schema by which editors complete and check it.
+
+    Args:
+        name: of the case; its folder and its ending may stand there, too.
+        target: the new file, or a folder for it; a file of its name in the working folder if None.
+
+    Returns:
+        The new file.
+
+    Raises:
+        FpsolveError: there is no such case, or a file stands where one would be written; nothing is written.
+    """
+    known = shipped_cases()
+    source = known.get(name.removesuffix(".toml").rpartition("/")[2])
+    if source is None:
+        text = f"got {shown(name)}; must be the name of a case;{nearest(name, known)} `fpsolve new` lists all of them"
+        raise FpsolveError(text)
+    path = Path(source.name) if target is None else target / source.name if target.is_dir() else target
+    text = f"#:schema {SCHEMA}\n{_NAMED.sub('', source.read_text(encoding='utf-8'))}"
+    copies = {path: text}
+    if mesh := tomllib.loads(text).get("mesh", {}).get("file"):
+        beside = path.parent / Path(mesh).name
+        copies = {beside: (source.parent / mesh).read_text(encoding="utf-8"), path: text.replace(mesh, beside.name)}
+    for each in copies:
+        if each.exists() or each.is_symlink():
+            raise FpsolveError(f"{each} is there already; write `fpsolve new {source.stem} FILE` with another FILE")
+    schema = path.parent / SCHEMA
+    if not schema.exists():
+        copies[schema] = schema_text()
+    for each, content in copies.items():
+        write_text(each, content)
+    return path
