@@ -134,7 +134,12 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
 
     ω ρ, or |dφ/dt| ρ where the noise moves the phase there, is the probability flux through an impact, where the
     log-amplitude jumps by ln R; it is taken on the side from where the impact is met.
+
+    Raises:
+        ValueError: the pair is not the one at p = 0, or several noises have values.
     """
+    if len(pair.generator.problem.coloured.parts) > 1:
+        raise ValueError("the formula is for one noise that has values, but there are several; use lyapunov_exponent")
     space, problem, at = _of_zero(pair).space, pair.generator.problem, pair.space.xi.samples()
     system, phi = problem.motion, space.phi.points[:, None]
     rate = growth_rate(system, at.xi)(phi)

@@ -336,16 +336,22 @@ class Discretisation:
         """The elements of a mesh, which is cut off at the end of the noise's support, in the coordinates of a frame.
 
         Raises:
-            MeshError: the mesh has lines where ξ is no diffusion by itself, or none where it is.
+            MeshError: the mesh has lines where ξ is no diffusion by itself, or none where it is; or several noises
+                have values.
         """
+        if len(noise.parts) > 1:
+            raise MeshError("a mesh is for one noise that has values, but there are several; leave it out")
         if noise.is_diffusion != bool(mesh.z_lines.size):
             raise MeshError(
-                "noise with states, or with an angle, needs a mesh without z_lines, and noise on a line one with them"
+                "noise with states, with an angle or of a filter needs a mesh without z_lines, and noise on a line one "
+                "with them; leave the mesh out, and one is chosen for each p"
             )
         lines = mesh.phi_lines if frame is None else frame.phase(mesh.phi_lines)
         phase = PhaseCells(lines, np.full(mesh.phi_lines.size - 1, mesh.phi_degree))
         if noise.basis == "waves":
             return cls(phase, (Waves(mesh.xi_degree),))
+        if noise.basis == "pairs":
+            return cls(phase, (Pairs(mesh.xi_degree),))
         if noise.has_states:
             return cls(phase, (States(noise.reached.size),))
         mesh = mesh.within(noise.half_width / noise.standard_deviation)

@@ -213,7 +213,7 @@ def test_problems_of_chains_pickle():
 
 
 def test_a_chain_refuses_a_mesh_with_lines():
-    with pytest.raises(MeshError, match="noise with states, or with an angle, needs a mesh without z_lines"):
+    with pytest.raises(MeshError, match="noise with states, with an angle or of a filter needs a mesh without z_lines"):
         Generator(Problem(oscillator(), TELEGRAPH), make_mesh())
 
 

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve.analysis.density import furstenberg_khasminskii
 from fpsolve.analysis.sensitivity import solve_sensitivities
 from fpsolve.arrays import identity
+from fpsolve.errors import MeshError
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.mesh import make_mesh
 from fpsolve.model import CoefficientMatrix, Jump, Noises, Poisson, SineWiener, Telegraph, White
 from fpsolve.proofs.statement import statement_of
 from fpsolve.theory.hierarchy import hierarchy_exponent
 from fpsolve.theory.perturbation import second_order
-from tests.oracles.moment_hierarchy import chain, gaussian, several_exponent
+from tests.oracles.moment_hierarchy import chain, gaussian, rates_of_monomials, several_exponent, struck_rates
 from tests.random_several import compared
 
 RATES = "v", "-omega**2*x - 2*zeta*omega*v - load*x - sway*v"
@@ -57,6 +60,20 @@ def test_the_hierarchy_of_chains_and_white_noise():
     assert ExponentSolver(struck).solution(2.0).pair.value == pytest.approx(
         hierarchy_exponent(struck, 2.0)[0], abs=1e-8
     )
+
+
+@pytest.mark.parametrize("sense", ["stratonovich", "ito"])
+def test_white_noise_and_impulses(sense):
+    """The 3 × 3 equations of the second moments, and the 5 × 5 ones of order 4."""
+    impulses, white = Poisson(rate=1.3, sizes=(0.5, -0.8), weights=(2.0, 1.0)), White(s=0.4, interpretation=sense)
+    solver = ExponentSolver(beam(impulses, white))
+    drift = np.array(STEADY) - (0.5 * 0.16 * np.array(DAMPING) @ np.array(DAMPING) if sense == "ito" else 0.0)
+    for p in (2, 4):
+        moved = rates_of_monomials(0.4 * np.array(DAMPING), p)
+        total = struck_rates(drift, STIFFNESS, impulses.rate, impulses.sizes, impulses.shares, p) + 0.5 * moved @ moved
+        expected, found = float(np.linalg.eigvals(total).real.max()), solver.solution(float(p))
+        assert abs(found.pair.value - expected) <= found.error + 1e-12
+        assert found.error < 1e-7
 
 
 def test_two_noises_of_one_term_are_one():
@@ -126,6 +143,11 @@ def test_what_several_noises_may_be():
         Problem(beam(GAUSSIAN, GAUSSIAN).system, GAUSSIAN)
     with pytest.raises(TypeError, match="got the noises axial and lateral at once; proofs are for one noise"):
         statement_of(beam(Telegraph(a=0.2, k=1.0), White(s=0.1)))
+    solver = ExponentSolver(beam(GAUSSIAN, Telegraph(a=0.2, k=1.0)), rtol=1e-4)
+    with pytest.raises(ValueError, match="the formula is for one noise"):
+        furstenberg_khasminskii(solver.pair(0.0))
+    with pytest.raises(MeshError, match="a mesh is for one noise"):
+        ExponentSolver(solver.problem, make_mesh()).solution(2.0)
     turning = [CoefficientMatrix(1, ((0.0, 1.0), (0.0, 0.0)), identity, name) for name in "ab"]
     system = PlaneSystem([CoefficientMatrix(0, STEADY), *turning], [Jump(math.pi / 2, -0.1)])
     with pytest.raises(Exception, match="two noises with a density move the phase over the ray"):

@@ -1,6 +1,7 @@
 """Filtered noise: law and step, Λ(p) against moments over Hermite polynomials, limits, derivatives, case files."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,10 +13,11 @@ from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, se
 from fpsolve.analysis.sensitivity import changed_value
 from fpsolve.arrays import identity
 from fpsolve.case.case import load_case
-from fpsolve.errors import CaseError, NotConverged
+from fpsolve.errors import CaseError, MeshError, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.pairs import PairAxis
 from fpsolve.model import CoefficientMatrix, Filter, ParametricOscillator, White, noise_kind
 from fpsolve.simulation.motions import draw
@@ -221,6 +223,17 @@ def test_sensitivities():
     for key in ("omega", "zeta", "s", "c0", "c1"):
         slope = found.moment_by_theta.sel(parameter=f"noise.{key}").item()
         assert slope == pytest.approx(changed_value(pair, problem.derivative(f"noise.{key}")).value, abs=1e-8)
+
+
+def test_a_given_mesh():
+    """Without lines of ξ; its degree is that of the products."""
+    mesh = make_mesh(phi_cells=2, phi_degree=12, xi_degree=12)
+    noise = Filter(*law_of("y", 0.3))
+    found = solved(noise, mesh=replace(mesh, z_lines=np.zeros(0)))
+    assert found.pair.space.shape[1] == 12 * 13 // 2
+    assert found.pair.value == pytest.approx(-0.0280940333946, abs=found.error + 1e-12)
+    with pytest.raises(MeshError, match="of a filter needs a mesh without z_lines"):
+        solved(noise, mesh=mesh)
 
 
 def test_the_lyapunov_exponent_of_a_saddle():

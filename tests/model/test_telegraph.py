@@ -9,7 +9,7 @@ from pydantic.dataclasses import dataclass
 from fpsolve import PlaneSystem, boundary, lyapunov_exponent, moment_lyapunov, sensitivities
 from fpsolve.analysis.zero import Axis
 from fpsolve.arrays import identity
-from fpsolve.model import CoefficientMatrix, MarkovChain, Problem, Telegraph, noise_kind
+from fpsolve.model import CoefficientMatrix, MarkovChain, Problem, Telegraph, White, noise_kind
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.model.noises.markov_chain import Chain
 from fpsolve.model.parameters import parameter
@@ -96,3 +96,16 @@ def test_a_chart_over_its_parameters():
     assert branch.x.size > 10
     for a, k in zip(branch.x[::5], branch.y[::5], strict=True):
         assert hierarchy(2, a, k, 0.1) == pytest.approx(0, abs=1e-9)
+
+
+def test_fast_noise_is_white():
+    """a²/k = S(0) fixed: Λ(p) comes nearer to that of white noise as 1/k does, by the moment equations of both too."""
+    white = moment_lyapunov(Problem(PlaneSystem.of(spring, stiffness=1.0, damping=0.05), White(s=0.5)), [1.0, 2.0])
+    exact = moment_hierarchy.white_noise_exponent([[0.0, 1.0], [-1.0, -0.1]], [[[0.0, 0.0], [-0.5, 0.0]]], 2)
+    assert white.value[1] == pytest.approx(exact, abs=1e-9)
+    rates = np.array([2048.0, 4096.0, 8192.0])
+    found = [moment_lyapunov(of(a=0.5 * np.sqrt(k), k=k), [1.0, 2.0], rtol=1e-10) for k in rates]
+    for each, k in zip(found, rates, strict=True):
+        assert each.value[1] == pytest.approx(hierarchy(2, a=0.5 * np.sqrt(k), k=k), abs=1e-9)
+    orders = -np.diff(np.log2(np.abs([each.value - white.value for each in found])), axis=0)
+    np.testing.assert_allclose(orders, 1.0, atol=0.02)

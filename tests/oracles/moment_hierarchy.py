@@ -50,7 +50,12 @@ def white_noise_exponent(drift, noises, p, interpretation="stratonovich"):
 
 
 def impulses_exponent(drift, driven, rate, sizes, shares, p):
-    """Λ(p) where x is multiplied by M = exp(w A₁) at a rate: monomials (ax + by)^k (cx + dy)^(p−k) written out."""
+    """Λ(p) where x is multiplied by M = exp(w A₁) at a rate."""
+    return float(np.max(np.linalg.eigvals(struck_rates(drift, driven, rate, sizes, shares, p)).real))
+
+
+def struck_rates(drift, driven, rate, sizes, shares, p):
+    """What moves the monomials of degree p then, with (ax + by)^k (cx + dy)^(p−k) written out."""
     total = rates_of_monomials(drift, p)
     for size, share in zip(sizes, shares, strict=True):
         (a, b), (c, d) = expm(size * np.asarray(driven, dtype=float))
@@ -59,7 +64,7 @@ def impulses_exponent(drift, driven, rate, sizes, shares, p):
             for k in range(p + 1)
         ]
         total += rate * share * (np.array(struck) - np.eye(p + 1))
-    return float(np.max(np.linalg.eigvals(total).real))
+    return total
 
 
 def _powers(line, n):
