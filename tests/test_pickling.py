@@ -47,9 +47,9 @@ def test_assembling_again_keeps_no_memory(strong_pair):
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()
-    before, after = assembled(20), assembled(20)
+    before, after = assembled(6), assembled(6)
     tracemalloc.stop()
-    assert after - before <= 0.1 * 20 * strong_pair.right.nbytes  # not even a tenth of a vector each time
+    assert after - before <= 0.1 * 6 * strong_pair.right.nbytes  # not even a tenth of a vector each time
 
 
 def test_results_pickle():

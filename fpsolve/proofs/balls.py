@@ -102,8 +102,12 @@ def _beyond(bound: arb, direction: float) -> float:
 
 def rounded(numbers: Balls) -> tuple[FloatArray, FloatArray]:
     """Floats near real balls, and by how much the balls may differ from them at most."""
-    near = each(float, numbers).astype(float)
-    radius = each(lambda number: float(number.rad()), numbers).astype(float)
+    from flint import arb
+
+    near, radius = (
+        np.fromiter(map(float, found), float, numbers.size).reshape(numbers.shape)
+        for found in (numbers.flat, map(arb.rad, numbers.flat))
+    )
     return near, np.abs(near) * 2.0**-52 + radius * (1 + 2.0**-20) + TINY
 
 

@@ -210,10 +210,11 @@ def test_periodic_by_pi(grids):
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     return written(
-        tmp_path_factory.mktemp("reference"), ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
+        tmp_path_factory.mktemp("reference"), ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["full circle"])
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["T", "T_adjoint", "stationary_density"])
 def test_every_mesh_shows_the_same_field(grids, reference, name):
     """Interpolated by VTK itself, at random points."""
