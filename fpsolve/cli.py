@@ -13,7 +13,7 @@ from pathlib import Path
 from shlex import quote
 from time import monotonic
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, CycloptsError, CycloptsPanel, Parameter, Token
 from rich.console import Console
@@ -27,6 +27,7 @@ from fpsolve.signals import ended_by_signals
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
+    from fpsolve.output.report import Reporter
     from fpsolve.pool import Pool
     from fpsolve.workflow.progress import Watch
 
@@ -74,6 +75,19 @@ Quiet = Annotated[
     Parameter(
         help='Print the last line only, and on the standard error what is wrong or "not converged": no tables, notes, '
         "warnings or progress; all of that is in the files.",
+        negative="",
+    ),
+]
+
+
+Report = Annotated[
+    bool,
+    Parameter(help="Write report.html too: all of it on one page, with figures, which opens from disk.", negative=""),
+]
+Interactive = Annotated[
+    bool,
+    Parameter(
+        help="Write report.html with numbers where the pointer is, by plotly: pip install 'fpsolve[interactive]'.",
         negative="",
     ),
 ]
@@ -195,6 +209,8 @@ def run(
     json: Annotated[
         bool, Parameter(help="Print the summaries, one line of JSON for each case, instead of tables.", negative="")
     ] = False,
+    report: Report = False,
+    interactive: Interactive = False,
     quiet: Quiet = False,
     overrides: Overrides = None,
 ) -> int:
@@ -211,11 +227,13 @@ def run(
     from fpsolve.output.terminal import done_of, known_of, note_missing, print_written
     from fpsolve.workflow.cases import run_case
 
-    code, loaded = 0, load_to_write(cases, overrides, monte_carlo=monte_carlo)
+    code, reporter = 0, reporter_of(report, interactive)
+    loaded = load_to_write(cases, overrides, monte_carlo=monte_carlo)
     pool = pool_of(jobs, scheduler, loaded)
     for case in loaded:
         start, watch = monotonic(), _watch(is_json=json, is_quiet=quiet)
-        outcome = run_case(case, out, monte_carlo=monte_carlo, pool=pool, is_fresh=fresh, watch=watch)
+        how: dict[str, Any] = {"monte_carlo": monte_carlo, "is_fresh": fresh, "reporter": reporter}
+        outcome = run_case(case, out, pool=pool, watch=watch, **how)
         if outcome.interruption:
             print_error(outcome.interruption)
         if not quiet:
@@ -248,6 +266,8 @@ def simulate(
     jobs: Annotated[Count | None, Parameter(help="How many processors; all if omitted.")] = None,
     scheduler: Scheduler = "",
     fresh: Fresh = False,
+    report: Report = False,
+    interactive: Interactive = False,
     quiet: Quiet = False,
     overrides: Overrides = None,
 ) -> int:
@@ -260,6 +280,7 @@ def simulate(
     from fpsolve.output.terminal import done_of, known_of, print_written
     from fpsolve.workflow.cases import simulate_case
 
+    reporter = reporter_of(report, interactive)
     stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
     options = {
         f"--{name} {value:{'g' if name == 'time' else ''}}": f"monte_carlo.{name}={value}"
@@ -270,7 +291,8 @@ def simulate(
     pool = pool_of(jobs, scheduler)
     for case in loaded:
         start, watch = monotonic(), _watch(is_quiet=quiet)
-        outcome = simulate_case(case, out, pool=pool if scheduler else None, is_fresh=fresh, watch=watch)
+        how: dict[str, Any] = {"is_fresh": fresh, "reporter": reporter, "watch": watch}
+        outcome = simulate_case(case, out, pool=pool if scheduler else None, **how)
         if outcome.interruption:
             print_error(outcome.interruption)
         what = done_of(case, sum(not each.interrupted for each in outcome.simulated))
@@ -331,6 +353,8 @@ def chart(
     out: Out = Path("results"),
     jobs: Jobs = None,
     scheduler: Scheduler = "",
+    report: Report = False,
+    interactive: Interactive = False,
     quiet: Quiet = False,
     overrides: Overrides = None,
 ) -> int:
@@ -345,13 +369,14 @@ def chart(
     from fpsolve.study.chart import refuse_no_chart
     from fpsolve.workflow.cases import chart_case
 
-    code, loaded = 0, load_to_write(cases, overrides)
+    code, reporter = 0, reporter_of(report, interactive)
+    loaded = load_to_write(cases, overrides)
     for case in loaded:
         refuse_no_chart(case)
     pool = pool_of(jobs, scheduler)
     for case in loaded:
         start = monotonic()
-        found = chart_case(case, out, pool=pool, watch=_watch(is_quiet=quiet))
+        found = chart_case(case, out, pool=pool, reporter=reporter, watch=_watch(is_quiet=quiet))
         if quiet:
             for each in dict.fromkeys(found.failures):
                 print_remark(f"{case.name}: {each.words(CASE_WORDS)}", Severity.FAILURE)
@@ -374,6 +399,7 @@ def prove(
     out: Out = Path("results"),
     jobs: Jobs = None,
     scheduler: Scheduler = "",
+    report: Report = False,
     quiet: Quiet = False,
     overrides: Overrides = None,
 ) -> int:
@@ -393,7 +419,7 @@ def prove(
     if (check is None) == (not cases):
         raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
     if check is not None:
-        if width is not None or overrides or jobs is not None or scheduler:
+        if width is not None or overrides or jobs is not None or scheduler or report:
             raise FpsolveError("--check takes a proof.json and nothing else, as that says all that is verified")
         checked = check_proof(check)
         for text in checked.objections:
@@ -406,13 +432,15 @@ def prove(
         unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
         print(f"accepted: {escaped(str(check))} ({bounds} follow from their certificates{unfinished})")
         return 0
-    code, loaded = 0, load_to_write(cases or [], overrides)
+    code, reporter = 0, reporter_of(report)
+    loaded = load_to_write(cases or [], overrides)
     for case in loaded:
         refuse_unprovable_case(case, width)
     pool = pool_of(jobs, scheduler)
     for case in loaded:
         start = monotonic()
-        proofs = prove_case(case, out, width=width, pool=pool, watch=_watch(is_quiet=quiet))
+        watch = _watch(is_quiet=quiet)
+        proofs = prove_case(case, out, width=width, pool=pool, reporter=reporter, watch=watch)
         if not quiet:
             print_proofs(case, proofs)
         unmet = sum(not each.is_met for each in proofs)
@@ -513,15 +541,24 @@ def pool_of(jobs: int | None, scheduler: str, cases: Sequence[Case] = ()) -> Poo
     return pool
 
 
+def reporter_of(report: bool, interactive: bool = False) -> Reporter | None:
+    """Who writes reports, if one is wanted. Raises `FpsolveError` where what it needs is not installed."""
+    if not (report or interactive):
+        return None
+    from fpsolve.output.report import Reporter
+
+    return Reporter(is_interactive=interactive)
+
+
 def _watch(*, is_json: bool = False, is_quiet: bool = False) -> Watch:
     """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
-    from fpsolve.output.terminal import print_remarks, print_results, print_simulation
+    from fpsolve.output.terminal import print_message, print_remarks, print_results, print_simulation
     from fpsolve.workflow.progress import Bars, Watch
 
     if is_quiet:
-        return Watch(solved=partial(print_remarks, severities=[Severity.FAILURE]))
-    bar = Bars().bar
-    return Watch(bar, print_remarks) if is_json else Watch(bar, print_results, print_simulation)
+        return Watch(solved=partial(print_remarks, severities=[Severity.FAILURE]), said=print_message)
+    bar, said = Bars().bar, print_message
+    return Watch(bar, print_remarks, said=said) if is_json else Watch(bar, print_results, print_simulation, said)
 
 
 if __name__ == "__main__":

@@ -277,6 +277,9 @@ class Code(Enum):
     RESPONSE_STOPPED = "warning: the response was stopped early, after {time:.3g}"
     RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"
 
+    NO_REPORT = "warning: no report.html: {kind}: {text} (a fault of fpsolve; all other files are there)"
+    NO_PICTURE = "note: this picture could not be drawn: {reason}"
+
     NO_MEMORY = "failure: not enough memory"
     WORKER_DIED = "failure: its worker died, perhaps for lack of memory; {remedy}, and run it again"
     FAULT = "failure: {kind}: {text} (a fault of fpsolve, in {file}:{line})"

@@ -83,12 +83,12 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
     write_json(folder / "chart.json", summary)
 
 
-def draw_chart(case: Case, chart: Chart, folder: Path) -> None:
-    """chart.png and chart.pdf: the lines, their closed forms dashed, and the regions with their names."""
+def draw_chart(case: Case, chart: Chart, folder: Path, *, into: Path | None = None) -> None:
+    """chart.png and .pdf, or `into` another file: the lines, their closed forms dashed, and the regions with names."""
     frame, unit = (charted(case).x.axis, charted(case).y.axis), case.figure.time_unit
     keys = frame[0].key, frame[1].key
     held = held_in_words(case.curve({}), keys, unit)
-    paths = [folder / "chart.png", folder / "chart.pdf"]
+    paths = [into] if into else [folder / "chart.png", folder / "chart.pdf"]
     with figure_for(paths, case.headline, held, _FORM) as figure:
         axes = figure.add_subplot()
         label_axes(axes, *(case.about(key).attributes for key in keys))

@@ -134,8 +134,15 @@ def _several(varied: Sequence[Varied]) -> tuple[dict[str, int], list[str]]:
     return {key: counts[key] for key in several if key not in texts}, texts
 
 
-def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path) -> None:
-    """Draw figure.png and figure.pdf: finite elements, perturbation theory, and what is simulated as dots.
+def draw(
+    case: Case,
+    results: Sequence[CurveResult],
+    simulated: Sequence[SimulatedCurve],
+    folder: Path,
+    *,
+    into: Path | None = None,
+) -> None:
+    """Draw figure.png and .pdf, or `into` another file: finite elements, perturbation theory, dots of a simulation.
 
     Over two keys with many values it is a map. There is none with `[output] figure = false`, and without a [figure]
     none of a case that does not ask for Λ(p).
@@ -144,7 +151,7 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
     if not case.output.figure or setting.needed not in case.output.quantities or not results:
         return
     held = held_in_words(results[0].curve, case.vary.keys, setting.time_unit)
-    with figure_for(_paths(folder, "figure"), case.caption, held, FORMATS[setting.width]) as figure:
+    with figure_for(_paths(folder, "figure", into), case.caption, held, FORMATS[setting.width]) as figure:
         axes = figure.add_subplot()
         if other := map_key(setting, case.vary):
             _draw_map(axes, case, results, (setting.x, other), folder)
@@ -160,7 +167,7 @@ def draw(case: Case, results: Sequence[CurveResult], simulated: Sequence[Simulat
         draw_series(axes, case, series, setting.quantity.closed_form + ", reduced noise" * is_exact)
 
 
-def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path) -> None:
+def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path, *, into: Path | None = None) -> None:
     """Draw sensitivities.png and .pdf of every curve, if the case says so: θ ∂/∂θ of λ and of some Λ(p), scaled."""
     for result in results if case.output.sensitivities else ():
         found = result.sensitivities
@@ -171,16 +178,17 @@ def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path)
             size = float(scale.moment(p)) if p else scale.linear
             bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
         held = held_in_words(result.curve, (), case.figure.time_unit)
-        with figure_for(_paths(folder, f"sensitivities{result.curve.suffix}"), case.headline, held) as figure:
+        with figure_for(_paths(folder, f"sensitivities{result.curve.suffix}", into), case.headline, held) as figure:
             words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
             draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).shown for key in found.theta])
 
 
-def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
+def draw_response(case: Case, simulated: SimulatedCurve, folder: Path, *, into: Path | None = None) -> None:
     """Draw response.png and .pdf of a curve, if it has one: the joint density of x and ẋ, and that of the amplitude."""
     if simulated.response is None:
         return
-    paths, held = _paths(folder, f"response{simulated.curve.suffix}"), held_in_words(simulated.curve, (), "time")
+    paths = _paths(folder, f"response{simulated.curve.suffix}", into)
+    held = held_in_words(simulated.curve, (), "time")
     with figure_for(paths, case.headline, held, Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
         simulated.response.plot(plane)
@@ -188,8 +196,8 @@ def draw_response(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
         simulated.response.plot_amplitude(radial)
 
 
-def _paths(folder: Path, name: str) -> list[Path]:
-    return [folder / f"{name}.{ending}" for ending in ("png", "pdf")]
+def _paths(folder: Path, name: str, into: Path | None) -> list[Path]:
+    return [into] if into else [folder / f"{name}.{ending}" for ending in ("png", "pdf")]
 
 
 def _some(count: int) -> set[int]:

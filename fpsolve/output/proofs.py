@@ -83,12 +83,12 @@ def print_proofs(case: Case, proofs: Sequence[CurveProof]) -> None:
     """The bounds and what follows from them: a table for each curve, or of many curves a row each."""
     screen = Screen.of()
     if len(proofs) > MOST_TABLES:
-        screen.show(_curve_grid(case, proofs))
+        screen.show(proofs_grid(case, proofs))
         return
     for proof in proofs:
-        screen.show(_moment_grid(case, proof))
+        screen.show(proof_grid(case, proof))
         indices = [(LYAPUNOV_EXPONENT.symbol, proof.exponent), (STABILITY_INDEX.symbol, proof.index)]
-        screen.packed([f"{symbol} {_between(found)}" for symbol, found in indices if found is not None])
+        screen.packed([f"{symbol} {between(found)}" for symbol, found in indices if found is not None])
         told = proof.verdicts
         if sum(found is not None and found.sign != 0 for _, found in proof.moments) > MOST_TOLD:
             path = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
@@ -98,7 +98,7 @@ def print_proofs(case: Case, proofs: Sequence[CurveProof]) -> None:
         screen.lines([""])
 
 
-def _moment_grid(case: Case, proof: CurveProof) -> Grid:
+def proof_grid(case: Case, proof: CurveProof) -> Grid:
     symbol = MOMENT.symbol
     columns = [Column("p"), Column(f"{symbol} ≥"), Column(f"{symbol} ≤"), Column("width", 2), Column("the moment", 1)]
     grid = Grid(case.heading(proof.curve), columns)
@@ -112,7 +112,7 @@ def _moment_grid(case: Case, proof: CurveProof) -> Grid:
     return grid
 
 
-def _curve_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
+def proofs_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
     """What varies, how many Λ(p) are proven, the bounds on λ, and what becomes of paths and moments."""
     has_exponent = any(proof.exponent is not None for proof in proofs)
     p = [p for p, _ in proofs[0].moments]
@@ -122,7 +122,7 @@ def _curve_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
     grid = Grid(case.headline, [*columns, *[Column(heading, 3) for heading in headings]])
     for proof in proofs[:MOST_ROWS]:
         proven = sum(found is not None and found.is_proven for _, found in proof.moments)
-        exponent = ["", ""] if proof.exponent is None else [_between(proof.exponent), WORDS[proof.exponent.sign]]
+        exponent = ["", ""] if proof.exponent is None else [between(proof.exponent), WORDS[proof.exponent.sign]]
         words = [_fate(each, found) for each, found in proof.moments]
         moments = words if len(p) <= MOST_TOLD else [_counted(proof)]
         varied = map(written, proof.curve.varied.values())
@@ -149,7 +149,7 @@ def _counted(proof: CurveProof) -> str:
     return ", ".join(told) or "none is known"
 
 
-def _between(found: Enclosure | IndexEnclosure) -> str:
+def between(found: Enclosure | IndexEnclosure) -> str:
     """ "in [0.0010257274, 0.0010257275]"."""
     return f"in [{', '.join(bounds_text(found))}]" if found.is_proven else NOT_PROVEN
 

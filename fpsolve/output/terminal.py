@@ -198,7 +198,7 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
     else:
         for result in results:
             if result.moments.p.size:
-                screen.show(_moment_grid(case, result))
+                screen.show(moment_grid(case, result))
             groups: list[list[str]] = [[]]  # what concerns impacts apart from the others
             for index in _told(case) if any(result.estimates.values()) else ():
                 estimate = result.estimates[index.name]
@@ -259,7 +259,7 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
     pairs = [(each, solved.get(each.curve.key)) for each in simulated]
     if is_short and case.figure.x == "p":
         for each, result in pairs:
-            screen.show(_simulation_grid(case, each, result))
+            screen.show(simulation_grid(case, each, result))
             found = each.result
             value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
             exponent = f"{LYAPUNOV_EXPONENT.symbol} = {_with_error(value, error)}"
@@ -271,7 +271,7 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
             screen.say(f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}")
             screen.lines([""])
     else:
-        screen.show(_exponent_grid(case, pairs))
+        screen.show(exponent_grid(case, pairs))
         if not is_short:
             screen.say(f"{len(simulated)} curves; all numbers are in {MONTE_CARLO}, one for each curve")
     for each in simulated if is_short else ():
@@ -282,7 +282,7 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
     print_remarks(case, simulated, MONTE_CARLO)
 
 
-def _simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
+def simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
     """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
     compared = [Column("finite elements", 2), Column("s.e. away", 1)] if result else []
     columns = [Column("p"), Column(MOMENT.symbol), Column("± s.e."), *compared, Column("effective paths", 3)]
@@ -295,7 +295,7 @@ def _simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult 
     return grid
 
 
-def _exponent_grid(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Grid:
+def exponent_grid(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult | None]]) -> Grid:
     """A row for each curve, or for more than `MOST_ROWS` those with the least and the largest λ: λ by both methods."""
     compared = [Column("finite elements", 2), Column("s.e. away", 1)] if any(result for _, result in pairs) else []
     is_digest, symbol = len(pairs) > MOST_ROWS, LYAPUNOV_EXPONENT.symbol
@@ -338,7 +338,7 @@ def _deviation(value: float, error: float, exact: float) -> str:
     return f"{(value - exact) / error:+.1f}"
 
 
-def _moment_grid(case: Case, result: CurveResult) -> Grid:
+def moment_grid(case: Case, result: CurveResult) -> Grid:
     is_exact = result.curve.is_exact
     theory = Column(f"Eq. {MOMENT.closed_form}{'*' if is_exact else ''}", 1)
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
@@ -355,9 +355,8 @@ def _moment_grid(case: Case, result: CurveResult) -> Grid:
     return grid
 
 
-def print_chart(case: Case, chart: Chart) -> None:
-    """The special points of every line, and what the regions are."""
-    screen = Screen.of()
+def chart_grid(case: Case, chart: Chart) -> Grid:
+    """The branches of every line, and their special points."""
     keys = charted(case).x.key, charted(case).y.key
     names = short_names(keys)
     columns = [Column("line"), Column("branch", 1), Column("points", 2), *map(Column, names)]
@@ -373,7 +372,13 @@ def print_chart(case: Case, chart: Chart) -> None:
                     label = label.replace(f"{key} ", f"{name} ")
                 grid.rows.append(["", "", "", f"{branch.x[i]:.7g}", f"{branch.y[i]:.7g}", label])
             grid.ends.add(len(grid.rows) - 1)
-    screen.show(grid)
+    return grid
+
+
+def print_chart(case: Case, chart: Chart) -> None:
+    """The special points of every line, and what the regions are."""
+    screen = Screen.of()
+    screen.show(chart_grid(case, chart))
     for region in () if chart.regions is None else chart.regions.each:
         screen.say(f"{region.share:5.1%}  {region.name}")
     for text in in_case_words(chart.remarks):
@@ -474,6 +479,11 @@ def print_remark(text: str, severity: Severity = Severity.NOTE) -> None:
     """A sentence on the standard error, in lines that fit, indented from the second on."""
     word, style = STYLES[severity]
     Screen.of(errors=True).say(f"{word}: {text}", style)
+
+
+def print_message(case: Case, message: Message) -> None:
+    """What is said of the files of a case."""
+    print_remark(f"{case.name}: {message.words(CASE_WORDS)}", message.severity)
 
 
 def note_missing(case: Case, *, monte_carlo: bool) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fpsolve.case.case import Case, Curve, load_case
 from fpsolve.errors import NotConverged
@@ -35,7 +37,11 @@ from fpsolve.workflow.folders import (
     saying_if_interrupted,
 )
 from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Phase, Watch, ignore
+from fpsolve.workflow.reports import facts_since, write_report
 from fpsolve.workflow.sets import Simulations, Sweep
+
+if TYPE_CHECKING:
+    from fpsolve.output.report import Reporter
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +119,7 @@ def run_case(
     monte_carlo: bool = False,
     pool: Pool | None = None,
     is_fresh: bool = False,
+    reporter: Reporter | None = None,
     watch: Watch = SILENT,
 ) -> Outcome:
     """Solve a case, simulate it too if `monte_carlo` is true, and draw both in one figure.
@@ -122,6 +129,7 @@ def run_case(
     Args:
         pool: who solves; this process if none is given.
         is_fresh: whether to solve all sets again.
+        reporter: writes report.html, if one is wanted.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -147,6 +155,18 @@ def run_case(
                 with watch.bar(Phase(case.name, "figures")), writable(folder):
                     draw(case, sweep.results, simulated, folder)
                     draw_sensitivities(case, sweep.results, folder)
+                if reporter is not None:
+                    done = not interruption and len(simulated) == case.planned * monte_carlo
+                    write_report(
+                        reporter,
+                        case,
+                        folder,
+                        watch,
+                        facts=sweep.facts(),
+                        results=sweep.results,
+                        simulated=simulated,
+                        complete=done and len(sweep.results) == case.planned,
+                    )
     return Outcome(sweep.results, tuple(simulated), interruption, known=sweep.known, outdated=sweep.records.outdated)
 
 
@@ -156,6 +176,7 @@ def simulate_case(
     *,
     pool: Pool | None = None,
     is_fresh: bool = False,
+    reporter: Reporter | None = None,
     watch: Watch = SILENT,
 ) -> Outcome:
     """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further curves monte_carlo-2.json, ….
@@ -167,6 +188,7 @@ def simulate_case(
     Args:
         pool: who simulates, such as a `cluster`; None for all processors of this machine.
         is_fresh: whether to simulate all curves again.
+        reporter: writes report.html, if one is wanted.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -175,6 +197,7 @@ def simulate_case(
     """
     refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
+    started = datetime.now(UTC)
     with (
         own_folder(case, out, (SIMULATED,)) as folder,
         saying_if_interrupted(lambda: kept(len(simulated), of_curves(case), folder)),
@@ -182,10 +205,20 @@ def simulate_case(
         simulations = Simulations(case, folder, is_fresh=is_fresh)
         interruption = _simulate(simulations, watch, simulated, pool)
         watch.simulated(case, simulated, ())
+        if reporter is not None:
+            facts = facts_since(case, started)
+            write_report(reporter, case, folder, watch, facts=facts, simulated=simulated, complete=not interruption)
     return Outcome((), tuple(simulated), interruption, known=simulations.known, outdated=simulations.records.outdated)
 
 
-def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = None, watch: Watch = SILENT) -> Chart:
+def chart_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    pool: Pool | None = None,
+    reporter: Reporter | None = None,
+    watch: Watch = SILENT,
+) -> Chart:
     """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
 
     The tables are written again after every branch. What an earlier chart wrote there is removed first, and what was
@@ -193,6 +226,7 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
 
     Args:
         pool: who scans the plane; this process if none is given.
+        reporter: writes report.html, if one is wanted.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -200,7 +234,7 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
         KeyboardInterrupt: its text says what is kept; the figure shows that.
     """
     refuse_no_chart(case)
-    chart = Chart((), ())
+    chart, started = Chart((), ()), datetime.now(UTC)
 
     def traced() -> str:
         count = sum(len(line.traces) for line in chart.lines)
@@ -221,6 +255,9 @@ def chart_case(case: Case, out: str | Path = "results", *, pool: Pool | None = N
         finally:
             if chart.lines:
                 draw_chart(case, chart, folder)
+                if reporter is not None:
+                    facts = facts_since(case, started)
+                    write_report(reporter, case, folder, watch, facts=facts, chart=chart, complete=chart.complete)
     return chart
 
 

@@ -17,6 +17,8 @@ SOLVED = (
     r"|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
 )
 SIMULATED = r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)"
+REPORT = r"report\.html"
+"""Pattern of the name of the report of what was done last, which whatever is done next makes stale."""
 CHART, PROVEN = r"chart\.(csv|json|png|pdf)", r"proof\.json"
 """Patterns of the names of the files that a run writes, a simulation, a chart, and proofs."""
 _UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
@@ -41,9 +43,9 @@ def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator
                 is_folder = path.is_dir() and not path.is_symlink()
                 if re.fullmatch(_FOLDERS, name) and not is_folder:
                     raise OutputError(f"{path} cannot be written to: it is no folder, or a link to one", Remedy.FOLDER)
-                if re.fullmatch("|".join(replaced), name) and is_folder:
+                if re.fullmatch("|".join([*replaced, REPORT]), name) and is_folder:
                     raise OutputError(f"{path} cannot be written: Is a directory", Remedy.FOLDER)
-            names = "|".join([*replaced, *_stale(case, there), _UNFINISHED])
+            names = "|".join([*replaced, REPORT, *_stale(case, there), _UNFINISHED])
             for name, path in there.items():
                 if re.fullmatch(names, name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink()

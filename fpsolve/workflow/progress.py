@@ -14,6 +14,7 @@ from rich.table import Column
 from rich.text import Text
 
 from fpsolve.case.case import Case
+from fpsolve.messages import Message
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT = "sets", "p", "nodes", "points", "bounds", "%"
@@ -62,11 +63,13 @@ class Watch:
         bar: gives a phase what it shall call for its progress; a chart has two phases at a time.
         solved: takes a case and its curves once they are solved.
         simulated: takes a case, its simulated curves, and those that are solved too.
+        said: takes a case and a message about its files.
     """
 
     bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(ignore)
     solved: Callable[[Case, Sequence[CurveResult]], None] = lambda *_: None
     simulated: Callable[[Case, Sequence[SimulatedCurve], Sequence[CurveResult]], None] = lambda *_: None
+    said: Callable[[Case, Message], None] = lambda *_: None
 
 
 SILENT = Watch()

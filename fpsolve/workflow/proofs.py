@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from time import monotonic
+from typing import TYPE_CHECKING
 
 from fpsolve.case.case import Case
 from fpsolve.case.reading import Unreadable, Words, read_text
@@ -18,6 +20,10 @@ from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.study.prove import CurveProof, Plan, answer, refuse_unprovable_case
 from fpsolve.workflow.folders import ANEW, PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
+from fpsolve.workflow.reports import facts_since, write_report
+
+if TYPE_CHECKING:
+    from fpsolve.output.report import Reporter
 
 EVERY = 30.0
 """Seconds after which the curves that are done are written, so that a run that is killed keeps them."""
@@ -43,6 +49,7 @@ def prove_case(
     *,
     width: float | None = None,
     pool: Pool | None = None,
+    reporter: Reporter | None = None,
     watch: Watch = SILENT,
 ) -> list[CurveProof]:
     """Prove bounds on Λ at every p of every curve of a case, and on λ and δ_p; write proof.json into `out`/<case>/.
@@ -50,6 +57,7 @@ def prove_case(
     Args:
         width: wanted upper − lower; 1e-7 of the scale of each number if None.
         pool: who proves; this process if none is given.
+        reporter: writes report.html, if one is wanted.
 
     Raises:
         FpsolveError: a curve cannot be proven, or the width is none; nothing is written.
@@ -59,6 +67,7 @@ def prove_case(
     refuse_unprovable_case(case, width)
     plan = Plan(case, width)
     answers: list[Enclosure | IndexEnclosure] = []
+    started = datetime.now(UTC)
 
     def write() -> list[CurveProof]:
         proofs = plan.gathered(answers)
@@ -83,6 +92,9 @@ def prove_case(
                     written = monotonic()
         finally:
             proofs = write()
+            if reporter is not None and proofs:
+                facts, is_whole = facts_since(case, started), len(answers) == plan.total
+                write_report(reporter, case, folder, watch, facts=facts, proofs=proofs, complete=is_whole)
     return proofs
 
 

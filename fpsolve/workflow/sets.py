@@ -127,15 +127,15 @@ class Sweep(_Kept):
 
     def write_tables(self) -> None:
         self._tabled = len(self.results)
-        write_results(self.case, self.results, self.folder, self._facts())
+        write_results(self.case, self.results, self.folder, self.facts())
 
     def write_all(self) -> None:
         """Write the tables, results.nc, and the series over the curves."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        write_dataset(self.case, self.results, self.folder, self._facts())
+        write_dataset(self.case, self.results, self.folder, self.facts())
 
-    def _facts(self) -> dict[str, Any]:
+    def facts(self) -> dict[str, Any]:
         return facts_of(self.case, self.started, monotonic() - self._clock)
 
     def _wanted(self, curve: Curve) -> Wanted:

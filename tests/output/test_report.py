@@ -1,0 +1,270 @@
+"""report.html: what stands on the page, that it is one file, that texts are texts, and that it never costs a result."""
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.cli import BAD_INPUT, main
+from fpsolve.output import report
+from fpsolve.output.meanings import Part, equations_of, meanings, parts_of
+from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
+from tests.proofs.case import CASE as PROVABLE
+from tests.solving import solve_case
+from tests.study.test_chart import CASE as CHARTED
+from tests.test_workflow import DRAWN, files
+
+CASES = Path(__file__).parents[2] / "cases"
+NASTY = "<script>alert(1)</script>"
+ONE = DRAWN.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', "")
+OWN = f"""
+title = "{NASTY} & more"
+[system]
+variables = ["x", "v"]
+drift = ["v", "-k * x - 2*b * v - xi * x"]
+parameters = {{ k = {{ value = 1.0, symbol = "<script>", unit = "<b>", words = "{NASTY}" }}, b = 0.05 }}
+[noise]
+kind = "telegraph"
+a = 0.5
+k = 1.0
+[moments]
+p = [2.0]
+[output]
+quantities = ["moment", "lyapunov_exponent"]
+"""
+
+
+class Page(HTMLParser):
+    """The elements of a page, its ids, what it refers to, and its text."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.text, self.tags, self.ids, self.inside, self.outside, self.open = "", [], [], [], [], []
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.open.append(tag)
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value)
+            if name in ("href", "xlink:href", "src", "action", "data") and not value.startswith(("data:", "#")):
+                self.outside.append(value)
+            if name in ("href", "xlink:href") and value.startswith("#"):
+                self.inside.append(value[1:])
+            self.inside += re.findall(r"url\(#([^)]*)\)", value or "")
+
+    def handle_endtag(self, tag):
+        if tag in self.open:
+            while self.open.pop() != tag:
+                pass
+
+    def handle_data(self, data):
+        if not {"style", "script"} & set(self.open[-1:]):
+            self.text += data
+
+
+def run(folder, text, *arguments, command="run", name="test.toml"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return main([command, str(path), "--out", str(folder), "--quiet", "--jobs", "1", *arguments])
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """A run of Fig. 1's oscillator, without rendering, which takes a process of its own."""
+    folder = tmp_path_factory.mktemp("reports")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "run_child", lambda *_, **__: SimpleNamespace(returncode=-11))
+        assert run(folder, ONE, "--report", "--set", "noise.D0=1.0") == 0
+    return folder / "test"
+
+
+def test_the_page_holds_the_equation_numbers_meanings_and_the_case(solved):
+    page = Page(solved / "report.html")
+    words = " ".join(page.text.split())
+    for text in (
+        "ẍ = −x + 0.001 ẋ + 0.1 ξ ẋ",
+        "|ẋ|⁺ = 0.9980019987 |ẋ|⁻ at x = 0",
+        "almost every path grows, doubling in a time of 637",
+        "Λ(2) = 0.01416314 > 0: the mean square grows",
+        "moments of the orders δ_p < p < 0 decay",
+        "0.00108397, Eq. (39)",
+        "natural frequency",
+        "with noise.D0 = 1.0",
+        "--set noise.D0=1.0",
+        'treatment = "ou-reduction"',
+        "numpy",
+        "The moment Lyapunov exponent, Λ(p), over p",
+    ):
+        assert text in words, text
+    assert "svg" in page.tags
+
+
+def test_it_is_one_file_without_scripts_and_with_unique_ids(solved):
+    page = Page(solved / "report.html")
+    assert not page.outside
+    assert "script" not in page.tags
+    assert len(set(page.ids)) == len(page.ids)
+    assert set(page.inside) <= set(page.ids)
+    text = (solved / "report.html").read_text(encoding="utf-8")
+    assert "@import" not in text
+    assert len(text.encode()) < 3e6
+
+
+def test_an_eigenfunction_that_cannot_be_rendered_is_left_out_with_a_line(solved):
+    text = Page(solved / "report.html").text
+    assert "this picture could not be drawn: the process that draws it ended with -11" in text
+    assert (solved / "eigenfunctions/p+2.0.vtu").is_file()
+
+
+@pytest.mark.slow
+def test_eigenfunctions_are_pictures_where_this_machine_renders(tmp_path):
+    from fpsolve.surfaces import can_render
+
+    assert run(tmp_path, ONE, "--report") == 0
+    page = (tmp_path / "test/report.html").read_text(encoding="utf-8")
+    assert ("data:image/png;base64," in page) == can_render()
+    assert ("this picture could not be drawn" in page) != can_render()
+
+
+def test_texts_are_texts(tmp_path):
+    assert run(tmp_path, OWN, "--report", "--set", f"figure.title='{NASTY}'", name="a<b>.toml") == 0
+    page = Page(tmp_path / "a<b>/report.html")
+    assert not {"script", "b"} & set(page.tags)
+    assert page.text.count(NASTY) >= 4  # the title, in the head and on the page, the words, the case
+    assert "<script>" in page.text.replace(NASTY, "")  # the symbol
+    assert "a<b>.toml" in page.text
+    assert len(set(page.ids)) == len(page.ids)
+
+
+@pytest.mark.parametrize("kind", [SOLVED, SIMULATED, CHART, PROVEN])
+def test_a_report_goes_with_what_it_reported(tmp_path, kind):
+    """Whatever is done next in a folder, also for the same parameters."""
+    (tmp_path / "minimal").mkdir()
+    for name in ("report.html", "reports.html"):
+        (tmp_path / "minimal" / name).write_text("earlier", encoding="utf-8")
+    with own_folder(load_case(CASES / "minimal.toml"), tmp_path, (kind,)) as folder:
+        assert files(folder) - {".fpsolve.lock"} == {"reports.html"}
+
+
+def test_a_simulation_is_compared_with_the_finite_elements(tmp_path):
+    few = "monte_carlo={ paths = 64, time = 40.0 }"
+    assert run(tmp_path, ONE, "--report", "--monte-carlo", "--set", few, "--set", "output.eigenfunctions=[]") == 0
+    text = Page(tmp_path / "test/report.html").text
+    assert "s.e. away" in text
+    assert "monte_carlo.json" in text
+
+
+@pytest.mark.slow
+def test_a_simulation_has_a_page(tmp_path):
+    assert run(tmp_path, ONE, "--report", "--paths", "64", "--time", "40", command="simulate") == 0
+    assert "effective paths" in Page(tmp_path / "test/report.html").text
+
+
+def test_a_fault_in_the_report_costs_nothing_else(tmp_path, monkeypatch, capsys):
+    def fault(*_):
+        raise RuntimeError("a fault")
+
+    monkeypatch.setattr(report, "equations_of", fault)
+    lean = ["--set", "output={ quantities = ['lyapunov_exponent'] }"]
+    assert run(tmp_path, ONE, "--report", *lean) == 0
+    assert "warning: test: no report.html: RuntimeError: a fault" in capsys.readouterr().err
+    assert {"summary.json", "curves.csv", "results.nc"} <= files(tmp_path / "test")
+    assert "report.html" not in files(tmp_path / "test")
+    assert not any(name.startswith(".fpsolve") for name in files(tmp_path / "test"))
+
+
+def test_a_figure_that_fails_is_told_in_its_place(tmp_path, monkeypatch):
+    def fault(*_, **__):
+        raise RuntimeError("no ink")
+
+    monkeypatch.setattr(report, "draw", fault)
+    assert run(tmp_path, OWN, "--report") == 0
+    assert "this picture could not be drawn: RuntimeError: no ink" in Page(tmp_path / "test/report.html").text
+
+
+def test_without_plotly_it_is_named_before_anything_is_solved(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(report, "find_spec", lambda _: None)
+    assert run(tmp_path, ONE, "--interactive") == BAD_INPUT
+    assert "pip install 'fpsolve[interactive]'" in capsys.readouterr().err
+    assert not (tmp_path / "test").exists()
+
+
+def test_an_interactive_page_holds_its_script_and_escapes_its_data(tmp_path):
+    pytest.importorskip("plotly")
+    assert run(tmp_path, OWN, "--interactive") == 0
+    text = (tmp_path / "test/report.html").read_text(encoding="utf-8")
+    page = Page(tmp_path / "test/report.html")
+    assert page.tags.count("script") == 2  # that of plotly, and the plot
+    assert not page.outside
+    assert re.search(r'Plotly\.newPlot\("plot-1", \[\{', text)
+    assert NASTY not in text
+
+
+def test_proofs_have_a_page(tmp_path):
+    pytest.importorskip("flint")
+    assert (
+        run(
+            tmp_path,
+            PROVABLE + "[output]\nquantities = ['moment']\nfigure = false\n",
+            "--report",
+            "--width",
+            "0.01",
+            command="prove",
+            name="proven.toml",
+        )
+        == 0
+    )
+    assert "Proven: the moment of order 2 grows." in Page(tmp_path / "proven/report.html").text
+
+
+@pytest.mark.slow
+def test_charts_have_a_page(tmp_path):
+    assert run(tmp_path, CHARTED, "--report", "--interactive", command="chart", name="plane.toml") == 0
+    page = Page(tmp_path / "plane/report.html")
+    assert "almost surely stable" in page.text
+    assert "special point" in page.text
+    assert {"svg", "script"} <= set(page.tags)
+
+
+@pytest.mark.parametrize(
+    ("latex", "parts"),
+    [
+        (r"$\tau_0$", [Part("τ"), Part("0", "_")]),
+        (r"$\varepsilon$", [Part("ε")]),
+        (r"$\sigma_{\xi}^2$", [Part("σ"), Part("ξ", "_"), Part("2", "^")]),
+        (r"$\Lambda$", [Part("Λ")]),
+        ("$<script>$", [Part("<script>")]),
+        (r"$\unknown x$", [Part("unknown"), Part("x")]),
+        ("", []),
+    ],
+)
+def test_symbols_without_latex(latex, parts):
+    assert parts_of(latex) == parts
+
+
+@pytest.mark.parametrize(
+    ("name", "equations"),
+    [
+        ("theorem", ["ẍ = −x + 0.1 ẋ + ξ ẋ", "|ẋ|⁺ = 0.8 |ẋ|⁻ at x = 0"]),
+        ("systems/own_equation", ["ẍ = −x − 0.2 ẋ − ξ x"]),
+        ("systems/two_noises", ["ẍ = −x − 0.2 ẋ − ξ_axial x − ξ_lateral ẋ"]),
+        ("systems/turning", ["dx₁/dt = x₁ − ξ x₂", "dx₂/dt = −x₂ + ξ x₁"]),
+    ],
+)
+def test_equations_have_the_numbers_of_the_case(name, equations):
+    assert equations_of(next(load_case(CASES / f"{name}.toml").curves()).problem) == equations
+
+
+def test_rare_paths_that_carry_the_mean_square_are_told_of():
+    """λ < 0 < Λ(2), as the theorem's case has them."""
+    [result] = solve_case(load_case(CASES / "theorem.toml", ["moments.p=[2.0]", "expect=[]"]))
+    told = " ".join(meanings(result))
+    assert "almost every path decays" in told
+    assert "the mean square grows" in told
+    assert "bursts of rare paths" in told
+    assert "falls as A to the power" in told
