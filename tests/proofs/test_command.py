@@ -255,7 +255,7 @@ CODE = "from fpsolve.cli import main; print('begun', flush=True); raise SystemEx
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-@pytest.mark.parametrize(("kind", "code"), sampled((signal.SIGTERM, 143), (signal.SIGINT, 130)))
+@pytest.mark.parametrize(("kind", "code"), sampled((signal.SIGINT, 130), (signal.SIGTERM, 143)))
 def test_what_an_interrupted_run_has_proven_is_kept(case, tmp_path, kind, code):
     """Of p = 0, which needs no time, and another, which takes longer than anybody waits."""
     slow = CODE.replace(
