@@ -463,12 +463,12 @@ def tried(
 def main() -> int:
     """Print how all ended."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("kinds", nargs="*", choices=list(KINDS))
+    parser.add_argument("kinds", nargs="*", default="all", choices=[*KINDS, "all"])
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int)
     asked = parser.parse_args()
     failed = 0
-    for kind in asked.kinds or KINDS:
+    for kind in KINDS if "all" in asked.kinds else asked.kinds:
         start = time.monotonic()
         ended, wrong = tried(kind, asked.seed, asked.count or COUNTS[kind], print)
         failed += len(wrong)
