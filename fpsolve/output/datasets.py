@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -35,8 +36,10 @@ MOST_COMPRESSED = 1000
 
 def write_dataset(case: Case, results: Iterable[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
     """results.nc, for xarray and whatever reads netCDF-4; what is missing or failed is NaN."""
+    content = io.BytesIO()  # HDF5 does not survive a full disk
+    dataset_of(case, results, facts).to_netcdf(content, engine="h5netcdf")
     with atomic(folder / RESULTS) as draft:
-        dataset_of(case, results, facts).to_netcdf(draft, engine="h5netcdf")
+        draft.write_bytes(content.getbuffer())
 
 
 def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, Any]) -> xr.Dataset:

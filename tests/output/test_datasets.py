@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import resource
 import shutil
 
 import h5py
@@ -14,6 +15,7 @@ import fpsolve
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.model.quantity import MOMENT
+from fpsolve.output.datasets import write_dataset
 from tests.solving import case_in, case_text
 
 TEXT = case_text("[moments]\np = [2.0, 0.0, -1.0]\n[output]\neigenfunctions = []\nfigure = false\n")
@@ -61,6 +63,20 @@ def test_a_product_has_a_dimension_for_each_key(tmp_path):
     assert found.lyapunov_exponent.attrs["equation"] == "(2)"
     assert found.stability_index_perturbation.attrs["equation"] == "(38)"
     assert found["noise.D0"].attrs == {"long_name": "noise intensity", "symbol": "$D_0$", "units": "1/time"}
+
+
+def test_a_full_disk_is_an_error_and_leaves_nothing_behind(tmp_path):
+    """A limit for files is what a full disk looks like."""
+    case, results, _ = solved(tmp_path, TEXT)
+    (tmp_path / "full").mkdir()
+    _, most = limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4000, most))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            write_dataset(case, results, tmp_path / "full", {})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not list((tmp_path / "full").iterdir())
 
 
 def test_sets_side_by_side_have_one_dimension(tmp_path):
