@@ -1,0 +1,329 @@
+"""The pages that follow from the code: the gallery of cases, the reference, the keys of case files, validation."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import re
+import shutil
+from pathlib import Path
+from typing import get_args
+
+from sphinx_gallery.scrapers import figure_rst
+
+import fpsolve
+from fpsolve.case import Case
+from fpsolve.data import plain_unit
+from fpsolve.exponent import Budget
+from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
+from fpsolve.model.parameters import Parametrised, example_of, meaning_of, symbol_of, unit_of
+from fpsolve.workflow import check_case
+
+ROOT = Path(__file__).parents[1]
+CASES = [*sorted(ROOT.glob("cases/*.toml")), *sorted(ROOT.glob("cases/systems/*.toml"))]
+CHARTS = {path.name for path in (ROOT / "docs/charts").glob("*")}
+"""Cases whose chart takes long; theirs is drawn from what `fpsolve chart` wrote once."""
+TWO_AXES = "filtered", "two_noises", "stochastic_mathieu"
+"""Cases with a dimension more, of which their own p are drawn."""
+ROOMS = {
+    "model": "what is studied: systems in the plane and their noises",
+    "exponent": "Λ(p), its eigenpairs and what follows from them",
+    "analysis": "densities, sensitivities, where stability ends",
+    "simulation": "an independent witness by Monte Carlo",
+    "proofs": "bounds that hold with certainty",
+    "theory": "what is known in closed form",
+    "fem": "meshes and the matrices of the generator",
+    "case": "case files",
+    "study": "cases become results",
+    "output": "results become files",
+    "workflow": "run, simulate, chart and check a case",
+}
+
+
+def write_all(folder: Path) -> None:
+    """Write what Sphinx reads, into a folder that no other file is in."""
+    folder.mkdir(exist_ok=True)
+    write_gallery(folder / "cases")
+    write_reference(folder / "reference")
+    _write(folder / "keys.part.md", keys())
+    _write(folder / "expected.part.md", expected())
+    _write(folder / "oracles.part.md", oracles())
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file unless it says so already, so that an unchanged page is not built again."""
+    path.parent.mkdir(exist_ok=True)
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def _row(*cells: object) -> str:
+    return "| " + " | ".join(str(cell).replace("|", "\\|").replace("\n", " ") for cell in cells) + " |\n"
+
+
+def _table(*heads: str) -> str:
+    return "\n" + _row(*heads) + _row(*["---"] * len(heads))
+
+
+# The gallery
+
+
+def write_gallery(folder: Path) -> None:
+    """A script for each case, beside a copy of the case file."""
+    folder.mkdir(exist_ok=True)
+    _write(folder / "GALLERY_HEADER.rst", GALLERY)
+    shutil.copytree(ROOT / "meshes", folder.parent / "meshes", dirs_exist_ok=True)
+    for path in CASES:
+        shutil.copy(path, folder / path.name)
+        _write(folder / f"plot_{path.stem}.py", script(path))
+
+
+GALLERY = """\
+Gallery
+=======
+
+Every case file that comes with fpsolve, with its figure. Each page has the file as it stands, and the lines of Python
+that draw it. On the command line the same is ``fpsolve run cases/fig1.toml``.
+"""
+
+
+def script(path: Path) -> str:
+    """The script that draws the figure of a case."""
+    case, text = fpsolve.load_case(path), path.read_text(encoding="utf-8")
+    words = re.match(r"((?:#.*\n)*)", text).group(1).replace("# ", "").replace("#", "")
+    few = case.figure.x == "p" and case.moments.values.size < 8
+    sets = ["output={ quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"]
+    if few:
+        sets = ["output={ quantities = ['moment'] }", "expect=[]", "figure={}"]
+        sets += ["moments.p={ start = 0.0, stop = 3.0, num = 13 }"] * (path.stem not in TWO_AXES)
+    title = re.sub(r"^(Fig\. \d\S*): (.*)", r"\1: \2", case.title)
+    head = f'"""\n{title}\n{"=" * len(title)}\n\n{_rst(words)}\n"""\n\n'
+    shown = f"# %%\n# The case file:\n#\n# .. literalinclude:: /generated/cases/{path.name}\n#    :language: toml\n"
+    run = f"""
+# %%
+# {"Λ(p) over a range of p:" if few else "The figure of the case:"}
+
+import fpsolve
+
+case = fpsolve.load_case("{path.name}", {_listed(sets)})
+results = fpsolve.run(case)
+{"" if few else INDICES}"""
+    return head + shown + run + (CHART.format(name=path.stem) if path.stem in CHARTS else "")
+
+
+INDICES = """for result in results[:6]:
+    print(dict(result.curve.varied), "lambda =", result.lyapunov_exponent, "delta_p =", result.stability_index)
+"""
+CHART = """
+# %%
+# Its chart takes minutes, so it is drawn here from what ``fpsolve chart`` wrote:
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+
+from fpsolve.output.charts import read_line
+
+x, y = case.chart.x.axis, case.chart.y.axis
+figure, axes = plt.subplots(layout="constrained")
+for number, zero in enumerate(case.chart.zero):
+    lines, _ = read_line(Path("../../charts/{name}"), (x.key, y.key), zero, case.curve({{}}).parameters)
+    for line in lines:
+        axes.plot(*line, color=f"C{{number}}", label=zero.latex)
+axes.set(xscale=x.scale, yscale=y.scale, xlabel=x.key, ylabel=y.key, xlim=(x.start, x.stop), ylim=(y.start, y.stop))
+axes.legend()
+"""
+
+
+def _rst(text: str) -> str:
+    return re.sub(r"([*|\\])", r"\\\\\1", text).replace('"""', "'''")
+
+
+def _listed(texts: list[str]) -> str:
+    return "[\n" + "".join(f'    "{text}",\n' for text in texts) + "]"
+
+
+def pictures_of_results(block, block_vars, gallery_conf):
+    """Scrape the pictures that a block wrote into results/, each once."""
+    name = Path(block_vars["src_file"])
+    folder = name.parent / "results" / name.stem.removeprefix("plot_")
+    made = []
+    for picture in sorted(folder.glob("*.png")):
+        target = next(block_vars["image_path_iterator"])
+        picture.replace(target)
+        made.append(target)
+    return figure_rst(made, gallery_conf["src_dir"])
+
+
+# The reference
+
+
+def write_reference(folder: Path) -> None:
+    """A page for `fpsolve` itself and one for each room."""
+    top = [*fpsolve.__all__]
+    _write(folder / "fpsolve.rst", _page("fpsolve", "what ``import fpsolve`` offers", top))
+    for room, words in ROOMS.items():
+        names = importlib.import_module(f"fpsolve.{room}").__all__
+        again = sorted(set(names) & set(top))
+        links = ", ".join(f":py:obj:`fpsolve.{name}`" for name in again)
+        page = _page(f"fpsolve.{room}", words, [name for name in names if name not in top])
+        also = f"\nAlso here, described with fpsolve itself: {links}.\n" if again else ""
+        _write(folder / f"{room}.rst", page + also)
+
+
+def _page(module: str, words: str, names: list[str]) -> str:
+    title = f"{module}: {words.replace('``', '')}"
+    lines = [title, "=" * len(title), ""]
+    for name in sorted(names, key=str.lower):
+        item = getattr(importlib.import_module(module), name)
+        kind = "class" if inspect.isclass(item) else "function" if inspect.isroutine(item) else "data"
+        if kind == "data":
+            lines += [f".. py:data:: {module}.{name}", "", f"   Of the type ``{type(item).__name__}``.", ""]
+            continue
+        lines += [f".. auto{kind}:: {module}.{name}", *["   :members:", "   :show-inheritance:"] * (kind == "class")]
+        lines.append("")
+    return "\n".join(lines) + "\n"
+
+
+def plain_docstring(app, what, name, obj, options, lines):
+    """Take what a docstring says as text: stars and bars are mathematics; indented formulas stay as they are."""
+    out, block = [], False
+    for line in lines:
+        is_indented, before = line.startswith("    "), out[-1] if out else ""
+        if not line.strip():
+            out.append(line)
+            continue
+        if is_indented and not block and not before.strip() and not _in_section(out):
+            out += ["::", ""]
+            block = True
+        elif not is_indented:
+            block = False
+        if block or line.lstrip().startswith((">>>", "...")):
+            out.append(line)
+            continue
+        pieces = line.split("`")
+        pieces[::2] = [re.sub(r"(?<=\w)_(?!\w)", r"\\_", re.sub(r"([*|\\])", r"\\\1", each)) for each in pieces[::2]]
+        out.append(re.sub(r"(`[^`]+`)(?=\w)", r"\1\\ ", "`".join(pieces)))
+    lines[:] = out
+
+
+def _in_section(lines: list[str]) -> bool:
+    """Whether the last line that is not indented is the head of a section of arguments and the like."""
+    for line in reversed(lines):
+        if line and not line.startswith(" "):
+            return line.rstrip() in ("Args:", "Returns:", "Raises:", "Attributes:")
+    return False
+
+
+def plain_signature(app, what, name, obj, options, signature, returned):
+    """Leave out how pydantic keeps a parameter."""
+    if what != "class" or not hasattr(obj, "__pydantic_fields__"):
+        return None
+    shown = [
+        key if each.is_required() else f"{key}={_shown(each.get_default(call_default_factory=True))}"
+        for key, each in obj.__pydantic_fields__.items()
+    ]
+    return f"({', '.join(shown)})", ""
+
+
+def parameter_list(app, what, name, obj, options, lines):
+    """Add the parameters of a kind of system or noise, with units and ranges."""
+    if what != "class" or not (inspect.isclass(obj) and issubclass(obj, Parametrised)):
+        return
+    for key, each in obj.fields().items():
+        unit = f", in {plain_unit(unit_of(each))}" if unit_of(each) else ""
+        about = f"{each.description}{unit}; {_range(each)}" if _range(each) else f"{each.description}{unit}"
+        lines += ["", f"* ``{key}``: {_rst(about).replace(chr(92) * 2, chr(92))}"]
+    lines.append("")
+
+
+def _shown(value: object) -> str:
+    value = getattr(value, "value", value)
+    return repr(value) if isinstance(value, str | int | float | bool | tuple | None) else "..."
+
+
+# The keys of case files
+
+SIGNS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤", "min_length": "at least", "max_length": "at most"}
+
+
+def _range(field) -> str:
+    found = []
+    for rule in field.metadata:
+        for name, sign in SIGNS.items():
+            if (value := getattr(rule, name, None)) is not None:
+                found.append(f"{sign} {value:g}" if isinstance(value, float | int) else f"{sign} {value}")
+    return ", ".join(found)
+
+
+def _fields(fields) -> str:
+    text = _table("key", "meaning", "range", "if omitted", "example")
+    for name, each in fields.items():
+        default = "" if each.is_required() else each.get_default(call_default_factory=True)
+        default = "" if default in (None, "", ()) else f"`{_shown(default)}`"
+        required = "**required**" if each.is_required() else default
+        symbol = symbol_of(each)
+        meaning = f"{symbol}: {meaning_of(each)}" if symbol else meaning_of(each)
+        text += _row(f"`{name}`", meaning, _range(each), required, f"`{example_of(each)}`")
+    return text
+
+
+def keys() -> str:
+    """Every key of a case file, from the declarations that check it."""
+    text = "\n## Sections\n" + _fields(Case.model_fields)
+    for name in SYSTEMS:
+        kind = system_kind(name)
+        text += f'\n## `[system]` with `kind = "{name}"`\n\n{_first(kind)}\n'
+        text += _fields({**kind.stated, **kind.fields()})
+    for name in NOISES:
+        for kind in (noise_kind(name), *noise_kind(name).variants):
+            also = "" if kind is noise_kind(name) else ", or"
+            text += f'\n## `[noise]` with `kind = "{name}"`{also}\n\n{_first(kind)}\n'
+            text += _fields({**kind.stated, **kind.fields()})
+    for section, field in Case.model_fields.items():
+        made = Budget if section == "budget" else _section_of(field.annotation)
+        if made is not None:
+            brackets = f"[[{section}]]" if section == "expect" else f"[{section}]"
+            text += f"\n## `{brackets}`\n\n{_first(made)}\n" + _fields(getattr(made, "__pydantic_fields__", {}))
+    return text
+
+
+def _section_of(annotation):
+    for each in (annotation, *get_args(annotation)):
+        if inspect.isclass(each) and hasattr(each, "model_fields"):
+            return each
+    return None
+
+
+def _first(item) -> str:
+    return (inspect.getdoc(item) or "").partition("\n\n")[0].replace("\n", " ").replace("*", "\\*").replace("`[", "[")
+
+
+# Validation
+
+
+def oracles() -> str:
+    """What each independent code of the tests is, in its own words."""
+    text = _table("code", "what it computes, and how")
+    for path in sorted((ROOT / "tests/oracles").glob("*.py")):
+        if doc := ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))):
+            text += _row(f"`{path.stem}`", doc.partition("\n\n")[0].replace("*", "\\*").replace("_", "\\_"))
+    return text
+
+
+def expected() -> str:
+    """What every case expects beside what is computed now."""
+    text = _table("case", "quantity", "expected", "computed", "difference", "source of the expected value")
+    for path in CASES:
+        for each in check_case(fpsolve.load_case(path)).comparisons:
+            if not each.met:
+                raise ValueError(f"{path}: {each}")
+            asked = each.expectation
+            what = asked.quantity if asked.p is None else f"Λ({asked.p:g})"
+            where = ", ".join(f"{key} = {value}" for key, value in each.varied.items())
+            difference = f"{abs(each.value - asked.value):.0e}"
+            name = f"{{doc}}`{path.stem} </generated/gallery/plot_{path.stem}>`"
+            what = f"{what.replace('_', ' ')}, {where}" if where else what.replace("_", " ")
+            text += _row(name, what, f"{asked.value:.13g}", f"{each.value:.13g}", difference, asked.source)
+    return text

@@ -1,0 +1,83 @@
+r"""
+4. A thousand sets
+==================
+
+A sweep solves a case for many sets of parameters. This tutorial makes a thousand of them from one case file, solves
+them, and looks at the result with xarray.
+"""
+
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import xarray as xr
+
+import fpsolve
+
+# %%
+# A case with two varied keys
+# ---------------------------
+# ``[vary]`` with ``mode = "product"`` makes all combinations: 40 frequencies and 25 intensities. ``quantities`` says
+# what is wanted; what is not wanted costs nothing.
+CASE = """
+title = "A thousand oscillators"
+
+[oscillator]
+epsilon = 0.1
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+
+[noise]
+D0 = 0.1
+tau0 = 0.5
+r0 = 0.95
+
+[moments]
+p = [2.0]
+
+[vary]
+mode = "product"
+"oscillator.omega" = { start = 0.5, stop = 4.0, num = 40 }
+"noise.D0" = { start = 0.05, stop = 2.0, num = 25, scale = "log" }
+
+[output]
+quantities = ["moment", "lyapunov_exponent"]
+figure = false
+"""
+folder = Path(tempfile.mkdtemp())
+(folder / "thousand.toml").write_text(CASE, encoding="utf-8")
+
+# %%
+# Solve
+# -----
+# ``jobs=None`` uses all processors. Each set that is finished is kept at once: after a kill the same line goes on from
+# where it was. On the command line it is ``fpsolve run thousand.toml``.
+results = fpsolve.run(folder / "thousand.toml", folder / "results", jobs=None)
+print(len(results), "sets")
+
+# %%
+# Look at it
+# ----------
+# ``results.nc`` is a labelled array. It needs no fpsolve to be read.
+found = xr.open_dataset(folder / "results/thousand/results.nc")
+print(found.sizes)
+print(found.moment.attrs["long_name"], "in", found.moment.attrs["units"])
+
+# %%
+# The second moment over both keys, with the line where it is neutral:
+moment = found.moment.sel(p=2.0).rename(None)
+names = list(moment.dims)
+figure, axes = plt.subplots(layout="constrained")
+colours = axes.pcolormesh(moment[names[0]], moment[names[1]], moment.T, cmap="RdBu_r", vmin=-0.03, vmax=0.03)
+axes.contour(moment[names[0]], moment[names[1]], moment.T, levels=[0], colors="black")
+axes.set(xlabel=names[0], ylabel=names[1], yscale="log")
+figure.colorbar(colours, label=r"$\Lambda(2)$ in 1/time")
+
+# %%
+# How many of the thousand are safe on almost every path but not in the mean square?
+both = (found.lyapunov_exponent < 0) & (found.moment.sel(p=2.0) > 0)
+print(int(both.sum()), "of", both.size)
+
+# %%
+# Several runs at once are one table with ``fpsolve.open_results("results/*")``, see :doc:`/guide/sweeps`.

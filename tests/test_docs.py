@@ -1,0 +1,61 @@
+"""What the pages of the site tell to type into Python runs, page by page, and their case files are read."""
+
+import re
+from pathlib import Path
+
+import matplotlib
+import pytest
+
+import fpsolve
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs").glob("[!g]*/*.md"))]
+PAGES += sorted((ROOT / "docs/guide").glob("*.md"))
+
+
+def blocks(page, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+def named(pages, language):
+    return [pytest.param(page, id=f"{page.parent.name}/{page.stem}") for page in pages if blocks(page, language)]
+
+
+@pytest.mark.parametrize("page", named(PAGES, "python"))
+def test_blocks_of_python_run(page, tmp_path, monkeypatch, capsys):
+    """Each number that a comment says of what is printed is printed."""
+    matplotlib.use("Agg")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for block in blocks(page, "python"):
+        if "results/fig1" in block:
+            numbers = "output={ figure = false, quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"
+            fpsolve.run(fpsolve.load_case(ROOT / "cases/fig1.toml", [numbers]))
+        text = block.replace("paths=4096", "paths=64, time=100.0")
+        text = re.sub(r"( = boundary\(.*)\)\n", r"\1, nodes=5)\n", text)  # which takes a fifth of the time
+        exec(text, names)
+    printed = capsys.readouterr().out
+    for block in blocks(page, "python"):
+        for comment in re.findall(r"print\(.*\)  # (-?\d.*)", block):
+            for number in re.findall(r"-?\d+\.\d{6,}", comment):
+                assert number[:-2] in printed, number
+    matplotlib.pyplot.close("all")
+
+
+@pytest.mark.parametrize("page", named(PAGES, "toml"))
+def test_blocks_of_toml_are_cases(page, tmp_path):
+    """A whole case is read; what is less is a part of one."""
+    for number, block in enumerate(blocks(page, "toml")):
+        if "entry-points" in block:
+            continue
+        parts = [block]
+        for section, text in (
+            ("title", 'title = "T"\n'),
+            ("[moments]", "\n[moments]\np = [2.0]\n"),
+            ("[noise", '\n[noise]\nkind = "ornstein-uhlenbeck"\nalpha = 1.0\nsigma = 1.0\n'),
+        ):
+            if section not in block:
+                parts.insert(0 if section == "title" else len(parts), text)
+        path = tmp_path / f"part{number}.toml"
+        path.write_text("".join(parts), encoding="utf-8")
+        fpsolve.load_case(path)
