@@ -91,7 +91,7 @@ that draw it. On the command line the same is ``fpsolve run cases/fig1.toml``.
 def script(path: Path) -> str:
     """The script that draws the figure of a case."""
     case, text = fpsolve.load_case(path), path.read_text(encoding="utf-8")
-    words = re.match(r"((?:#.*\n)*)", text).group(1).replace("# ", "").replace("#", "")
+    words = re.match(r"(?:#:.*\n)?((?:#.*\n)*)", text).group(1).replace("# ", "").replace("#", "")
     few = case.figure.x == "p" and case.moments.values.size < 8
     sets = ["output={ quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"]
     if few:

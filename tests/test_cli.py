@@ -553,11 +553,12 @@ def test_help_shows_an_example(command, capsys):
     assert f"Example: fpsolve {command} " in capsys.readouterr().out
 
 
-def test_help_and_readme_name_all_quantities(capsys):
+def test_help_and_reference_name_all_quantities(capsys):
     assert main(["run", "--help"]) == 0
-    words, readme = capsys.readouterr().out.split(), (CASES.parent / "README.md").read_text(encoding="utf-8")
+    words = capsys.readouterr().out.split()
+    page = (CASES.parent / "docs/reference/cases.md").read_text(encoding="utf-8")
     assert {*QUANTITY_NAMES} <= {word.strip(",.") for word in words}
-    assert {*QUANTITY_NAMES} == {*re.findall(r'"(\w+)"', re.search(r"(?ms)^quantities = \[.*?^\]", readme)[0])}
+    assert {*QUANTITY_NAMES} == {*re.findall(r'"(\w+)"', re.search(r"(?ms)^quantities = \[.*?^\]", page)[0])}
 
 
 def test_help_names_the_exit_codes(capsys):

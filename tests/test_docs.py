@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-import matplotlib
+import matplotlib.pyplot as plt
 import pytest
 
 import fpsolve
@@ -24,7 +24,7 @@ def named(pages, language):
 @pytest.mark.parametrize("page", named(PAGES, "python"))
 def test_blocks_of_python_run(page, tmp_path, monkeypatch, capsys):
     """Each number that a comment says of what is printed is printed."""
-    matplotlib.use("Agg")
+    plt.switch_backend("Agg")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     for block in blocks(page, "python"):
@@ -39,7 +39,7 @@ def test_blocks_of_python_run(page, tmp_path, monkeypatch, capsys):
         for comment in re.findall(r"print\(.*\)  # (-?\d.*)", block):
             for number in re.findall(r"-?\d+\.\d{6,}", comment):
                 assert number[:-2] in printed, number
-    matplotlib.pyplot.close("all")
+    plt.close("all")
 
 
 @pytest.mark.parametrize("page", named(PAGES, "toml"))

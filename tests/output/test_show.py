@@ -322,7 +322,7 @@ def test_words_around_the_cylinder(paraview, named_results):
 
 def test_the_command_without_a_display_is_the_same_everywhere():
     """Without -noreset the virtual display restarts under ParaView now and then."""
-    for file in ("README.md", "fpsolve/output/show.py"):
+    for file in ("docs/reference/files.md", "fpsolve/output/show.py"):
         commands = re.findall("xvfb-run[^`\n]*", (ROOT / file).read_text(encoding="utf-8"))
         assert commands == ["xvfb-run -a -s -noreset pvpython show.py"], file
 
