@@ -22,13 +22,13 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.data import plain_unit, written
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import digits
-from fpsolve.exponent.quantities import INDICES, MOMENT
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.files import write_text
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.output.charts import draw_chart
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, simulated_meanings
-from fpsolve.output.proofs import proof_grid, proofs_grid
+from fpsolve.output.proofs import between, proof_grid, proofs_grid
 from fpsolve.output.screen import Column, Grid
 from fpsolve.output.terminal import (
     MOST_TABLES,
@@ -127,7 +127,7 @@ class Reporter:
             facts=found.facts,
             file=case.path.name,
             equations=equations_of(curve.problem),
-            about=list(_about(case, curve)),
+            about=list(_about(case, found, curve)),
             parameters=list(_parameters(case, curve)),
             meanings=list(_meanings(found)),
             figures=list(_figures(case, found, folder)),
@@ -139,10 +139,13 @@ class Reporter:
         )
 
 
-def _about(case: Case, curve: Curve) -> Iterator[str]:
+def _about(case: Case, found: Found, curve: Curve) -> Iterator[str]:
     yield from noises_of(curve.problem)
     if case.system.is_nonlinear:
         yield "The nonlinear damping is in the simulated response alone: Λ(p), λ and δ_p are of the linear system."
+    if found.chart is not None:
+        keys = f"{charted(case).x.key} and {charted(case).y.key}"
+        yield f"The chart is over {keys}; the equation above has the values of the case."
     if case.planned > 1:
         yield f"{case.planned} curves, over {', '.join(case.vary.keys)}; the equation above is that of the first one."
 
@@ -167,8 +170,10 @@ def _meanings(found: Found) -> Iterator[tuple[str, list[str]]]:
         for each in found.simulated:
             yield each.curve.label, list(simulated_meanings(each))
     for proof in found.proofs[:MOST_DRAWN]:
-        if proof.verdicts:
-            yield proof.curve.label, [f"Proven: {each}." for each in proof.verdicts]
+        bounds = [(LYAPUNOV_EXPONENT.symbol, proof.exponent), (STABILITY_INDEX.symbol, proof.index)]
+        told = [f"{symbol} is {between(each)}" for symbol, each in bounds if each is not None and each.is_proven]
+        if told := [*proof.verdicts, *told]:
+            yield proof.curve.label, [f"Proven: {each}." for each in told]
     if found.chart is not None and found.chart.regions is not None:
         ordered = sorted(found.chart.regions.each, key=lambda region: -region.share)
         yield "", [f"{region.share:.1%} of the frame: {region.name}." for region in ordered]
@@ -268,8 +273,8 @@ def _grids(case: Case, found: Found) -> Iterator[Grid]:
 
 def _index_grid(case: Case, result: CurveResult) -> Grid:
     """λ, δ_p and the other indices with their errors, beside perturbation theory."""
-    columns = [Column("quantity"), Column("value"), Column("± error"), Column("unit"), Column("perturbation theory")]
-    grid = Grid(case.heading(result.curve), [Column("", is_text=True), *columns])
+    columns = [Column("symbol"), Column("value"), Column("± error"), Column("unit"), Column("perturbation theory")]
+    grid = Grid(case.heading(result.curve), [Column("quantity", is_text=True), *columns])
     for name, index in INDICES.items():
         estimate = result.estimates[name]
         if estimate is None:
@@ -343,6 +348,10 @@ def _line(name: str, x: list[float], y: list[float], **more: Any) -> dict[str, A
 
 
 def _plot(title: str, data: list[dict[str, Any]], axes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    look: dict[str, Any] = {"margin": {"t": 20}, "hovermode": "closest", "legend": {"orientation": "h"}}
+    look: dict[str, Any] = {
+        "margin": {"t": 60},
+        "hovermode": "closest",
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom"},
+    }
     layout = {**look, "showlegend": True, "xaxis": axes[0], "yaxis": axes[1]}
     return {"title": f"{title}, with numbers where the pointer is", "data": data, "layout": layout}
