@@ -23,12 +23,12 @@ from fpsolve.data import plain_unit, written
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
-from fpsolve.files import write_text
+from fpsolve.files import parsed_json, plain_text, write_text
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.output.charts import draw_chart
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, simulated_meanings
-from fpsolve.output.proofs import between, proof_grid, proofs_grid
+from fpsolve.output.proofs import PROOF, between, proof_grid, proofs_grid
 from fpsolve.output.screen import Column, Grid
 from fpsolve.output.terminal import (
     MOST_TABLES,
@@ -129,7 +129,7 @@ class Reporter:
             equations=equations_of(curve.problem),
             about=list(_about(case, found, curve)),
             parameters=list(_parameters(case, curve)),
-            meanings=list(_meanings(found)),
+            meanings=list(_meanings(found, _proven(folder) if found.results else {})),
             figures=list(_figures(case, found, folder)),
             plots=plots,
             plotly=_plotly() if plots else "",
@@ -160,11 +160,23 @@ def _parameters(case: Case, curve: Curve) -> Iterator[dict[str, Any]]:
         yield {"key": key, "symbol": parts_of(quantity.latex), "value": shown, "unit": unit, "words": words}
 
 
-def _meanings(found: Found) -> Iterator[tuple[str, list[str]]]:
-    """By curves what their numbers say; of many curves, whose table is enough, nothing."""
+def _proven(folder: Path) -> dict[frozenset[Any], list[str]]:
+    """What a proof.json beside the results says of paths and moments, by the parameters."""
+    try:
+        curves = parsed_json(plain_text(folder / PROOF))["curves"]
+        return {
+            frozenset(each["parameters"].items()): [f"Proven: {text}." for text in each["verdicts"]] for each in curves
+        }
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):  # there is none, or it is none of ours
+        return {}
+
+
+def _meanings(found: Found, proven: Mapping[frozenset[Any], list[str]]) -> Iterator[tuple[str, list[str]]]:
+    """By curves what their numbers say, and what is proven of them; of many curves, whose table is enough, nothing."""
     if len(found.results) <= MOST_DRAWN:
         for result in found.results:
-            if told := list(meanings(result)):
+            parameters = frozenset(result.curve.parameters.items())
+            if told := [*meanings(result), *proven.get(parameters, [])]:
                 yield result.curve.label, told
     if not found.results and len(found.simulated) <= MOST_DRAWN:
         for each in found.simulated:

@@ -207,19 +207,13 @@ def test_an_interactive_page_holds_its_script_and_escapes_its_data(tmp_path):
 
 def test_proofs_have_a_page(tmp_path):
     pytest.importorskip("flint")
-    assert (
-        run(
-            tmp_path,
-            PROVABLE + "[output]\nquantities = ['moment']\nfigure = false\n",
-            "--report",
-            "--width",
-            "0.01",
-            command="prove",
-            name="proven.toml",
-        )
-        == 0
-    )
+    text = f'{PROVABLE}[output]\nquantities = ["moment"]\nfigure = false\n'
+    assert run(tmp_path, text, "--report", "--width", "0.01", command="prove", name="proven.toml") == 0
     assert "Proven: the moment of order 2 grows." in Page(tmp_path / "proven/report.html").text
+    assert run(tmp_path, text, "--report", name="proven.toml") == 0  # which keeps the proof, as of its parameters
+    words = Page(tmp_path / "proven/report.html").text
+    assert "Proven: the moment of order 2 grows." in words
+    assert "the mean square grows" in words
 
 
 @pytest.mark.slow
