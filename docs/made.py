@@ -102,7 +102,7 @@ def script(path: Path) -> str:
     shown = f"# %%\n# The case file:\n#\n# .. literalinclude:: /generated/cases/{path.name}\n#    :language: toml\n"
     run = f"""
 # %%
-# {"Λ(p) over a range of p:" if few else "The figure of the case:"}
+# {"The figure of the case:" if path.stem in TWO_AXES or not few else "Λ(p) over a range of p:"}
 
 import fpsolve
 
@@ -189,6 +189,10 @@ def _page(module: str, words: str, names: list[str]) -> str:
 def plain_docstring(app, what, name, obj, options, lines):
     """Take what a docstring says as text: stars and bars are mathematics; indented formulas stay as they are."""
     out, block = [], False
+    if lines and lines[0].startswith("bool(x)"):  # the words of Python about a property made of a built-in function
+        lines.clear()
+    if lines and what in ("property", "attribute"):  # what stands before a colon would be taken as its type
+        lines[0] = lines[0].replace(": ", " – ", 1)
     for line in lines:
         is_indented, before = line.startswith("    "), out[-1] if out else ""
         if not line.strip():

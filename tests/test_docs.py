@@ -1,5 +1,6 @@
 """What the pages of the site tell to type into Python runs, page by page, and their case files are read."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -59,3 +60,13 @@ def test_blocks_of_toml_are_cases(page, tmp_path):
         path = tmp_path / f"part{number}.toml"
         path.write_text("".join(parts), encoding="utf-8")
         fpsolve.load_case(path)
+
+
+def test_every_room_has_a_page_of_reference():
+    """The pages list the public names of the rooms; that each has a docstring is a test of the architecture."""
+    tree = ast.parse((ROOT / "docs/made.py").read_text(encoding="utf-8"))
+    values = {each.targets[0].id: each.value for each in tree.body if isinstance(each, ast.Assign)}
+    rooms = {path.parent.name for path in (ROOT / "fpsolve").glob("*/__init__.pyi")}
+    assert set(ast.literal_eval(values["ROOMS"])) == rooms
+    index = (ROOT / "docs/reference/index.md").read_text(encoding="utf-8")
+    assert all(f"/generated/reference/{room}\n" in index for room in rooms)
