@@ -5,11 +5,13 @@ from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+import pyvista
 
 from fpsolve.case.case import load_case
 from fpsolve.cli import BAD_INPUT, main
-from fpsolve.output import report
+from fpsolve.output import pictures, report
 from fpsolve.output.meanings import Part, equations_of, meanings, parts_of
 from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
 from tests.proofs.case import CASE as PROVABLE
@@ -119,6 +121,22 @@ def test_an_eigenfunction_that_cannot_be_rendered_is_left_out_with_a_line(solved
     text = Page(solved / "report.html").text
     assert "this picture could not be drawn: the process that draws it ended with -11" in text
     assert (solved / "eigenfunctions/p+2.0.vtu").is_file()
+
+
+def test_where_the_noise_has_states_each_is_a_line(tmp_path):
+    """T of telegraph noise as it was written, at each of its two values; it is drawn without rendering."""
+    with_eigenfunctions = OWN.replace('"lyapunov_exponent"]', '"eigenfunctions"]').replace('symbol = "<script>", ', "")
+    assert run(tmp_path, with_eigenfunctions) == 0
+    written = tmp_path / "test/eigenfunctions/p+2.0.vtu"
+    surface = pictures.surface_from(written)
+    assert surface.is_lines
+    assert surface.xi.tolist() == [-0.5, 0.5]
+    grid = pyvista.read(written)
+    for state, values in zip((1, 2), surface.values.T, strict=True):
+        strip = np.round(grid.points[:, 1]) == state
+        assert np.array_equal(np.unique(values), np.unique(grid.point_data["T"][strip]))
+    assert pictures.main([str(written), str(tmp_path / "lines.png")]) == 0
+    assert (tmp_path / "lines.png").read_bytes()[1:4] == b"PNG"
 
 
 @pytest.mark.slow
