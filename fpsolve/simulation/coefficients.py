@@ -150,7 +150,7 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         steady = sum((line[0] * matrix for matrix, line in lines if line), np.zeros((2, 2)))
         driven = sum((line[1] * matrix for matrix, line in lines if line), np.zeros((2, 2)))
         driven = sum((system.epsilon**each.order * np.array(each.matrix) for each in diffusions), driven)
-    free = matrix_at(moved, 0.0, slice(0, 1))
+    free = np.tensordot(noise.probabilities, steady, 1) if is_switched else matrix_at(moved, 0.0, slice(0, 1))
     if not free.any():
         free = steady.mean(axis=0) if is_switched else steady
     even = _even_coordinates(free)

@@ -222,6 +222,22 @@ def test_time_is_measured_by_the_system():
     assert steps[0] == pytest.approx(steps[1], rel=1e-12)
 
 
+def test_a_phase_that_noise_hardly_disturbs():
+    """It keeps its order; time is counted in half-turns of the mean motion, or the growth goes up and down."""
+    steady, driven = np.array([[0.4, 0.95], [-1.2, -0.1]]), np.array([[0.07, 0.09], [0.02, 0.32]])
+    states, rates = (-2.5, -1.4, -2.4), np.array([[-0.08, 0.075, 0.005], [2.9, -4.0, 1.1], [0.9, 0.2, -1.1]])
+    noise = MarkovChain(states, rates.tolist())
+    terms = [CoefficientMatrix(0, steady.tolist()), CoefficientMatrix(1, driven.tolist(), identity)]
+    mean = steady + (noise.probabilities @ states) * driven
+    known = coefficients(PlaneSystem(terms), noise)
+    assert known.half_turn == pytest.approx(math.pi / abs(np.linalg.eigvals(mean)[0].imag), rel=1e-12)
+    made = simulate(PlaneSystem(terms), noise, 2.0, estimator="population", paths=4096, time=100.0, seed=1)
+    expected = moment_hierarchy.moment_lyapunov([steady + xi * driven for xi in states], rates, 2)
+    [found] = made.estimates
+    assert found.value == pytest.approx(expected, abs=4 * found.standard_error)
+    assert found.standard_error < 5e-4
+
+
 def test_a_function_of_a_chain_is_simulated():
     """g(ξ) = ξ³ of states ±½ is ξ/4."""
     one, other = (
