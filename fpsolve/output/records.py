@@ -383,7 +383,7 @@ def codec(kind: Any) -> Codec:
         plain = lru_cache(lambda value: json.dumps(row.plain(value)))
         made = lru_cache(lambda text: row.made(json.loads(text)))
         return Codec(row.form, plain, lambda data: made(_checked(data, str)))
-    if origin is np.ndarray:
+    if origin is get_origin(FloatArray):  # np.ndarray, or NDArray itself since NumPy 2.5
         return Codec("array", _packed, _unpacked)
     if origin is Literal:
         return Codec(parts, str, lambda data: parts[parts.index(data)])
