@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
 import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 if "PYTEST_XDIST_WORKER" in os.environ:  # one worker for each processor: more threads would only wait for each other
@@ -31,6 +34,50 @@ UNIT_NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
 @pytest.fixture(scope="session")
 def fig1_solver() -> ExponentSolver:
     return ExponentSolver(Problem(FIG1, FIG1_NOISE.ou_reduction()))
+
+
+@functools.cache
+def painting():
+    """What lays figures out and paints them: the owner, the name, and the function as it is."""
+    from matplotlib.figure import Figure  # here, as processes of tests import this file, too
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    methods = (Figure, "savefig"), (Figure, "draw_without_rendering"), (ConstrainedLayoutEngine, "execute")
+    return [(owner, name, getattr(owner, name)) for owner, name in methods]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def outlines():
+    """Figures are made, but neither laid out nor painted, which takes most of the time of a run; files stay empty."""
+    from matplotlib.mathtext import MathTextParser
+
+    (_, _, save), *_ = methods = painting()
+
+    def touch(figure, target, **options):
+        return target.touch() if isinstance(target, Path) else save(figure, target, **options)
+
+    parse: Any = MathTextParser._parse_cached  # which forgets all but 50 formulas
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(MathTextParser, "_parse_cached", functools.lru_cache(maxsize=None)(parse.__wrapped__))
+        for (owner, name, _), instead in zip(methods, [touch, *[lambda *_: None] * 2], strict=True):
+            patch.setattr(owner, name, instead)
+        yield
+
+
+@contextmanager
+def painted():
+    """Figures as everywhere else, with their files."""
+    with pytest.MonkeyPatch.context() as patch:
+        for owner, name, real in painting():
+            patch.setattr(owner, name, real)
+        yield
+
+
+@pytest.fixture
+def pictures():
+    """For tests that look at what is painted, or at where it is."""
+    with painted():
+        yield
 
 
 @pytest.fixture

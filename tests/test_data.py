@@ -355,7 +355,7 @@ BARS = {"tilted": ["density (time/rad)"], "response": [r"density of $(x, \dot{x}
 
 
 @pytest.mark.parametrize("name", UNITS)
-def test_pictures_name_units(results, name):
+def test_pictures_name_units(pictures, results, name):
     axes = results[name].plot()
     labels = axes.get_xlabel(), axes.get_ylabel()
     assert all(label.endswith(unit) for label, unit in zip(labels, UNITS[name], strict=True)), labels
@@ -372,7 +372,7 @@ def test_pictures_name_units(results, name):
         assert extent.y1 <= box.y1
 
 
-def test_every_result_is_drawn_where_it_is_told(result):
+def test_every_result_is_drawn_where_it_is_told(pictures, result):
     figure, (left, right) = pyplot.subplots(1, 2)
     assert result.plot(ax=right) is right
     assert pyplot.get_fignums() == [figure.number]

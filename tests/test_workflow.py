@@ -9,7 +9,6 @@ import subprocess
 import sys
 from contextlib import nullcontext
 from importlib.metadata import version
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -28,6 +27,7 @@ from fpsolve.output.tables import write_results
 from fpsolve.study import solve
 from fpsolve.study.solve import compare, solve_curve
 from fpsolve.workflow import Watch, check_case, run_case, sets, simulate_case
+from tests.conftest import painted
 from tests.solving import solve_case, solve_sets
 
 TEXT = """
@@ -69,13 +69,8 @@ def whole(tmp_path_factory):
     """The results and the folder of a case that is run once, by the name of its file, for tests that only look."""
     folder = tmp_path_factory.mktemp("whole")
     write(folder, DRAWN)
-    return SimpleNamespace(results=fpsolve.run(str(folder / "test.toml"), folder), folder=folder / "test")
-
-
-@pytest.fixture
-def unpainted(monkeypatch):
-    """Figures whose files stay empty."""
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda _, path, **__: Path(path).touch())
+    with painted():
+        return SimpleNamespace(results=fpsolve.run(str(folder / "test.toml"), folder), folder=folder / "test")
 
 
 LEAN = "output={ quantities = ['lyapunov_exponent'] }"
@@ -170,7 +165,6 @@ def without_times(folder):
     return summary, moments, [line.rpartition(",")[0] for line in curves.splitlines()]
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_tables_are_the_same_twice(whole, tmp_path):
     """Of a case, and of the name of its file."""
     case = write(tmp_path, DRAWN)
@@ -222,7 +216,6 @@ def test_missing_stability_index_is_null_and_said(tmp_path):
 HOPELESS = "mesh={ phi_cells = 1, phi_degree = 2, xi_cells = 2, xi_degree = 3 }"
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
     """The strong-noise curve fails at p = 2 and −1; the weak one and p = 0 are kept."""
     text = DRAWN.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
@@ -366,7 +359,6 @@ def test_tables_are_whole_where_an_interruption_comes_as_they_are_written(case, 
     assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_run_goes_on_where_it_was_interrupted(whole, tmp_path, monkeypatch):
     """With the numbers of a run that nobody interrupts; files but records are made anew."""
     case = write(tmp_path, DRAWN)
@@ -676,7 +668,6 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     assert not list((tmp_path / "out").rglob("*.vtu"))
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_sensitivities_are_written(tmp_path):
     """At nine p or all, and of the indices, each with its error; those of the Python function."""
     sets = ["moments.p={start=-2.0, stop=6.0, num=17}", "vary={}", "output.sensitivities=true"]

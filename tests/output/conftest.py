@@ -10,7 +10,7 @@ from tests.output.drawing import assert_sound
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """The figures, laid out; their files stay empty, which takes half the time."""
+    """The figures; laid out for tests that take `pictures` before. Their files stay empty."""
     figures = []
 
     class Recorded(matplotlib.figure.Figure):
@@ -26,7 +26,7 @@ def drawn(monkeypatch):
 
 
 @pytest.fixture
-def sound(monkeypatch):
+def sound(pictures, monkeypatch):
     """The figures, once for each file; looked at instead of being written, in the style that they are drawn in."""
     figures = []
 

@@ -11,6 +11,7 @@ from fpsolve.output.charts import draw_chart
 from tests.output.drawing import words
 from tests.solving import case_in, case_text
 
+pytestmark = pytest.mark.usefixtures("pictures")
 CHART = """[moments]
 p = [2.0]
 [chart]

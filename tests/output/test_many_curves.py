@@ -7,6 +7,7 @@ import time
 import numpy as np
 import pytest
 
+from fpsolve.case.vary import map_key
 from fpsolve.drawing import label_of
 from fpsolve.output.datasets import dataset_of
 from fpsolve.output.figures import Encoding, draw
@@ -82,7 +83,7 @@ def test_up_to_eight_curves_are_named(drawn, tmp_path, count):
     assert len(figure.axes) == 1
 
 
-def test_more_have_a_colour_for_the_value_of_the_key(drawn, tmp_path):
+def test_more_have_a_colour_for_the_value_of_the_key(pictures, drawn, tmp_path):
     drawn_case(tmp_path, [intensities(9)])
     axes, bar = drawn[0].axes
     assert bar.get_ylabel() == "noise intensity $D_0$ (1/time)"
@@ -195,7 +196,7 @@ def test_a_parameter_is_called_alike_in_all_figures(drawn, tmp_path):
     assert drawn[2].axes[0].get_xlabel() == label_of(found["p"].attrs) == "order of the moment $p$"
 
 
-def test_a_map_is_centred_at_zero_and_has_its_line(drawn, tmp_path):
+def test_a_map_is_centred_at_zero_and_has_its_line(pictures, drawn, tmp_path):
     drawn_case(tmp_path, PLANE)
     axes, bar = drawn[0].axes
     [mesh] = [each for each in axes.collections if type(each).__name__ == "QuadMesh"]
@@ -260,13 +261,16 @@ def test_a_chart_that_is_none_is_left(drawn, tmp_path, text):
 
 
 @pytest.mark.parametrize(
-    ("count", "more", "is_map"), sampled((9, "", True), (8, "", False), (8, "figure.map=true", True), keep=2)
+    ("count", "more", "key"), [(9, "", "noise.D0"), (8, "", ""), (8, "figure.map=true", "noise.D0")]
 )
-def test_when_it_is_a_map(drawn, tmp_path, count, more, is_map):
+def test_when_it_is_a_map(drawn, tmp_path, count, more, key):
     sets = [intensities(count), "vary.oscillator.omega=[1.0, 2.0, 4.0]", over("oscillator.omega"), more]
-    drawn_case(tmp_path, list(filter(None, sets)))
-    maps = [each for each in drawn[0].axes[0].collections if type(each).__name__ == "QuadMesh"]
-    assert [each.get_array().shape for each in maps] == [(count, 3)] * is_map
+    case = case_of(tmp_path, list(filter(None, sets)))
+    assert (map_key(case.figure, case.vary) or "") == key
+    if more:
+        draw(case, results_of(case), [], tmp_path)
+        [mesh] = [each for each in drawn[0].axes[0].collections if type(each).__name__ == "QuadMesh"]
+        assert mesh.get_array().shape == (count, 3)
 
 
 @pytest.mark.slow

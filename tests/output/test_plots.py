@@ -14,6 +14,7 @@ from fpsolve.output.figures import Series, draw, draw_response, draw_series
 from fpsolve.simulation.response import MEANS, Response
 from tests.solving import solve_case
 
+pytestmark = pytest.mark.usefixtures("pictures")
 CASE = load_case(Path(__file__).parents[2] / "cases/minimal.toml")
 
 

@@ -14,6 +14,7 @@ from fpsolve.cli import BAD_INPUT, main
 from fpsolve.output import pictures, report
 from fpsolve.output.meanings import Part, equations_of, meanings, parts_of
 from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
+from tests.conftest import painted
 from tests.proofs.case import CASE as PROVABLE
 from tests.solving import solve_case
 from tests.study.test_chart import CASE as CHARTED
@@ -79,7 +80,7 @@ def run(folder, text, *arguments, command="run", name="test.toml"):
 def solved(tmp_path_factory):
     """A run of Fig. 1's oscillator, without rendering, which takes a process of its own."""
     folder = tmp_path_factory.mktemp("reports")
-    with pytest.MonkeyPatch.context() as patch:
+    with painted(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "run_child", lambda *_, **__: SimpleNamespace(returncode=-11))
         assert run(folder, ONE, "--report", "--set", "noise.D0=1.0") == 0
     return folder / "test"

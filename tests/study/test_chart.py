@@ -13,6 +13,7 @@ from fpsolve.cli import main
 from fpsolve.output.charts import read_line
 from fpsolve.study.chart import chart_work, solve_chart
 from fpsolve.workflow import Watch, chart_case, run
+from tests.conftest import painted
 from tests.solving import case_text
 
 CHART = """[moments]
@@ -45,7 +46,8 @@ def few_nodes():
 @pytest.fixture(scope="module")
 def folder(path):
     out = path.parent / "results"
-    assert main(["chart", str(path), "--out", str(out), "--jobs", "1"]) == 0
+    with painted():
+        assert main(["chart", str(path), "--out", str(out), "--jobs", "1"]) == 0
     return out / "plane"
 
 

@@ -194,7 +194,7 @@ def test_run_adds_markers(case, out, capsys, drawn):
     assert "finite elements" in capsys.readouterr().out
 
 
-def test_run_adds_markers_over_a_parameter(case, out):
+def test_run_adds_markers_over_a_parameter(pictures, case, out):
     arguments = [*TWO, "--set", 'figure={x="noise.D0", y="lyapunov_exponent"}']
     assert main(["run", str(case), "--out", str(out), "--monte-carlo", *arguments]) == 0
     assert (out / "quick/figure.png").stat().st_size > 10_000
