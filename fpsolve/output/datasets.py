@@ -39,7 +39,7 @@ def write_dataset(case: Case, results: Iterable[CurveResult], folder: Path, fact
     content = io.BytesIO()  # HDF5 does not survive a full disk
     dataset_of(case, results, facts).to_netcdf(content, engine="h5netcdf")
     with atomic(folder / RESULTS) as draft:
-        draft.write_bytes(content.getbuffer())
+        draft.write_bytes(content.getvalue())
 
 
 def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, Any]) -> xr.Dataset:

@@ -112,6 +112,7 @@ def noises_of(problem: Problem) -> list[str]:
         numbers += [f"correlation time {time:.6g}"] if 0 < time < math.inf else []
         name = f"ξ of [{section}]" if len(problem.noise.parts) > 1 else "ξ"
         lines.append(f"{name} is noise of the kind {noise.kind}{', with ' if numbers else ''}{' and '.join(numbers)}.")
+        lines[-1] += f" The equation is meant in {noise.sense} sense." if noise.sense else ""
     return lines
 
 

@@ -44,6 +44,8 @@ from fpsolve.study.prove import CurveProof
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 REPORT = "report.html"
+_OTHERS = "summary.json", "monte_carlo.json", "chart.json", "proof.json"
+"""What a command says that it has done."""
 MOST_PICTURES, MOST_REMARKS = 3, 100
 """Curves whose eigenfunctions are shown, and messages that are told."""
 PATIENCE = 120.0
@@ -134,7 +136,7 @@ class Reporter:
             plots=plots,
             plotly=_plotly() if plots else "",
             grids=grids,
-            more=_more(found),
+            more=_more(found, folder),
             remarks=list(_remarks(case, found)),
         )
 
@@ -299,11 +301,14 @@ def _index_grid(case: Case, result: CurveResult) -> Grid:
     return grid
 
 
-def _more(found: Found) -> str:
-    """Where all numbers are."""
+def _more(found: Found, folder: Path) -> str:
+    """Where all numbers are, and what other commands have left beside them."""
     names = ["summary.json", "curves.csv", "moments.csv", "results.nc"] * bool(found.results)
     names += ["monte_carlo.json"] * bool(found.simulated) + ["chart.csv", "chart.json"] * (found.chart is not None)
-    return f"All numbers are in {', '.join([*names, *['proof.json'] * bool(found.proofs)])} beside this page."
+    names += ["proof.json"] * bool(found.proofs)
+    others = [name for name in _OTHERS if name not in names and (folder / name).is_file()]
+    also = f" Other commands wrote {', '.join(others)} there; their own --report shows it." if others else ""
+    return f"All numbers are in {', '.join(names)} beside this page.{also}"
 
 
 def _remarks(case: Case, found: Found) -> Iterator[dict[str, str]]:

@@ -36,9 +36,10 @@ MOST_INDENTED = 100
 def facts_of(case: Case, started: datetime, seconds: float) -> dict[str, Any]:
     """Of a run: versions, the command, the machine, when it began and how long it takes, and the case as written."""
     packages = {name: version(name) for name in ("numpy", "scipy", "scikit-fem")}
+    name, *rest = sys.argv
     return {
         "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},
-        "command": shlex.join(sys.argv),
+        "command": shlex.join(["python", "-m", "fpsolve", *rest] if name.endswith("__main__.py") else [name, *rest]),
         "host": socket.gethostname(),
         "started": started.isoformat(timespec="seconds"),
         "wall_seconds": round(seconds, 3),

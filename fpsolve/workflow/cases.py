@@ -37,7 +37,7 @@ from fpsolve.workflow.folders import (
     saying_if_interrupted,
 )
 from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Phase, Watch, ignore
-from fpsolve.workflow.reports import facts_since, write_report
+from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 from fpsolve.workflow.sets import Simulations, Sweep
 
 if TYPE_CHECKING:
@@ -144,29 +144,31 @@ def run_case(
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
     with own_folder(case, out, replaced) as folder:
         sweep = _solve(case, folder, pool or serial(), watch, is_fresh=is_fresh)
-        with saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}"):
-            try:
-                watch.solved(case, sweep.results)
-                if monte_carlo:
-                    simulations = Simulations(case, folder, is_fresh=is_fresh)
-                    interruption = _simulate(simulations, watch, simulated, simulators)
-                    watch.simulated(case, simulated, sweep.results)
-            finally:
-                with watch.bar(Phase(case.name, "figures")), writable(folder):
-                    draw(case, sweep.results, simulated, folder)
-                    draw_sensitivities(case, sweep.results, folder)
-                if reporter is not None:
-                    done = not interruption and len(simulated) == case.planned * monte_carlo
-                    write_report(
-                        reporter,
-                        case,
-                        folder,
-                        watch,
-                        facts=sweep.facts(),
-                        results=sweep.results,
-                        simulated=simulated,
-                        complete=done and len(sweep.results) == case.planned,
-                    )
+
+        def show() -> None:
+            with watch.bar(Phase(case.name, "figures")), writable(folder):
+                draw(case, sweep.results, simulated, folder)
+                draw_sensitivities(case, sweep.results, folder)
+            if reporter is not None:
+                is_whole = not interruption and len(simulated) == case.planned * monte_carlo
+                write_report(
+                    reporter,
+                    case,
+                    folder,
+                    watch,
+                    facts=sweep.facts(),
+                    results=sweep.results,
+                    simulated=simulated,
+                    complete=is_whole and len(sweep.results) == case.planned,
+                )
+
+        told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
+        with told, shown_at_the_end(show):
+            watch.solved(case, sweep.results)
+            if monte_carlo:
+                simulations = Simulations(case, folder, is_fresh=is_fresh)
+                interruption = _simulate(simulations, watch, simulated, simulators)
+                watch.simulated(case, simulated, sweep.results)
     return Outcome(sweep.results, tuple(simulated), interruption, known=sweep.known, outdated=sweep.records.outdated)
 
 
@@ -240,6 +242,14 @@ def chart_case(
         count = sum(len(line.traces) for line in chart.lines)
         return kept(count, f"branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines", folder)
 
+    def show() -> None:
+        if chart.lines:
+            with writable(folder):
+                draw_chart(case, chart, folder)
+            if reporter is not None:
+                facts = facts_since(case, started)
+                write_report(reporter, case, folder, watch, facts=facts, chart=chart, complete=chart.complete)
+
     with (
         own_folder(case, out, (CHART,)) as folder,
         saying_if_interrupted(traced, ANEW),
@@ -249,15 +259,9 @@ def chart_case(
         pool or serial() as workers,
     ):
         rows = partial(workers.map, stepped=progress)
-        try:
+        with shown_at_the_end(show):
             for chart in solve_chart(case, progress=progress, stepped=stepped, map=rows):
                 write_chart(case, chart, folder)
-        finally:
-            if chart.lines:
-                draw_chart(case, chart, folder)
-                if reporter is not None:
-                    facts = facts_since(case, started)
-                    write_report(reporter, case, folder, watch, facts=facts, chart=chart, complete=chart.complete)
     return chart
 
 

@@ -20,7 +20,7 @@ from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.study.prove import CurveProof, Plan, answer, refuse_unprovable_case
 from fpsolve.workflow.folders import ANEW, PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
-from fpsolve.workflow.reports import facts_since, write_report
+from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 
 if TYPE_CHECKING:
     from fpsolve.output.report import Reporter
@@ -66,8 +66,13 @@ def prove_case(
     """
     refuse_unprovable_case(case, width)
     plan = Plan(case, width)
-    answers: list[Enclosure | IndexEnclosure] = []
+    answers, proofs = list[Enclosure | IndexEnclosure](), list[CurveProof]()
     started = datetime.now(UTC)
+
+    def show() -> None:
+        if reporter is not None and proofs:
+            facts, is_whole = facts_since(case, started), len(answers) == plan.total
+            write_report(reporter, case, folder, watch, facts=facts, proofs=proofs, complete=is_whole)
 
     def write() -> list[CurveProof]:
         proofs = plan.gathered(answers)
@@ -83,18 +88,16 @@ def prove_case(
         pool or serial() as workers,
     ):
         written = monotonic()
-        try:
-            for found in workers.map(answer, plan.questions()):
-                answers.append(found)
-                progress(failed=not found.is_proven)
-                if monotonic() - written > EVERY and len(answers) % plan.each == 0:
-                    write()
-                    written = monotonic()
-        finally:
-            proofs = write()
-            if reporter is not None and proofs:
-                facts, is_whole = facts_since(case, started), len(answers) == plan.total
-                write_report(reporter, case, folder, watch, facts=facts, proofs=proofs, complete=is_whole)
+        with shown_at_the_end(show):
+            try:
+                for found in workers.map(answer, plan.questions()):
+                    answers.append(found)
+                    progress(failed=not found.is_proven)
+                    if monotonic() - written > EVERY and len(answers) % plan.each == 0:
+                        write()
+                        written = monotonic()
+            finally:
+                proofs = write()
     return proofs
 
 

@@ -1,6 +1,7 @@
 """report.html: what stands on the page, that it is one file, that texts are texts, and that it never costs a result."""
 
 import re
+from datetime import UTC, datetime
 from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,9 +12,13 @@ import pyvista
 
 from fpsolve.case.case import load_case
 from fpsolve.cli import BAD_INPUT, main
+from fpsolve.errors import OutputError, Remedy
+from fpsolve.model import PlaneSystem, Problem, White
 from fpsolve.output import pictures, report
-from fpsolve.output.meanings import Part, equations_of, meanings, parts_of
+from fpsolve.output.meanings import Part, equations_of, meanings, noises_of, parts_of
+from fpsolve.output.tables import facts_of
 from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
+from fpsolve.workflow.reports import shown_at_the_end
 from tests.conftest import painted
 from tests.proofs.case import CASE as PROVABLE
 from tests.solving import solve_case
@@ -231,6 +236,7 @@ def test_proofs_have_a_page(tmp_path):
     assert "Proven: the moment of order 2 grows." in Page(tmp_path / "proven/report.html").text
     assert run(tmp_path, text, "--report", name="proven.toml") == 0  # which keeps the proof, as of its parameters
     words = Page(tmp_path / "proven/report.html").text
+    assert "Other commands wrote proof.json there" in words
     assert "Proven: the moment of order 2 grows." in words
     assert "the mean square grows" in words
 
@@ -271,6 +277,30 @@ def test_symbols_without_latex(latex, parts):
 )
 def test_equations_have_the_numbers_of_the_case(name, equations):
     assert equations_of(next(load_case(CASES / f"{name}.toml").curves()).problem) == equations
+
+
+@pytest.mark.parametrize(("sense", "words"), [("ito", "Itô's"), ("stratonovich", "Stratonovich's")])
+def test_white_noise_is_told_with_its_sense(sense, words):
+    problem = Problem(PlaneSystem.of_equations(("x", "v"), ("v", "-x - xi*v")), White(s=0.5, interpretation=sense))
+    assert noises_of(problem) == [f"ξ is noise of the kind white. The equation is meant in {words} sense."]
+
+
+@pytest.mark.parametrize("called", ["/somewhere/bin/fpsolve", "/somewhere/fpsolve/__main__.py"])
+def test_the_command_can_be_typed_again(called, monkeypatch):
+    monkeypatch.setattr("sys.argv", [called, "run", "a case.toml"])
+    command = "/somewhere/bin/fpsolve" if called.endswith("fpsolve") else "python -m fpsolve"
+    case = load_case(CASES / "minimal.toml")
+    assert facts_of(case, datetime.now(UTC), 1.0)["command"] == f"{command} run 'a case.toml'"
+
+
+def test_an_interrupt_is_told_where_the_report_of_what_was_done_cannot_be_written():
+    def show():
+        raise OutputError("no space is left", Remedy.FOLDER)
+
+    with pytest.raises(KeyboardInterrupt, match="kept"), shown_at_the_end(show):
+        raise KeyboardInterrupt("what was done is kept")
+    with pytest.raises(OutputError), shown_at_the_end(show):
+        pass
 
 
 def test_rare_paths_that_carry_the_mean_square_are_told_of():

@@ -86,6 +86,10 @@ class Poisson(Memoryless):
             raise ValueError(f"got {len(self.weights)} weights for {len(self.sizes)} sizes; must be as many")
 
     @property
+    def sense(self) -> str:
+        return "Marcus's"
+
+    @property
     def shares(self) -> FloatArray:
         """How likely each size is, shape (n,)."""
         weights = np.array(self.weights or np.ones(len(self.sizes)), dtype=float)

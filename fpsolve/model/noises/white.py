@@ -79,6 +79,10 @@ class White(Memoryless):
     kind: ClassVar[str] = "white"
     of_xi: ClassVar[Sequence[str]] = ("s",)
 
+    @property
+    def sense(self) -> str:
+        return "Itô's" if self.interpretation == Interpretation.ITO else "Stratonovich's"
+
     def spectral_density(self, omega: float) -> float:
         """S(ω) = s²."""
         return self.s**2
