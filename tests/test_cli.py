@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 from contextlib import chdir, redirect_stderr, redirect_stdout
-from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -443,7 +442,7 @@ def command_line(arguments, unbuffered="", stderr=subprocess.PIPE, **options):
 
 @pytest.mark.parametrize(
     ("arguments", "unbuffered"),
-    sampled(*((command, "") for command in COMMANDS), (COMMANDS[3], "1"), (["--help"], "1")),
+    sampled(*((command, "") for command in COMMANDS), (COMMANDS[3], "1")),
 )
 def test_a_full_output_is_said_in_one_sentence(case, tmp_path, arguments, unbuffered):
     with Path("/dev/full").open("w", encoding="utf-8") as full:
@@ -473,7 +472,8 @@ def test_any_failure_to_write_is_said_in_one_sentence(case, capsys, monkeypatch,
 
 
 @pytest.mark.parametrize(
-    ("arguments", "unbuffered"), sampled(*product([["--version"], ["--help"], ["check", "test.toml"]], ["", "1"]))
+    ("arguments", "unbuffered"),
+    sampled((["--version"], ""), (["--help"], "1"), (["check", "test.toml"], ""), (["check", "test.toml"], "1")),
 )
 def test_a_closed_pipe_ends_a_command_quietly(case, arguments, unbuffered):
     read, write = os.pipe()

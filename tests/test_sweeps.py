@@ -103,13 +103,6 @@ def test_results_do_not_depend_on_the_number_of_processes(place):
     assert len(lines(place, "two")) == SIZE**2
 
 
-@pytest.mark.slow
-def test_a_single_set_by_several_processes(place):
-    """Its progress is reported within this one."""
-    run(place, "single", "--jobs", "2", "--set", "vary={}", "--set", "figure.x=p")
-    assert len(lines(place, "single")) == 1
-
-
 def wait_for_records(place, out, count, process):
     """Until so many are written, or the run has ended."""
     for _ in range(6000):
@@ -219,7 +212,7 @@ def test_an_interrupt_keeps_what_is_solved(place):
         assert found.attrs["complete"] == 0
         assert int((found.status != 3).sum()) == summary["done"]
     assert Records(folder).look().are_there
-    run(place, "interrupted", "--jobs", "2")
+    run(place, "interrupted", "--jobs", "1")
     assert_same_results(place, "interrupted")
 
 
@@ -309,7 +302,11 @@ def dask_cluster(count=2):
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_results(place):
     pytest.importorskip("distributed")
+    case = load_case(place / "sweep.toml", ["vary={}"])
     with dask_cluster() as (address, workers, _):
+        pool = cluster(address)  # works for one case after the other, as its client ends with each
+        numbers = [run_case(case, place / out, pool=pool).results[0].moments.value for out in ("first", "second")]
+        np.testing.assert_array_equal(*numbers)
         process = begun(place, "cluster", "--scheduler", address)
         wait_for_records(place, "cluster", 4, process)
         workers[0].kill()
@@ -323,17 +320,6 @@ def test_a_cluster_gives_the_same_results(place):
 def test_a_single_set(place, jobs):
     run(place, f"single{jobs}", "--jobs", jobs, "--set", "vary={}")
     assert len(lines(place, f"single{jobs}")) == 1
-
-
-@pytest.mark.slow
-def test_a_cluster_works_for_one_case_after_the_other(place):
-    """Its client ends with each."""
-    pytest.importorskip("distributed")
-    case = load_case(place / "sweep.toml", ["vary={}"])
-    with dask_cluster(1) as (address, *_):
-        pool = cluster(address)
-        numbers = [run_case(case, place / out, pool=pool).results[0].moments.value for out in ("first", "second")]
-    np.testing.assert_array_equal(*numbers)
 
 
 @pytest.mark.slow

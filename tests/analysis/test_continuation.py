@@ -103,7 +103,7 @@ def test_a_circle_is_closed(u, v, radius):
     assert np.allclose(np.linalg.norm(branch.at - (u, v), axis=1), radius, rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("seed", sampled(*range(20), keep=6))
+@pytest.mark.parametrize("seed", sampled(*range(12), keep=6))
 def test_a_circle_between_the_nodes_is_found(seed):
     """A circle of more than half the diagonal of a cell of the finer grid has a point of that inside."""
     least = math.sqrt(0.5) / ((NODES - 1) * (FINE - 1))
@@ -322,10 +322,10 @@ def test_a_cusp_does_not_hang():
 
 @pytest.mark.slow
 def test_steps_do_not_jump_to_a_neighbour():
-    """sin(12 π u) = 0.1 v has 12 lines, closer than the longest step."""
-    number, w = 12, 12 * math.pi
+    """sin(8 π u) = 0.1 v has 8 lines, closer than the longest step."""
+    number, w = 8, 8 * math.pi
     of = field(lambda u, v: (np.sin(w * u) - 0.1 * v, w * np.cos(w * u), -0.1))
-    branches = [branch for branch in lines(of, nodes=17, longest=0.1) if length(branch) > 0.5]
+    branches = [branch for branch in lines(of, nodes=17, longest=0.15) if length(branch) > 0.5]
     assert len(branches) == number
     for branch in branches:
         u, v = branch.at.T

@@ -74,8 +74,7 @@ def test_f_is_zero_on_a_line(zero, epsilon):
         assert (abs(value) - error) / slope <= point.sample.width < 1e-8
 
 
-@pytest.mark.parametrize("zero", sampled(SECOND, LAMBDA, INDEX))
-@pytest.mark.parametrize("omega", sampled(3.0, 1.2))
+@pytest.mark.parametrize(("zero", "omega"), sampled((SECOND, 3.0), (LAMBDA, 1.2), (INDEX, 3.0)))
 def test_weak_noise_has_the_lines_of_the_paper(zero, omega):
     """c₁ of Λ₂(p)/p = 0, Eq. (36), is off by O(ε²)."""
     s0, s2 = NOISE.spectral_density(0.0), NOISE.spectral_density(2 * omega)

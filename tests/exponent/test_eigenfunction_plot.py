@@ -17,6 +17,8 @@ from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.surfaces import can_render, flat_figure
 from tests.conftest import FIG1, UNIT_NOISE
 
+pytestmark = pytest.mark.usefixtures("pictures")
+
 HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.5)
 EXACT = NonGaussianNoise(D0=0.5, tau0=1.0, r0=0.9)
 

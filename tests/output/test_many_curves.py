@@ -274,7 +274,7 @@ def test_when_it_is_a_map(drawn, tmp_path, count, more, key):
 
 
 @pytest.mark.slow
-def test_thousands_of_curves_take_seconds(tmp_path):
+def test_thousands_of_curves_take_seconds(pictures, tmp_path):
     case = case_of(tmp_path, ["vary.noise.D0={start=0.1, stop=3.0, num=2500}"])
     results = results_of(case)
     started = time.process_time()
@@ -284,7 +284,7 @@ def test_thousands_of_curves_take_seconds(tmp_path):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", sampled("two", "map", "over a parameter", "fifty over a parameter", keep=2))
+@pytest.mark.parametrize("name", sampled("two", "map", "over a parameter", keep=2))
 @pytest.mark.parametrize("most", sampled(0, 1))
 def test_what_failed_leaves_a_figure(sound, tmp_path, name, most):
     """Also where nothing is solved, or one set alone."""

@@ -171,7 +171,7 @@ def test_the_name_of_the_noise_is_asked_for(tmp_path):
 
 
 @pytest.mark.parametrize(("start", "stop"), [(1.0, 4.0), (2.0, 8.0), (0.9, 4.5), (1.0, 2.0), (0.3, 0.5)])
-def test_short_logarithmic_axes_have_round_ticks(start, stop):
+def test_short_logarithmic_axes_have_round_ticks(pictures, start, stop):
     figure = Figure()
     axes = figure.subplots()
     axes.set(xscale="log", xlim=(start, stop))

@@ -42,7 +42,7 @@ PROOFS = {
     "whole support": (MIDDLE, (0.4, 0.6, 0.7), "exact", 1.5, 1e-6),
     "path, bounded noise": (MIDDLE, (0.4, 0.6, 0.7), "exact", None, 1e-5),
 }
-STEP = 1 if "FPSOLVE_ALL_MUTATIONS" in os.environ else 8
+STEP = 1 if "FPSOLVE_ALL_MUTATIONS" in os.environ else 16
 """Of the slow tests through all mutations of a proof."""
 
 

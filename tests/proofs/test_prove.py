@@ -13,7 +13,6 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.proofs import objection, prove, prove_lyapunov_exponent, prove_stability_index, search
 from fpsolve.proofs.statement import statement_of
 from tests import random_proofs
-from tests.conftest import sampled
 
 FIG1 = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1, "D0": 1.0, "tau0": 0.5, "r0": 0.95}
 MIDDLE = {"omega": 1.3, "restitution": 0.75, "c1": -0.1, "epsilon": 0.5, "D0": 0.4, "tau0": 0.6, "r0": 0.9}
@@ -65,7 +64,7 @@ def test_without_loss_the_second_moment_is_that_of_the_moment_hierarchy(numbers,
     assert found.lower < value < found.upper
 
 
-@pytest.mark.parametrize("epsilon", [0.2, pytest.param(0.7, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("epsilon", [0.2])
 def test_the_second_negative_moment_is_known_without_loss_for_gaussian_noise(epsilon):
     """Λ(−2) = −ε²c₁ + ε²σ²/(2α²), exactly."""
     given = problem(**FIG1 | {"restitution": 1.0, "epsilon": epsilon, "D0": 0.2, "reduced": True})
@@ -161,7 +160,7 @@ def test_numbers_that_are_none_are_refused(p, width):
         prove(problem(**FIG1), p, width=width)
 
 
-@pytest.mark.parametrize("seed", sampled(103, 104))
+@pytest.mark.parametrize("seed", [103])
 def test_random_problems(seed):
     """A hundred others: `python -m tests.random_proofs`."""
     found = random_proofs.outcome(seed)

@@ -81,7 +81,7 @@ def small(seed, estimator="direct", orders=(-1.0, 1.0)):
 @pytest.mark.parametrize("estimator", sampled("direct", "population"))
 def test_seed_decides_whatever_the_threads(monkeypatch, estimator):
     found = small(3, estimator)
-    for threads in (1, 2, 3):
+    for threads in (1, 3):
         monkeypatch.setattr(batches, "processors", lambda threads=threads: threads)
         assert small(3, estimator) == found
     assert small(4, estimator) != found

@@ -265,6 +265,6 @@ def test_passages_of_a_ray_that_is_passed_both_ways():
     noise, lost = OrnsteinUhlenbeck(1.0, math.sqrt(2)), []
     for factor in (2, 0.5):
         step = factor * default_step(system, noise)
-        found = simulate(system, noise, [], paths=16384, time=100.0, step=step, seed=1)
+        found = simulate(system, noise, [], paths=8192, time=100.0, step=step, seed=1)
         lost.append(1 - found.impacts / (found.paths * found.time) * math.pi / rate)
     assert 0 < lost[1] < 0.7 * lost[0] < 0.01

@@ -11,10 +11,7 @@ SEEDS = {
     3: "ornstein-uhlenbeck",
     225: "bounded",
     224: "poisson",
-    242: "filter y'",
     250: "telegraph and ornstein-uhlenbeck",
-    253: "poisson and ornstein-uhlenbeck",
-    237: "white and harmonic",
 }
 
 
