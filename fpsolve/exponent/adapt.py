@@ -19,13 +19,14 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.corners import corners, graded_more, resolving
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.error import Solution
+from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
+from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.discretisation import (
     MOST_DEGREE,
     Cells,
     Discretisation,
+    ModeEffects,
     NoisePart,
     PhaseCells,
     Polynomials,
@@ -441,7 +442,7 @@ class _Search:
                 pair = principal_pair(Generator(self.place.problem, chosen), self.p, start=pair, clock=self.tick)
             except (MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError) as failure:
                 self.failure, pair = failure, None
-                chosen = chosen.doubled()
+                chosen = chosen.doubled(effects_of(failure))
                 continue
             solution, allowed = Solution(pair), self.tolerance(self.p, pair.value)
             seems_enough = solution.error_by_modes <= allowed
@@ -503,8 +504,9 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
             each.reached if each.has_states else np.array([-1, 1]) * min(2 * each.standard_deviation, each.half_width)
             for each in known
         ]
-        phase = _phase(system, problem.at_values(typical), digits)
-        chosen = Discretisation(phase, tuple(first_part(each, digits) for each in known))
+        parts = tuple(first_part(each, digits) for each in known)
+        phase = _phase(system, problem.at_values(typical), digits, is_smooth=sum(each.dimension for each in parts) > 1)
+        chosen = Discretisation(phase, parts)
         if noise.basis != "pairs":
             return chosen
         if center is None:
@@ -537,21 +539,28 @@ def first_far(problem: Problem, place: Place, rtol: float) -> Discretisation:
     return Discretisation(phase, (Cells(lines, round(2 + digits / 2), is_killed=True),))
 
 
-def _phase(system: System, xi: Xi, digits: float, more: int = 0) -> PhaseCells:
+def _phase(system: System, xi: Xi, digits: float, more: int = 0, is_smooth: bool = False) -> PhaseCells:
     """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
 
-    There are more where the speed of the phase changes much for some of the ξ.
+    There are more where the speed of the phase changes much for some of the ξ; but one, of a higher degree, where
+    several numbers move it, which leave T smoother, and each function of φ is a thousand unknowns.
     """
     speed = phase_speed(system, xi)
     widest = float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
-    cells = (8 if widest > 1 else 4 if widest > 0.5 else 2) + more
+    cells = 1 if is_smooth else (8 if widest > 1 else 4 if widest > 0.5 else 2) + more
     rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
     lines = rays[0] + np.linspace(0, math.pi, cells + 1)
     others = rays[0] + np.mod(np.array(rays[1:]) - rays[0], math.pi)
     near = np.min(np.abs(lines[1:-1, None] - others[None]), axis=1, initial=math.inf) < 0.3 * math.pi / cells
     lines = np.sort(np.concatenate([lines[:1], lines[1:-1][~near], lines[-1:], others]))
-    degree = round(np.clip(digits + 2 - (widest > 0.5) * 4, 4, MOST_DEGREE))
+    degree = round(np.clip(digits + (4 if is_smooth else -2 if widest > 0.5 else 2), 4, MOST_DEGREE))
     return PhaseCells(lines, np.full(lines.size - 1, degree))
+
+
+def effects_of(failure: Exception) -> Sequence[ModeEffects | None]:
+    """Those of the pair that a failed search has reached; nothing where there is none."""
+    pair = getattr(failure, "partial", None)
+    return mode_effects(pair) if pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT else ()
 
 
 def widened(generator: Generator) -> Discretisation:

@@ -27,6 +27,8 @@ HALVING = 2 * math.log(2)
 """By how much more the logarithm of an effect falls with each degree in half a cell."""
 MAX_POLYNOMIALS = 200
 LEAST_DEGREE, SPLIT_DEGREE, MOST_DEGREE = 4, 6, 14
+LITTLE = 1e-2
+"""Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
 THIRDS = 3
 """Into how many parts a cell of φ is cut for a place far out: where the phase rests must not come to lie on a line."""
 LARGEST_RATIO = 1.4
@@ -121,9 +123,11 @@ class NoisePart:
         degree: of cells; 0 for others.
         slope: s/p of the factor exp(s z) that goes with polynomials.
         is_killed: whether paths that leave the cells are killed.
+        dimension: of the state of the noise.
     """
 
     kind: ClassVar[Literal["polynomials", "cells", "states", "waves", "pairs"]]
+    dimension: ClassVar[int] = 1
     lines: FloatArray
     degree: int
     slope: float
@@ -264,6 +268,7 @@ class States(NoisePart):
     count: int
 
     kind, lines, degree, slope, is_killed = "states", NO_LINES, 0, 0.0, False
+    dimension = 0
 
     @property
     def size(self) -> int:
@@ -301,6 +306,7 @@ class Pairs(Polynomials):
     """
 
     kind = "pairs"  # type: ignore[assignment]
+    dimension = 2
 
     @property
     def size(self) -> int:
@@ -390,10 +396,13 @@ class Discretisation:
         """A finer one: two degrees more each way; where there are none left, cells are halved."""
         return Discretisation(self.phase.enriched(), tuple(part.enriched() for part in self.noises))
 
-    def doubled(self) -> Discretisation:
-        """Twice as many functions each way, where nothing is known yet."""
-        phase = self.phase.doubled(self.parts_of_phase)
-        return Discretisation(phase, tuple(part.doubled() for part in self.noises))
+    def doubled(self, effects: Sequence[ModeEffects | None] = ()) -> Discretisation:
+        """Twice as many functions along the axes that lack most by their effects; along all where nothing is known."""
+        errors = [each.error if each else 0.0 for each in effects] or [1.0] * (1 + len(self.noises))
+        of_phase, *of_noises = (error > LITTLE * max(errors) for error in errors)
+        phase = self.phase.doubled(self.parts_of_phase) if of_phase else self.phase
+        pairs = zip(self.noises, of_noises, strict=True)
+        return Discretisation(phase, tuple(part.doubled() if is_coarse else part for part, is_coarse in pairs))
 
     def raised(self) -> Discretisation:
         """One more function each way, where what a cell lacks harms others."""

@@ -13,7 +13,7 @@ from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import truncation
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
+from fpsolve.fem.discretisation import Discretisation, ModeEffects, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.markov_chain import MarkovChain
@@ -188,6 +188,14 @@ def test_truncation_bounds_what_a_cut_changes():
         pair = principal_pair(Generator(Problem(oscillator, WEAK_NOISE), mesh), 3.0)
         error = abs(pair.value - full)
         assert 1e-10 < error <= 3 * truncation(pair)[1] <= 1e3 * error
+
+
+def test_while_nothing_is_resolved_the_axis_that_lacks_most_is_doubled():
+    chosen = Discretisation(PhaseCells(np.array([0.0, 1.0]), np.array([5])), (Polynomials(4), Polynomials(6)))
+    small, large = (ModeEffects(np.array([5]), np.array([size]), np.array([10 * size])) for size in (1e-4, 1.0))
+    assert [part.count for part in chosen.doubled((small, large, small)).noises] == [8, 6]
+    assert chosen.doubled((small, large, small)).phase.size == 6
+    assert chosen.doubled().size == 8 * chosen.size
 
 
 @pytest.mark.parametrize("budget", [Budget(unknowns=900), Budget(unknowns=1500), Budget(seconds=0.02)])

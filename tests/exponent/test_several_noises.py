@@ -10,6 +10,7 @@ from fpsolve.analysis.density import furstenberg_khasminskii
 from fpsolve.analysis.sensitivity import solve_sensitivities
 from fpsolve.arrays import identity
 from fpsolve.errors import MeshError
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model import CoefficientMatrix, Jump, Noises, Poisson, SineWiener, Telegraph, White
@@ -17,7 +18,7 @@ from fpsolve.proofs.statement import statement_of
 from fpsolve.theory.hierarchy import hierarchy_exponent
 from fpsolve.theory.perturbation import second_order
 from tests.oracles.moment_hierarchy import chain, gaussian, rates_of_monomials, several_exponent, struck_rates
-from tests.random_several import compared
+from tests.random_several import compared, drawn
 
 RATES = "v", "-omega**2*x - 2*zeta*omega*v - load*x - sway*v"
 NAMES = {"load": "noise.axial", "sway": "noise.lateral"}
@@ -33,6 +34,15 @@ def beam(axial, lateral, **parameters):
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6, pytest.param(7, marks=pytest.mark.slow)])
 def test_random_systems_under_two_noises(seed):
     assert (found := compared(seed, 2.0, rtol=1e-6 if seed % 6 == 1 else 1e-8)).is_within, found
+
+
+def test_only_the_axis_that_lacks_functions_is_refined():
+    """Λ(2) of the moment hierarchy for slow lateral and fast axial noise: some 24 x 8 x 30 functions."""
+    problem = drawn(13)[0]
+    found = ExponentSolver(problem, rtol=1e-6, budget=Budget(unknowns=8000)).solution(2.0)
+    assert abs(found.pair.value - 3.1913285717) <= found.error + 1e-10
+    _, axial, lateral = found.pair.space.shape
+    assert lateral > 2 * axial
 
 
 def test_moments_of_two_and_four():

@@ -241,7 +241,7 @@ def test_the_lyapunov_exponent_of_a_saddle():
     terms = CoefficientMatrix(0, ((0.0, 1.0), (1.0, -0.2))), CoefficientMatrix(1, ((0.2, -0.1), (0.4, -0.3)), identity)
     solver = ExponentSolver(Problem(PlaneSystem(terms), Filter(3.0, 0.9, 3.0, 0.0, 1.0)), rtol=1e-4)
     generator = solver.solution(2.0).pair.generator
-    pairs = [principal_pair(generator, p) for p in (0.0, 0.02, -0.02, 0.04, -0.04)]
+    pairs = [principal_pair(generator, p) for p in (0.0, 0.0025, -0.0025, 0.005, -0.005)]
     slopes = [(pairs[k].value - pairs[k + 1].value) / (2 * pairs[k].p) for k in (1, 3)]
     assert pairs[0].derivative == pytest.approx((4 * slopes[0] - slopes[1]) / 3, abs=1e-9)
     assert pairs[0].residual < 1e-13
@@ -263,6 +263,14 @@ def test_what_is_too_strong_is_refused_in_words():
 def test_random_filters(seed):
     """Twenty: `python -m tests.random_filters`."""
     assert (found := random_filters.compared(seed)).is_within, found
+
+
+def test_a_filter_that_needs_a_high_degree():
+    """Of a few functions of φ each: one cell of a high degree, which T of a filter needs no more than."""
+    found = random_filters.compared(10)
+    assert found.is_within, found
+    assert found.shape[1] > 200
+    assert math.prod(found.shape) < 5000
 
 
 @pytest.mark.slow
