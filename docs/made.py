@@ -24,8 +24,10 @@ ROOT = Path(__file__).parents[1]
 CASES = [*sorted(ROOT.glob("cases/*.toml")), *sorted(ROOT.glob("cases/systems/*.toml"))]
 CHARTS = {path.name for path in (ROOT / "docs/charts").glob("*")}
 """Cases whose chart takes long; theirs is drawn from what `fpsolve chart` wrote once."""
-TWO_AXES = "filtered", "two_noises", "stochastic_mathieu"
-"""Cases with a dimension more, of which their own p are drawn."""
+TWO_AXES = "filtered", "two_noises"
+"""Cases with a dimension more, which are drawn at fewer p, to four digits."""
+OWN_P = ("stochastic_mathieu",)
+"""Cases of which their own p are drawn."""
 ROOMS = {
     "model": "what is studied: systems in the plane and their noises",
     "exponent": "Λ(p), its eigenpairs and what follows from them",
@@ -96,13 +98,14 @@ def script(path: Path) -> str:
     sets = ["output={ quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"]
     if few:
         sets = ["output={ quantities = ['moment'] }", "expect=[]", "figure={}"]
-        sets += ["moments.p={ start = 0.0, stop = 3.0, num = 13 }"] * (path.stem not in TWO_AXES)
+        count, digits = (7, ", rtol = 1e-4") if path.stem in TWO_AXES else (13, "")
+        sets += [f"moments={{ p = {{ start = 0.0, stop = 3.0, num = {count} }}{digits} }}"] * (path.stem not in OWN_P)
     title = re.sub(r"^(Fig\. \d\S*): (.*)", r"\1: \2", case.title)
     head = f'"""\n{title}\n{"=" * len(title)}\n\n{_rst(words)}\n"""\n\n'
     shown = f"# %%\n# The case file:\n#\n# .. literalinclude:: /generated/cases/{path.name}\n#    :language: toml\n"
     run = f"""
 # %%
-# {"The figure of the case:" if path.stem in TWO_AXES or not few else "Λ(p) over a range of p:"}
+# {"The figure of the case:" if path.stem in OWN_P or not few else "Λ(p) over a range of p:"}
 
 import fpsolve
 

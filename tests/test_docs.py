@@ -2,12 +2,17 @@
 
 import ast
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
 
 import fpsolve
+from fpsolve import ExponentSolver
+from fpsolve.exponent import INDICES
+from fpsolve.output.tables import facts_of, write_results
+from fpsolve.study.solve import Numerics, everything, solve_curve
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs").glob("[!g]*/*.md"))]
@@ -70,3 +75,22 @@ def test_every_room_has_a_page_of_reference():
     assert set(ast.literal_eval(values["ROOMS"])) == rooms
     index = (ROOT / "docs/reference/index.md").read_text(encoding="utf-8")
     assert all(f"/generated/reference/{room}\n" in index for room in rooms)
+
+
+def test_a_quantity_of_the_walk_through_is_solved_and_tabulated(monkeypatch, tmp_path):
+    """As the page on contributing says: once it is one of the `INDICES`, tables are loops over these."""
+    names: dict[str, object] = {}
+    for block in blocks(ROOT / "docs/contributing.md", "python"):
+        exec(block, names)
+    index = names["index"]
+    monkeypatch.setitem(INDICES, index.name, index)
+    case = fpsolve.load_case(ROOT / "cases/theorem.toml", ["expect=[]", "figure={}"])
+    asked_for = case.model_copy(update={"output": case.output.model_copy(update={"quantities": (index.name,)})})
+    wanted = everything(asked_for)
+    assert wanted.indices == (index.name,)
+    result = solve_curve(next(case.curves()), wanted, Numerics.of(case)).result
+    found, finer = result.estimates[index.name], index.solve(ExponentSolver(case.problem, rtol=1e-9), None)
+    assert abs(found.value - finer.value) <= found.error_estimate + finer.error_estimate
+    write_results(asked_for, [result], tmp_path, facts_of(asked_for, datetime.now(UTC), 0.0))
+    heads = (tmp_path / "curves.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert {index.name, f"{index.name}_error"} <= set(heads)

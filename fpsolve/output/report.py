@@ -368,7 +368,7 @@ def _plot(title: str, data: list[dict[str, Any]], axes: Sequence[Mapping[str, An
     look: dict[str, Any] = {
         "margin": {"t": 60},
         "hovermode": "closest",
-        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom"},
+        "legend": {"orientation": "h", "y": -0.25, "yanchor": "top"},
     }
     layout = {**look, "showlegend": True, "xaxis": axes[0], "yaxis": axes[1]}
     return {"title": f"{title}, with numbers where the pointer is", "data": data, "layout": layout}
