@@ -73,8 +73,8 @@ Fresh = Annotated[bool, Parameter(help="Solve or simulate again what an earlier 
 Quiet = Annotated[
     bool,
     Parameter(
-        help='Print the last line only, and on the standard error what is wrong or "not converged": no tables, notes, '
-        "warnings or progress; all of that is in the files.",
+        help='Print the last line only, and on the standard error what is wrong or "not converged". Tables, notes and '
+        "warnings are in the files.",
         negative="",
     ),
 ]
@@ -360,8 +360,9 @@ def chart(
 ) -> int:
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
 
-    A line takes any time, or [budget] line_seconds of the processor: then what is traced is kept, with exit code 3. In
-    the scan [budget] seconds are for a row of 13 nodes, each of which may take half of what is left.
+    [budget] line_seconds limits the time of a line: what is traced by then is kept, with exit code 3.
+    [budget] seconds limits a row of 13 nodes of the scan, of which each may take half of what is left.
+    Both are times of the processor.
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """
@@ -405,9 +406,11 @@ def prove(
 ) -> int:
     """Prove bounds on the exponents that hold with certainty; write them with certificates, OUT/<case>/proof.json.
 
-    A bound takes [budget] seconds of the processor at most, those of δ_p together twice as much, and a third more.
-    Needs python-flint: pip install 'fpsolve[proof]'. Exit codes: 0 proven, 3 a width is not met; of --check 0 accepted,
-    1 rejected, 2 malformed.
+    A bound takes at most [budget] seconds of the processor and a third more.
+    The bounds on δ_p together take at most twice as much.
+    Needs python-flint: pip install 'fpsolve[proof]'.
+
+    Exit codes: 0 proven, 3 a width is not met; with --check 0 accepted, 1 rejected, 2 malformed.
 
     Example: fpsolve prove cases/fig1.toml --width 1e-9
     """
