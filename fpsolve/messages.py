@@ -198,9 +198,9 @@ class Code(Enum):
         "note: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded "
         "noise P(sup ‖x‖ > A) may fall faster than any power of A}"
     )
-    NOT_ONE_RAY = "note: the motion has impacts on {count:?{count}¦no} rays, and only on a single one have they a rate"
+    NOT_ONE_RAY = "note: the motion has impacts on {count:?{count}¦no} rays; their rate is told where there is one ray"
     RARE_IMPACTS = (
-        "note: N cannot be told from 0, N < {most:.1g}, as where the motion does not turn: R leaves λ as it is"
+        "note: N cannot be told from 0, N < {most:.1g}, as where the motion does not turn; so R does not change λ"
     )
     LOG_OUT_OF_RANGE = "note: its logarithm is {value:.3g}, beyond ±{most:g}"
     NO_RESTITUTION = "note: the motion has no coefficient of restitution"
