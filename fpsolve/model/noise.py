@@ -58,7 +58,6 @@ class Noise(Parametrised):
         tails_beyond: the name of a parameter, the value above which P_s has algebraic tails, and what else to do.
         may_tilt: whether functions of ξ gain by a factor exp(s ξ), as where P_s falls to both sides.
         has_peak: whether its spectral density may be largest, and very large, at a frequency of its own.
-        sense: whose sense the equation is meant in, as "Itô's"; empty where all senses are the same.
         is_white: whether it has no value; it then has one state, ξ = 0, and moves what it drives by diffusion, see
             `motion`, or by impulses.
         of_xi: the names of parameters whose unit is that of ξ, or made of it; it is stated for ξ in 1/time.
@@ -71,9 +70,13 @@ class Noise(Parametrised):
     tails_beyond: ClassVar[tuple[str, float, str] | None] = None
     may_tilt: ClassVar[bool] = True
     has_peak: bool = False
-    sense: str = ""
     is_white: ClassVar[bool] = False
     of_xi: ClassVar[Sequence[str]] = ()
+
+    @property
+    def sense(self) -> str:
+        """Whose sense the equation is meant in, as "Itô's"; empty where all senses are the same."""
+        return ""
 
     @property
     def parts(self) -> Mapping[str, Noise]:
