@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray, real_array, real_numbers
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget, misplaced
+from fpsolve.exponent.adapt import Budget, Tolerance, misplaced
 from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, checked
 from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, missed, of_the_start
 from fpsolve.fem.mesh import CylinderMesh
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 
 SEARCH_INTERVAL: tuple[float, float] = (-20.0, 20.0)
 LEAST_SLOPE = 1e-100
+MOST_STEPS = 100
+PRECISE = 0.5
+"""Of what rtol allows δ_p, for the error of the last Λ(p)/p."""
 SHARE = 0.4
 """Of the tolerance of Λ(p)/p, that is left to the interpolation."""
 FEW_NODES = 5
@@ -254,7 +258,8 @@ def nonzero_root(
 ) -> Estimate | Absent:
     """δ_p, the non-zero root of Λ(p), or why Λ has none in the interval, as for noise with algebraic tails.
 
-    Λ is convex, so Λ(p)/p increases and has one root at most: a safeguarded Newton iteration on it.
+    Λ is convex, so Λ(p)/p increases and has one root at most: a Newton iteration on it, which halves the bracket where
+    its steps do not, as where Λ(p)/p bends from flat to steep. The last solve is as accurate as δ_p is to be.
 
     Raises:
         NotConverged: some p on the way is not resolved.
@@ -262,31 +267,49 @@ def nonzero_root(
     if grows_far_out(solver.problem):
         return Absent(Message(Code.NO_INDEX))
     noise = solver.problem.noise
-    low, high = (float(end) for end in np.clip(interval, *solver.problem.moments))
+    ends = low, high = tuple(float(end) for end in np.clip(interval, *solver.problem.moments))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)
         guess = -ratio / slope
-    p, tried = min(max(guess, low), high), set()
-    for _ in range(60):
+    p, tried, steps, tolerance = min(max(guess, low), high), set(), [high - low] * 2, None
+    for _ in range(MOST_STEPS):
         tried.add(p)
-        ratio, slope, error = solver.ratio(p)
+        ratio, slope, error = _precise_ratio(solver, p, tolerance)
         if solver.classes:  # Λ(p)/p may be constant
             slope = max(slope, LEAST_SLOPE)
         if not slope > 0:
             raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=solver.near.refinement)
-        low, high = (p, high) if ratio < 0 else (low, p)
         new = p - ratio / slope
         least = 1e-13 * max(1.0, abs(p))
         if abs(new - p) <= max(least, 0.1 * error / slope) or 0 < high - low <= 10 * least:
             found = Estimate(p, error / slope + abs(new - p), scale=1.0, quantity=STABILITY_INDEX)
-            return checked(found, solver.near.remedy)
+            if found.relative_error <= solver.rtol or tolerance or solver.mesh is not None or solver.classes:
+                return checked(found, solver.near.remedy)
+            tolerance = partial(_share_of, PRECISE * solver.rtol * slope * max(1.0, abs(p)))
+            low, high = max(ends[0], low - 2 * found.error_estimate), min(ends[1], high + 2 * found.error_estimate)
+            continue
+        low, high = (p, high) if ratio < 0 else (low, p)
         if low == high:
-            low, high = np.clip(interval, *solver.problem.moments)
-            return Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=noise.is_bounded))
+            return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
         if not low < new < high:
             new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
+        elif abs(new - p) > 0.5 * steps[-2]:
+            new = 0.5 * (low + high)
+        steps.append(abs(new - p))
         p = new
     raise NotConverged(Message(Code.INDEX_UNSETTLED, p=p), remedy=solver.near.refinement)
+
+
+def _precise_ratio(solver: ExponentSolver, p: float, tolerance: Tolerance | None) -> tuple[float, float, float]:
+    """Λ(p)/p, its slope and error within a tolerance; within that of rtol where that of δ_p is out of reach."""
+    with suppress(NotConverged):
+        return solver.ratio(p, tolerance)
+    return solver.ratio(p)
+
+
+def _share_of(most: float, p: float, value: float) -> float:
+    """The tolerance of Λ(p) that leaves Λ(p)/p an error of this at most."""
+    return most * abs(p)
 
 
 @of_problem

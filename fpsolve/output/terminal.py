@@ -102,10 +102,14 @@ def _told(case: Case) -> list[Index]:
 
 
 def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
-    """An index of a curve with its digits, or that there is none."""
+    """An index of a curve with its digits, or that there is none, or that it was not found out."""
     estimate = result.estimates[index.name]
     if estimate is not None:
         return digits(estimate.value, estimate.error_estimate, most)
+    told = map(message_of, (*(failure.reason for failure in result.failures), *result.warnings))
+    unsolved = {Code.INDEX_FAILED, Code.INDEX_MISSING} if result.failures else {Code.INDEX_FAILED}
+    if any(each.code in unsolved and index.symbol in each.data["symbols"] for each in told):
+        return "not solved"
     return "none" if index == CRITICAL_RESTITUTION or grows_far_out(result.curve.problem) else "none found"
 
 

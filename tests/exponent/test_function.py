@@ -15,6 +15,7 @@ from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
+from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite, perturbation
@@ -218,3 +219,39 @@ def test_stability_index_of_the_weakest_noise(epsilon):
     theory = perturbation.stability_index(oscillator, WEAK_NOISE)
     assert abs(index.value - theory) <= index.error_estimate + 10 * epsilon**2
     assert index.error_estimate < 1e-5
+
+
+def test_stability_index_where_newton_steps_run_in_circles():
+    """Λ(p)/p bends from flat to steep here, and each Newton step leads from one end of the bracket to the other."""
+    system = PlaneSystem.of_equations(
+        ("theta", "omega"),
+        ("omega", "-2*zeta*sqrt(g/l)*omega - (g + xi)/l*theta"),
+        {"g": 9.81, "l": 1.2, "zeta": 0.0871052631579},
+    )
+    solver = ExponentSolver(Problem(system, OrnsteinUhlenbeck(alpha=3.0, sigma=3.625 * math.sqrt(6.0))))
+    for guess in (None, 0.5, 18.0):
+        index = nonzero_root(solver, guess=guess)
+        assert index.value == pytest.approx(7.067497956, abs=2e-9)  # of an interpolant from -1 to 9
+        assert index.relative_error <= 1e-8
+    below, above = (solver.solution(index.value * share).pair.value for share in (1 - 1e-8, 1 + 1e-8))
+    assert below < 0 < above
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_stability_index_in_strong_noise_is_where_a_scan_changes_its_sign(seed):
+    """δ_p may lie anywhere from -20 to 20, or beyond; the signs of Λ(p)/p tell between which p."""
+    rng = np.random.default_rng(seed)
+    damping, alpha, deviation = rng.uniform(0.05, 0.4), rng.uniform(0.5, 4.0), rng.uniform(0.3, 0.8)
+    system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 2*zeta*v - xi*x"), {"zeta": damping})
+    noise = OrnsteinUhlenbeck(alpha=alpha, sigma=deviation * math.sqrt(2 * alpha))
+    solver = ExponentSolver(Problem(system, noise), rtol=1e-6)
+    index = nonzero_root(solver)
+    p = np.array([-19.5, -8.5, -2.5, -0.5, 0.5, 1.5, 3.5, 7.5, 13.5, 19.5])
+    negative = np.array([solver.solution(each).pair.value / each < 0 for each in p])
+    count = np.count_nonzero(negative)
+    assert np.all(negative[:count])  # Λ(p)/p increases
+    if not index:
+        assert count in (0, p.size)
+        return
+    assert (p[count - 1] if count else -20) < index.value < (p[count] if count < p.size else 20)
+    assert abs(solver.solution(index.value).pair.value) <= 1e-6 * solver.scale(index.value) + 1e-10
