@@ -6,10 +6,15 @@ loaded when its name is asked for and is none of ours.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
+from hashlib import sha256
 from importlib import import_module
 from importlib.metadata import entry_points
+from inspect import getsource
+from pathlib import Path
 from typing import Any, Literal
 
 from fpsolve.model.noise import Noise
@@ -65,7 +70,7 @@ def kind_names(room: Literal["systems", "noises"]) -> tuple[str, ...]:
 
 @cache
 def version_of(kind: type[Parametrised]) -> str:
-    """The package and version that a kind of others comes from, on which results depend; empty for ours."""
+    """The package and version that a kind of others comes from; empty for ours, and where no package is known."""
     if kind.kind in SYSTEMS or kind.kind in NOISES:
         return ""
     for group in ("fpsolve.systems", "fpsolve.noises"):
@@ -73,6 +78,25 @@ def version_of(kind: type[Parametrised]) -> str:
             if entry.name == kind.kind and entry.dist is not None and entry.value.partition(":")[0] == kind.__module__:
                 return f"{entry.dist.name} {entry.dist.version}"
     return ""
+
+
+def source_of(kind: type[Parametrised]) -> str:
+    """A digest of the files that a kind of others is written in, its bases among them; empty for ours.
+
+    Results depend on them: who writes a kind corrects it without a new version. Of a class without a file, as in a
+    notebook, it is that of its lines; where there are none, of nothing.
+    """
+    others = [each for each in kind.__mro__ if each.__module__.partition(".")[0] not in ("fpsolve", "builtins", "abc")]
+    if not others:
+        return ""
+    digest = sha256()
+    for each in others:
+        file = getattr(sys.modules.get(each.__module__), "__file__", None)
+        text = b""
+        with suppress(OSError, TypeError):
+            text = Path(file).read_bytes() if file else getsource(each).encode()
+        digest.update(f"{each.__module__}.{each.__qualname__} {len(text)} ".encode() + text)
+    return digest.hexdigest()
 
 
 @cache

@@ -38,7 +38,7 @@ from fpsolve.exponent.quantities import BY_JUMP, INDICES
 from fpsolve.exponent.solver import InvariantClass
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Message, message_of
-from fpsolve.model.kinds import version_of
+from fpsolve.model.kinds import source_of, version_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Numerics, Wanted, everything
 
@@ -251,8 +251,11 @@ def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSec
 
 
 def _of_curve(curve: Curve) -> dict[str, Any]:
-    """The parameters, and the system and the noise as they are written, with the versions of other packages' kinds."""
-    kinds = [[repr(half), version_of(type(half))] for half in curve.problem.halves]  # type: ignore[arg-type]
+    """The parameters, and the system and the noise as they are written, with versions and files of others' kinds."""
+    kinds = []
+    for half in curve.problem.halves:
+        kind: Any = type(half)
+        kinds.append([repr(half), version_of(kind), *filter(None, [source_of(kind)])])
     return {"parameters": dict(curve.parameters), "kinds": kinds}
 
 

@@ -26,6 +26,7 @@ from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
+from fpsolve.model.kinds import version_of
 from fpsolve.model.quantity import MOMENT, MOMENTS
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
@@ -37,6 +38,8 @@ def facts_of(case: Case, started: datetime, seconds: float) -> dict[str, Any]:
     """Of a run: versions, the command, the machine, when it began and how long it takes, and the case as written."""
     packages = {name: version(name) for name in ("numpy", "scipy", "scikit-fem")}
     name, *rest = sys.argv
+    kinds = filter(None, (version_of(type(half)) for half in case.problem.halves))  # type: ignore[arg-type]
+    packages |= dict(each.rsplit(" ", 1) for each in kinds)
     return {
         "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},
         "command": shlex.join(["python", "-m", "fpsolve", *rest] if name.endswith("__main__.py") else [name, *rest]),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,7 @@ from fpsolve.case.case import load_case
 from fpsolve.case.vary import legend
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
-from fpsolve.model.kinds import noise_kind, version_of
+from fpsolve.model.kinds import noise_kind, source_of, version_of
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
@@ -20,6 +22,7 @@ from fpsolve.model.noises.telegraph import Telegraph
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.records import key_of
+from fpsolve.output.tables import facts_of
 from fpsolve.simulation.setup import simulated_parts
 from fpsolve.study.prove import refuse_unprovable_case
 from fpsolve.study.solve import Numerics, everything
@@ -190,6 +193,31 @@ def test_records_depend_on_the_kind_and_its_version(
         case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS))
         keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
     assert len(keys) == 2
+
+
+def test_records_depend_on_the_file_of_a_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A noise that is corrected without a new version, itself or its base, is solved anew."""
+    monkeypatch.syspath_prepend(tmp_path)
+    base, own = tmp_path / "breeze.py", tmp_path / "squall.py"
+    base.write_text("from fpsolve import OrnsteinUhlenbeck\n\nclass Breeze(OrnsteinUhlenbeck):\n    pass\n")
+    own.write_text("from breeze import Breeze\n\nclass Squall(Breeze):\n    pass\n")
+    kind = importlib.import_module("squall").Squall
+    found = [source_of(kind)]
+    for file in (own, base):
+        file.write_text(file.read_text() + "    half = 0.5\n")
+        found.append(source_of(kind))
+    assert len({"", *found}) == 4
+    assert source_of(kind) == found[-1]
+    assert source_of(OrnsteinUhlenbeck) == ""  # type: ignore[arg-type]
+
+
+def test_records_of_a_changed_kind_are_others(windy: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    case, keys = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS)), set()
+    for source in ("a", "b"):
+        monkeypatch.setattr("fpsolve.output.records.source_of", lambda _, source=source: source)
+        keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
+    assert len(keys) == 2
+    assert facts_of(case, datetime.now(UTC), 0.0)["versions"]["windy"] == "1.5"
 
 
 def test_figures_speak_of_the_parameters_of_the_case(tmp_path: Path) -> None:
