@@ -200,26 +200,27 @@ class Solution:
 
 
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
-    """The effects along every axis; None along one that has states."""
+    """The effects along every direction of every axis; None along one that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
     operator = pair.generator.at(pair.p).matrix.shifted(pair.value)
     tables, found = (space.table(pair.right), space.table(pair.left)), list[ModeEffects | None]()
-    for at, axis in enumerate(space.axes):
-        inner, count = axis.cells >= 0, int(axis.cells.max()) + 1
+    directions = [(at, axis, *ladder) for at, axis in enumerate(space.axes) for ladder in axis.ladders]
+    for at, axis, cells, modes, own in directions:
+        inner, count = cells >= 0, int(cells.max()) + 1
         if count == 0:
             found.append(None)
             continue
         degrees = np.zeros(count, dtype=int)
-        np.maximum.at(degrees, axis.cells[inner], axis.modes[inner])
-        nested = [axis.nested if k == at else None for k in range(len(space.axes))]
+        np.maximum.at(degrees, cells[inner], modes[inner])
+        nested = [own if k == at else None for k in range(len(space.axes))]
         effects, (right, left) = [], (along(nested, table) for table in tables)
         for depth in (2, 4):
-            high = inner & (axis.modes > degrees[axis.cells] - depth)
+            high = inner & (modes > degrees[cells] - depth)
             mask = high.reshape([-1 if k == at else 1 for k in range(len(space.axes))])
             image = space.table(operator @ np.ravel(right * mask))
             others = tuple(k for k in range(len(space.axes)) if k != at)
             shares = np.abs(left * mask * image).sum(axis=others)[high]
-            effects.append(np.bincount(axis.cells[high], shares, minlength=count) / abs(norm))
+            effects.append(np.bincount(cells[high], shares, minlength=count) / abs(norm))
         found.append(ModeEffects(degrees, effects[0], effects[1], axis.slowest))
     return tuple(found)
 

@@ -181,6 +181,10 @@ class ExponentSolver:
         """Λ(p) around the place nearest to ξ = 0, for all noise but that of algebraic tails the only one."""
         if self.classes:  # near p = 0
             return max(self.classes, key=lambda each: each.lyapunov_exponent().value).near
+        if self.problem.dimension > 2:
+            from fpsolve.exponent.modes import SpherePlace
+
+            return SpherePlace(self.problem, **self._own)
         return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **self._own)
 
     @property

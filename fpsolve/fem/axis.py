@@ -29,6 +29,9 @@ class Axis:
         constant: coefficients of the function 1, times the factor of the axis, shape (size,).
         nested: the matrix to coefficients of modes whose sums by degree are all functions of a lower degree; None where
             they are that already.
+        unit: ∫ u v; None where it is the identity, or for noise.
+        is_full: whether every function is coupled to most others.
+        ladders: cells, modes and `nested` of every direction, for which errors are estimated.
         turns: how often the axis fits on the full circle; 1 for noise.
         levels: functions to be eliminated together, of which each level is coupled to its neighbours only; empty where
             the matrices tell them, None where every function can be by itself.
@@ -41,10 +44,16 @@ class Axis:
     constant: FloatArray
     nested: Any = None
     levels: Any = None
+    unit: Any = None
+    is_full = False
     turns, slowest = 1, 0.0
 
     def __init__(self) -> None:
         self._matrices: dict[Coefficient | None, Any] = {}
+
+    @property
+    def ladders(self) -> Sequence[tuple[Any, Any, Any]]:
+        return ((self.cells, self.modes, self.nested),)
 
     def mass(self, g: Any = one) -> Any:
         """∫ g u v in the weight of the axis."""
@@ -85,9 +94,11 @@ class KroneckerSum:
 
     Attributes:
         terms: for each term a square matrix for each axis, arrays or sparse.
+        unit: ∫ u v of the first axis; None where it is the identity.
     """
 
     terms: Sequence[tuple[Any, ...]]
+    unit: Any = None
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -108,11 +119,11 @@ class KroneckerSum:
     @property
     def T(self) -> KroneckerSum:
         """The transpose."""
-        return KroneckerSum([tuple(factor.T for factor in term) for term in self.terms])
+        return KroneckerSum([tuple(factor.T for factor in term) for term in self.terms], self.unit)
 
     def __abs__(self) -> KroneckerSum:
         """A bound on the absolute values."""
-        return KroneckerSum([tuple(abs(factor) for factor in term) for term in self.terms])
+        return KroneckerSum([tuple(abs(factor) for factor in term) for term in self.terms], self.unit)
 
     @cached_property
     def norm(self) -> float:
@@ -122,8 +133,10 @@ class KroneckerSum:
     def shifted(self, shift: float) -> KroneckerSum:
         """The sum less `shift` · 1 ⊗ Ξ₀ ⊗ …, Ξ₀ ⊗ … being what the first term has beside its φ-matrix."""
         (phase, *noises), *others = self.terms
-        unit = identity(phase.shape[0], format="csr") if issparse(phase) else np.eye(phase.shape[0])
-        return KroneckerSum([(phase - shift * unit, *noises), *others])
+        unit = self.unit
+        if unit is None:
+            unit = identity(phase.shape[0], format="csr") if issparse(phase) else np.eye(phase.shape[0])
+        return KroneckerSum([(phase - shift * unit, *noises), *others], self.unit)
 
     @cached_property
     def is_sparse(self) -> bool:
@@ -235,8 +248,8 @@ class TensorSpace:
 
     @cached_property
     def _of_noises(self) -> tuple[Any, ...]:
-        """The factors of `mass`; None for that of φ, which is the identity."""
-        return None, *self.mass.terms[0][1:]
+        """The factors of `mass`; None for that of φ where it is the identity."""
+        return self.phi.unit, *self.mass.terms[0][1:]
 
     def table(self, coefficients: FloatArray) -> FloatArray:
         """Coefficients of a function by axes, shape `shape`."""

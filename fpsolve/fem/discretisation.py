@@ -98,6 +98,10 @@ class PhaseCells:
         """Number of unknowns."""
         return int(np.sum(self.degrees + 1))
 
+    def axis(self) -> PhaseAxis:
+        """The functions."""
+        return PhaseAxis(self.lines, self.degrees)
+
     def enriched(self) -> PhaseCells:
         """Two degrees more; where there are none left, cells are halved."""
         if np.max(self.degrees) + 2 > MAX_DEGREE:
@@ -334,7 +338,7 @@ class Discretisation:
         noises: a part for each noise.
     """
 
-    phase: PhaseCells
+    phase: Any
     noises: tuple[NoisePart, ...]
 
     @classmethod

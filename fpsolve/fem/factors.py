@@ -56,18 +56,21 @@ class Factors(Protocol):
         """x of A x = b, or of Aᵀx = b."""
 
 
-def factorised(operator: KroneckerSum, levels: Sequence[Any] = ()) -> Factors:
+def factorised(operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: bool = False) -> Factors:
     """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted.
 
     Args:
         operator: the sum.
         levels: for each axis the functions that are eliminated together, see `Axis`; nothing where none are.
+        is_full: whether most functions of the first axis are coupled, so that no order of elimination spares anything.
     """
     if operator.size <= MAX_DENSE_UNKNOWNS and not operator.is_sparse:
         return DenseFactors(operator.toarray())
     m, n = operator.halves
     if operator.is_sparse:
         return SparseFactors(operator)
+    if is_full:
+        return _of_full(operator, levels)
     if len(operator.shape) == 3 and operator.shape[1] > n:
         return SwappedFactors(operator, levels)
     most = MAX_THICK_BLOCK if len(operator.shape) == 3 else MAX_BLOCK
@@ -81,6 +84,17 @@ def factorised(operator: KroneckerSum, levels: Sequence[Any] = ()) -> Factors:
                 with suppress(SingularMatrix):
                     return LevelFactors(operator, each)
     return SparseFactors(operator)
+
+
+def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
+    m, n = operator.halves
+    if n > 2 and levels and levels[-1] is not None:
+        own = levels[-1] or levels_of(operator)
+        with suppress(SingularMatrix):
+            return LevelFactors(operator, own)
+    elif 2 * operator.band < n:
+        return BlockFactors(operator)
+    return DenseFactors(operator.toarray())
 
 
 class DenseFactors:

@@ -16,7 +16,6 @@ from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.plane import (
     Harmonics,
@@ -57,7 +56,8 @@ class Pencil:
 
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM: dense, by blocks along the last axis, or sparse."""
-        return factorised(self.matrix.shifted(shift), [axis.levels for axis in self.space.axes])
+        levels = [axis.levels for axis in self.space.axes]
+        return factorised(self.matrix.shifted(shift), levels, is_full=self.space.phi.is_full)
 
 
 class Generator:
@@ -75,7 +75,7 @@ class Generator:
         if isinstance(chosen, CylinderMesh):
             chosen = Discretisation.on(chosen, problem.coloured, problem.frame)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
-        self.phi = PhaseAxis(chosen.phase.lines, chosen.phase.degrees)
+        self.phi = chosen.phase.axis()
         if any(noise.has_states for noise in problem.noise.parts.values()):
             self.phi.slowest = LEFT_BY_STATES
         self._spaces: dict[float, TensorSpace] = {}
@@ -112,11 +112,15 @@ class Generator:
 
     def enriched(self) -> Generator:
         """That of the next finer discretisation."""
-        return Generator(self.problem, self.chosen.enriched())
+        return type(self)(self.problem, self.chosen.enriched())
 
     def terms(self) -> tuple[Term, ...]:
         """L(p) term by term."""
-        return tuple(Terms(self.problem, self.space(0.0)).whole())
+        return tuple(self._own_terms.whole())
+
+    @property
+    def _own_terms(self) -> Any:
+        return Terms(self.problem, self.space(0.0))
 
     def matrix(self, p: float, *, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
         """The matrix of dᵏL/dpᵏ in the space for p, from the terms of some orders in ε, the ξ-matrix of 1 first.
@@ -132,7 +136,7 @@ class Generator:
         """The matrix of ∂/∂θ dᵏL/dpᵏ, the functions of φ and ξ held; that of P_s, and so of `mass`, is in it."""
         axes = self.space(p).axes[1:]
         if by not in self._changes:
-            self._changes[by] = tuple(Terms(self.problem, self.space(0.0)).changed(by))
+            self._changes[by] = tuple(self._own_terms.changed(by))
         parts: list[tuple[Any, ...]] = [
             (phase, *(axis.matrix(g) for axis, g in zip(axes, term.noises, strict=True)))
             for term in self._changes[by]

@@ -93,6 +93,22 @@ class LineSpace:
         starts = np.arange(0, m * n * k + 1, k)
         return csr_matrix((self._values.ravel(), columns, starts), shape=(m * n, self.size))
 
+    @cached_property
+    def slopes(self) -> csr_matrix:
+        """Their derivatives at the points, shape (n, size)."""
+        return csr_matrix((self._slopes.ravel(), self.values.indices, self.values.indptr), shape=self.values.shape)
+
+    def jumps_of_slope(self) -> csr_matrix:
+        """u′(x⁺) − u′(x⁻) at the inner vertices, shape (m − 1, size)."""
+        _, slopes = _reference(self.degree, np.array([0.0, 1.0]).tobytes())
+        sides = (slopes / self._sizes[:, None, None]) @ self._transform
+        rows = np.repeat(np.arange(self.lines.size - 2), self.degree + 1)
+        right, left = (
+            csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(self.lines.size - 2, self.size))
+            for values, dofs in ((sides[1:, 0], self._dofs[1:]), (sides[:-1, 1], self._dofs[:-1]))
+        )
+        return right - left
+
     def constant(self) -> FloatArray:
         """Coefficients of the function 1, shape (size,): the vertex functions add up to it."""
         return np.where(self.modes == 1, self._norms, 0.0)

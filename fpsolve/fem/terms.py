@@ -155,7 +155,8 @@ class TermSum:
             [
                 (phase, *(axis.matrix(g) for axis, g in zip(space.axes[1:], noises, strict=True)))
                 for noises, phase in self.phases(p, derivative, orders).items()
-            ]
+            ],
+            space.phi.unit,
         )
 
 

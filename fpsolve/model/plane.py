@@ -29,6 +29,8 @@ from fpsolve.model.parameters import Parametrised
 Matrix = Sequence[Sequence[float]]
 Xi = ArrayLike | Mapping[str, ArrayLike]
 """ξ, or with several noises that of each by its name."""
+SHAPES = [(n, n) for n in (2, 3, 4)]
+"""Of matrices."""
 SAMPLES = 4001
 """ξ among which the speed of the phase is seen to change its sign."""
 
@@ -169,12 +171,12 @@ class CoefficientMatrix:
 
     Args:
         order: n ≥ 0, the power of ε.
-        matrix: A, two rows of two numbers.
+        matrix: A, two rows of two numbers, or n rows of n for a state of n = 3 or 4.
         g: a coefficient of ξ: any callable from arrays to arrays or numbers; one that pickles, so that results do.
         noise: the name of that noise where there are several.
 
     Raises:
-        ValueError: the matrix is not 2×2 and finite, or the order is negative.
+        ValueError: the matrix is not square and finite, n = 2 to 4, or the order is negative.
     """
 
     order: int
@@ -186,7 +188,7 @@ class CoefficientMatrix:
         entries: FloatArray = np.zeros(0)
         with suppress(ValueError):
             entries = real_array(self.matrix, "matrix")
-        if entries.shape != (2, 2) or not is_whole(self.order, 0):
+        if entries.shape not in SHAPES or not is_whole(self.order, 0):
             raise ValueError(
                 f"got order = {shown(self.order)} and matrix = {shown(self.matrix)}; must be a whole number >= 0 and "
                 "two rows of two finite numbers, such as ((0.0, 0.0), (0.0, 1.0))"
@@ -204,6 +206,14 @@ class CoefficientMatrix:
     def q(self) -> Harmonics:
         """q(φ) = eᵀA e, the growth rate of ln a."""
         return stretching(np.array(self.matrix))
+
+    @cached_property
+    def fastest(self) -> tuple[float, float]:
+        """The largest |e′ᵀA e| and |eᵀA e| of a unit vector e and one e′ across it; beyond the plane ‖A‖ for the first."""
+        if len(self.matrix) == 2:
+            return float(abs(self.h.mean) + self.h.amplitude), float(abs(self.q.mean) + self.q.amplitude)
+        a = np.array(self.matrix)
+        return float(np.linalg.norm(a, 2)), float(np.linalg.norm(a + a.T, 2) / 2)
 
 
 @dataclass(frozen=True)
@@ -316,6 +326,11 @@ class System(Parametrised):
     jumps: Sequence[Jump]
 
     @property
+    def dimension(self) -> int:
+        """n, that of the state."""
+        return max((len(term.matrix) for term in self.terms), default=2)
+
+    @property
     def drives(self) -> Sequence[CoefficientMatrix]:
         """Deprecated: `terms`."""
         warnings.warn("drives are called terms now", DeprecationWarning, stacklevel=2)
@@ -388,7 +403,7 @@ def split_by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[
     Raises:
         ValueError: a coefficient is no a + bξ.
     """
-    steady, driven = [], np.zeros((2, 2))
+    steady, driven = [], np.zeros((system.dimension, system.dimension))
     for term in terms:
         line = affine(term.g)
         if line is None:
@@ -413,13 +428,13 @@ def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:
 
 
 def matrix_at(system: System, xi: Xi, orders: slice = slice(None)) -> FloatArray:
-    """A(ξ) = Σ ε^n g(ξ) A over the terms of some orders, shape (*ξ.shape, 2, 2).
+    """A(ξ) = Σ ε^k g(ξ) A over the terms of some orders, shape (*ξ.shape, n, n).
 
     With several noises ξ is a mapping from their names to arrays, and its shape that of these broadcast together.
     """
     named = {name: np.asarray(each, dtype=float) for name, each in xi.items()} if isinstance(xi, Mapping) else {}
     rest = np.zeros(np.broadcast_shapes(*(each.shape for each in named.values()))) if named else np.asarray(xi, float)
-    total = np.zeros((*rest.shape, 2, 2))
+    total = np.zeros((*rest.shape, system.dimension, system.dimension))
     wanted = range(1 + max((term.order for term in system.terms), default=0))[orders]
     for term in system.terms:
         if term.order in wanted:
@@ -482,10 +497,10 @@ def rotating_coordinates(a: FloatArray) -> FloatArray | None:
 def angular_frequency(system: System) -> float:
     """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0, or of all without one.
 
-    ω is the imaginary part of the eigenvalues of the matrix of order 0.
+    ω is the imaginary part of the eigenvalues of the matrix of order 0, beyond the plane the largest.
     """
     a = matrix_at(system, 0.0, slice(0, 1))
-    square = float(squared_frequency(a))
+    square = float(squared_frequency(a)) if len(a) == 2 else float(np.max(np.linalg.eigvals(a).imag)) ** 2
     if square > 0:
         return math.sqrt(square)
     sizes = [system.epsilon**term.order * float(np.linalg.norm(term.matrix)) for term in system.terms]

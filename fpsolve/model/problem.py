@@ -164,9 +164,16 @@ class Problem:
     def _struck(self) -> Sequence[Impulse]:
         return self.noise.impulses(self.system)
 
+    @property
+    def dimension(self) -> int:
+        """Of the state."""
+        return self.system.dimension
+
     @cached_property
     def frame(self) -> Frame | None:
-        """The coordinates that it is solved in where these are not x itself."""
+        """The coordinates that it is solved in where these are not x itself; None beyond the plane."""
+        if self.dimension > 2:
+            return None
         drift, diffusions = self._moved
         return normal_frame(
             drift.terms,
@@ -200,6 +207,8 @@ class Problem:
     @cached_property
     def invariant_rays(self) -> tuple[float, ...]:
         """φ of rays that the phase never leaves, nor reaches, whatever the noise does; 0 alone where all rays are."""
+        if self.dimension > 2:
+            return ()
         drift, diffusions = self._moved
         lines = [affine(term.g) for term in drift.terms]
         if None not in lines:  # most turn without noise: numbers are quicker than arrays
@@ -243,7 +252,7 @@ class Problem:
         the faster one. Told for one noise.
         """
         noise = self.noise
-        if not noise.is_bounded or len(noise.parts) > 1 or self.diffusions or self.impulses or self.invariant_rays:
+        if self.dimension > 2 or not noise.is_bounded or len(noise.parts) > 1 or self.diffusions or self.impulses or self.invariant_rays:
             return False
         phi = np.linspace(0, math.pi, PHASES, endpoint=False)
         turns = phase_speed(self.motion, noise.reached)(phi[:, None])

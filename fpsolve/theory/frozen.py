@@ -116,5 +116,5 @@ class FrozenNoise:
 
 @kept(8)
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
-    """The `FrozenNoise` of a problem; None where ξ is no diffusion by itself, and for several noises."""
-    return FrozenNoise(problem) if problem.coloured.is_diffusion else None
+    """The `FrozenNoise` of a problem; None beyond the plane, where ξ is no diffusion by itself, for several noises."""
+    return FrozenNoise(problem) if problem.coloured.is_diffusion and problem.dimension == 2 else None

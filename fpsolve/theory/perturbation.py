@@ -122,6 +122,8 @@ def second_order(problem: Problem) -> SecondOrder:
         NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in the noise.
     """
     system, noises = problem.motion, problem.noise.parts
+    if problem.dimension > 2:
+        raise NoPerturbationTheory("perturbation theory is for systems in the plane")
     if problem.impulses:
         raise NoPerturbationTheory("perturbation theory is for noise of small effects, not for impulses")
     driven = {name: np.zeros((2, 2)) for name, noise in noises.items() if not (noise.is_white and len(noises) > 1)}
@@ -245,9 +247,10 @@ def scale_of(problem: Problem) -> Scale:
     """
     if theory := second_order_or_none(problem):
         return theory.scale
-    system, steady, of_noises = problem.motion, np.zeros((2, 2)), dict[str, float]()
+    system, of_noises = problem.motion, dict[str, float]()
+    steady = np.zeros((problem.dimension, problem.dimension))
     for term in system.terms:
-        size = system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
+        size = system.epsilon**term.order * term.fastest[1]
         noise, driven = problem.named_noise(term.noise), 0.0
         if line := affine(term.g):
             at_mean = line[0] + (line[1] and line[1] * noise.mean)
@@ -262,7 +265,7 @@ def scale_of(problem: Problem) -> Scale:
     for name, size in of_noises.items():
         driven += size * min(1.0, size * problem.named_noise(name).correlation_time) if size else 0.0
     for each in problem.diffusions:
-        h, q = (system.epsilon**each.order * float(abs(f.mean) + f.amplitude) for f in (each.h, each.q))
+        h, q = (system.epsilon**each.order * speed for speed in each.fastest)
         driven += 0.5 * q * max(h, q)
     driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in problem.impulses)
     return Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)

@@ -120,6 +120,7 @@ class PlaneSystem(System):
     named: tuple[tuple[str, float], ...] = ()
 
     kind: ClassVar[str] = "plane"
+    dimensions: ClassVar[Sequence[int]] = (2,)
     takes_any: ClassVar[bool] = True
     stated: ClassVar[Mapping[str, FieldInfo]] = {
         "terms": stated_field(
@@ -151,6 +152,18 @@ class PlaneSystem(System):
         if not self.terms or not (math.isfinite(self.epsilon) and self.epsilon > 0):
             raise ValueError(
                 f"got {len(self.terms)} terms and epsilon = {self.epsilon}; needs one at least, and a positive number"
+            )
+        sizes = sorted({len(term.matrix) for term in self.terms})
+        if len(sizes) > 1 or sizes[0] not in self.dimensions:
+            known = " or ".join(map(str, self.dimensions))
+            raise ValueError(
+                f"got matrices of {' and '.join(map(str, sizes))} rows; {type(self).__name__} takes {known}, the same "
+                "for all terms" + ("; take LinearSystem for more" if max(sizes) > max(self.dimensions) else "")
+            )
+        if self.jumps and sizes[0] > 2:
+            raise ValueError(
+                f"got {len(self.jumps)} jumps of a system of {sizes[0]} variables; a wall stretches the state at a "
+                "single ray in the plane alone, beyond it nothing is solved: leave jumps out"
             )
 
     @classmethod

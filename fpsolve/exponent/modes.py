@@ -1,0 +1,214 @@
+"""Λ(p) of systems of dimension 3 and 4: waves of ever higher degree on the sphere of directions, until Λ(p) settles.
+
+The functions are those of directions in coordinates that the second moments choose. E‖x‖² grows with Λ(2), and
+T = xᵀQx is its eigenfunction for p = 2: in the coordinates of the eigenvectors of Q the strong modes are one group and
+the weak ones the other. Where the noise is weak against the difference of their dampings, T has a layer of the width
+√(q_weak/q_strong) beside the weak ones, for which the elements are graded.
+
+Any search begins at p = 0, where T = 1, and goes from p to p on the coarsest space; on finer ones it begins with what
+the coarser one has found. What two degrees of waves change tells their error, that of all else comes from the highest
+modes, see `error`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from fpsolve.arrays import FloatArray, finite, one
+from fpsolve.errors import MeshError, NotConverged, SingularMatrix
+from fpsolve.exponent.adapt import SHARE, NearPlace, _Search
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.error import Solution, mode_effects
+from fpsolve.fem.discretisation import Discretisation, first_part
+from fpsolve.fem.sphere import Coordinates, SphereCells, SphereGenerator
+from fpsolve.messages import Code, Message
+from fpsolve.model.problem import Problem
+
+FIRST_WAVES, FIRST_DEGREE = 4, 6
+LARGEST_STEP = 1.0
+"""Of p, from one pair to the next one on the coarsest space."""
+WEAK, STEP = 0.2, 1.3
+"""Width of a layer for which elements are graded, and their size in ln tan η."""
+WORST_CONDITION = 100.0
+"""Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
+LEFT = 0.3
+"""Share of the change before the last one that the error is at least."""
+MOST_DIRECTIONS = 3200
+"""Functions of directions at most: every matrix of theirs is full."""
+MOST_MOMENTS = 2000
+DIGITS = 10.0
+
+
+def second_moments(problem: Problem) -> tuple[float, FloatArray]:
+    """Λ(2) and Q of E‖x‖², from the equations of the second moments in polynomials of the noise.
+
+    With T = Σ xᵀQ_k x f_k(ξ) the generator is Σ (Aᵀ ⊕ Aᵀ) ⊗ Ξ_g + 1 ⊗ L_ξ + ½(Bᵀ ⊕ Bᵀ)², and Q the mean over ξ.
+    """
+    motion, named = problem.motion, problem.coloured.parts
+    axes = [first_part(noise, DIGITS).axis(noise, 0.0) for noise in named.values()]
+    ones = [np.asarray(axis.matrix(one)) for axis in axes]
+    unit = np.eye(problem.dimension)
+
+    def both(matrix: Any, order: int) -> FloatArray:
+        a = motion.epsilon**order * np.array(matrix).T
+        return np.kron(a, unit) + np.kron(unit, a)
+
+    def product(of_state: FloatArray, of_noise: Any = None, at: int = 0) -> FloatArray:
+        factors = [of_noise if k == at and of_noise is not None else each for k, each in enumerate(ones)]
+        for each in factors:
+            of_state = np.kron(of_state, np.asarray(each))
+        return of_state
+
+    names, size = list(named), problem.dimension**2
+    total = sum(product(np.eye(size), axis.matrix(None), k) for k, axis in enumerate(axes))
+    for term in motion.terms:
+        at = names.index(term.noise) if term.noise in named else 0
+        total = total + product(both(term.matrix, term.order), axes[at].matrix(term.g), at)
+    for each in problem.diffusions:
+        square = both(each.matrix, each.order)
+        total = total + product(0.5 * square @ square)
+    values, vectors = scipy.linalg.eig(finite(total), finite(product(np.eye(size))))
+    best = int(np.argmax(values.real))
+    mean = np.ones(1)
+    for axis, weight in zip(axes, ones, strict=True):
+        mean = np.kron(mean, weight @ axis.constant)
+    q = (vectors[:, best].real.reshape(size, -1) @ mean).reshape(unit.shape)
+    q = 0.5 * (q + q.T)
+    return float(values[best].real), q * np.sign(np.trace(q))
+
+
+def modal_coordinates(problem: Problem) -> tuple[Coordinates, float]:
+    """S of y = S⁻¹x whose directions are solved for, and the width of the layer."""
+    free = sum(
+        problem.motion.epsilon**term.order * float(term.g(problem.named_noise(term.noise).mean)) * np.array(term.matrix)
+        for term in problem.motion.terms
+    )
+    values, vectors = np.linalg.eig(free)
+    columns: list[FloatArray] = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value.imag > 0:
+            columns += [vector.real, vector.imag]
+        elif value.imag == 0:
+            columns.append(vector.real)
+    own = np.column_stack(columns)
+    if not np.linalg.cond(own) < WORST_CONDITION:
+        _, own = scipy.linalg.matrix_balance(free, permute=False)
+    _, q = second_moments(problem)
+    sizes, axes = np.linalg.eigh(own.T @ q @ own)
+    sizes, axes = np.maximum(sizes[::-1], 1e-300), axes[:, ::-1]
+    count = len(sizes) // 2
+    if len(sizes) == 3 and sizes[0] * sizes[2] < sizes[1] ** 2:  # the weakest one is by itself
+        axes = axes[:, [2, 0, 1]]
+        width = math.sqrt(sizes[2] / sizes[1])
+    else:
+        width = math.sqrt(sizes[count] / sizes[count - 1])
+    return tuple(map(tuple, (own @ axes).tolist())), width
+
+
+def first_cells(problem: Problem) -> SphereCells:
+    """The coarsest functions of directions."""
+    coordinates, width = modal_coordinates(problem)
+    lines = np.linspace(0, math.pi / 2, 3)
+    if width < WEAK:
+        reach = math.log(1 / width) + 1
+        inner = np.linspace(-reach, reach, max(2, round(2 * reach / STEP)) + 1)
+        lines = np.concatenate([[0.0], np.arctan(np.exp(inner)), [math.pi / 2]])
+    return SphereCells(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
+
+
+@dataclass(frozen=True, eq=False)
+class SpherePlace(NearPlace):
+    """Λ(p) of a system of dimension 3 or 4; arguments as in `NearPlace`."""
+
+    _levels: list[SphereGenerator] = field(init=False, default_factory=list)
+    _pairs: list[PrincipalPair] = field(init=False, default_factory=list)
+
+    def fits(self, generator: Any, q: float, p: float) -> bool:
+        """False: every p has waves of its own."""
+        return False
+
+    def trimmed(self, solution: Solution, tolerance: Any) -> Discretisation:
+        return solution.pair.generator.chosen
+
+    def searched(self, search: _Search, start: Solution | None) -> Solution:
+        """From the coarsest space on."""
+        if not self._levels:
+            parts = tuple(first_part(noise, -math.log10(self.rtol)) for noise in self.problem.coloured.parts.values())
+            self._begin(Discretisation(first_cells(self.problem), parts))
+        values: list[float] = []
+        pair: PrincipalPair | None = None
+        level = 0
+        while True:
+            chosen = self._chosen(level)
+            self._check(search, chosen)
+            try:
+                pair = self._pair(level, search, pair)
+            except (NotConverged, SingularMatrix, MeshError) as failure:
+                search.failure, pair, values = failure, None, []
+                level += 1
+                continue
+            values.append(pair.value)
+            allowed = search.tolerance(search.p, pair.value)
+            effects = mode_effects(pair)
+            rest = sum(each.error for each in effects if each)
+            if rest > 0.5 * allowed:
+                self._begin(self._finer(chosen, effects, allowed))
+                level, values = max(0, level - 1), []
+                continue
+            changes = np.abs(np.diff(values))
+            if changes.size:
+                left = max(changes[-1], LEFT * changes[-2]) if changes.size > 1 else changes[-1]
+                solution = Solution(pair, search=float(left))
+                if solution.error <= allowed:
+                    return solution
+                search.note(solution, solution.error, allowed)
+            level += 1
+
+    def _begin(self, chosen: Discretisation) -> None:
+        """Other elements and functions of the noise, the waves from the coarsest on."""
+        cells = replace(chosen.phase, waves=FIRST_WAVES)
+        self._levels[:] = [SphereGenerator(self.problem, replace(chosen, phase=cells))]
+
+    def _chosen(self, level: int) -> Discretisation:
+        first = self._levels[0].chosen
+        return replace(first, phase=replace(first.phase, waves=FIRST_WAVES + 2 * level))
+
+    def _check(self, search: _Search, chosen: Discretisation) -> None:
+        if chosen.phase.size > MOST_DIRECTIONS:
+            search.stop(Message(Code.UNKNOWNS_SPENT, unknowns=chosen.phase.size, most=MOST_DIRECTIONS))
+        search.check(chosen)
+
+    def _finer(self, chosen: Discretisation, effects: Sequence[Any], allowed: float) -> Discretisation:
+        of_elements, *of_noises = effects
+        share = SHARE * allowed
+        noises = tuple(
+            part if each is None or each.error <= share else part.refined(each, share, may_coarsen=False)
+            for part, each in zip(chosen.noises, of_noises, strict=True)
+        )
+        phase = chosen.phase.finer_elements() if of_elements.error > 2 * share else chosen.phase
+        found = Discretisation(phase, noises)
+        return found if found.size > chosen.size else chosen.enriched()
+
+    def _pair(self, level: int, search: _Search, coarse: PrincipalPair | None) -> PrincipalPair:
+        """The pair at p on one level, from that on a coarser one, or from p to p since p = 0."""
+        while len(self._levels) <= level:
+            self._levels.append(SphereGenerator(self.problem, self._chosen(len(self._levels))))
+        generator, p = self._levels[level], search.p
+        if coarse is not None:
+            return principal_pair(generator, p, start=coarse, clock=search.tick)
+        near = [pair for pair in self._pairs if pair.generator is generator]
+        if not near:
+            near = [principal_pair(generator, 0.0, clock=search.tick)]
+        closest = min(near, key=lambda pair: abs(pair.p - p)).p
+        steps = math.ceil(abs(p - closest) / LARGEST_STEP)
+        for k in range(1, steps + 1):
+            sides = sorted(near, key=lambda pair: abs(pair.p - p))[:2]
+            near.append(principal_pair(generator, closest + k / steps * (p - closest), start=sides, clock=search.tick))
+        self._pairs[:] = near
+        return min(near, key=lambda pair: abs(pair.p - p))

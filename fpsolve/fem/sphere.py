@@ -1,0 +1,435 @@
+"""Functions on the sphere of directions of linear systems of dimension 3 and 4, and the terms of their generators.
+
+With x = r e and T = r^p u(e), ẋ = Xx gives ẇ = h·∂ and d ln r/dt = q. A direction is written by one angle between two
+groups of coordinates and by a unit vector of each, e = (cos η e₁, sin η e₂), 0 ≤ η ≤ π/2, of the dimensions (2, 2) for
+n = 4, Hopf's coordinates with e_i = (cos θ_i, sin θ_i), and (1, 2) for n = 3, where e₁ = ±1. With the blocks X_ij of a
+matrix, t_i = de_i/dθ_i, a_ij = e_iᵀX_ij e_j, b_ij = t_iᵀX_ij e_j, c = cos η and s = sin η,
+
+    h·∇ = (c² a₂₁ + cs (a₂₂ − a₁₁) − s² a₁₂) ∂η + (b₁₁ + b₁₂ tan η) ∂θ₁ + (b₂₂ + b₂₁ cot η) ∂θ₂
+    q = c² a₁₁ + cs (a₁₂ + a₂₁) + s² a₂₂,      measure c^(n₁ − 1) s^(n₂ − 1) dη dθ₁ dθ₂,      div h = tr X − n q.
+
+u is even, as x and −x are one direction: continuous elements in η times waves of θ₁ and θ₂ of even total degree; waves
+of θ₂ vanish at η = 0, where e₂ has no say, those of θ₁ at η = π/2. Without upwinding pairs that no path has may lie on
+the right: jumps of ∂u/∂η between elements are penalised by γ h² N⁻³ β (cs)², β the norm of the growth.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
+from scipy.sparse import csr_matrix, diags
+
+from fpsolve.arrays import FloatArray, dense, one
+from fpsolve.fem.axis import Axis, TensorSpace
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.line import LineSpace
+from fpsolve.fem.terms import OfMoment, Term
+from fpsolve.model.plane import CoefficientMatrix, is_driven, written_coefficient
+from fpsolve.model.problem import ParameterDerivative, Problem
+
+PENALTY = 0.02
+"""γ of the penalty on jumps of ∂u/∂η."""
+MOST_DEGREE = 10
+"""Of an element in η; beyond, elements are halved."""
+SIDE = 16
+"""Points along each angle at which signs are looked at, at least."""
+Coordinates = tuple[tuple[float, ...], ...]
+Parts = list[tuple[FloatArray, Any]]
+"""Σ f(η) ⊗ g: values at points of η, shape (points, nodes), and waves, shape (all, own)."""
+
+
+@dataclass(frozen=True, eq=False)
+class SphereCells:
+    """Which functions there are of directions, in the place of those of the phase.
+
+    Attributes:
+        coordinates: S of y = S⁻¹x, whose directions they are of, n rows; the first group of coordinates first.
+        lines: the vertices in η, shape (m + 1,).
+        degree: of the elements.
+        waves: the largest total degree of a wave, even.
+    """
+
+    coordinates: Coordinates
+    lines: FloatArray
+    degree: int
+    waves: int
+
+    @property
+    def dimensions(self) -> tuple[int, int]:
+        """Of the two groups of coordinates."""
+        return len(self.coordinates) // 2, (len(self.coordinates) + 1) // 2
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        nodes, (first, second) = (self.lines.size - 1) * self.degree + 1, self._degrees
+        return int(first.size * nodes - np.count_nonzero(first) - np.count_nonzero(second))
+
+    @property
+    def _degrees(self) -> tuple[Any, Any]:
+        waves = Waves.of(self.dimensions, self.waves)
+        return waves.first[waves.own], waves.second[waves.own]
+
+    def axis(self) -> SphereAxis:
+        """The functions."""
+        return SphereAxis(self)
+
+    def enriched(self) -> SphereCells:
+        """Two degrees more in every direction."""
+        return self.finer_waves().finer_elements()
+
+    doubled = enriched
+
+    def finer_waves(self) -> SphereCells:
+        """Two degrees more of the waves."""
+        return replace(self, waves=self.waves + 2)
+
+    def finer_elements(self) -> SphereCells:
+        """Two degrees more in η, where there are none left elements of half the size."""
+        if self.degree + 2 <= MOST_DEGREE:
+            return replace(self, degree=self.degree + 2)
+        lines = np.sort(np.append(self.lines, 0.5 * (self.lines[1:] + self.lines[:-1])))
+        return replace(self, lines=lines, degree=MOST_DEGREE // 2 + 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """Real waves of the angles of both groups, orthonormal in the mean, with all to which two factors of e_i lead.
+
+    Attributes:
+        first, second: for each the degree in θ₁ and in θ₂.
+        own: which of them a function may have, of total degrees up to the largest; the first is constant.
+        along: for each pair (i, j) the matrices of multiplication by the products of the components of e_i and e_j.
+        across: the same for t_i and e_j; nothing for i of dimension 1.
+        slopes: for each group ∂/∂θ_i; None for one of dimension 1.
+        samples: their values at some angles, shape (points, waves).
+    """
+
+    first: Any
+    second: Any
+    own: Any
+    along: dict[tuple[int, int], Any]
+    across: dict[tuple[int, int], Any]
+    slopes: tuple[Any, Any]
+    samples: FloatArray
+
+    @staticmethod
+    @lru_cache(maxsize=16)
+    def of(dimensions: tuple[int, int], most: int) -> Waves:
+        """Those up to a total degree."""
+        reach = most + 2
+        groups = [_group(dimension, reach) for dimension in dimensions]
+        first, second = (
+            np.ravel(each) for each in np.meshgrid(*(group.degrees for group in groups), indexing="ij")
+        )
+        kept = np.flatnonzero(((first + second) % 2 == 0) & (first + second <= reach))
+
+        def product(*factors: Any) -> Any:
+            return csr_matrix(scipy.sparse.kron(*map(csr_matrix, factors)))[kept][:, kept]
+
+        ones = [np.eye(group.degrees.size) for group in groups]
+
+        def products(i: int, lefts: Sequence[FloatArray], j: int) -> list[list[Any]]:
+            def of_pair(left: FloatArray, right: FloatArray) -> Any:
+                factors = [*ones]
+                factors[i] = left
+                factors[j] = factors[j] @ right if i == j else right
+                return product(*factors)
+
+            return [[of_pair(left, right) for right in groups[j].unit] for left in lefts]
+
+        pairs = [(i, j) for i in (0, 1) for j in (0, 1)]
+        slopes = [None if group.slope is None else group.slope for group in groups]
+        first, second = first[kept], second[kept]
+        return Waves(
+            first,
+            second,
+            np.flatnonzero(first + second <= most),
+            {(i, j): products(i, groups[i].unit, j) for i, j in pairs},
+            {(i, j): products(i, groups[i].tangent, j) for i, j in pairs if groups[i].tangent},
+            (
+                None if slopes[0] is None else product(slopes[0], ones[1]),
+                None if slopes[1] is None else product(ones[0], slopes[1]),
+            ),
+            np.kron(groups[0].samples, groups[1].samples)[:, kept],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Waves of one unit vector: of their degrees, multiplication by components of it and of its tangent, and ∂θ."""
+
+    degrees: Any
+    unit: list[FloatArray]
+    tangent: list[FloatArray]
+    slope: FloatArray | None
+    samples: FloatArray
+
+
+def _group(dimension: int, most: int) -> _Group:
+    if dimension == 1:  # functions of ±1
+        values = np.array([[1.0, 1.0], [1.0, -1.0]])
+        return _Group(np.arange(2), [np.array([[0.0, 1.0], [1.0, 0.0]])], [], None, values)
+    k = np.arange(1, most + 1)
+    degrees = np.concatenate([[0], np.repeat(k, 2)])
+
+    def values(count: int) -> tuple[FloatArray, FloatArray]:
+        theta = 2 * np.pi * np.arange(count) / count
+        waves = math.sqrt(2) * np.stack([np.cos(np.outer(theta, k)), np.sin(np.outer(theta, k))], axis=2)
+        return theta, np.column_stack([np.ones(count), waves.reshape(count, -1)])
+
+    theta, table = values(2 * most + 4)
+
+    def multiplied(f: FloatArray) -> FloatArray:
+        product = table.T @ (f[:, None] * table) / theta.size
+        return np.where(np.abs(product) > 1e-14, product, 0.0)
+
+    slope = np.zeros((degrees.size, degrees.size))
+    cosines, sines = 2 * k - 1, 2 * k
+    slope[sines, cosines], slope[cosines, sines] = -k, k
+    unit = [multiplied(np.cos(theta)), multiplied(np.sin(theta))]
+    return _Group(degrees, unit, [-unit[1], unit[0]], slope, values(max(SIDE, most))[1])
+
+
+class SphereAxis(Axis):
+    """Continuous elements in η times waves of the other angles, see the module.
+
+    Args:
+        chosen: which.
+
+    Attributes:
+        identity: ∫ u v, which is no identity, shape (size, size).
+        inner_values: values at points of the sphere, shape (points, size).
+        ladders: of the elements alone; that of the waves is told by what two degrees more change.
+    """
+
+    is_full = True
+    ladders: tuple[tuple[Any, Any, Any], ...] = ()
+
+    def __init__(self, chosen: SphereCells) -> None:
+        super().__init__()
+        self.n, (first, second) = len(chosen.coordinates), chosen.dimensions
+        self.chosen, self._slices = chosen, (slice(0, first), slice(first, None))
+
+        def weight(eta: Any) -> Any:
+            return np.cos(eta) ** (first - 1) * np.sin(eta) ** (second - 1)
+
+        line = self.line = LineSpace(chosen.lines, chosen.degree, weight, end_exponents=(second - 1, first - 1))
+        waves = self.waves = Waves.of(chosen.dimensions, chosen.waves)
+        degrees = waves.first[waves.own], waves.second[waves.own]
+        kept = np.ones((line.size, waves.own.size), dtype=bool)
+        kept[line.ends[0], degrees[1] > 0] = kept[line.ends[1], degrees[0] > 0] = False
+        self._kept = np.flatnonzero(kept)
+        self.size = self._kept.size
+        self.cells, self.modes = np.full(self.size, -1), np.zeros(self.size, dtype=int)
+        node = self._kept // waves.own.size
+        of_elements = np.where(line.modes[node] == 1, -1, line.cells[node])
+        self.ladders = ((of_elements, line.modes[node], self._on_kept(line.nested)),)
+        constant = np.zeros((line.size, waves.own.size))
+        constant[:, 0] = line.constant()
+        self.constant = constant.ravel()[self._kept]
+        self._of_line, self._slopes = line.values.toarray(), line.slopes.toarray()
+        self.identity = self.unit = self._form(self._itself, self._itself)
+
+    def _assembled(self, of_line: Sequence[FloatArray], of_waves: Sequence[Any]) -> FloatArray:
+        """Σ A_k ⊗ B_k of matrices in η and of the waves, shape (size, size)."""
+        nodes, waves = self.line.size, self.waves.own.size
+        lines = np.stack([each.ravel() for each in of_line], axis=1)
+        total = lines @ np.stack([dense(each).ravel() for each in of_waves])
+        total = total.reshape(nodes, nodes, waves, waves).transpose(0, 2, 1, 3).reshape(nodes * waves, -1)
+        return np.asarray(total if self.size == nodes * waves else total[np.ix_(self._kept, self._kept)])
+
+    def _on_kept(self, of_line: Any) -> Any:
+        whole = scipy.sparse.kron(of_line, scipy.sparse.identity(self.waves.own.size), format="csr")
+        return whole[self._kept][:, self._kept]
+
+    @cached_property
+    def inner_values(self) -> FloatArray:
+        own = self.waves.samples[:, self.waves.own]
+        points = self.line.values[:: max(1, self.chosen.degree // 4)]
+        return np.asarray(scipy.sparse.kron(points, csr_matrix(own), format="csc")[:, self._kept].toarray())
+
+    def mass(self, g: Any = one) -> Any:
+        """∫ u v."""
+        return self.identity
+
+    def projection(self, other: SphereAxis) -> Any:
+        """In η by the inner product, of waves those that both have."""
+        of_line = self.line.values.T @ diags(self.line.measure) @ other.line.at(self.line.points)
+        nodes = scipy.sparse.linalg.spsolve(self.line.mass().tocsc(), csr_matrix(of_line).tocsc())
+        own = {each: k for k, each in enumerate(self._labels)}
+        pairs = np.array([(own[each], k) for k, each in enumerate(other._labels) if each in own])
+        shape = self.waves.own.size, other.waves.own.size
+        shared = csr_matrix((np.ones(len(pairs)), pairs.T), shape=shape)
+        return scipy.sparse.kron(nodes, shared, format="csr")[self._kept][:, other._kept]
+
+    @cached_property
+    def _labels(self) -> list[tuple[int, ...]]:
+        """For each wave its degrees, and which of those with the same it is."""
+        counts: dict[tuple[int, int], int] = {}
+        found = []
+        for pair in zip(*(each[self.waves.own].tolist() for each in (self.waves.first, self.waves.second)), strict=True):
+            counts[pair] = counts.get(pair, -1) + 1
+            found.append((*pair, counts[pair]))
+        return found
+
+    def _moved(self, matrix: FloatArray) -> tuple[Parts, Parts]:
+        """h·∇u and q u of a matrix."""
+        eta = self.line.points
+        c, s = np.cos(eta)[:, None], np.sin(eta)[:, None]
+
+        def form(table: dict[tuple[int, int], Any], i: int, j: int) -> Any:
+            block = matrix[self._slices[i], self._slices[j]]
+            return sum(size * table[i, j][k][m] for (k, m), size in np.ndenumerate(block))
+
+        a = {pair: form(self.waves.along, *pair) for pair in self.waves.along}
+        b = {pair: form(self.waves.across, *pair) for pair in self.waves.across}
+        values, slopes, own = self._of_line, self._slopes, self.waves.own
+        moved = [(c * c * slopes, a[1, 0]), (c * s * slopes, a[1, 1] - a[0, 0]), (-s * s * slopes, a[0, 1])]
+        for i, ratio in ((0, s / c), (1, c / s)):
+            if (turn := self.waves.slopes[i]) is not None:
+                moved += [(values, b[i, i] @ turn), (ratio * values, b[i, 1 - i] @ turn)]
+        growth = [(c * c * values, a[0, 0]), (c * s * values, a[0, 1] + a[1, 0]), (s * s * values, a[1, 1])]
+        return [(of_eta, of[:, own]) for of_eta, of in moved], [(of_eta, of[:, own]) for of_eta, of in growth]
+
+    def _form(self, left: Parts, right: Parts) -> FloatArray:
+        """∫ v̂ û of functions of v and of u."""
+        measure = self.line.measure[:, None]
+        pairs = [(a, b) for a in left for b in right]
+        of_line = [np.asarray(a[0].T @ (measure * b[0])) for a, b in pairs]
+        return self._assembled(of_line, [a[1].T @ b[1] for a, b in pairs])
+
+    @property
+    def _itself(self) -> Parts:
+        """u."""
+        every = scipy.sparse.identity(self.waves.first.size, format="csc")
+        return [(self._of_line, every[:, self.waves.own])]
+
+    def driven(self, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """∫ v h·∇u and ∫ v q u."""
+        moved, growth = self._moved(matrix)
+        return self._form(self._itself, moved), self._form(self._itself, growth)
+
+    def diffusion(self, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """∫ v D_a D_b u, D = h·∇ + p q of two matrices, D* v = −h·∇v − tr v + (p + n) q v: by p⁰, p¹ and p²."""
+        (moved_a, growth_a), (moved_b, growth_b) = self._moved(a), self._moved(b)
+        parts = ((-1.0, moved_a), (-float(np.trace(a)), self._itself), (float(self.n), growth_a))
+        adjoint = [(c * of_eta, of) for c, each in parts for of_eta, of in each]
+        linear = self._form(adjoint, growth_b) + self._form(growth_a, moved_b)
+        return self._form(adjoint, moved_b), linear, self._form(growth_a, growth_b)
+
+    def penalty(self) -> FloatArray:
+        """−Σ γ h² N⁻³ (cs)² w [∂u/∂η] [∂v/∂η] over the inner vertices."""
+        inner, sizes, degree = self.line.lines[1:-1], np.diff(self.line.lines), self.chosen.degree
+        first, second = self.chosen.dimensions
+        weights = PENALTY * (0.5 * (sizes[1:] + sizes[:-1])) ** 2 / degree**3
+        weights = weights * np.cos(inner) ** (first + 1) * np.sin(inner) ** (second + 1)
+        jump = self.line.jumps_of_slope().toarray()
+        return self._assembled([-(jump.T @ (weights[:, None] * jump))], [np.eye(self.waves.own.size)])
+
+
+class SphereTerms:
+    """L(p) of a system of dimension 3 or 4, and ∂L(p)/∂θ, term by term.
+
+    Args:
+        problem: whose motion it is, and what white noise adds to it.
+        space: the trial and test functions.
+    """
+
+    def __init__(self, problem: Problem, space: TensorSpace) -> None:
+        self._problem, self.phi, self._names = problem, space.phi, tuple(problem.coloured.parts)
+        coordinates = np.array(self.phi.chosen.coordinates)
+        self._coordinates, self._inverse = coordinates, np.linalg.inv(coordinates)
+
+    def _matrix(self, term: CoefficientMatrix) -> FloatArray:
+        """ε^n S⁻¹AS."""
+        size = self._problem.motion.epsilon**term.order
+        return np.asarray(size * self._inverse @ np.array(term.matrix) @ self._coordinates)
+
+    def _term(self, phase: Any, g: Any, text: str, of_p: OfMoment = OfMoment(0), order: int = 0, of: str = "") -> Term:
+        at = self._names.index(of) if of in self._names else 0
+        return Term(order, of_p, phase, tuple(g if k == at else one for k in range(len(self._names))), text)
+
+    def whole(self) -> Iterator[Term]:
+        """L(p)."""
+        identity, free = self.phi.identity, np.zeros_like(self._coordinates)
+        for name in self._names:
+            text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
+            yield self._term(identity, None, text, of=name)
+        for term in self._problem.motion.terms:
+            yield from self._driven(term)
+            free += self._matrix(term) * (term.order == 0)
+        for each in self._problem.diffusions:
+            yield from self._diffused([(0.5, each, each)])
+        size = float(np.linalg.norm(free + free.T, 2)) / 2
+        yield self._term(size * self.phi.penalty(), one, "penalty on jumps of ∂u/∂η")
+
+    def changed(self, by: ParameterDerivative) -> Iterator[Term]:
+        """∂L(p)/∂θ; the penalty is held, as ∂u/∂η jumps by the error of the elements alone."""
+        for term in by.terms:
+            yield from self._driven(term)
+        for own, other in zip(self._problem.diffusions, by.diffusions, strict=bool(by.diffusions)):
+            yield from self._diffused([(0.5, own, other), (0.5, other, own)])
+
+    def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
+        """h·∇ + p q."""
+        moved, growth = self.phi.driven(self._matrix(term))
+        text = written_coefficient(term.g)
+        yield self._term(moved, term.g, f"{text}h·∇", order=term.order, of=term.noise)
+        yield self._term(growth, term.g, f"p {text}q", OfMoment(1), term.order, term.noise)
+
+    def _diffused(self, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]) -> Iterator[Term]:
+        """Σ c (h_a·∇ + p q_a)(h_b·∇ + p q_b)."""
+        order = min(a.order + b.order for _, a, b in pairs)
+        parts = [(c, self.phi.diffusion(self._matrix(a), self._matrix(b))) for c, a, b in pairs]
+        for power in range(3):
+            total = sum(c * each[power] for c, each in parts)
+            yield self._term(total, one, f"{('', 'p ', 'p² ')[power]}½ (h·∇ + p q)² of white noise", OfMoment(power), order)
+
+
+class SphereGenerator(Generator):
+    """L(p) of a system of dimension 3 or 4 in weak form."""
+
+    @property
+    def _own_terms(self) -> SphereTerms:
+        return SphereTerms(self.problem, self.space(0.0))
+
+    @property
+    def keeps_constants(self) -> bool:  # type: ignore[override]
+        """False: damping moves directions."""
+        return False
+
+    def upper_bound(self, p: float) -> float:
+        """A number right of Λ(p): that of E exp ∫ f dt, f the supremum of p q over all directions."""
+        problem, axes = self.problem, self.space(p).axes[1:]
+        coordinates = np.array(self.chosen.phase.coordinates)
+        inverse = np.linalg.inv(coordinates)
+
+        def fastest(terms: Sequence[CoefficientMatrix], xi: Any) -> Any:
+            values = np.asarray(xi, dtype=float)
+            total = np.zeros((*values.shape, *coordinates.shape))
+            for term in terms:
+                size = problem.motion.epsilon**term.order * np.asarray(term.g(values))
+                total += size[..., None, None] * (inverse @ np.array(term.matrix) @ coordinates)
+            rates = np.linalg.eigvalsh(0.5 * (total + np.swapaxes(total, -1, -2)))
+            return np.maximum(p * rates[..., 0], p * rates[..., -1])
+
+        named = dict(zip(problem.coloured.parts, axes, strict=True))
+        parts = {
+            name: [each for each in problem.motion.terms if is_driven(each.g) and each.noise in (name, "")]
+            for name in named
+        }
+        growth = float(fastest([each for each in problem.motion.terms if not is_driven(each.g)], 0.0))
+        for name, axis in named.items():
+            growth += self._growth_along(axis, partial(fastest, parts[name]))
+        for each in problem.diffusions:
+            size = np.linalg.norm(problem.motion.epsilon**each.order * inverse @ np.array(each.matrix) @ coordinates, 2)
+            growth += float(0.5 * (p * p + 2 * abs(p)) * size**2)
+        return growth
