@@ -221,7 +221,7 @@ class NearPlace:
         else:
             try:
                 with one_thread():
-                    return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
+                    return self.pair_on(type(pair.generator)(self.problem, chosen), pair.p, pair)
             except MeshError as failure:
                 reason = failure.message
             except MemoryError:

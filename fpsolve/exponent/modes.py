@@ -191,7 +191,7 @@ class SpherePlace(NearPlace):
             part if each is None or each.error <= share else part.refined(each, share, may_coarsen=False)
             for part, each in zip(chosen.noises, of_noises, strict=True)
         )
-        phase = chosen.phase.finer_elements() if of_elements.error > 2 * share else chosen.phase
+        phase = chosen.phase.finer_elements() if of_elements.error > 0.1 * allowed else chosen.phase
         found = Discretisation(phase, noises)
         return found if found.size > chosen.size else chosen.enriched()
 
