@@ -35,13 +35,14 @@ LARGEST_STEP = 1.0
 """Of p, from one pair to the next one on the coarsest space."""
 WEAK, STEP = 0.2, 1.3
 """Width of a layer for which elements are graded, and their size in ln tan η."""
+THINNEST = 1e-3
+"""The least width: of modes that nothing couples the layer has none."""
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 LEFT = 0.3
 """Share of the change before the last one that the error is at least."""
 MOST_DIRECTIONS = 3200
 """Functions of directions at most: every matrix of theirs is full."""
-MOST_MOMENTS = 2000
 DIGITS = 10.0
 
 
@@ -66,7 +67,9 @@ def second_moments(problem: Problem) -> tuple[float, FloatArray]:
         return of_state
 
     names, size = list(named), problem.dimension**2
-    total = sum(product(np.eye(size), axis.matrix(None), k) for k, axis in enumerate(axes))
+    total = 0.0 * product(np.eye(size))
+    for k, axis in enumerate(axes):
+        total = total + product(np.eye(size), axis.matrix(None), k)
     for term in motion.terms:
         at = names.index(term.noise) if term.noise in named else 0
         total = total + product(both(term.matrix, term.order), axes[at].matrix(term.g), at)
@@ -75,9 +78,9 @@ def second_moments(problem: Problem) -> tuple[float, FloatArray]:
         total = total + product(0.5 * square @ square)
     values, vectors = scipy.linalg.eig(finite(total), finite(product(np.eye(size))))
     best = int(np.argmax(values.real))
-    mean = np.ones(1)
+    mean: FloatArray = np.ones(1)
     for axis, weight in zip(axes, ones, strict=True):
-        mean = np.kron(mean, weight @ axis.constant)
+        mean = np.asarray(np.kron(mean, weight @ axis.constant))
     q = (vectors[:, best].real.reshape(size, -1) @ mean).reshape(unit.shape)
     q = 0.5 * (q + q.T)
     return float(values[best].real), q * np.sign(np.trace(q))
@@ -108,6 +111,7 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float]:
         width = math.sqrt(sizes[2] / sizes[1])
     else:
         width = math.sqrt(sizes[count] / sizes[count - 1])
+    width = max(width, THINNEST)
     return tuple(map(tuple, (own @ axes).tolist())), width
 
 

@@ -20,6 +20,7 @@ from fpsolve.fem.circle import CircleAxis
 from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
 from fpsolve.fem.pairs import PairAxis
+from fpsolve.fem.phase import PhaseAxis
 from fpsolve.model.frame import Frame
 from fpsolve.model.noise import Noise
 

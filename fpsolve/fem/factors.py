@@ -87,7 +87,7 @@ def factorised(operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: b
 
 
 def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
-    m, n = operator.halves
+    n = operator.shape[-1]
     if n > 2 and levels and levels[-1] is not None:
         own = levels[-1] or levels_of(operator)
         with suppress(SingularMatrix):

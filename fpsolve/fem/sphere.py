@@ -38,6 +38,7 @@ PENALTY = 0.02
 """γ of the penalty on jumps of ∂u/∂η."""
 MOST_DEGREE = 10
 """Of an element in η; beyond, elements are halved."""
+FREE = OfMoment(0)
 SIDE = 16
 """Points along each angle at which signs are looked at, at least."""
 Coordinates = tuple[tuple[float, ...], ...]
@@ -126,9 +127,7 @@ class Waves:
         """Those up to a total degree."""
         reach = most + 2
         groups = [_group(dimension, reach) for dimension in dimensions]
-        first, second = (
-            np.ravel(each) for each in np.meshgrid(*(group.degrees for group in groups), indexing="ij")
-        )
+        first, second = (np.ravel(each) for each in np.meshgrid(*(group.degrees for group in groups), indexing="ij"))
         kept = np.flatnonzero(((first + second) % 2 == 0) & (first + second <= reach))
 
         def product(*factors: Any) -> Any:
@@ -158,7 +157,7 @@ class Waves:
                 None if slopes[0] is None else product(slopes[0], ones[1]),
                 None if slopes[1] is None else product(ones[0], slopes[1]),
             ),
-            np.kron(groups[0].samples, groups[1].samples)[:, kept],
+            np.asarray(np.kron(groups[0].samples, groups[1].samples)[:, kept], dtype=float),
         )
 
 
@@ -175,8 +174,8 @@ class _Group:
 
 def _group(dimension: int, most: int) -> _Group:
     if dimension == 1:  # functions of ±1
-        values = np.array([[1.0, 1.0], [1.0, -1.0]])
-        return _Group(np.arange(2), [np.array([[0.0, 1.0], [1.0, 0.0]])], [], None, values)
+        signs = np.array([[1.0, 1.0], [1.0, -1.0]])
+        return _Group(np.arange(2), [np.array([[0.0, 1.0], [1.0, 0.0]])], [], None, signs)
     k = np.arange(1, most + 1)
     degrees = np.concatenate([[0], np.repeat(k, 2)])
 
@@ -275,7 +274,9 @@ class SphereAxis(Axis):
         """For each wave its degrees, and which of those with the same it is."""
         counts: dict[tuple[int, int], int] = {}
         found = []
-        for pair in zip(*(each[self.waves.own].tolist() for each in (self.waves.first, self.waves.second)), strict=True):
+        for pair in zip(
+            *(each[self.waves.own].tolist() for each in (self.waves.first, self.waves.second)), strict=True
+        ):
             counts[pair] = counts.get(pair, -1) + 1
             found.append((*pair, counts[pair]))
         return found
@@ -353,7 +354,7 @@ class SphereTerms:
         size = self._problem.motion.epsilon**term.order
         return np.asarray(size * self._inverse @ np.array(term.matrix) @ self._coordinates)
 
-    def _term(self, phase: Any, g: Any, text: str, of_p: OfMoment = OfMoment(0), order: int = 0, of: str = "") -> Term:
+    def _term(self, phase: Any, g: Any, text: str, of_p: OfMoment = FREE, order: int = 0, of: str = "") -> Term:
         at = self._names.index(of) if of in self._names else 0
         return Term(order, of_p, phase, tuple(g if k == at else one for k in range(len(self._names))), text)
 
@@ -391,7 +392,9 @@ class SphereTerms:
         parts = [(c, self.phi.diffusion(self._matrix(a), self._matrix(b))) for c, a, b in pairs]
         for power in range(3):
             total = sum(c * each[power] for c, each in parts)
-            yield self._term(total, one, f"{('', 'p ', 'p² ')[power]}½ (h·∇ + p q)² of white noise", OfMoment(power), order)
+            yield self._term(
+                total, one, f"{('', 'p ', 'p² ')[power]}½ (h·∇ + p q)² of white noise", OfMoment(power), order
+            )
 
 
 class SphereGenerator(Generator):
@@ -402,7 +405,7 @@ class SphereGenerator(Generator):
         return SphereTerms(self.problem, self.space(0.0))
 
     @property
-    def keeps_constants(self) -> bool:  # type: ignore[override]
+    def keeps_constants(self) -> bool:
         """False: damping moves directions."""
         return False
 

@@ -209,7 +209,7 @@ class CoefficientMatrix:
 
     @cached_property
     def fastest(self) -> tuple[float, float]:
-        """The largest |e′ᵀA e| and |eᵀA e| of a unit vector e and one e′ across it; beyond the plane ‖A‖ for the first."""
+        """The largest |e′ᵀA e| and |eᵀA e|, e′ across a unit vector e; beyond the plane ‖A‖ is taken for the first."""
         if len(self.matrix) == 2:
             return float(abs(self.h.mean) + self.h.amplitude), float(abs(self.q.mean) + self.q.amplitude)
         a = np.array(self.matrix)

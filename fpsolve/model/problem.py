@@ -45,6 +45,8 @@ RATE = "1/time"
 """The unit of ξ for which those of parameters of noises are stated."""
 PHASES = 360
 """At which it is seen which way the phase passes them."""
+BEYOND_PLANE = ("moment_lyapunov", "lyapunov_exponent", "stability_index")
+"""What is solved for systems of more than two variables."""
 LINE = 90
 """Letters of a line of parameters at most."""
 
@@ -125,6 +127,11 @@ class Problem:
     @property
     def no_picture(self) -> str:
         """Why functions of it are neither; empty where they are."""
+        if self.dimension > 2:
+            return (
+                f"functions of the directions of {self.dimension} variables are no surface over phase and noise; look "
+                "at Λ(p)"
+            )
         if len(self.coloured.parts) > 1:
             several = "functions of the phase and of several noises are no surface and no lines over the phase"
             return f"{several}; make all of these noises white but one"
@@ -252,7 +259,14 @@ class Problem:
         the faster one. Told for one noise.
         """
         noise = self.noise
-        if self.dimension > 2 or not noise.is_bounded or len(noise.parts) > 1 or self.diffusions or self.impulses or self.invariant_rays:
+        if (
+            self.dimension > 2
+            or not noise.is_bounded
+            or len(noise.parts) > 1
+            or self.diffusions
+            or self.impulses
+            or self.invariant_rays
+        ):
             return False
         phi = np.linspace(0, math.pi, PHASES, endpoint=False)
         turns = phase_speed(self.motion, noise.reached)(phi[:, None])
@@ -527,7 +541,13 @@ def of_problem(function: Callable[Concatenate[Problem, P], R_co]) -> OfProblem[P
 
     @wraps(function)
     def with_pair(*args: Any, **kwargs: Any) -> R_co:
-        return function(*problem_first(args, kwargs), **kwargs)
+        problem, *others = problem_first(args, kwargs)
+        if problem.dimension > 2 and function.__name__ not in BEYOND_PLANE:
+            raise ValueError(
+                f"{function.__name__} is for systems in the plane; of a system of {problem.dimension} variables "
+                f"{', '.join(BEYOND_PLANE)} are known"
+            )
+        return function(problem, *others, **kwargs)
 
     return _signed(with_pair, 0)
 

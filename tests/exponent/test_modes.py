@@ -1,0 +1,168 @@
+"""Λ(p) of systems of three and four variables: moment equations, the plane, other codes, and other coordinates."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fpsolve import (
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    lyapunov_exponent,
+    moment_lyapunov,
+    simulate,
+    stability_index,
+)
+from fpsolve.arrays import identity
+from fpsolve.exponent.modes import second_moments
+from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Telegraph, White
+from tests.oracles import kronecker
+
+FREE = np.array([[0, 1, 0, 0], [-1, -0.1, 0, 0], [0, 0, 0, 1], [0, 0, -2.56, -0.16]])
+"""Two modes, q̈₁ + 0.1 q̇₁ + q₁ and q̈₂ + 0.16 q̇₂ + 2.56 q₂."""
+
+
+def stiffness(own, other):
+    """Noise in the stiffness of both modes, and between them."""
+    return -np.array([[0, 0, 0, 0], [own, 0, other, 0], [0, 0, 0, 0], [other, 0, own, 0]])
+
+
+COUPLED = stiffness(0.5, 0.3)
+OU = OrnsteinUhlenbeck(alpha=1.0, sigma=0.5 * math.sqrt(2))
+
+
+def problem(noise, steady=FREE, driven=COUPLED):
+    terms = (
+        CoefficientMatrix(0, np.asarray(steady).tolist()),
+        CoefficientMatrix(1, np.asarray(driven).tolist(), identity),
+    )
+    return Problem(LinearSystem(terms), noise)
+
+
+def random_system(seed, n):
+    """Damped, of rates about 1, with noise of a third of them in all entries."""
+    rng = np.random.default_rng([30, seed])
+    turn = rng.standard_normal((n, n))
+    return turn - turn.T - 0.3 * np.diag(rng.uniform(0.3, 1.0, n)), 0.4 * rng.standard_normal((n, n))
+
+
+@pytest.mark.parametrize(("seed", "n"), [(0, 3), (1, 3), (2, 4)])
+@pytest.mark.parametrize("kind", ["white", "telegraph", "ornstein-uhlenbeck"])
+def test_second_moments(seed, n, kind):
+    """The growth rate of E‖x‖², with which coordinates are chosen, is that of Kronecker squares."""
+    steady, driven = random_system(seed, n)
+    noise, expected = {
+        "white": (White(s=1.0), kronecker.white(steady, driven, 2)),
+        "telegraph": (
+            Telegraph(a=0.7, k=0.6),
+            kronecker.chain(steady, driven, (-0.7, 0.7), ((0, 0.6), (0.6, 0)), 2),
+        ),
+        "ornstein-uhlenbeck": (
+            OrnsteinUhlenbeck(alpha=1.5, sigma=0.5),
+            kronecker.ornstein_uhlenbeck(steady, driven, 1.5, 0.5 / math.sqrt(3), 2, 12),
+        ),
+    }[kind]
+    value, q = second_moments(problem(noise, steady, driven))
+    assert value == pytest.approx(expected, abs=1e-9)
+    assert np.min(np.linalg.eigvalsh(q)) > 0
+
+
+@pytest.mark.parametrize(("seed", "n"), [(0, 3), (3, 3), (2, 4)])
+def test_even_moments_under_white_noise(seed, n):
+    steady, driven = random_system(seed, n)
+    found = moment_lyapunov(problem(White(s=1.0), steady, driven), [2.0, 4.0], rtol=1e-5)
+    expected = [kronecker.white(steady, driven, p) for p in (2, 4)]
+    assert np.all(np.abs(found.value - expected) <= found.error_estimate)
+    assert np.all(found.error_estimate < 1e-3)
+
+
+def test_even_moments_under_telegraph_noise():
+    steady, driven = random_system(1, 3)
+    found = moment_lyapunov(problem(Telegraph(a=0.7, k=0.6), steady, driven), [2.0, 4.0], rtol=1e-5)
+    expected = [kronecker.chain(steady, driven, (-0.7, 0.7), ((0, 0.6), (0.6, 0)), p) for p in (2, 4)]
+    assert np.all(np.abs(found.value - expected) <= found.error_estimate)
+
+
+@pytest.mark.slow
+def test_even_moments_of_two_modes():
+    found = moment_lyapunov(problem(OU), [2.0, 4.0], rtol=1e-5)
+    expected = [kronecker.ornstein_uhlenbeck(FREE, COUPLED, 1.0, 0.5, p, 2 + 6 * (6 - p)) for p in (2, 4)]
+    assert np.all(np.abs(found.value - expected) <= found.error_estimate)
+
+
+# by elements and by harmonics of the sphere of another code, to the last digit written
+WHITE = {1.0: -0.00081016, 3.0: 0.1124463, -1.0: 0.0314237}
+WEAK = {0.5: -0.0248041093, 1.0: -0.0495297287, 3.0: -0.147647323}
+
+
+@pytest.mark.parametrize(
+    ("driven", "expected", "unit"),
+    [(COUPLED, WHITE, 1e-7), pytest.param(0.1 * COUPLED, WEAK, 1e-9, marks=pytest.mark.slow)],
+    ids=["strong", "weak"],
+)
+def test_odd_moments_of_two_modes(driven, expected, unit):
+    found = moment_lyapunov(problem(White(s=1.0), driven=driven), list(expected), rtol=1e-4)
+    off = np.abs(found.value - [expected[p] for p in found.p])
+    assert found.p.size == 3
+    assert np.all(off <= found.error_estimate + unit)
+    assert not found.warnings  # each error is within rtol
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("noise", "driven", "expected", "unit"),
+    [
+        (White(s=1.0), COUPLED, -0.01687416, 1e-8),
+        (OU, COUPLED, -0.0484034, 1e-7),
+        (White(s=1.0), 0.1 * COUPLED, -0.0496867093, 1e-10),
+    ],
+    ids=["white", "ornstein-uhlenbeck", "weak"],
+)
+def test_the_lyapunov_exponent_of_two_modes(noise, driven, expected, unit):
+    found = lyapunov_exponent(problem(noise, driven=driven), rtol=1e-5)
+    assert abs(found.value - expected) <= found.error_estimate + unit
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [White(s=0.8), OrnsteinUhlenbeck(alpha=1.0, sigma=0.6)], ids=["white", "ou"])
+def test_an_oscillator_with_what_it_drives(noise):
+    """z of ż = −z + x grows as x does: Λ(p) is that of the plane."""
+    steady, driven = [[0, 1], [-1, -0.3]], [[0, 0], [-1, 0]]
+    more = [[0, 1, 0], [-1, -0.3, 0], [1, 0, -1]], [[0, 0, 0], [-1, 0, 0], [0, 0, 0]]
+    terms = CoefficientMatrix(0, steady), CoefficientMatrix(1, driven, identity)
+    plane = moment_lyapunov(PlaneSystem(terms), noise, [1.0, 3.0])
+    found = moment_lyapunov(problem(noise, *more), [1.0, 3.0], rtol=1e-4)
+    assert np.all(np.abs(found.value - plane.value) <= found.error_estimate)
+
+
+def test_other_coordinates_change_nothing():
+    steady, driven = random_system(5, 3)
+    turn, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
+    values = [
+        moment_lyapunov(problem(White(s=1.0), s @ steady @ s.T, s @ driven @ s.T), [1.0, 3.0], rtol=1e-3).value
+        for s in (np.eye(3), turn)
+    ]
+    np.testing.assert_allclose(*values, atol=1e-10)
+
+
+def test_the_stability_index():
+    """Λ(δ_p) = 0: at δ_p = 2 where the damping is such that Λ(2) = 0 by the moments."""
+    steady, driven = random_system(1, 3)
+    steady = steady - 0.5 * kronecker.white(steady, driven, 2) * np.eye(3)
+    found = stability_index(problem(White(s=1.0), steady, driven), rtol=1e-4)
+    assert abs(found.value - 2) <= found.error_estimate
+
+
+def test_what_is_refused():
+    terms = [CoefficientMatrix(0, FREE.tolist())]
+    with pytest.raises(ValueError, match="a single ray in the plane"):
+        LinearSystem(terms, [Jump(0.0, -0.1)])
+    with pytest.raises(ValueError, match="take LinearSystem"):
+        PlaneSystem(terms)
+    with pytest.raises(ValueError, match="the same for all terms"):
+        LinearSystem([*terms, CoefficientMatrix(0, [[0.0, 1.0], [-1.0, 0.0]])])
+    with pytest.raises(ValueError, match="simulate is for systems in the plane"):
+        simulate(problem(OU), [1.0])
+    with pytest.raises(ValueError, match="two rows"):
+        CoefficientMatrix(0, np.eye(5).tolist())
