@@ -123,11 +123,6 @@ class Noise(Parametrised):
         return "states" if self.has_states else "cells" if self.has_algebraic_tails else "polynomials"
 
     @property
-    def sense(self) -> str:
-        """Whose sense the equation is meant in, as "Itô's"; empty where all senses are the same."""
-        return ""
-
-    @property
     def is_diffusion(self) -> bool:
         """Whether ξ by itself is a diffusion, so that b, σ and P_s tell all of it."""
         return self.basis in ("polynomials", "cells")
