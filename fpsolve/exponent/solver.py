@@ -169,6 +169,10 @@ class ExponentSolver:
         for name, kind, words in _KINDS:
             if not isinstance(getattr(self, name), kind) or getattr(self, name) is True:
                 raise TypeError(f"got {name} = {shown(getattr(self, name))}; must be {words}")
+        if self.mesh is not None and self.problem.dimension > 2:
+            raise ValueError(
+                "got a mesh; its lines are those of a phase, which there is in the plane alone: leave it out"
+            )
         if not (self.problem.noise.is_white or math.isfinite(self.problem.noise.standard_deviation)):
             raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))
         with suppress(ValueError):

@@ -108,6 +108,11 @@ class Problem:
                 raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
         if any(noise.is_white for noise in given.values()):
             _ = self._moved, self._struck  # refuses what has no meaning
+        if self.dimension > 2 and (self._struck or self.noise.has_algebraic_tails):
+            raise ValueError(
+                f"got {self.noise.kind} noise for {self.dimension} variables; beyond the plane nothing is solved under "
+                "impulses, nor under noise with algebraic tails: take another kind, such as r0 <= 1"
+            )
         if not self.noise.is_random:
             raise ValueError(
                 "nothing but the start of this noise is random, and Λ(p) is p times the largest real part of Floquet's "

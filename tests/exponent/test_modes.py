@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 
 from fpsolve import (
+    NonGaussianNoise,
     OrnsteinUhlenbeck,
     PlaneSystem,
     Problem,
     lyapunov_exponent,
+    make_mesh,
     moment_lyapunov,
     simulate,
     stability_index,
 )
 from fpsolve.arrays import identity
 from fpsolve.exponent.modes import second_moments
-from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Telegraph, White
+from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
 from tests.oracles import kronecker
 
 FREE = np.array([[0, 1, 0, 0], [-1, -0.1, 0, 0], [0, 0, 0, 1], [0, 0, -2.56, -0.16]])
@@ -164,5 +166,11 @@ def test_what_is_refused():
         LinearSystem([*terms, CoefficientMatrix(0, [[0.0, 1.0], [-1.0, 0.0]])])
     with pytest.raises(ValueError, match="simulate is for systems in the plane"):
         simulate(problem(OU), [1.0])
+    heavy = NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.2)
+    for noise in (Poisson(1.0, (0.1,), (1.0,)), heavy):
+        with pytest.raises(ValueError, match="beyond the plane nothing is solved"):
+            problem(noise)
+    with pytest.raises(ValueError, match="got a mesh"):
+        moment_lyapunov(problem(OU), 1.0, mesh=make_mesh())
     with pytest.raises(ValueError, match="two rows"):
         CoefficientMatrix(0, np.eye(5).tolist())

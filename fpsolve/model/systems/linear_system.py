@@ -13,14 +13,14 @@ from fpsolve.model.systems.plane_system import PlaneSystem
 class LinearSystem(PlaneSystem):
     """ẋ = Σ ε^k g(ξ) A x for a state x of n = 2 to 4 numbers, from its coefficient matrices; see `PlaneSystem`.
 
-    >>> from fpsolve import CoefficientMatrix
+    >>> from fpsolve.model import CoefficientMatrix
     >>> free = CoefficientMatrix(0, ((0, 1, 0), (-1, -0.2, 0.5), (0, -0.5, -1)))  # an oscillator with a voltage
     >>> LinearSystem([free]).dimension
     3
 
     Args:
         terms: one at least, all of the same n.
-        jumps: stretches at rays, for n = 2 alone: on a wall of more dimensions ‖x‖^p has no ray to jump at.
+        jumps: stretches at rays, for n = 2 alone: a wall of more dimensions holds many directions, not one.
         epsilon, build, named: as in `PlaneSystem`.
 
     Raises:
