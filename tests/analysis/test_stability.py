@@ -586,9 +586,9 @@ def test_f_is_solved_in_one_thread(monkeypatch):
     """More only wait for each other: with two λ of strong noise took four times as long."""
     threads = []
 
-    def factorised(*given):
+    def factorised(*given, **named):
         threads.extend(pool["num_threads"] for pool in ThreadpoolController().info())
-        return known(*given)
+        return known(*given, **named)
 
     known = generator.factorised
     monkeypatch.setattr(generator, "factorised", factorised)
