@@ -146,6 +146,7 @@ def test_where_the_noise_has_states_each_is_a_line(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("pictures")
 def test_eigenfunctions_are_pictures_where_this_machine_renders(tmp_path):
     from fpsolve.surfaces import can_render
 
@@ -242,6 +243,7 @@ def test_proofs_have_a_page(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("pictures")
 def test_charts_have_a_page(tmp_path):
     assert run(tmp_path, CHARTED, "--report", "--interactive", command="chart", name="plane.toml") == 0
     page = Page(tmp_path / "plane/report.html")
