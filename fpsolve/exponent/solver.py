@@ -33,6 +33,7 @@ from fpsolve.exponent.adapt import (
 from fpsolve.exponent.eigen import PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
+from fpsolve.exponent.modes import SpherePlace
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
@@ -186,8 +187,6 @@ class ExponentSolver:
         if self.classes:  # near p = 0
             return max(self.classes, key=lambda each: each.lyapunov_exponent().value).near
         if self.problem.dimension > 2:
-            from fpsolve.exponent.modes import SpherePlace
-
             return SpherePlace(self.problem, **self._own)
         return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **self._own)
 
