@@ -30,7 +30,7 @@ from fpsolve.arrays import FloatArray, dense, one
 from fpsolve.fem.axis import Axis, TensorSpace
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.line import LineSpace
-from fpsolve.fem.terms import OfMoment, Term
+from fpsolve.fem.terms import NoiseTerms, OfMoment, Term
 from fpsolve.model.plane import CoefficientMatrix, is_driven, written_coefficient
 from fpsolve.model.problem import ParameterDerivative, Problem
 
@@ -38,7 +38,6 @@ PENALTY = 0.02
 """γ of the penalty on jumps of ∂u/∂η."""
 MOST_DEGREE = 10
 """Of an element in η; beyond, elements are halved."""
-FREE = OfMoment(0)
 SIDE = 16
 """Points along each angle at which signs are looked at, at least."""
 Coordinates = tuple[tuple[float, ...], ...]
@@ -85,8 +84,6 @@ class SphereCells:
     def enriched(self) -> SphereCells:
         """Two degrees more in every direction."""
         return self.finer_waves().finer_elements()
-
-    doubled = enriched
 
     def finer_waves(self) -> SphereCells:
         """Two degrees more of the waves."""
@@ -145,7 +142,7 @@ class Waves:
             return [[of_pair(left, right) for right in groups[j].unit] for left in lefts]
 
         pairs = [(i, j) for i in (0, 1) for j in (0, 1)]
-        slopes = [None if group.slope is None else group.slope for group in groups]
+        slopes = [group.slope for group in groups]
         first, second = first[kept], second[kept]
         return Waves(
             first,
@@ -336,7 +333,7 @@ class SphereAxis(Axis):
         return self._assembled([-(jump.T @ (weights[:, None] * jump))], [np.eye(self.waves.own.size)])
 
 
-class SphereTerms:
+class SphereTerms(NoiseTerms):
     """L(p) of a system of dimension 3 or 4, and ∂L(p)/∂θ, term by term.
 
     Args:
@@ -345,28 +342,23 @@ class SphereTerms:
     """
 
     def __init__(self, problem: Problem, space: TensorSpace) -> None:
-        self._problem, self.phi, self._names = problem, space.phi, tuple(problem.coloured.parts)
+        super().__init__(problem)
+        self._problem, self.phi = problem, space.phi
         coordinates = np.array(self.phi.chosen.coordinates)
         self._coordinates, self._inverse = coordinates, np.linalg.inv(coordinates)
 
-    def _matrix(self, term: CoefficientMatrix) -> FloatArray:
+    def matrix(self, term: CoefficientMatrix) -> FloatArray:
         """ε^n S⁻¹AS."""
         size = self._problem.motion.epsilon**term.order
         return np.asarray(size * self._inverse @ np.array(term.matrix) @ self._coordinates)
 
-    def _term(self, phase: Any, g: Any, text: str, of_p: OfMoment = FREE, order: int = 0, of: str = "") -> Term:
-        at = self._names.index(of) if of in self._names else 0
-        return Term(order, of_p, phase, tuple(g if k == at else one for k in range(len(self._names))), text)
-
     def whole(self) -> Iterator[Term]:
         """L(p)."""
-        identity, free = self.phi.identity, np.zeros_like(self._coordinates)
-        for name in self._names:
-            text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
-            yield self._term(identity, None, text, of=name)
+        yield from self._generators(self.phi.identity)
+        free = np.zeros_like(self._coordinates)
         for term in self._problem.motion.terms:
             yield from self._driven(term)
-            free += self._matrix(term) * (term.order == 0)
+            free += self.matrix(term) * (term.order == 0)
         for each in self._problem.diffusions:
             yield from self._diffused([(0.5, each, each)])
         size = float(np.linalg.norm(free + free.T, 2)) / 2
@@ -381,7 +373,7 @@ class SphereTerms:
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h·∇ + p q."""
-        moved, growth = self.phi.driven(self._matrix(term))
+        moved, growth = self.phi.driven(self.matrix(term))
         text = written_coefficient(term.g)
         yield self._term(moved, term.g, f"{text}h·∇", order=term.order, of=term.noise)
         yield self._term(growth, term.g, f"p {text}q", OfMoment(1), term.order, term.noise)
@@ -389,7 +381,7 @@ class SphereTerms:
     def _diffused(self, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]) -> Iterator[Term]:
         """Σ c (h_a·∇ + p q_a)(h_b·∇ + p q_b)."""
         order = min(a.order + b.order for _, a, b in pairs)
-        parts = [(c, self.phi.diffusion(self._matrix(a), self._matrix(b))) for c, a, b in pairs]
+        parts = [(c, self.phi.diffusion(self.matrix(a), self.matrix(b))) for c, a, b in pairs]
         for power in range(3):
             total = sum(c * each[power] for c, each in parts)
             yield self._term(
@@ -411,16 +403,13 @@ class SphereGenerator(Generator):
 
     def upper_bound(self, p: float) -> float:
         """A number right of Λ(p): that of E exp ∫ f dt, f the supremum of p q over all directions."""
-        problem, axes = self.problem, self.space(p).axes[1:]
-        coordinates = np.array(self.chosen.phase.coordinates)
-        inverse = np.linalg.inv(coordinates)
+        problem, axes, matrix = self.problem, self.space(p).axes[1:], self._own_terms.matrix
 
         def fastest(terms: Sequence[CoefficientMatrix], xi: Any) -> Any:
             values = np.asarray(xi, dtype=float)
-            total = np.zeros((*values.shape, *coordinates.shape))
+            total = np.zeros((*values.shape, problem.dimension, problem.dimension))
             for term in terms:
-                size = problem.motion.epsilon**term.order * np.asarray(term.g(values))
-                total += size[..., None, None] * (inverse @ np.array(term.matrix) @ coordinates)
+                total += np.asarray(term.g(values))[..., None, None] * matrix(term)
             rates = np.linalg.eigvalsh(0.5 * (total + np.swapaxes(total, -1, -2)))
             return np.maximum(p * rates[..., 0], p * rates[..., -1])
 
@@ -433,6 +422,5 @@ class SphereGenerator(Generator):
         for name, axis in named.items():
             growth += self._growth_along(axis, partial(fastest, parts[name]))
         for each in problem.diffusions:
-            size = np.linalg.norm(problem.motion.epsilon**each.order * inverse @ np.array(each.matrix) @ coordinates, 2)
-            growth += float(0.5 * (p * p + 2 * abs(p)) * size**2)
+            growth += float(0.5 * (p * p + 2 * abs(p)) * np.linalg.norm(matrix(each), 2) ** 2)
         return growth

@@ -160,7 +160,30 @@ class TermSum:
         )
 
 
-class Terms:
+class NoiseTerms:
+    """What lists of terms share: which noise each of them has a function of.
+
+    Args:
+        problem: whose motion it is.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._names = tuple(problem.coloured.parts)
+
+    def _term(
+        self, phase: Any, g: Coefficient | None, text: str, of_p: OfMoment = OfMoment(0), order: int = 0, of: str = ""
+    ) -> Term:
+        """One with a function of the noise `of`, or of the first."""
+        at = self._names.index(of) if of in self._names else 0
+        return Term(order, of_p, phase, tuple(g if k == at else one for k in range(len(self._names))), text)
+
+    def _generators(self, identity: Any) -> Iterator[Term]:
+        """The generator of every noise."""
+        for name in self._names:
+            yield self._term(identity, None, f"L_ξ, the generator of the noise{f' {name}' if name else ''}", of=name)
+
+
+class Terms(NoiseTerms):
     """L(p) of a system, and ∂L(p)/∂θ, term by term; what is of φ alone is the same with any tilt.
 
     Args:
@@ -172,9 +195,10 @@ class Terms:
     """
 
     def __init__(self, problem: Problem, space: TensorSpace) -> None:
+        super().__init__(problem)
         system = self.system = problem.motion
         self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.axes[1:]
-        self._names, self._impulses = tuple(problem.coloured.parts), problem.impulses
+        self._impulses = problem.impulses
         self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
         self._has_states = [noise.has_states for noise in problem.coloured.parts.values()]
         self._ends = problem.at_values([axis.support for axis in self.noises])
@@ -188,13 +212,6 @@ class Terms:
         self._is_exact, self._two_way = is_exact, np.flatnonzero(is_exact & (direction == 0))
         # nothing is left of the other side: where ξ is large that would count
         self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - by_rows(0.5 * direction, self._jump)
-
-    def _term(
-        self, phase: Any, g: Coefficient | None, text: str, of_p: OfMoment = OfMoment(0), order: int = 0, of: str = ""
-    ) -> Term:
-        """One with a function of the noise `of`, or of the first."""
-        at = self._names.index(of) if of in self._names else 0
-        return Term(order, of_p, phase, tuple(g if k == at else one for k in range(len(self.noises))), text)
 
     def _terms(
         self, phase: Any, f: Callable[[Xi], Any], text: str, of_p: OfMoment = OfMoment(0), order: int = 0
@@ -224,9 +241,7 @@ class Terms:
 
     def whole(self) -> Iterator[Term]:
         """L(p) of Eq. (19)."""
-        for name in self._names:
-            text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
-            yield self._term(self.phi.identity, None, text, of=name)
+        yield from self._generators(self.phi.identity)
         for term in self.system.terms:
             yield from self._driven(term)
         for each in self._diffusions:
