@@ -321,9 +321,11 @@ def check(
 ) -> int:
     """Solve case files and compare with the values that they expect; write nothing.
 
+    A noise of a kind that another package registers is checked: each of its members against what the others make of it.
+
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
-    from fpsolve.output.terminal import agreement, print_comparisons, print_remarks
+    from fpsolve.output.terminal import agreement, print_comparisons, print_message, print_remarks
     from fpsolve.study.hierarchy import refuse_no_hierarchy
     from fpsolve.workflow.cases import check_case
 
@@ -339,9 +341,11 @@ def check(
         else:
             print_comparisons(case, outcome.comparisons)
             print_remarks(case, outcome.results, "")
+        for fault in outcome.faults:
+            print_message(case, fault)
         if outcome.failures:
             code = NOT_CONVERGED
-        elif not all(comparison.met for comparison in outcome.comparisons):
+        elif outcome.faults or not all(comparison.met for comparison in outcome.comparisons):
             code = max(code, CHECK_FAILED)
     return code
 

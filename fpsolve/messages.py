@@ -252,6 +252,15 @@ class Code(Enum):
     LINE_SPENT = "failure: budget.line_seconds = {most:g} is used up by the clock"
     LINE_STOPPED = "note: the line {line} is not traced to its end, and may have more branches: {reason}"
 
+    NOISE_DIFFERS = (
+        "failure: {member}{xi:? at xi = {xi:.4g}} is {value:.6g}, but {source} gives {must:.6g}; correct one of the two"
+    )
+    NOISE_SIZE = "failure: {member}{xi:? at xi = {xi:.4g}} is {value:.6g}; it must be a finite number > 0"
+    NOISE_FAILS = "failure: {member}: {reason}"
+    NOISE_REFUSED = (
+        "warning: no sensitivities under {kind} noise: {reason}; correct its class until `check_noise` is silent"
+    )
+
     NO_PATH_VARIANCE = (
         "warning: no estimate of Λ(p) at p = {p:g}: ‖x‖^p has no variance, as for r0 > 1 the moment of order 2p is "
         "infinite; use the finite elements"

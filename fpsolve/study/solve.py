@@ -23,7 +23,7 @@ from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import EIGENFUNCTIONS, SENSITIVITIES
-from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
+from fpsolve.errors import FpsolveError, NoDerivative, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, Failure
@@ -149,15 +149,19 @@ def solve_curve(
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
     pairs, stationary, undrawn = _functions(solver, without_failed(wanted, found.failures))
-    slopes = None
+    slopes, refused = None, list[Message]()
     if wanted.differentiated is not None:
-        slopes = solve_sensitivities(
-            solver,
-            np.array([p for p in wanted.differentiated if np.any(found.p == p)]),
-            curve.problem.derivatives(),
-            indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
-            root=None if (index := estimates[STABILITY_INDEX.name]) is None else index.value,
-        )
+        try:
+            along = curve.problem.derivatives()
+            slopes = solve_sensitivities(
+                solver,
+                np.array([p for p in wanted.differentiated if np.any(found.p == p)]),
+                along,
+                indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
+                root=None if (index := estimates[STABILITY_INDEX.name]) is None else index.value,
+            )
+        except NoDerivative as failure:
+            refused = [failure.message]
     exponent = estimates[LYAPUNOV_EXPONENT.name]
     notes = (
         heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
@@ -191,7 +195,7 @@ def solve_curve(
         for name, estimate in estimates.items()
         if estimate and estimate.relative_error > numerics.rtol
     ]
-    limits = (*of[Severity.WARNING], *imprecise, *undrawn, *unresolved)
+    limits = (*of[Severity.WARNING], *imprecise, *undrawn, *unresolved, *refused)
     result = CurveResult(
         curve=curve,
         moments=MomentColumns(

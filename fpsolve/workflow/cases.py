@@ -14,6 +14,8 @@ from fpsolve.case.case import Case, Curve, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
+from fpsolve.model.checks import check_noise
+from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_simulation
@@ -53,6 +55,7 @@ class Outcome:
         simulated: its curves, simulated.
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
         comparisons: what the case expects beside what was computed.
+        faults: of a noise that is no kind of fpsolve, see `check_noise`.
         known: how many of its curves an earlier run had finished.
         outdated: how many records of its curves another version has written; these are not used.
     """
@@ -61,6 +64,7 @@ class Outcome:
     simulated: tuple[SimulatedCurve, ...] = ()
     interruption: str = ""
     comparisons: tuple[Comparison, ...] = ()
+    faults: tuple[Message, ...] = ()
     known: int = 0
     outdated: int = 0
 
@@ -268,6 +272,8 @@ def chart_case(
 def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:
     """Solve what a case expects, and return it with the `comparisons`; nothing is written.
 
+    A noise of a kind that fpsolve does not know itself is checked, too.
+
     With `by_hierarchy` that is Λ of its even p, by the moment hierarchy.
     """
     found: list[CurveResult] = []
@@ -288,7 +294,8 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
                 progress(failed=result.status.fails)
     found.sort(key=lambda result: result.curve.number)
     comparisons = compare_with_hierarchy(case, found) if by_hierarchy else compare(case, found)
-    return Outcome(found, comparisons=tuple(comparisons))
+    faults = [fault for each in case.problem.noise.parts.values() if not is_ours(each) for fault in check_noise(each)]
+    return Outcome(found, comparisons=tuple(comparisons), faults=tuple(faults))
 
 
 def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Sweep:
