@@ -197,7 +197,8 @@ class Case(Section):
 
     @property
     def rtol(self) -> float:
-        return self.moments.rtol
+        """The relative error wanted of Λ(p), as the case states it, or else the `usual_rtol` of its problem."""
+        return self.moments.rtol if "rtol" in self.moments.model_fields_set else self.problem.usual_rtol
 
     @property
     def shown(self) -> FloatArray:

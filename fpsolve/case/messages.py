@@ -113,7 +113,11 @@ def _toml(value: Any) -> str:
 
 def faults_in(error: ValidationError) -> Iterator[ErrorDetails]:
     """What pydantic found, without calling a list too short only because its entries are wrong."""
-    return (each for each in error.errors(include_url=False) if each["type"] != "too_short" or not each["input"])
+    return (
+        each
+        for each in error.errors(include_url=False)
+        if each["type"] != "too_short" or len(each["input"]) < each["ctx"]["min_length"]
+    )
 
 
 def too_long(detail: Mapping[str, Any]) -> str:

@@ -26,6 +26,7 @@ from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, rea
 from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE
 from fpsolve.model.quantity import Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
@@ -37,6 +38,7 @@ SENSITIVITIES, EIGENFUNCTIONS = "sensitivities", "eigenfunctions"
 QUANTITY_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS)
 """What may be asked for; eigenfunctions with the stationary density."""
 _LARGEST = 1e30
+WANTED = f"wanted relative error; where it is not stated {RTOL_BEYOND_PLANE:g} for more than two variables"
 _APART = 1e-9
 """How far the ends of an axis are from each other at least, relative to their size."""
 MOST_NAMED = 8
@@ -153,7 +155,7 @@ class Moments(Section):
             name="order of the moment",
         ),
     ]
-    rtol: Annotated[float, parameter("wanted relative error", "rtol = 1e-8", gt=1e-13, lt=1)] = 1e-8
+    rtol: Annotated[float, parameter(WANTED, "rtol = 1e-8", gt=1e-13, lt=1, name="wanted relative error")] = RTOL
 
     @property
     def is_range(self) -> bool:

@@ -331,6 +331,11 @@ class System(Parametrised):
         return max((len(term.matrix) for term in self.terms), default=2)
 
     @property
+    def states(self) -> Sequence[str]:
+        """What its variables are called."""
+        return tuple(f"x{'₁₂₃₄'[k]}" for k in range(self.dimension))
+
+    @property
     def drives(self) -> Sequence[CoefficientMatrix]:
         """Deprecated: `terms`."""
         warnings.warn("drives are called terms now", DeprecationWarning, stacklevel=2)

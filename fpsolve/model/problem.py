@@ -46,8 +46,8 @@ RATE = "1/time"
 """The unit of ξ for which those of parameters of noises are stated."""
 PHASES = 360
 """At which it is seen which way the phase passes them."""
-BEYOND_PLANE = ("moment_lyapunov", "lyapunov_exponent", "stability_index")
-"""What is solved for systems of more than two variables."""
+RTOL, RTOL_BEYOND_PLANE = 1e-8, 1e-5
+"""The relative error that is wanted where a case names none: of two variables, and of more."""
 LINE = 90
 """Letters of a line of parameters at most."""
 
@@ -124,6 +124,11 @@ class Problem:
     def coloured(self) -> Noise:
         """What ξ is: the noise; of several those that have values, one noise or several, of white ones alone one."""
         return self.noise if len(self.noise.parts) == 1 else self.noise.coloured  # type: ignore[attr-defined]
+
+    @property
+    def usual_rtol(self) -> float:
+        """The relative error that is wanted where a case names none."""
+        return RTOL if self.dimension == 2 else RTOL_BEYOND_PLANE
 
     @property
     def is_on_cylinder(self) -> bool:
@@ -548,13 +553,7 @@ def of_problem(function: Callable[Concatenate[Problem, P], R_co]) -> OfProblem[P
 
     @wraps(function)
     def with_pair(*args: Any, **kwargs: Any) -> R_co:
-        problem, *others = problem_first(args, kwargs)
-        if problem.dimension > 2 and function.__name__ not in BEYOND_PLANE:
-            raise ValueError(
-                f"{function.__name__} is for systems in the plane; of a system of {problem.dimension} variables "
-                f"{', '.join(BEYOND_PLANE)} are known"
-            )
-        return function(problem, *others, **kwargs)
+        return function(*problem_first(args, kwargs), **kwargs)
 
     return _signed(with_pair, 0)
 

@@ -55,9 +55,10 @@ def _letter(command: str) -> str:
 
 
 def equations_of(problem: Problem) -> list[str]:
-    """The motion with its numbers: of the second order where x₂ is a multiple of ẋ₁, else two rates; and its walls."""
+    """The motion with its numbers: of the second order where x₂ is a multiple of ẋ₁, else the rates; and its walls."""
     system, named = problem.system, len(problem.system.noise_sections) > 1
-    still, driven = np.zeros((2, 2)), dict[str, FloatArray]()
+    n = problem.dimension
+    still, driven = np.zeros((n, n)), dict[str, FloatArray]()
     for term in system.terms:
         line, size = affine(term.g), system.epsilon**term.order * np.array(term.matrix)
         letter = f"ξ_{term.noise}" if named and term.noise else "ξ"
@@ -65,21 +66,21 @@ def equations_of(problem: Problem) -> list[str]:
         still += offset * size
         if slope:
             name = letter if line else f"g({letter})"
-            driven[name] = driven.get(name, np.zeros((2, 2))) + slope * size
+            driven[name] = driven.get(name, np.zeros((n, n))) + slope * size
     speed = float(still[0, 1])
     first = [still[0, 0], *(each for matrix in driven.values() for each in matrix[0])]
-    is_second_order = speed != 0 and not any(first)
+    is_second_order = n == 2 and speed != 0 and not any(first)
     if is_second_order:
         scale = np.array([speed, 1.0])
         rows = [("ẍ", still[1] * scale, {name: each[1] * scale for name, each in driven.items()}, ("x", "ẋ"))]
     else:
-        names = "x₁", "x₂"
-        rows = [(f"d{names[i]}/dt", still[i], {key: each[i] for key, each in driven.items()}, names) for i in (0, 1)]
+        names = problem.system.states
+        rows = [(f"d{names[i]}/dt", still[i], {key: each[i] for key, each in driven.items()}, names) for i in range(n)]
     lines = [f"{left} = {_sum(constant, by_noise, states)}" for left, constant, by_noise, states in rows]
     for jump in system.jumps:
         factor = f"{math.exp(jump.log_factor):.10g}"
         at_wall = math.isclose(math.cos(jump.phase), 0.0, abs_tol=1e-12)
-        names = ("x", "ẋ") if is_second_order else ("x₁", "x₂")
+        names = ("x", "ẋ") if is_second_order else problem.system.states
         words = (
             f"|{names[1]}|⁺ = {factor} |{names[1]}|⁻ at {names[0]} = 0"
             if at_wall

@@ -36,6 +36,9 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
         FpsolveError: they cannot.
     """
     system, noise = problem.system, problem.noise
+    if problem.dimension > 2:
+        told = f"simulation is for systems in the plane, but this one has {problem.dimension} variables"
+        raise FpsolveError(f"{told}; use the finite elements")
     if len(noise.parts) > 1 and any(jump.log_factor and not is_steady(system, jump) for jump in system.jumps):
         told = "simulation of several noises is for walls over which none of them moves the phase"
         raise FpsolveError(f"{told}; use the finite elements")

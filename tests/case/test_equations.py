@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.case.vary import legend
 from fpsolve.cli import BAD_INPUT, main
 from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.model.problem import RTOL_BEYOND_PLANE
 from fpsolve.model.systems import EquationSystem, VibroImpactOscillator
 from fpsolve.output.records import key_of
 from fpsolve.study.solve import Numerics, everything
 from tests import snapshots
+from tests.oracles import kronecker
 
 SYSTEM = """\
 title = "mine"
@@ -137,6 +140,43 @@ def test_check_and_chart(tmp_path: Path) -> None:
         )
     )
     assert case.chart is not None
+
+
+VOLTAGE = """title = "An oscillator with a voltage"
+
+[system]
+variables = ["x", "v", "u"]
+drift = ["v", "-omega**2 * x - 2*zeta*omega * v + kappa * u - xi * x", "-kappa * v - u"]
+parameters = { omega = 1.0, zeta = 0.05, kappa = 0.5 }
+
+[noise]
+kind = "white"
+s = 0.8
+
+[output]
+quantities = ["moment", "eigenfunctions"]
+
+[moments]
+p = [2.0]
+"""
+STEADY = np.array([[0, 1, 0], [-1, -0.1, 0.5], [0, -0.5, -1]])
+DRIVEN = 0.8 * np.array([[0, 0, 0], [-1, 0, 0], [0, 0, 0]])
+
+
+def test_a_case_of_three_variables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its number is that of the second moments; what is for the phase alone is left out or refused in words."""
+    path = write(tmp_path, VOLTAGE)
+    assert load_case(path).rtol == RTOL_BEYOND_PLANE
+    assert main(["run", str(path), "--out", str(tmp_path), "--report"]) == 0
+    assert "directions of 3 variables are no surface" in capsys.readouterr().err
+    [curve] = json.loads((tmp_path / "mine/summary.json").read_text(encoding="utf-8"))["curves"]
+    expected, [found] = kronecker.white(STEADY, DRIVEN, 2), curve["moments"]
+    assert abs(found["value"] - expected) <= found["error_estimate"] <= 1e-5
+    assert curve["discretisation"]["waves"] >= 4
+    assert "du/dt = −0.5 v − u" in (tmp_path / "mine/report.html").read_text(encoding="utf-8")
+    for command, said in (("prove", "proofs are for systems"), ("simulate", "simulation is for systems")):
+        assert main([command, str(path), "--out", str(tmp_path)]) == BAD_INPUT
+        assert f"{said} in the plane" in capsys.readouterr().err
 
 
 def test_a_hundred_thousand_signs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

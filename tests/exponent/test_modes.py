@@ -17,6 +17,7 @@ from fpsolve import (
     stability_index,
 )
 from fpsolve.arrays import identity
+from fpsolve.errors import FpsolveError
 from fpsolve.exponent.modes import second_moments
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
 from tests.oracles import kronecker
@@ -164,7 +165,7 @@ def test_what_is_refused():
         PlaneSystem(terms)
     with pytest.raises(ValueError, match="the same for all terms"):
         LinearSystem([*terms, CoefficientMatrix(0, [[0.0, 1.0], [-1.0, 0.0]])])
-    with pytest.raises(ValueError, match="simulate is for systems in the plane"):
+    with pytest.raises(FpsolveError, match="simulation is for systems in the plane"):
         simulate(problem(OU), [1.0])
     heavy = NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.2)
     for noise in (Poisson(1.0, (0.1,), (1.0,)), heavy):

@@ -1,4 +1,4 @@
-"""A linear system in the plane written as equations: ẋ = v, v̇ = −ω²x − 2ζωv − ξx, with walls."""
+"""A linear system of two to four variables written as equations: ẋ = v, v̇ = −ω²x − 2ζωv − ξx, with walls."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
 from fpsolve.model.quantity import Quantity
 
 EPSILON = "epsilon"
+MOST_VARIABLES = 4
 _LAW = 1e-12
 """How near to 1 a wall's R is for a coefficient of restitution of 1."""
 _NEWTON = 60
@@ -71,7 +72,7 @@ def _as_table(value: Any) -> Any:
     return value if isinstance(value, dict | StatedParameter) else {"value": value}
 
 
-Pair = Annotated[tuple[str, str], Field(strict=False)]
+Texts = Annotated[tuple[str, ...], Field(strict=False, min_length=2, max_length=MOST_VARIABLES)]
 
 
 @dataclass(frozen=True)
@@ -89,25 +90,25 @@ class Wall:
 
 @dataclass(frozen=True)
 class EquationSystem(System):
-    """Two rates, each linear in two variables and affine in the noise, written as text; see `PlaneSystem.of_equations`.
+    """Rates, each linear in two to four variables and affine in the noise, as text; see `PlaneSystem.of_equations`.
 
     Σ εⁿ (A + ξ B) x has one matrix for each power n of a parameter called epsilon, constant and with the noise. Without
     such a parameter ε = 1, what is constant has the order 0 and the noise the order 1.
 
     Args:
-        variables: the names of the two.
+        variables: their names, two to four.
         drift: their rates.
         named: the values of the parameters by their names.
         noises: what the noise is called in the rates, and the section that states it, one pair.
-        walls: where the state is reflected.
+        walls: where the state is reflected, in the plane alone.
         quantities: what parameters are, by their names, as far as that is stated.
 
     Raises:
         TableError: one of these is not what it must be, with its place.
     """
 
-    variables: tuple[str, str]
-    drift: tuple[str, str]
+    variables: tuple[str, ...]
+    drift: tuple[str, ...]
     named: tuple[tuple[str, float], ...] = ()
     noises: tuple[tuple[str, str], ...] = (("xi", "noise"),)
     walls: tuple[Wall, ...] = ()
@@ -116,10 +117,10 @@ class EquationSystem(System):
     kind: ClassVar[str] = "equations"
     stated: ClassVar[Mapping[str, FieldInfo]] = {
         "variables": stated_field(
-            Annotated[Pair, parameter("the names of the two variables", 'variables = ["x", "v"]')]
+            Annotated[Texts, parameter("the names of the two to four variables", 'variables = ["x", "v"]')]
         ),
         "drift": stated_field(
-            Annotated[Pair, parameter("the rates of the two variables", 'drift = ["v", "-omega**2 * x - xi * x"]')]
+            Annotated[Texts, parameter("the rates of the variables", 'drift = ["v", "-omega**2 * x - xi * x"]')]
         ),
         "parameters": stated_field(
             Annotated[
@@ -148,10 +149,15 @@ class EquationSystem(System):
 
     def __post_init__(self) -> None:
         for key in ("variables", "drift"):
-            pair = tuple(each) if isinstance(each := getattr(self, key), list | tuple) else (each,)
-            if len(pair) != 2 or not all(isinstance(text, str) for text in pair):
-                raise TableError(f"got {shown(each)}; must be a list of two texts", key)
-            object.__setattr__(self, key, pair)
+            texts = tuple(each) if isinstance(each := getattr(self, key), list | tuple) else (each,)
+            if not 2 <= len(texts) <= MOST_VARIABLES or not all(isinstance(text, str) for text in texts):
+                raise TableError(f"got {shown(each)}; must be a list of two to four texts", key)
+            object.__setattr__(self, key, texts)
+        if len(self.drift) != len(self.variables):
+            counts = f"{len(self.drift)} rates of {len(self.variables)} variables"
+            raise TableError(
+                f"got {counts}; must be one rate for each variable, in their order; add or leave out some", "drift"
+            )
         for name, path in self._given_names():
             fault = name_fault(name) if isinstance(name, str) else "must be a text"
             if not fault and (name in self.stated or name == "kind"):
@@ -189,6 +195,9 @@ class EquationSystem(System):
                 raise TableError(f"{name} is in no rate; write it into drift{named}", "noises", name)
         if not self.terms:
             raise TableError("no rate has a term; write terms with the variables", "drift")
+        if self.walls and len(self.variables) > 2:
+            why = "a wall is solved in the plane alone: beyond it a wall holds many directions of the state, not one"
+            raise TableError(f"got a wall for {len(self.variables)} variables; {why}; leave walls out", "walls")
         jumps = self.jumps
         if len({jump.phase for jump in jumps}) < len(jumps):
             raise TableError("two walls are at one place; remove one of them", "walls")
@@ -256,6 +265,11 @@ class EquationSystem(System):
         return tuple(section for _, section in self.noises)
 
     @property
+    def states(self) -> Sequence[str]:
+        """The names of its variables; of a pair x₁ and x₂, as of any system in the plane."""
+        return self.variables if len(self.variables) > 2 else super().states
+
+    @property
     def values(self) -> Mapping[str, float | str]:
         return dict(self.named)
 
@@ -270,10 +284,10 @@ class EquationSystem(System):
         return replace(self, named=tuple({**known, **values}.items()))  # type: ignore[arg-type]
 
     @cached_property
-    def _rates(self) -> tuple[Form, Form]:
+    def _rates(self) -> tuple[Form, ...]:
         return self._rates_by("")
 
-    def _rates_by(self, by: str) -> tuple[Form, Form]:
+    def _rates_by(self, by: str) -> tuple[Form, ...]:
         """The rates, with their derivatives by a parameter. Raises `TableError`."""
         names = {name: constant(value, float(name == by)) for name, value in self.named}
         if EPSILON in names:
@@ -295,9 +309,9 @@ class EquationSystem(System):
             except ExpressionError as error:
                 raise TableError(str(error), "drift", i) from None
             rates.append(total)
-        return rates[0], rates[1]
+        return tuple(rates)
 
-    def _terms_of(self, rates: tuple[Form, Form], at: int) -> tuple[CoefficientMatrix, ...]:
+    def _terms_of(self, rates: Sequence[Form], at: int) -> tuple[CoefficientMatrix, ...]:
         """The terms of rates, of their values for `at` = 0, of their derivatives for 1."""
         has_orders = EPSILON in dict(self.named)
         names = {name: section[6:] for name, section in self.noises} if len(self.noises) > 1 else {}
@@ -305,7 +319,7 @@ class EquationSystem(System):
         for i, form in enumerate(rates):
             for (state, noise, power), series in form.parts.items():
                 order = power if has_orders else int(bool(noise))
-                matrix = matrices.setdefault((order, noise), np.zeros((2, 2)))
+                matrix = matrices.setdefault((order, noise), np.zeros((len(rates), len(rates))))
                 matrix[i, self.variables.index(state)] += series[at]
         return tuple(
             CoefficientMatrix(order, matrix.tolist(), identity if noise else one, names.get(noise, ""))

@@ -234,7 +234,7 @@ class PlaneSystem(System):
         noises: Mapping[str, str] | None = None,
         walls: Sequence[Mapping[str, float | str]] = (),
     ) -> EquationSystem:
-        """The system of two rates that are written as text, with exact derivatives by each of its parameters.
+        """The system of rates that are written as text, with exact derivatives by each of its parameters.
 
         >>> rates = "v", "-omega**2 * x - 2*zeta*omega * v - xi * x"  # ẍ + 2ζω ẋ + (ω² + ξ) x = 0
         >>> wall = {"at": "x = 0", "restitution": 0.8}
@@ -242,7 +242,7 @@ class PlaneSystem(System):
         ((0.0, 1.0), (-4.0, -0.4))
 
         Args:
-            variables: the names of the two.
+            variables: their names, two; three or four for a system beyond the plane, which has no walls.
             drift: their rates: linear in the variables and affine in the noise, of numbers, names, + - * / **, pi,
                 exp() and sqrt().
             parameters: values by names. One called epsilon is ε, in whose powers all coefficients must be polynomials.
