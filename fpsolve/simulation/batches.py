@@ -19,6 +19,7 @@ from fpsolve.simulation.coefficients import Coefficients
 from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
 from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
 from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator, starting_state
+from fpsolve.simulation.spaces import DrivenSpace, SwitchedSpace
 
 _PORTION_SECONDS = 0.1
 STEP_SECONDS = 2e-8
@@ -38,14 +39,15 @@ class Plan:
         motion, noise_step, step: the motion, one step of the noise, and its length.
         p: orders of the moments, shape (n,).
         paths: in one batch.
-        slice_steps: steps in one slice, the unit in which batches are advanced: one transient.
+        slice_steps: steps in one slice, the unit in which batches are advanced: one transient, of populations beyond
+            the plane without the time in which modes share the motion.
         settling: slices before the estimate begins.
         wanted: slices for the estimate.
         levels: the direct estimator has windows of 2⁰ … 2^(levels − 1) slices.
     """
 
     known: Coefficients
-    motion: DrivenMotion | SwitchedMotion | StruckMotion
+    motion: DrivenMotion | SwitchedMotion | StruckMotion | DrivenSpace | SwitchedSpace
     noise_step: Any
     step: float
     p: FloatArray
@@ -88,7 +90,7 @@ class _Paths:
 
     def __init__(self, plan: Plan, seed: SeedSequence) -> None:
         self.plan, self.rng = plan, default_rng(seed)
-        self.x, self.u, self.xi = starting_state(plan.noise, plan.paths, self.rng)
+        self.x, self.u, self.xi = starting_state(plan.noise, plan.paths, self.rng, dimension=plan.known.dimension)
         self.log_norm, self.push = np.zeros((2, plan.paths))
         self.state = self.x, self.u, self.xi, self.log_norm, self.push
         self.slices = -plan.settling

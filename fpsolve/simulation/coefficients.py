@@ -8,17 +8,26 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import expm
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System, affine, is_driven, is_steady, matrix_at, squared_frequency
 from fpsolve.simulation.motions import DrivenMotion, Rays, StruckMotion, SwitchedMotion
 from fpsolve.simulation.several import SplitMotion, drivers
+from fpsolve.simulation.spaces import DrivenSpace, SplitSpace, SwitchedSpace
 
 _FAR = 5.0
 """Standard deviations at which noise held to one side is compared with noise held to the other."""
 _UNRESOLVED = 1 / 30
 """Of the coefficient of [A₁, [A₁, A₀]] under white noise, its mean for given ∫dW and ∫W dt, as a share of s²h²."""
+
+_PARALLEL = 100.0
+"""The condition of the modes from which on they are no coordinates."""
+_ONE_WAY = 1e-12
+"""The ratio of two entries below which one of them is none but for rounding."""
+_FORGOTTEN, _LONGEST = 6.0, 1000
+"""Of a rate, the times that it needs; half-turns in which that of modes which hardly mix is taken to be over."""
 
 
 @dataclass(frozen=True)
@@ -26,16 +35,18 @@ class Coefficients:
     """A system as a noise moves it.
 
     The coordinates are those in which the order 0, where it turns, is a rotation times a growth, and else has two
-    entries of one size beside its diagonal. A linear map of the plane leaves Λ(p) alone.
+    entries of one size beside its diagonal; of more than two variables it has such blocks, see `_modal_coordinates`. A
+    linear map of the state leaves Λ(p) alone.
 
     Attributes:
         noise: which it is.
-        steady: A₀, shape (2, 2); under a chain A of each state, shape (states, 2, 2).
-        driven: A₁, shape (2, 2); under white noise that of dW, under a chain 0.
+        steady: A₀, shape (n, n); under a chain A of each state, shape (states, n, n).
+        driven: A₁, shape (n, n); under white noise that of dW, under a chain 0.
         strength: d ln‖x‖/dt for ξ = 1 at most; negative where it is ξ < 0 that makes more of it.
         fluctuation: the standard deviation of what the noise adds to d ln‖x‖/dt; of white noise to ln‖x‖ in a unit of
             time.
-        half_turn: π/ω; without rotation π times the time in which the direction of x is forgotten.
+        half_turn: π/ω, ω the largest; without rotation π times the time in which the direction of x is forgotten.
+        settling: the time in which it is forgotten how modes shared the motion, 0 in the plane.
         rays: the lines of the jumps.
         impulses: the matrices of impulses, shape (n, 2, 2); None without any.
     """
@@ -47,6 +58,7 @@ class Coefficients:
     fluctuation: float
     half_turn: float
     rays: Rays
+    settling: float = 0.0
     impulses: FloatArray | None = None
 
     @property
@@ -54,17 +66,25 @@ class Coefficients:
         """Whether steps of any length leave nothing out."""
         return self.steady.ndim == 3 or self.impulses is not None
 
-    def motion(self, h: float) -> DrivenMotion | SwitchedMotion | StruckMotion:
+    @property
+    def dimension(self) -> int:
+        """n."""
+        return self.steady.shape[-1]
+
+    def motion(self, h: float) -> DrivenMotion | SwitchedMotion | StruckMotion | DrivenSpace | SwitchedSpace:
         """The numbers that move paths by a step of length h."""
         if self.impulses is not None:
             return StruckMotion(_rows(self.steady[None]), self.impulses, self.rays)
+        if self.steady.ndim == 3 and self.dimension > 2:
+            return SwitchedSpace(self.steady, expm(h * self.steady), np.linalg.norm(self.steady, 2, axis=(1, 2)))
         if self.steady.ndim == 3:
             return SwitchedMotion(_rows(self.steady), self.rays)
         steady, driven = self.steady, self.driven
         double = _commutator(driven, _commutator(driven, steady))
         if self.noise.is_white:
             steady = steady + _UNRESOLVED * h * double
-        return DrivenMotion(_rows(np.array([steady, driven, _commutator(steady, driven), double])), self.rays)
+        matrices = np.array([steady, driven, _commutator(steady, driven), double])
+        return DrivenSpace(matrices) if self.dimension > 2 else DrivenMotion(_rows(matrices), self.rays)
 
     def noise_step(self, h: float, bias: float = 0.0) -> Any:
         """The step of the noise, see `Noise.step`."""
@@ -77,7 +97,7 @@ class Coefficients:
 
 @dataclass(frozen=True)
 class SplitCoefficients(Coefficients):
-    """A system as several noises move it; `driven` has a matrix for each, shape (noises, 2, 2), s with those of white.
+    """A system as several noises move it; `driven` has a matrix for each, shape (noises, n, n), s with those of white.
 
     Attributes:
         sizes: the standard deviation of ‖A_k‖ξ_k of each; of white noise in a unit of time.
@@ -89,7 +109,9 @@ class SplitCoefficients(Coefficients):
     def is_exact(self) -> bool:
         return False
 
-    def motion(self, h: float) -> SplitMotion:  # type: ignore[override]
+    def motion(self, h: float) -> SplitMotion | SplitSpace:  # type: ignore[override]
+        if self.dimension > 2:
+            return SplitSpace(self.driven, np.linalg.norm(self.driven, 2, axis=(1, 2)), expm(0.5 * h * self.steady))
         return SplitMotion(_rows(np.concatenate([self.steady[None], self.driven])), self.rays)
 
     def noise_step(self, h: float, bias: float = 0.0) -> Any:
@@ -102,36 +124,43 @@ class SplitCoefficients(Coefficients):
 def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
     """The matrices of a system under several noises."""
     moved, _ = noise.motion(system)
-    steady, driven, sizes = np.zeros((2, 2)), list[FloatArray](), list[tuple[float, bool]]()
+    zero = np.zeros((system.dimension, system.dimension))
+    steady, driven, sizes = zero.copy(), list[FloatArray](), list[tuple[float, bool]]()
     for term in moved.terms:
         if line := affine(term.g):
             steady += line[0] * system.epsilon**term.order * np.array(term.matrix)
-    even = _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)))
-    back, intensity = np.linalg.inv(even), 0.0
+    every = sum((np.abs(system.epsilon**term.order * np.array(term.matrix)) for term in system.terms), zero)
+    even = _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)), every)
+    back, intensity, intensities = np.linalg.inv(even), 0.0, list[float]()
     for name, part in noise.parts.items():
         own = [term for term in system.terms if is_driven(term.g) and term.noise == name]
         total = sum(
             (line[1] * system.epsilon**term.order * np.array(term.matrix) for term in own if (line := affine(term.g))),
-            np.zeros((2, 2)),
+            zero,
         )
         size = float(np.linalg.norm(even @ total @ back, 2))
         if part.is_white:
             sizes.append((size * math.sqrt(part.spectral_density(0.0)), True))
             driven.append(total if len(part.marks) else total * math.sqrt(part.spectral_density(0.0)))
             intensity += sizes[-1][0] ** 2
+            intensities.append(part.spectral_density(0.0) if len(part.marks) else 1.0)
         else:
             sizes.append((size * part.standard_deviation, False))
             driven.append(total)
-            intensity += 2 * sizes[-1][0] ** 2 * min(part.correlation_time, part.period or math.inf)
+            time = min(part.correlation_time, part.period or math.inf)
+            intensity += 2 * sizes[-1][0] ** 2 * time
+            intensities.append(2 * part.standard_deviation**2 * time)
     free = even @ matrix_at(moved, 0.0, slice(0, 1)) @ back
+    half_turn = math.pi / _rate(free, intensity)
     return SplitCoefficients(
         noise,
         even @ steady @ back,
         even @ np.array(driven) @ back,
         0.0,
         math.sqrt(intensity),
-        math.pi / _rate(free, intensity),
+        half_turn,
         _rays(system, noise, even, even @ steady @ back),
+        _settling(free, list(zip(intensities, even @ np.array(driven) @ back, strict=True)), half_turn),
         sizes=sizes,
     )
 
@@ -142,26 +171,27 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         return split_coefficients(system, noise)
     moved, diffusions = noise.motion(system)
     is_switched = noise.has_states and not noise.is_white
-    driven = np.zeros((2, 2))
+    driven = zero = np.zeros((system.dimension, system.dimension))
     if is_switched:
         steady = matrix_at(moved, noise.reached)
     else:
         lines = [(system.epsilon**term.order * np.array(term.matrix), affine(term.g)) for term in moved.terms]
-        steady = sum((line[0] * matrix for matrix, line in lines if line), np.zeros((2, 2)))
-        driven = sum((line[1] * matrix for matrix, line in lines if line), np.zeros((2, 2)))
+        steady = sum((line[0] * matrix for matrix, line in lines if line), zero)
+        driven = sum((line[1] * matrix for matrix, line in lines if line), zero)
         driven = sum((system.epsilon**each.order * np.array(each.matrix) for each in diffusions), driven)
     free = np.tensordot(noise.probabilities, steady, 1) if is_switched else matrix_at(moved, 0.0, slice(0, 1))
     if not free.any():
         free = steady.mean(axis=0) if is_switched else steady
-    even = _even_coordinates(free)
+    every = np.abs(steady).max(axis=0) if is_switched else np.abs(steady) + np.abs(driven)
+    even = _even_coordinates(free, every)
     back = np.linalg.inv(even)
     free, steady, driven = even @ free @ back, even @ steady @ back, even @ driven @ back
+    around = steady - np.tensordot(noise.probabilities, steady, 1) if is_switched else steady
     struck = noise.impulses(system)
     impulses = even @ np.array([each.matrix for each in struck]) @ back if struck else None
     if struck:
         strength = fluctuation = math.sqrt(sum(each.rate * each.strength**2 for each in struck))
     elif is_switched:
-        around = steady - np.tensordot(noise.probabilities, steady, 1)
         strength = fluctuation = math.sqrt(noise.probabilities @ np.sum(around**2, axis=(1, 2)) / 2)
     else:
         deviation = 1.0 if noise.is_white else noise.standard_deviation
@@ -169,30 +199,74 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         fluctuation = strength * deviation
         up, down = (np.linalg.eigvals(steady + side * _FAR * deviation * driven).real.max() for side in (1, -1))
         strength *= -1.0 if down > up else 1.0
-    intensity = fluctuation**2 * (1.0 if noise.is_white else 2 * noise.correlation_time)
+    time = 1.0 if noise.is_white else 2 * noise.correlation_time
+    half_turn = math.pi / _rate(free, fluctuation**2 * time)
+    if is_switched:
+        moves = [(time * share, each) for share, each in zip(noise.probabilities, around, strict=True)]
+    else:
+        moves = [(time if noise.is_white else time * noise.standard_deviation**2, driven)]
     return Coefficients(
         noise,
         steady,
         driven,
         strength,
         fluctuation,
-        math.pi / _rate(free, intensity),
+        half_turn,
         _rays(system, noise, even, steady),
+        _settling(free, moves, half_turn),
         impulses,
     )
 
 
 def _rate(free: FloatArray, intensity: float) -> float:
     """ω where a motion turns, else the rate at which two directions come together."""
-    square = float(squared_frequency(free))
+    n = len(free)
+    square = float(squared_frequency(free)) if n == 2 else _fastest(free)
     if square > 0:
         return math.sqrt(square)
-    shear = float(np.linalg.norm(free - 0.5 * np.trace(free) * np.eye(2), 2))
+    shear = float(np.linalg.norm(free - np.trace(free) / n * np.eye(n), 2))
     return max(math.sqrt(-square), (shear**2 * intensity) ** (1 / 3)) or intensity or 1.0
 
 
-def _even_coordinates(free: FloatArray) -> FloatArray:
-    """S for which S A S⁻¹ = α + ω((0, 1), (−1, 0)), or without rotation has entries of one size off its diagonal."""
+def _fastest(free: FloatArray) -> float:
+    """The largest ω², or without rotation minus the square of half the difference of the eigenvalues."""
+    values = np.linalg.eigvals(free)
+    omega, spread = float(np.max(values.imag)), float(np.ptp(values.real)) / 2
+    return omega**2 if omega > 0 else -(spread**2)
+
+
+def _settling(free: FloatArray, driven: Sequence[tuple[float, FloatArray]], half_turn: float) -> float:
+    """Beyond the plane six times that in which E‖x‖² forgets how the modes shared it; 0 in the plane.
+
+    It is that under white noises, Σ ½ I (B ⊗ 1 + 1 ⊗ B)² for pairs (I, B), on symmetric matrices: where the noise has a
+    memory, about. What turns meanwhile is forgotten sooner, as it averages out.
+    """
+    n = len(free)
+    if n == 2:
+        return 0.0
+    pairs = [(i, j) for i in range(n) for j in range(i + 1)]
+    even = np.zeros((n * n, len(pairs)))
+    for k, (i, j) in enumerate(pairs):
+        even[i * n + j, k] = even[j * n + i, k] = 1.0
+    even /= np.linalg.norm(even, axis=0)
+    one = np.eye(n)
+    rates = np.kron(free, one) + np.kron(one, free)
+    for intensity, matrix in driven:
+        both = np.kron(matrix, one) + np.kron(one, matrix)
+        rates = rates + 0.5 * intensity * both @ both
+    values = np.linalg.eigvals(even.T @ rates @ even)
+    first = int(np.argmax(values.real))
+    rate = float(np.min(np.abs(np.delete(values, first) - values[first].real)))
+    return min(_FORGOTTEN / rate if rate else math.inf, _LONGEST * half_turn)
+
+
+def _even_coordinates(free: FloatArray, every: FloatArray) -> FloatArray:
+    """S for which S A S⁻¹ = α + ω((0, 1), (−1, 0)), or without rotation has entries of one size off its diagonal.
+
+    Beyond the plane the modes of A have such blocks; `every` is how large entries of all matrices are.
+    """
+    if len(free) > 2:
+        return _modal_coordinates(free, every)
     (p, q), (r, _) = free - 0.5 * np.trace(free) * np.eye(2)
     square = -(p * p + q * r)
     if square > 0:
@@ -201,8 +275,43 @@ def _even_coordinates(free: FloatArray) -> FloatArray:
     return np.diag([1.0, math.sqrt(abs(q / r)) if q * r else 1.0])
 
 
+def _modal_coordinates(free: FloatArray, every: FloatArray) -> FloatArray:
+    """S for which S A S⁻¹ has a block for each mode, scaled so that modes drive each other alike.
+
+    Where modes are nearly parallel the given coordinates are kept, but for their scales.
+    """
+    scales = _balance(every)
+    values, vectors = np.linalg.eig(free * scales / scales[:, None])
+    columns, sizes = list[FloatArray](), list[int]()
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value.imag >= 0:
+            parts = [vector.real, vector.imag] if value.imag else [vector.real]
+            columns += [part / np.linalg.norm(vector) for part in parts]
+            sizes.append(len(parts))
+    modes = np.array(columns).T
+    if not np.linalg.cond(modes) < _PARALLEL:
+        return np.diag(1 / scales)
+    back = np.linalg.inv(modes) / scales
+    of_mode = np.repeat(np.eye(len(sizes)), sizes, axis=1)
+    shares = of_mode @ np.abs(back) @ every @ np.abs(scales[:, None] * modes) @ of_mode.T
+    return back / (_balance(shares) @ of_mode)[:, None]
+
+
+def _balance(matrix: FloatArray) -> FloatArray:
+    """The scales d for which entries a_ij d_j/d_i and a_ji d_i/d_j are alike, as far as both are there."""
+    size = np.abs(matrix)
+    small, large = np.minimum(size, size.T), np.maximum(size, size.T)
+    pairs = [(i, j) for i, j in zip(*np.nonzero(small > _ONE_WAY * large), strict=True) if i < j]
+    sides, gaps = np.zeros((len(pairs), len(size))), np.zeros(len(pairs))
+    for k, (i, j) in enumerate(pairs):
+        sides[k, i], sides[k, j], gaps[k] = 1.0, -1.0, 0.5 * math.log(size[i, j] / size[j, i])
+    return np.exp(np.linalg.lstsq(sides, gaps, rcond=None)[0])
+
+
 def _rays(system: System, noise: Noise, even: FloatArray, steady: FloatArray) -> Rays:
     """The lines of the jumps in even coordinates."""
+    if not system.jumps:
+        return Rays(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
     phases = np.array([jump.phase for jump in system.jumps])
     along = np.stack([np.cos(phases), -np.sin(phases)], axis=1) @ even.T
     along /= np.linalg.norm(along, axis=1, keepdims=True)

@@ -34,6 +34,7 @@ from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.kernels import TALLIES
 from fpsolve.simulation.setup import (
     BATCHES,
+    FEWER,
     PATHS,
     TRANSIENTS,
     Estimator,
@@ -56,8 +57,8 @@ DRIFT = 4.0
 _KEPT = 0.3
 """The share of effective paths that a long window of the direct estimator must leave."""
 _LEVELS = 12
-_SETTLING = 9
-"""Slices in which a population finds its law."""
+_SETTLING, _LONGER = 9, 2
+"""Slices in which a population finds its law, and times that modes have beyond the plane to share the motion."""
 
 
 @dataclass(frozen=True)
@@ -161,12 +162,13 @@ def simulate(
     none, and KeyboardInterrupt is raised.
 
     Args:
-        oscillator, noise: any linear motion in the plane, an oscillator without its c₂ and c₃, and its noise; or one
-            `Problem` of both, in their place or as `problem`.
+        oscillator, noise: any linear motion of two to four variables, an oscillator without its c₂ and c₃, and its
+            noise; or one `Problem` of both, in their place or as `problem`.
         p: orders of the moments, one or several.
         estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
         paths: how many; a multiple of 32 is used.
-        time: length of the paths after the transient; 64 transients if None. Whole transients are used.
+        time: length of the paths after the transient; 64 transients if None, and 16 beyond the plane, where
+            they are longer. Whole transients are used.
         step: time step; None chooses one, which loses some 0.5 % of the passages of a ray that coloured noise lets the
             phase pass both ways.
         seed: ≥ 0.
@@ -185,9 +187,11 @@ def simulate(
     for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
         raise ValueError(f"{name}: {sentence}")
     h = default_step(oscillator, noise) if step is None else step
-    settling = transient(oscillator, noise)
-    wanted = TRANSIENTS if time is None else max(2, round(time / settling))
-    known = coefficients(oscillator, noise)
+    settling, known = transient(oscillator, noise), coefficients(oscillator, noise)
+    is_plane, is_direct = known.settling == 0, estimator == "direct"
+    length = settling if is_direct else transient(oscillator, noise, is_mixed=False)
+    time = (TRANSIENTS if is_plane else FEWER) * settling if time is None else time
+    wanted = max(2, round(time / length))
     plan = Plan(
         known=known,
         motion=known.motion(h),
@@ -196,10 +200,10 @@ def simulate(
         p=np.atleast_1d(np.array(p, dtype=float)),
         estimator=estimator,
         paths=math.ceil(paths / BATCHES),
-        slice_steps=round(settling / h),
-        settling=1 if estimator == "direct" else _SETTLING,
+        slice_steps=round(length / h),
+        settling=max(1 if is_direct else _SETTLING, math.ceil(_LONGER * known.settling / length)),
         wanted=wanted,
-        levels=min(_LEVELS, wanted.bit_length()) if estimator == "direct" else 0,
+        levels=min(_LEVELS, wanted.bit_length()) if is_direct else 0,
     )
     # each batch has a stream of random numbers of its own
     seeds = [each.spawn(1 + plan.p.size) for each in np.random.SeedSequence(seed).spawn(BATCHES)]

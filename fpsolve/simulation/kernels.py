@@ -2,8 +2,8 @@
 
 Sums and assignments are loops: those of whole arrays take numba seconds to compile, most for words of their errors.
 
-What moves them is a motion of `motions` and the `step` of the kind of noise. State: x, u and that of the noise of each
-path, see `motions`, changed in place.
+What moves them is a motion of `motions`, `several` or `spaces`, and the `step` of the kind of noise. State: x, u and
+that of the noise of each path, see `motions` and `spaces`, changed in place.
 """
 
 from __future__ import annotations
@@ -38,6 +38,34 @@ def _moved_by_its_kind(m, noise, h, x, u, xi, log_norm, push, room, rng):  # typ
     return m.instance_class.move
 
 
+def _normalise(x, u, log_norm):  # type: ignore[no-untyped-def]
+    """Bring all states to the norm 1; this is what numba replaces by the number of their variables."""
+    raise NotImplementedError
+
+
+@overload(_normalise)
+def _normalised_by_shape(x, u, log_norm):  # type: ignore[no-untyped-def]
+    def plane(x, u, log_norm):  # type: ignore[no-untyped-def]
+        for i in range(x.size):
+            norm = math.sqrt(x[i] * x[i] + u[i] * u[i])
+            log_norm[i] += math.log(norm)
+            x[i] /= norm
+            u[i] /= norm
+
+    def space(x, u, log_norm):  # type: ignore[no-untyped-def]
+        for i in range(x.size):
+            square = x[i] * x[i]
+            for k in range(u.shape[0]):
+                square += u[k, i] * u[k, i]
+            norm = math.sqrt(square)
+            log_norm[i] += math.log(norm)
+            x[i] /= norm
+            for k in range(u.shape[0]):
+                u[k, i] /= norm
+
+    return plane if u.ndim == 1 else space
+
+
 @compiled
 def advance(m, noise, h, x, u, xi, log_norm, push, steps, interval, rng):  # type: ignore[no-untyped-def]
     """Advance paths by `steps` steps of length h, in place, and return how often they crossed lines of jumps.
@@ -54,15 +82,11 @@ def advance(m, noise, h, x, u, xi, log_norm, push, steps, interval, rng):  # typ
     crossed = 0
     for first in range(0, x.size, CHUNK):
         part = slice(first, min(first + CHUNK, x.size))
-        xs, us, xis, logs, pushes = x[part], u[part], xi[..., part], log_norm[part], push[part]
+        xs, us, xis, logs, pushes = x[part], u[..., part], xi[..., part], log_norm[part], push[part]
         for step in range(1, steps + 1):
             crossed += _move(m, noise, h, xs, us, xis, logs, pushes, room, rng)  # type: ignore[no-untyped-call]
             if step % interval == 0 or step == steps:
-                for i in range(xs.size):
-                    norm = math.sqrt(xs[i] * xs[i] + us[i] * us[i])
-                    logs[i] += math.log(norm)
-                    xs[i] /= norm
-                    us[i] /= norm
+                _normalise(xs, us, logs)  # type: ignore[no-untyped-call]
     return crossed
 
 
@@ -155,8 +179,9 @@ def _resample(x, u, xi, log_weights, ancestors, rng):  # type: ignore[no-untyped
         chosen[i] = k
         mark += spacing
     _choose(x, chosen)
-    _choose(u, chosen)
     _choose(ancestors, chosen)
+    for numbers in u.reshape(-1, n):
+        _choose(numbers, chosen)
     for numbers in xi.reshape(-1, n):
         _choose(numbers, chosen)
     for i in range(n):

@@ -20,8 +20,8 @@ SPLIT = 0.06
 """The turn, growth or kick in one step at most where several noises move the state in turn."""
 BATCHES = 32
 """Independent sets of paths, from whose differences the errors are read."""
-PATHS, TRANSIENTS = 32_768, 64
-"""Defaults: how many paths, and how many transients long they are."""
+PATHS, TRANSIENTS, FEWER = 32_768, 64, 16
+"""Defaults: how many paths, and how many transients long they are, in the plane and beyond it."""
 MAX_PATHS = 10_000_000
 PROGRESS_STEPS = 100
 """How often each stretch of a simulation reports progress."""
@@ -36,9 +36,6 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
         FpsolveError: they cannot.
     """
     system, noise = problem.system, problem.noise
-    if problem.dimension > 2:
-        told = f"simulation is for systems in the plane, but this one has {problem.dimension} variables"
-        raise FpsolveError(f"{told}; use the finite elements")
     if len(noise.parts) > 1 and any(jump.log_factor and not is_steady(system, jump) for jump in system.jumps):
         told = "simulation of several noises is for walls over which none of them moves the phase"
         raise FpsolveError(f"{told}; use the finite elements")
@@ -75,19 +72,20 @@ def check_settings(problem: Problem, p: float | Sequence[float], estimator: Esti
 def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
     """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
 
-    For A₀ = ω((0, 1), (−1, 0)) + D and A₁ these are ω h ≤ ½, ‖D‖ h ≤ ⅛, ‖A₁‖ std(ξ) h ≤ ⅛, or under white noise
-    ‖A₁‖² h ≤ ⅛, and the `largest_step` of the noise. Under a chain or impulses, where a step is exact, it is 1/(2π)
-    half-turns.
+    For A₀ = ω((0, 1), (−1, 0)) + D, beyond the plane Ω + D with Ωᵀ = −Ω and ‖Ω‖ = ω, and for A₁ these are ω h ≤ ½,
+    ‖D‖ h ≤ ⅛, ‖A₁‖ std(ξ) h ≤ ⅛, or under white noise ‖A₁‖² h ≤ ⅛, and the `largest_step` of the noise. Under a chain
+    or impulses, where a step is exact, it is 1/(2π) half-turns.
     """
     known = coefficients(oscillator, noise)
     if known.is_exact:
         return 0.5 * known.half_turn / math.pi, "the frequency"
-    turn = 0.5 * (known.steady[0, 1] - known.steady[1, 0])
-    rest = float(np.linalg.norm(known.steady - turn * np.array([[0.0, 1.0], [-1.0, 0.0]]), 2))  # may underflow
+    turning = 0.5 * (known.steady - known.steady.T)
+    turn = float(np.linalg.norm(turning, 2))
+    rest = float(np.linalg.norm(known.steady - turning, 2))  # may underflow
     if len(noise.parts) > 1:
         strengths = [SPLIT / (size**2 if is_white else size) for size, is_white in known.sizes if size]  # type: ignore[attr-defined]
         split = {
-            "the frequency": 2 * SPLIT / abs(turn) if turn else math.inf,
+            "the frequency": 2 * SPLIT / turn if turn else math.inf,
             "the damping": SPLIT / rest if rest else math.inf,
             "the strength of the noise": min(strengths, default=math.inf),
             "the correlation time of the noise": noise.largest_step,
@@ -96,7 +94,7 @@ def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
         return split[reason], reason
     driven = float(np.linalg.norm(known.driven, 2))
     limits = {
-        "the frequency": 0.5 / abs(turn) if turn else math.inf,
+        "the frequency": 0.5 / turn if turn else math.inf,
         "the damping": 0.125 / rest if rest else math.inf,
         "the strength of the noise": math.inf,
         "the correlation time of the noise": noise.largest_step,
@@ -109,15 +107,16 @@ def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
     return limits[reason], reason
 
 
-def transient(oscillator: System, noise: Noise) -> float:
+def transient(oscillator: System, noise: Noise, *, is_mixed: bool = True) -> float:
     """The time after which ln E‖x‖^p grows like Λ(p) t: at least two half-turns π/ω and eight correlation times.
 
     It is a whole number of half-turns, in which the oscillation cancels that the start from the stationary law leaves
     in weak noise; beside a harmonic load, with which the growth goes up and down for ever, a whole number of periods.
+    Beyond the plane it is, if `is_mixed`, at least as long as the modes remember how they shared the motion.
     """
-    half_turn, unit = coefficients(oscillator, noise).half_turn, _repeated(oscillator, noise)
+    known, unit = coefficients(oscillator, noise), _repeated(oscillator, noise)
     relaxation_time = max((part.relaxation_time for part in noise.parts.values() if not part.period), default=0.0)
-    return unit * math.ceil(max(2 * half_turn, 8 * relaxation_time) / unit)
+    return unit * math.ceil(max(2 * known.half_turn, 8 * relaxation_time, is_mixed * known.settling) / unit)
 
 
 def default_step(oscillator: System, noise: Noise) -> float:
@@ -165,11 +164,15 @@ def obstacles(
 
 
 def starting_state(
-    noise: Noise, paths: int, rng: np.random.Generator, amplitude: float = 1.0
+    noise: Noise, paths: int, rng: np.random.Generator, amplitude: float = 1.0, dimension: int = 2
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """x, u and the state of the noise, of paths of one amplitude, with uniform phases and stationary noise.
+    """x, u and the state of the noise, of paths of one amplitude, with uniform directions and stationary noise.
 
-    The phases are in front of the wall, where they stand for all.
+    The phases are in front of the wall, where they stand for all. Beyond the plane u has a row for each variable but x.
     """
+    if dimension > 2:
+        state = rng.standard_normal((dimension, paths))
+        state *= amplitude / np.linalg.norm(state, axis=0)
+        return state[0].copy(), state[1:].copy(), noise.start(paths, rng)
     phase = rng.uniform(0, math.pi, paths)
     return amplitude * np.sin(phase), amplitude * np.cos(phase), noise.start(paths, rng)

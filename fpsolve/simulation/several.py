@@ -57,7 +57,7 @@ class SplitMotion(NamedTuple):
     def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
         """As that of a `DrivenMotion`, with a tuple of drivers as the step of the noise."""
         integrals = np.empty((m.matrices.shape[0] - 1, x.size))
-        _integrate_all(noise, xi, h, integrals, 0, room, push, rng)  # type: ignore[no-untyped-call]
+        integrate_all(noise, xi, h, integrals, 0, room, push, rng)
         return step_split(m, h, x, u, integrals, log_norm, rng)
 
 
@@ -89,6 +89,12 @@ def _integrated_one_by_one(noises, state, h, integrals, at, room, push, rng):  #
         _integrate_all(noises[1:], state, h, integrals, at + 1, room, push, rng)  # type: ignore[no-untyped-call]
 
     return one_and_the_rest
+
+
+@compiled
+def integrate_all(noises, state, h, integrals, at, room, push, rng):  # type: ignore[no-untyped-def]
+    """∫ξ dt of every noise over a step, from the row `at` on."""
+    _integrate_all(noises, state, h, integrals, at, room, push, rng)  # type: ignore[no-untyped-call]
 
 
 def _integrate(driver, state, h, integral, room, push, rng):  # type: ignore[no-untyped-def]

@@ -13,13 +13,13 @@ from fpsolve import (
     lyapunov_exponent,
     make_mesh,
     moment_lyapunov,
-    simulate,
     stability_index,
 )
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.modes import second_moments
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
+from fpsolve.simulation.response import stationary_response
 from tests.oracles import kronecker
 
 FREE = np.array([[0, 1, 0, 0], [-1, -0.1, 0, 0], [0, 0, 0, 1], [0, 0, -2.56, -0.16]])
@@ -165,8 +165,8 @@ def test_what_is_refused():
         PlaneSystem(terms)
     with pytest.raises(ValueError, match="the same for all terms"):
         LinearSystem([*terms, CoefficientMatrix(0, [[0.0, 1.0], [-1.0, 0.0]])])
-    with pytest.raises(FpsolveError, match="simulation is for systems in the plane"):
-        simulate(problem(OU), [1.0])
+    with pytest.raises(FpsolveError, match="the nonlinear response is that of a VibroImpactOscillator"):
+        stationary_response(problem(OU), 0.1, 0.1, paths=32, time=1.0, step=0.1, seed=0)
     heavy = NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.2)
     for noise in (Poisson(1.0, (0.1,), (1.0,)), heavy):
         with pytest.raises(ValueError, match="beyond the plane nothing is solved"):

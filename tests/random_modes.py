@@ -1,0 +1,135 @@
+"""λ, Λ(1) and Λ(−1) of random linear systems of three and four variables: finite elements against the simulation.
+
+`python -m tests.random_modes [first last]` prints for each system what both give, how far they are from each other in
+standard errors, and the errors stated; at last how many are given, refused and wrong. Damping is 0.1 % to 30 %, noise
+weak to strong: white, Ornstein-Uhlenbeck, telegraph, and a filter's.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+
+import numpy as np
+
+from fpsolve import OrnsteinUhlenbeck, Problem, lyapunov_exponent, moment_lyapunov
+from fpsolve.arrays import FloatArray, identity
+from fpsolve.errors import FpsolveError
+from fpsolve.exponent.adapt import Budget
+from fpsolve.model import CoefficientMatrix, Filter, LinearSystem, Telegraph, White
+from fpsolve.model.noise import Noise
+from fpsolve.simulation.coefficients import coefficients
+from fpsolve.simulation.estimators import MonteCarlo, simulate
+from fpsolve.simulation.setup import default_step, transient
+from tests.random_simulations import Outcome
+
+ORDERS = (1.0, -1.0)
+RTOL, SECONDS, SYSTEMS, MOST = 1e-5, 60.0, 60, 4.0
+KINDS = ("white", "ornstein-uhlenbeck", "telegraph", "filter")
+PATH_STEPS = 3e7
+"""Of one simulation, about: some seconds."""
+
+
+def drawn(seed: int) -> tuple[str, Problem]:
+    """What it is called, and the problem: kinds and dimensions in turn."""
+    rng = np.random.default_rng([2031, seed])
+    kind, n = KINDS[seed % 4], 3 + seed // 4 % 2
+    frequencies = np.cumprod([1.0, rng.uniform(1.1, 3.0)])
+    dampings = np.exp(rng.uniform(math.log(1e-3), math.log(0.3), 2))
+    steady, driven = np.zeros((n, n)), np.zeros((n, n))
+    for k in range(n // 2):
+        omega, at = frequencies[k], slice(2 * k, 2 * k + 2)
+        steady[at, at] = [[0.0, omega], [-omega, -2 * dampings[k] * omega]]
+    if n == 3:  # an oscillator with a current that it drives and that acts upon it
+        decay, coupling = rng.uniform(0.2, 2.0), rng.uniform(0.05, 0.5)
+        steady[2, 2], steady[2, 1], steady[1, 2] = -decay, coupling, -coupling
+        driven[1::2, 0], driven[1, 2], driven[2] = 1.0, rng.normal() / 2, rng.normal(size=3) / 3
+    else:
+        driven[np.ix_((1, 3), (0, 2))] = rng.normal(size=(2, 2))
+        driven[np.ix_((1, 3), (1, 3))] = rng.normal(size=(2, 2)) / 4
+    driven *= math.exp(rng.uniform(math.log(0.05), math.log(0.8))) / np.linalg.norm(driven, 2)
+    terms = CoefficientMatrix(0, steady.tolist()), CoefficientMatrix(1, driven.tolist(), identity)
+    return f"{kind}, n = {n}", Problem(LinearSystem(terms), _noise(kind, rng))
+
+
+def _noise(kind: str, rng: np.random.Generator) -> Noise:
+    """Of a standard deviation of 1 and correlation times from 0.3 to 2, or s = 1."""
+    memory = math.exp(rng.uniform(math.log(0.3), math.log(2.0)))
+    match kind:
+        case "white":
+            return White(s=1.0)
+        case "telegraph":
+            return Telegraph(a=1.0, k=0.5 / memory)
+        case "ornstein-uhlenbeck":
+            return OrnsteinUhlenbeck(alpha=1 / memory, sigma=math.sqrt(2 / memory))
+    omega, zeta = rng.uniform(0.7, 3.0), rng.uniform(0.2, 0.9)
+    return Filter(omega, zeta, 1 / Filter(omega, zeta, 1.0).standard_deviation)
+
+
+def by_simulation(problem: Problem, *, path_steps: float = PATH_STEPS, seed: int = 1) -> MonteCarlo:
+    """By populations, some 24 transients long, of 4096 paths or as many as the path-steps allow."""
+    parts = problem.system, problem.noise
+    length = max(2 * transient(*parts), 24 * transient(*parts, is_mixed=False))
+    steps = (length + 2 * coefficients(*parts).settling) / default_step(*parts)
+    paths = min(32768, max(4096, 32 * round(path_steps / steps / 32)))
+    return simulate(problem, list(ORDERS), estimator="population", paths=paths, time=length, seed=seed)
+
+
+def by_elements(problem: Problem) -> list[tuple[float, float] | str]:
+    """λ and Λ(p) with the errors stated, or why there is none."""
+    budget, found = Budget(seconds=SECONDS), list[tuple[float, float] | str]()
+    try:
+        rate = lyapunov_exponent(problem, rtol=RTOL, budget=budget)
+        found.append((rate.value, rate.error_estimate))
+    except FpsolveError as failure:
+        found.append(str(failure))
+    for p in ORDERS:
+        try:
+            made = moment_lyapunov(problem, p, rtol=RTOL, budget=budget)
+            found.append((float(made.value[0]), float(made.error_estimate[0])))
+        except FpsolveError as failure:
+            found.append(str(failure))
+    return found
+
+
+def outcomes(problem: Problem, *, path_steps: float = PATH_STEPS) -> list[Outcome | str]:
+    """λ and Λ(p) by both, or why the elements give none. A number that the simulation does not give is NaN."""
+    made = by_simulation(problem, path_steps=path_steps)
+    moments = [(each.value or math.nan, each.standard_error or math.nan) for each in made.estimates]
+    simulated = [(made.lyapunov_exponent, made.lyapunov_exponent_error), *moments]
+    return [
+        each if isinstance(each, str) else Outcome(*each, *pair)
+        for each, pair in zip(by_elements(problem), simulated, strict=True)
+    ]
+
+
+def main(first: int = 0, last: int = SYSTEMS - 1) -> None:
+    """Print a line for each number, and how many are given, refused and wrong."""
+    given = refused = wrong = unknown = systems = 0
+    sizes: list[FloatArray] = []
+    for seed in range(first, last + 1):
+        kind, problem = drawn(seed)
+        started = time.process_time()
+        found = outcomes(problem)
+        print(f"{seed:3d} {kind}, {time.process_time() - started:.1f} s", flush=True)
+        for name, each in zip(("λ", *(f"Λ({p:g})" for p in ORDERS)), found, strict=True):
+            if isinstance(each, str):
+                refused += 1
+                print(f"      {name:6s} refused: {' '.join(each.split())[:200]}", flush=True)
+                continue
+            given += 1
+            unknown += not math.isfinite(each.deviation)
+            wrong += abs(each.deviation) > MOST
+            sizes.append(np.array(abs(each.deviation)))
+            sign = " WRONG" if abs(each.deviation) > MOST else ""
+            print(f"      {name:6s} {each}, stated {each.stated:.1e}{sign}", flush=True)
+        systems += not any(isinstance(each, str) for each in found)
+    print(
+        f"{systems} of {last - first + 1} systems given in full; of the numbers {given} given, {refused} refused, "
+        f"{wrong} wrong, beyond {MOST:g} standard errors, {unknown} without one by simulation"
+    )
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
