@@ -31,7 +31,7 @@ class Remedy(StrEnum):
     REACH = "use a mesh that reaches there, or let it be chosen"
     BUDGET = "use a larger rtol or a larger budget"
     SMALLER_RTOL = "use a smaller rtol"
-    ROUNDING = "as rounding limits it"
+    ROUNDING = "keep this, which rounding limits"
     BOTH_AXES = "use more cells, in the phase and in the noise"
     PHASE = "use more cells in the phase"
     DEGREES = "use more or higher-degree cells"
@@ -177,7 +177,7 @@ class Code(Enum):
     )
     INDEX_RTOL_MISSED = (
         "warning: rtol = {rtol:g} is not met by {symbol}: {value:.6g} has an estimated error of {error:.1e}; "
-        "{remedy:?{remedy}, or }use a larger rtol"
+        "{remedy:?{remedy}, or use a larger rtol¦accept it by a larger rtol, or refine its mesh by a smaller one}"
     )
     CARRIED_ELSEWHERE = (
         "warning: Λ({p:g}) may be larger: {has_tails:?noise with heavy tails¦slow noise} may carry the moment near "
@@ -228,9 +228,9 @@ class Code(Enum):
         "to the delta law alone"
     )
     STRONG_NOISE = (
-        "note: Eq. (37) is for weak noise{is_reduced:?, and here for the reduced one}: from |p| = {first:.3g} on, what "
-        "it leaves out, epsilon^4 and higher, exceeds {most:.0%} of its terms, most at p = {p:.3g}, where it is "
-        "{rest:.3g}, {size:.0%}"
+        "note: Eq. (37) is for weak noise{is_reduced:?, and here for the reduced one}: do not rely on it from "
+        "|p| = {first:.3g} on, as Λ(p) differs from it by more than {most:.0%} of its terms; most at p = {p:.3g}, by "
+        "{rest:.3g}, which is {size:.0%}"
     )
     NO_SENSITIVITIES = "note: no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
     UNUSED = "note: {keys}: in no rate and in no restitution, so that nothing depends on it"
@@ -266,9 +266,9 @@ class Code(Enum):
         "infinite; use the finite elements"
     )
     FEW_PATHS = (
-        "warning: no estimate of Λ(p) at p = {p:g}: too few effective paths carry the mean, {low:.3g}{high:? to "
-        '{high:.3g}} of the {needed} that are needed; use {is_direct:?estimator = "population", or more paths¦more '
-        "paths}"
+        "warning: no estimate of Λ(p) at p = {p:g}: too few effective {is_direct:?windows¦paths} carry the mean, "
+        '{low:.0f}{high:? to {high:.0f}} where {needed} are needed; use {is_direct:?estimator = "population", or more '
+        "paths¦more paths}"
     )
     TWO_PLACES = (
         "warning: Λ({p:g}): populations that start in two places differ by {gap:.3g}, {size:.0f} standard errors: the "

@@ -491,7 +491,7 @@ class _Search:
             last, is_thin = self.failure, isinstance(self.failure, NotConverged)
             said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
-        raise NotConverged(told, best, Remedy.BUDGET)
+        raise NotConverged(told, best, None if reason.code is Code.ROUNDED else Remedy.BUDGET)  # a budget rounds, too
 
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Discretisation:

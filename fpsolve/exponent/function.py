@@ -140,7 +140,7 @@ class MomentLyapunovFunction(Result):
         is_meaningless = ~(error <= MEANINGLESS * np.maximum(np.abs(value), scale)) & (points != 0)
         for i in np.flatnonzero(is_meaningless):
             estimate = Estimate(float(value[i]), float(error[i]), float(scale[i]), quantity=moment_at(points[i]))
-            checked(estimate, self.solver.near.remedy, float(points[i]))
+            checked(estimate, self.solver.near.refinement, float(points[i]))
         return MomentLyapunov(
             p=points,
             value=value,
@@ -284,7 +284,7 @@ def nonzero_root(
         if abs(new - p) <= max(least, 0.1 * error / slope) or 0 < high - low <= 10 * least:
             found = Estimate(p, error / slope + abs(new - p), scale=1.0, quantity=STABILITY_INDEX)
             if found.relative_error <= solver.rtol or tolerance or solver.mesh is not None or solver.classes:
-                return checked(found, solver.near.remedy)
+                return checked(found, solver.near.refinement)
             tolerance = partial(_share_of, PRECISE * solver.rtol * slope * max(1.0, abs(p)))
             low, high = max(ends[0], low - 2 * found.error_estimate), min(ends[1], high + 2 * found.error_estimate)
             continue

@@ -299,7 +299,7 @@ class ExponentSolver:
             try:
                 solution = self.solution(float(points[i]))
                 if points[i] != 0:  # where Λ = 0 has no scale
-                    checked(self.estimate(solution), self.near.remedy, solution.pair.p)
+                    checked(self.estimate(solution), self.near.refinement, solution.pair.p)
                 solutions[i] = solution
             except NotConverged as failure:
                 failures.append(Failure(float(points[i]), failure.message))
@@ -334,7 +334,7 @@ class ExponentSolver:
         value, error = self.ratio_alone(0.0)
         meaning = ALMOST_EVERY if grows_far_out(self.problem) else ""
         found = Estimate(value, error, self.scales.linear, meaning, quantity.LYAPUNOV_EXPONENT)
-        return checked(found, self.near.remedy)
+        return checked(found, self.near.refinement)
 
     def variance_rate(self) -> Estimate:
         """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
@@ -358,7 +358,7 @@ class ExponentSolver:
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
         beyond = max(1.0, 1 / math.expm1(tail * math.log(WIDER)))  # what is left, over what the wider one has added
         error = beyond * abs(better - value) + rounding
-        return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.near.remedy)
+        return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.near.refinement)
 
     @cached_property
     def at_zero(self) -> tuple[PrincipalPair, PrincipalPair]:

@@ -289,7 +289,9 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
 def simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
     """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
     compared = [Column("finite elements", 2), Column("s.e. away", 1)] if result else []
-    columns = [Column("p"), Column(MOMENT.symbol), Column("± s.e."), *compared, Column("effective paths", 3)]
+    is_direct = any(each.estimator == "direct" for each in simulated.result.estimates)
+    effective = "effective windows" if is_direct else "effective paths"  # a path has many windows
+    columns = [Column("p"), Column(MOMENT.symbol), Column("± s.e."), *compared, Column(effective, 3)]
     grid = Grid(case.heading(simulated.curve), columns)
     exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
     for estimate in simulated.result.estimates:
@@ -344,7 +346,7 @@ def _deviation(value: float, error: float, exact: float) -> str:
 
 def moment_grid(case: Case, result: CurveResult) -> Grid:
     is_exact = result.curve.is_exact
-    theory = Column(f"Eq. {MOMENT.closed_form}{'*' if is_exact else ''}", 1)
+    theory = Column(f"perturbation, Eq. {MOMENT.closed_form}{'*' if is_exact else ''}", 1)
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
     moments = result.moments
     has_theory = any(map(math.isfinite, moments.perturbation))

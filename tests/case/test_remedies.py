@@ -63,3 +63,18 @@ def test_lower_rooms_know_no_sections_and_no_options(room: str) -> None:
             ]
             texts = [value for value in values if isinstance(value, str) and not KEY.fullmatch(value)]
             assert not [text for text in texts if OF_A_CASE.search(text)], path
+
+
+def test_rtol_is_made_smaller_for_a_better_number_and_larger_to_accept_one() -> None:
+    missed = Message(Code.INDEX_RTOL_MISSED, symbol="λ", value=3.0, error=1e-3, size=1e-3, rtol=1e-8, remedy=None)
+    assert missed.endswith("; accept it by a larger rtol, or refine its mesh by a smaller one")
+    on_a_mesh = Message(Code.INDEX_RTOL_MISSED, **{**missed.data, "remedy": Remedy.MESH})
+    assert on_a_mesh.endswith("or let the mesh be chosen, or use a larger rtol")
+
+
+def test_effective_windows_may_be_more_than_paths() -> None:
+    direct, population = (
+        Message(Code.FEW_PATHS, p=2.0, low=571.4, high=None, needed=1000, is_direct=each) for each in (True, False)
+    )
+    assert "too few effective windows carry the mean, 571 where 1000 are needed; use estimator" in direct
+    assert population.endswith("too few effective paths carry the mean, 571 where 1000 are needed; use more paths")

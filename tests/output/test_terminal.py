@@ -259,10 +259,12 @@ def test_sentences_that_differ_in_numbers_are_one(tmp_path, capsys):
     print_remarks(case, results)
     warning, note = capsys.readouterr().err.splitlines()
     worst = results[89].curve.label
-    assert note.startswith("note: many: 200 of 200 curves: Eq. (37) is for weak noise: from |p| = 89 on")
-    assert note.endswith(f"where it is 0.89, 89%; most for {worst} (all in summary.json)")
+    assert note.startswith(
+        "note: many: 200 of 200 curves: Eq. (37) is for weak noise: do not rely on it from |p| = 89 on"
+    )
+    assert note.endswith(f"by 0.89, which is 89%; most for {worst} (all in summary.json)")
     largest = results[3].curve.label  # 3 * 7 % 11 = 10
-    assert "rtol = 1e-08 is not met by λ: 3 has an estimated error of 1.0e-05; use a larger rtol" in warning
+    assert "rtol = 1e-08 is not met by λ: 3 has an estimated error of 1.0e-05; accept it by a larger rtol" in warning
     assert warning.endswith(f"most for {largest} (all in summary.json)")
 
 

@@ -45,4 +45,4 @@ def test_weak_noise_needs_no_note_and_strong_noise_gets_its_size():
     rest = values[1] - perturbation.moment_exponent(strong, noise, p)
     shares = np.abs(rest[p != 0]) / perturbation.moment_scale(strong, noise, p[p != 0])
     worst = shares.argmax()
-    assert f", most at p = {p[p != 0][worst]:g}, where it is {rest[p != 0][worst]:.3g}, {shares.max():.0%}" in note
+    assert f"; most at p = {p[p != 0][worst]:g}, by {rest[p != 0][worst]:.3g}, which is {shares.max():.0%}" in note
