@@ -365,7 +365,7 @@ def chart(
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
 
     [budget] line_seconds limits the time of a line: what is traced by then is kept, with exit code 3.
-    [budget] seconds limits a row of 13 nodes of the scan, of which each may take half of what is left.
+    [budget] seconds limits a row of nodes of the scan, of which each may take half of what is left.
     Both are times of the processor.
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0

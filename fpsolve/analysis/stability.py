@@ -326,10 +326,16 @@ def boundary(
     check_axes(problem, x, y)
     if not is_whole(nodes, 2):
         raise ValueError(f"got nodes = {shown(nodes)}; must be a whole number from 2")
-    empty = Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
-    line = Boundary(zero_of(zero), x, y, problem, scan=empty, step=_checked_step(step), budget=budget or Budget())
+    line = Boundary(
+        zero_of(zero), x, y, problem, scan=empty_scan(nodes), step=_checked_step(step), budget=budget or Budget()
+    )
     *_, whole = line.solve(progress=progress, stepped=progress)
     return whole
+
+
+def empty_scan(nodes: int) -> Scan:
+    """The grid of a scan, each way with so many nodes, without values."""
+    return Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
 
 
 def _checked_step(step: float) -> float:

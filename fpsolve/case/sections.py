@@ -31,6 +31,7 @@ from fpsolve.model.quantity import Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
+MAX_NODES = 1000
 _DIGITS = 12
 _SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
@@ -465,6 +466,10 @@ class ChartSection(Section):
         BeforeValidator(_zeros, json_schema_input_type=Zeros),
         parameter("what is zero on a line", _ZERO),
     ]
+    nodes: Annotated[
+        int | None,
+        parameter("nodes of the scan for lines, each way; 13 if omitted", "nodes = 25", ge=2, le=MAX_NODES),
+    ] = None
 
     @model_validator(mode="after")
     def _two_parameters(self) -> Self:

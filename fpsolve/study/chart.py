@@ -10,7 +10,7 @@ import numpy as np
 
 from fpsolve.analysis.regions import Regions, regions
 from fpsolve.analysis.scan import scan_row
-from fpsolve.analysis.stability import NODES, Boundary, Map, crossed
+from fpsolve.analysis.stability import NODES, Boundary, Map, crossed, empty_scan
 from fpsolve.analysis.zero import Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
@@ -82,7 +82,8 @@ def refuse_no_chart(case: Case) -> None:
 
 def chart_work(case: Case) -> int:
     """How often `solve_chart` reports progress: once for each node of each scan."""
-    return NODES**2 * len(charted(case).zero)
+    frame = charted(case)
+    return (frame.nodes or NODES) ** 2 * len(frame.zero)
 
 
 def solve_chart(
@@ -106,7 +107,8 @@ def solve_chart(
     curve = case.curve({})
     problem = curve.problem
     chart = Chart((), _closed_forms(problem, frame.zero, (x, y)))
-    begun = [Boundary(zero, x, y, problem, budget=case.budget) for zero in frame.zero]
+    scan = empty_scan(frame.nodes) if frame.nodes else None
+    begun = [Boundary(zero, x, y, problem, scan=scan, budget=case.budget) for zero in frame.zero]
     rows = iter(map(partial(scan_row, told=Steps(progress)), [row for line in begun for row in line.rows()]))
     for each in begun:
         done = chart.lines

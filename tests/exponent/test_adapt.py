@@ -19,6 +19,7 @@ from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.noises.sine_wiener import SineWiener
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
@@ -188,6 +189,17 @@ def test_truncation_bounds_what_a_cut_changes():
         pair = principal_pair(Generator(Problem(oscillator, WEAK_NOISE), mesh), 3.0)
         error = abs(pair.value - full)
         assert 1e-10 < error <= 3 * truncation(pair)[1] <= 1e3 * error
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_cells_that_reach_the_ends_of_the_noise_cut_nothing_off():
+    """There P_s of sine-Wiener noise is infinite, and σ² zero."""
+    noise, end = SineWiener(amplitude=1.0, sigma=1.0), math.sqrt(2)
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
+    mesh = make_mesh(phi_cells=2, phi_degree=10, xi_cells=4, xi_degree=8, xi_min=-end, xi_max=end)
+    pair = principal_pair(Generator(Problem(oscillator, noise), mesh), 3.0)
+    assert truncation(pair) == (0.0, 0.0)
+    assert pair.value == pytest.approx(moment_lyapunov(oscillator, noise, 3.0).value[0], rel=1e-5)
 
 
 def test_while_nothing_is_resolved_the_axis_that_lacks_most_is_doubled():

@@ -10,6 +10,7 @@ import pytest
 from fpsolve import ExponentSolver, load_case
 from fpsolve.analysis.zero import Zero
 from fpsolve.cli import main
+from fpsolve.errors import CaseError
 from fpsolve.output.charts import read_line
 from fpsolve.study.chart import chart_work, solve_chart
 from fpsolve.workflow import Watch, chart_case, run
@@ -194,6 +195,20 @@ def test_progress_and_rows_are_those_of_the_whole_chart(path):
     assert len(points) == sum(branch.x.size for line in whole.lines for branch in line.branches)  # none has a fold
     assert [len(chart.lines) for chart in partial] == [1, 1, 1, 2, 2, 2, 3, 3, 3]
     assert not any(chart.remarks for chart in partial)  # "no line was found" where none is traced yet
+
+
+def test_a_case_states_the_nodes_of_its_scan(path):
+    case, given = load_case(path, ["chart.nodes=3", 'chart.zero=["lyapunov_exponent"]']), []
+
+    def noting(function, rows):
+        given.append(len(rows))
+        return map(function, rows)
+
+    first = next(solve_chart(case, map=noting))
+    assert (given, chart_work(case)) == ([3], 9)
+    assert first.lines[0].scan.values.shape == (3, 3)
+    with pytest.raises(CaseError, match=r"chart.nodes: got 1; must be a whole number >= 2 and <= 1000 \(nodes of"):
+        load_case(path, ["chart.nodes=1"])
 
 
 @pytest.mark.slow
