@@ -22,6 +22,7 @@ from .plane import System as System
 from .problem import Problem as Problem
 from .systems.equations import EquationSystem as EquationSystem
 from .systems.linear_system import LinearSystem as LinearSystem
+from .systems.modal import ModalSystem as ModalSystem
 from .systems.parametric import ParametricOscillator as ParametricOscillator
 from .systems.plane_system import PlaneSystem as PlaneSystem
 from .systems.vibro_impact import ImpactLaw as ImpactLaw

@@ -26,6 +26,7 @@ SYSTEMS: Mapping[str, str] = {
     "plane": "plane_system:PlaneSystem",
     "parametric": "parametric:ParametricOscillator",
     "equations": "equations:EquationSystem",
+    "modes": "modal:ModalSystem",
 }
 NOISES: Mapping[str, str] = {
     "non-gaussian": "non_gaussian:NonGaussianNoise",

@@ -69,6 +69,7 @@ def equations_of(problem: Problem) -> list[str]:
             driven[name] = driven.get(name, np.zeros((n, n))) + slope * size
     speed = float(still[0, 1])
     first = [still[0, 0], *(each for matrix in driven.values() for each in matrix[0])]
+    rows: list[tuple[str, FloatArray, dict[str, FloatArray], Sequence[str]]]
     is_second_order = n == 2 and speed != 0 and not any(first)
     if is_second_order:
         scale = np.array([speed, 1.0])

@@ -223,7 +223,14 @@ class EquationSystem(System):
         return key in table_of(table.get("parameters"))
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> EquationSystem:
+    def named_of(
+        cls, table: Mapping[str, Any], stated: Mapping[str, FieldInfo]
+    ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, Quantity], ...]]:
+        """The parameters of a table, those beside its `stated` keys in their place, and what they are.
+
+        Raises:
+            TableError: one is no number, or two have one symbol.
+        """
         parameters: Mapping[str, StatedParameter] = table.get("parameters", {})
         quantities = tuple((name, _quantity(name, each)) for name, each in parameters.items())
         signs = [quantity.shown.strip("$") for _, quantity in quantities]
@@ -232,17 +239,22 @@ class EquationSystem(System):
                 text = f"got the symbol {sign} of two parameters; all must differ; choose another one"
                 raise TableError(text, "parameters", name, "symbol")
         named = {name: each.value for name, each in parameters.items()}
-        for name in (parameters.keys() & table.keys()) - cls.stated.keys():
+        for name in (parameters.keys() & table.keys()) - stated.keys():
             try:
                 named[name] = real_number(table[name], name)
             except ValueError:
                 raise TableError(
                     f"got {shown(table[name])}; must be a finite number; write {name} = 1.0", name
                 ) from None
+        return tuple(named.items()), quantities
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> EquationSystem:
+        named, quantities = cls.named_of(table, cls.stated)
         return cls(
             variables=table["variables"],
             drift=table["drift"],
-            named=tuple(named.items()),
+            named=named,
             noises=tuple(table.get("noises", {"xi": "noise"}).items()),
             walls=tuple(Wall(each.at, each.restitution) for each in table.get("walls", ())),
             quantities=quantities,

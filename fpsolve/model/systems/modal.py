@@ -1,0 +1,255 @@
+"""One or two modes by their matrices: M q̈ + (C + G + ξ C_ξ) q̇ + (K + H + ξ K_ξ) q = 0."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+from pydantic.fields import FieldInfo
+
+from fpsolve.arrays import FloatArray, shown
+from fpsolve.model.expressions import ExpressionError, constant, evaluate, names_in
+from fpsolve.model.faults import TableError
+from fpsolve.model.parameters import parameter, stated_field
+from fpsolve.model.systems.equations import EPSILON, EquationSystem
+
+Entry = float | str
+Matrix = Sequence[Sequence[Entry]]
+NoiseMatrix = Matrix | Mapping[str, Matrix]
+_Row = Annotated[tuple[Entry, ...], Field(strict=False, min_length=1, max_length=2)]
+_Stated = Annotated[tuple[_Row, ...], Field(strict=False, min_length=1, max_length=2)]
+SINGULAR = 1e12
+"""Condition of a mass matrix from which on it counts as singular."""
+_SKEW = 1e-12
+
+
+def _matrix(meaning: str, example: str, *, is_noise: bool = False, default: Any = ...) -> FieldInfo:
+    kind: Any = _Stated | dict[str, _Stated] if is_noise else _Stated
+    return stated_field(Annotated[kind, parameter(meaning, example)], default)
+
+
+@dataclass(frozen=True)
+class ModalSystem(EquationSystem):
+    """One or two modes by their mass, damping and stiffness; noise in stiffness and damping. See `ModalSystem.of`.
+
+    It is an `EquationSystem` of the variables q and q̇ of each mode, whose rates follow from the matrices.
+    """
+
+    kind: ClassVar[str] = "modes"
+    stated: ClassVar[Mapping[str, FieldInfo]] = {
+        "mass": _matrix("M, a row for each mode, numbers or expressions in the parameters", "mass = [[1.0]]"),
+        "stiffness": _matrix("K", 'stiffness = [["omega**2"]]'),
+        "damping": _matrix("C", 'damping = [["2*zeta*omega"]]', default=()),
+        "gyroscopic": _matrix("G, skew-symmetric, added to C", "gyroscopic = [[0, -1.0], [1.0, 0]]", default=()),
+        "circulatory": _matrix("H, skew-symmetric, added to K", "circulatory = [[0, 0.2], [-0.2, 0]]", default=()),
+        "stiffness_noise": _matrix(
+            "what the noise multiplies in the stiffness; of several noises a table of matrices by their names",
+            "stiffness_noise = [[1.0]]",
+            is_noise=True,
+            default=(),
+        ),
+        "damping_noise": _matrix(
+            "what the noise multiplies in the damping; of several noises a table of matrices by their names",
+            "damping_noise = [[1.0]]",
+            is_noise=True,
+            default=(),
+        ),
+        "modes": stated_field(
+            Annotated[
+                Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=2)],
+                parameter("the names of the modes", 'modes = ["heave", "pitch"]'),
+            ],
+            (),
+        ),
+        **{key: EquationSystem.stated[key] for key in ("parameters", "noises")},
+    }
+
+    @classmethod
+    def of(
+        cls,
+        mass: Matrix,
+        stiffness: Matrix,
+        damping: Matrix = (),
+        *,
+        gyroscopic: Matrix = (),
+        circulatory: Matrix = (),
+        stiffness_noise: NoiseMatrix = (),
+        damping_noise: NoiseMatrix = (),
+        modes: Sequence[str] = (),
+        parameters: Mapping[str, float] | None = None,
+        noises: Mapping[str, str] | None = None,
+    ) -> ModalSystem:
+        """M q̈ + (C + G + ξ C_ξ) q̇ + (K + H + ξ K_ξ) q = 0, with exact derivatives by each of its parameters.
+
+        >>> damping, noise = [["4*zeta - 0.1*U"]], [["-0.1*U"]]  # a galloping mode: wind U takes from its damping
+        >>> values = {"zeta": 0.05, "U": 1.0}
+        >>> ModalSystem.of([[2.0]], [[2.0]], damping, damping_noise=noise, parameters=values).terms[0].matrix
+        ((0.0, 1.0), (-1.0, -0.05))
+
+        Args:
+            mass: M, of one row or two, with an inverse.
+            stiffness, damping: K and C.
+            gyroscopic, circulatory: G and H, skew-symmetric.
+            stiffness_noise, damping_noise: K_ξ and C_ξ; of several noises mappings from their names in `noises`.
+            modes: the names of q; ("q1", "q2") if empty. The name of q̇ is that of q with _dot.
+            parameters: values by the names that entries of matrices may have, which are numbers, or arithmetic as in
+                the rates of `PlaneSystem.of_equations`.
+            noises: what noises are called, and which section of keys each has; {"xi": "noise"} if None.
+
+        Raises:
+            TableError: with the matrix, the place in it, and what it must be.
+        """
+        still = {"mass": mass, "stiffness": stiffness, "damping": damping}
+        still |= {"gyroscopic": gyroscopic, "circulatory": circulatory}
+        driven = {"stiffness_noise": stiffness_noise, "damping_noise": damping_noise}
+        named, sections = dict(parameters or {}), dict(noises or {"xi": "noise"})
+        variables, drift = _Rates(still, driven, tuple(modes), named, sections).written()
+        try:
+            return cls(variables, drift, tuple(named.items()), tuple(sections.items()))
+        except TableError as error:
+            if error.path[:1] == ("variables",):
+                raise TableError(error.text, "modes") from None
+            if error.path[:1] == ("drift",):
+                raise TableError(f"with the other matrices: {error.text}", "stiffness") from None
+            raise
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> ModalSystem:
+        named, quantities = cls.named_of(table, cls.stated)
+        given = {key: each for key, each in table.items() if key in cls.stated}
+        return replace(cls.of(**{**given, "parameters": dict(named)}), quantities=quantities)
+
+
+@dataclass(frozen=True)
+class _Rates:
+    """The rates of q and q̇ as text.
+
+    Args:
+        matrices: without noise, by their keys.
+        driven: what noises multiply.
+        modes, parameters, noises: as in `ModalSystem.of`.
+    """
+
+    matrices: Mapping[str, Matrix]
+    driven: Mapping[str, NoiseMatrix]
+    modes: tuple[str, ...]
+    parameters: Mapping[str, float]
+    noises: Mapping[str, str]
+
+    def written(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The names of q and q̇ of each mode in turn, and their rates. Raises `TableError`."""
+        modes = self.modes or tuple(f"q{k + 1}" for k in self)
+        if len(modes) != self.count:
+            raise TableError(f"got {len(modes)} names of {self.count} modes; must be one for each", "modes")
+        speeds = [f"{name}_dot" for name in modes]
+        of = {"damping": speeds, "gyroscopic": speeds, "stiffness": modes, "circulatory": modes}
+        of |= {"stiffness_noise": modes, "damping_noise": speeds}
+        matrices = {key: self._entries(each, key) for key, each in self.matrices.items()}
+        for key in ("gyroscopic", "circulatory"):
+            self._refuse_symmetric(matrices[key], key)
+        inverse = self._inverse(matrices.pop("mass"))
+        parts = [(matrix, of[key]) for key, matrix in matrices.items()]
+        driven = [(noise, self._entries(matrix, *path), of[path[0]]) for noise, path, matrix in self._driven()]
+        for name in self.noises:
+            if not any(noise == name and np.any(self._numbers(matrix)) for noise, matrix, _ in driven):
+                raise TableError(f"{name} is in no matrix; write stiffness_noise or damping_noise", "noises", name)
+        parts += [(matrix, [f"{noise}*{state}" for state in states]) for noise, matrix, states in driven]
+        forces = [[each for matrix, states in parts for each in zip(matrix[j], states, strict=True)] for j in self]
+        drift = list[str]()
+        for i, speed in enumerate(speeds):
+            terms = [(inverse[i][j], entry, state) for j in self for entry, state in forces[j]]
+            texts = [f"-{_product(a, b)}*{state}" for a, b, state in terms if a != 0.0 and b != 0.0]
+            drift += [speed, " ".join(texts) or "0"]
+        return tuple(name for pair in zip(modes, speeds, strict=True) for name in pair), tuple(drift)
+
+    @property
+    def count(self) -> int:
+        """Of modes."""
+        mass = self.matrices["mass"]
+        if not isinstance(mass, list | tuple) or len(mass) not in (1, 2):
+            raise TableError(f"got {shown(mass)}; must be a matrix of one row or two, one for each mode", "mass")
+        return len(mass)
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(range(self.count))
+
+    def _driven(self) -> Iterator[tuple[str, tuple[str, ...], Matrix]]:
+        """What each noise multiplies: its name, where that stands, and the matrix. Raises `TableError`."""
+        for key, given in self.driven.items():
+            if isinstance(given, Mapping):
+                for name, matrix in given.items():
+                    if name not in self.noises:
+                        known = ", ".join(self.noises)
+                        raise TableError(f"is none of the noises, which are {known}; rename it", key, name)
+                    yield name, (key, name), matrix
+            elif given and len(self.noises) > 1:
+                names = " and ".join(self.noises)
+                raise TableError(f"is one matrix for the noises {names}; write a table with one for each", key)
+            elif given:
+                yield from ((name, (key,), given) for name in self.noises)
+
+    def _entries(self, given: Matrix, *path: str) -> list[list[Entry]]:
+        """The entries of a matrix, numbers where they are; zeros of none. Raises `TableError`."""
+        if isinstance(given, list | tuple) and not given and path[0] not in ("mass", "stiffness"):
+            return [[0.0 for _ in self] for _ in self]
+        stated = given if isinstance(given, list | tuple) else ()
+        rows = [list(row) if isinstance(row, list | tuple) else [] for row in stated]
+        if [len(row) for row in rows] != [self.count for _ in self]:
+            size = f"{self.count} row{'s' * (self.count > 1)} of {self.count}, as mass is"
+            raise TableError(f"got {shown(given)}; must be {size}", *path)
+        names = {name: constant(value) for name, value in self.parameters.items()}
+        for i, row in enumerate(rows):
+            for j, entry in enumerate(row):
+                is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
+                if not (is_number or isinstance(entry, str)):
+                    must = "must be a number, or an expression in the parameters"
+                    raise TableError(f"got {shown(entry)}; {must}; write, for example, 1.0", *path, i, j)
+                try:
+                    number = evaluate(repr(float(entry)) if is_number else str(entry), names, "the entry").scalar
+                except ExpressionError as error:
+                    raise TableError(str(error), *path, i, j) from None
+                if path[0] == "mass" and isinstance(entry, str) and EPSILON in names_in(entry):
+                    raise TableError(f"has {EPSILON}, of which masses are no powers; give it another name", *path, i, j)
+                is_free = is_number or not names_in(str(entry))
+                rows[i][j] = number[0] if is_free and number is not None else str(entry)
+        return rows
+
+    def _numbers(self, matrix: list[list[Entry]]) -> FloatArray:
+        """With the parameters as they are."""
+        names = {name: constant(value) for name, value in self.parameters.items()}
+        values = [[evaluate(e, names, "").scalar if isinstance(e, str) else (e,) for e in row] for row in matrix]
+        return np.array([[each[0] if each else 0.0 for each in row] for row in values])
+
+    def _refuse_symmetric(self, matrix: list[list[Entry]], key: str) -> None:
+        values = self._numbers(matrix)
+        if np.max(np.abs(values + values.T)) > _SKEW * np.max(np.abs(values)):
+            other = "damping" if key == "gyroscopic" else "stiffness"
+            must = "must be skew-symmetric, each entry minus the one across the diagonal"
+            raise TableError(f"got {shown(values.tolist())}; {must}; write what is not in {other}", key)
+
+    def _inverse(self, mass: list[list[Entry]]) -> list[list[Entry]]:
+        """Of the masses, as text where they have names."""
+        values = self._numbers(mass)
+        if not np.linalg.cond(values) < SINGULAR:
+            raise TableError(f"got {shown(values.tolist())}; must have an inverse; change its entries", "mass")
+        if not any(isinstance(entry, str) for row in mass for entry in row):
+            found: list[list[Entry]] = np.linalg.inv(values).tolist()
+            return found
+        if self.count == 1:
+            return [[f"1/({mass[0][0]})"]]
+        (a, b), (c, d) = mass
+        if b == c == 0.0:
+            return [[f"1/({a})", 0.0], [0.0, f"1/({d})"]]
+        det = f"(({a})*({d}) - ({b})*({c}))"
+        minus = [[0.0 if each == 0.0 else f"-({each})/{det}" for each in row] for row in mass]
+        return [[f"({d})/{det}", minus[0][1]], [minus[1][0], f"({a})/{det}"]]
+
+
+def _product(a: Entry, b: Entry) -> str:
+    """a b in parentheses."""
+    if not isinstance(a, str) and not isinstance(b, str):
+        return f"({a * b!r})"
+    return "*".join(f"({each})" for each in (a, b) if each != 1.0)
