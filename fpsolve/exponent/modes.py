@@ -39,8 +39,10 @@ THINNEST = 1e-3
 """The least width: of modes that nothing couples the layer has none."""
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
-LEFT = 0.3
-"""Share of the change before the last one that the error is at least."""
+BEYOND = 1.5
+"""All waves of higher degrees by what the next two degrees change."""
+LEFT = 0.1
+"""Share of the last change that the error is at least."""
 MOST_DIRECTIONS = 3200
 """Functions of directions at most: every matrix of theirs is full."""
 DIGITS = 10.0
@@ -165,14 +167,23 @@ class SpherePlace(NearPlace):
                 self._begin(self._finer(chosen, effects, allowed))
                 level, values = max(0, level - 1), []
                 continue
-            changes = np.abs(np.diff(values))
-            if changes.size:
-                left = max(changes[-1], LEFT * changes[-2]) if changes.size > 1 else changes[-1]
-                solution = Solution(pair, search=float(left))
+            level += 1
+            if len(values) > 1:
+                left = max(BEYOND * abs(self._change(pair, level)), LEFT * abs(values[-1] - values[-2]))
+                solution = Solution(pair, search=left)
                 if solution.error <= allowed:
                     return solution
                 search.note(solution, solution.error, allowed)
-            level += 1
+
+    def _change(self, pair: PrincipalPair, level: int) -> float:
+        """What the waves of the next level change in Λ(p), to first order."""
+        generator = self._generator(level)
+        pencil, space, old = generator.at(pair.p), generator.space(pair.p), pair.space
+        operator, new = pencil.matrix.shifted(pair.value), space.phi.degrees > pair.generator.chosen.phase.waves
+        right = space.table(operator @ space.carry(pair.right, old))[new].ravel()
+        left = space.table(operator.T @ space.carry(pair.left, old))[new].ravel()
+        factors = replace(pencil, matrix=pencil.matrix.on(new)).factorised(pair.value)
+        return float(-left @ factors.solve(right) / (pair.left @ old.weighed(pair.right)))
 
     def _begin(self, chosen: Discretisation) -> None:
         """Other elements and functions of the noise, the waves from the coarsest on."""
@@ -199,11 +210,14 @@ class SpherePlace(NearPlace):
         found = Discretisation(phase, noises)
         return found if found.size > chosen.size else chosen.enriched()
 
-    def _pair(self, level: int, search: _Search, coarse: PrincipalPair | None) -> PrincipalPair:
-        """The pair at p on one level, from that on a coarser one, or from p to p since p = 0."""
+    def _generator(self, level: int) -> SphereGenerator:
         while len(self._levels) <= level:
             self._levels.append(SphereGenerator(self.problem, self._chosen(len(self._levels))))
-        generator, p = self._levels[level], search.p
+        return self._levels[level]
+
+    def _pair(self, level: int, search: _Search, coarse: PrincipalPair | None) -> PrincipalPair:
+        """The pair at p on one level, from that on a coarser one, or from p to p since p = 0."""
+        generator, p = self._generator(level), search.p
         if coarse is not None:
             return principal_pair(generator, p, start=coarse, clock=search.tick)
         near = [pair for pair in self._pairs if pair.generator is generator]

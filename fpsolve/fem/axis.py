@@ -138,6 +138,12 @@ class KroneckerSum:
             unit = identity(phase.shape[0], format="csr") if issparse(phase) else np.eye(phase.shape[0])
         return KroneckerSum([(phase - shift * unit, *noises), *others], self.unit)
 
+    def on(self, kept: Any) -> KroneckerSum:
+        """What it is on some functions of the first axis, where a mask is true."""
+        at = np.ix_(kept, kept)
+        unit = None if self.unit is None else self.unit[at]
+        return KroneckerSum([(first[at], *others) for first, *others in self.terms], unit)
+
     @cached_property
     def is_sparse(self) -> bool:
         return any(issparse(factor) for term in self.terms for factor in term)

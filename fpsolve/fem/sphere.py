@@ -202,6 +202,7 @@ class SphereAxis(Axis):
 
     Attributes:
         identity: ∫ u v, which is no identity, shape (size, size).
+        degrees: the total degree of the wave of each unknown, shape (size,).
         inner_values: values at points of the sphere, shape (points, size).
         ladders: of the elements alone; that of the waves is told by what two degrees more change.
     """
@@ -225,6 +226,7 @@ class SphereAxis(Axis):
         self._kept = np.flatnonzero(kept)
         self.size = self._kept.size
         self.cells, self.modes = np.full(self.size, -1), np.zeros(self.size, dtype=int)
+        self.degrees = sum(degrees)[self._kept % waves.own.size]
         node = self._kept // waves.own.size
         of_elements = np.where(line.modes[node] == 1, -1, line.cells[node])
         self.ladders = ((of_elements, line.modes[node], self._on_kept(line.nested)),)
