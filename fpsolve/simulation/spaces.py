@@ -152,16 +152,17 @@ def step_driven_space(m, h, x, u, mean, rise, log_norm):  # type: ignore[no-unty
         log_norm: takes in what the norm has grown by beyond that of the state.
     """
     n, lever = m.matrices.shape[1], -h * h / 6
-    omega, sizes = np.zeros((n, n, _BLOCK)), np.empty(_BLOCK)
-    begun, now, after = np.zeros((n, _BLOCK)), np.empty((n, _BLOCK)), np.empty((n, _BLOCK))
-    for first in range(0, x.size, _BLOCK):
-        part = slice(first, min(first + _BLOCK, x.size))
+    width = min(_BLOCK, x.size)
+    omega, sizes = np.zeros((n, n, width)), np.empty(width)
+    begun, now, after = np.zeros((n, width)), np.zeros((n, width)), np.empty((n, width))
+    for first in range(0, x.size, width):
+        part = slice(first, min(first + width, x.size))
         xs, us, means, rises, logs = x[part], u[:, part], mean[part], rise[part], log_norm[part]
         count = xs.size
         _copied(xs, begun[0], count)
         for k in range(n - 1):
             _copied(us[k], begun[1 + k], count)
-        for i in range(_BLOCK):
+        for i in range(width):
             sizes[i] = 0.0
         for r in range(n):
             _copied(begun[r], now[r], count)
