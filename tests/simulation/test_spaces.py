@@ -13,6 +13,7 @@ from fpsolve.model import CoefficientMatrix, Filter, LinearSystem, MarkovChain, 
 from fpsolve.simulation.coefficients import Coefficients, coefficients
 from fpsolve.simulation.kernels import advance
 from fpsolve.simulation.motions import Rays
+from fpsolve.simulation.setup import transient
 from fpsolve.simulation.spaces import step_driven_space
 from tests.conftest import UNIT_NOISE, sampled
 from tests.exponent.test_modes import COUPLED, FREE, OU, problem, random_system
@@ -135,7 +136,8 @@ def test_even_moments(noise, n):
         }[noise.kind](p)
         for p in (2, 4)
     ]
-    _, found = outcome(problem(noise, steady, driven), [2.0, 4.0], time=100.0)
+    given = problem(noise, steady, driven)
+    _, found = outcome(given, [2.0, 4.0], time=max(100.0, 2 * transient(given.system, noise)))
     for (value, error), exact in zip(found, expected, strict=True):
         assert abs(value - exact) < 4 * error
         assert error < 5e-3
@@ -156,7 +158,7 @@ def test_two_white_noises():
         kronecker.power(b, 2) @ kronecker.power(b, 2) for b in (driven, other)
     )
     given = Problem(LinearSystem(terms), {"a": White(s=1.0), "b": White(s=1.0)})
-    _, [(value, error)] = outcome(given, [2.0])
+    _, [(value, error)] = outcome(given, [2.0], time=2 * transient(given.system, given.noise))
     assert abs(value - np.max(np.linalg.eigvals(rates).real)) < 4 * error
     assert error < 5e-3
 
