@@ -42,7 +42,7 @@ WORST_CONDITION = 100.0
 BEYOND = 1.5
 """All waves of higher degrees by what the next two degrees change."""
 LEFT = 0.1
-"""Share of the last change that the error is at least."""
+"""Share of the last change that the error is at least; the change to come is one of it where there was none."""
 MOST_DIRECTIONS = 3200
 """Functions of directions at most: every matrix of theirs is full."""
 DIGITS = 10.0
@@ -168,12 +168,12 @@ class SpherePlace(NearPlace):
                 level, values = max(0, level - 1), []
                 continue
             level += 1
-            if len(values) > 1:
-                left = max(BEYOND * abs(self._change(pair, level)), LEFT * abs(values[-1] - values[-2]))
-                solution = Solution(pair, search=left)
-                if solution.error <= allowed:
-                    return solution
-                search.note(solution, solution.error, allowed)
+            change = abs(self._change(pair, level))
+            left = max(BEYOND * change, LEFT * abs(values[-1] - values[-2])) if len(values) > 1 else change / LEFT
+            solution = Solution(pair, search=left)
+            if solution.error <= allowed:
+                return solution
+            search.note(solution, solution.error, allowed)
 
     def _change(self, pair: PrincipalPair, level: int) -> float:
         """What the waves of the next level change in Λ(p), to first order."""

@@ -26,8 +26,8 @@ import scipy.sparse
 import scipy.sparse.linalg
 from scipy.sparse import csr_matrix, diags
 
-from fpsolve.arrays import FloatArray, dense, one
-from fpsolve.fem.axis import Axis, TensorSpace
+from fpsolve.arrays import FloatArray, one
+from fpsolve.fem.axis import Axis, KroneckerSum, TensorSpace
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.terms import NoiseTerms, OfMoment, Term
@@ -238,21 +238,18 @@ class SphereAxis(Axis):
 
     def _assembled(self, of_line: Sequence[FloatArray], of_waves: Sequence[Any]) -> FloatArray:
         """Σ A_k ⊗ B_k of matrices in η and of the waves, shape (size, size)."""
-        nodes, waves = self.line.size, self.waves.own.size
-        lines = np.stack([each.ravel() for each in of_line], axis=1)
-        total = lines @ np.stack([dense(each).ravel() for each in of_waves])
-        total = total.reshape(nodes, nodes, waves, waves).transpose(0, 2, 1, 3).reshape(nodes * waves, -1)
-        return np.asarray(total if self.size == nodes * waves else total[np.ix_(self._kept, self._kept)])
+        total = KroneckerSum(list(zip(of_line, of_waves, strict=True))).tocsc()
+        return np.asarray(total[self._kept][:, self._kept].toarray())
 
     def _on_kept(self, of_line: Any) -> Any:
         whole = scipy.sparse.kron(of_line, scipy.sparse.identity(self.waves.own.size), format="csr")
         return whole[self._kept][:, self._kept]
 
     @cached_property
-    def inner_values(self) -> FloatArray:
+    def inner_values(self) -> Any:
         own = self.waves.samples[:, self.waves.own]
         points = self.line.values[:: max(1, self.chosen.degree // 4)]
-        return np.asarray(scipy.sparse.kron(points, csr_matrix(own), format="csc")[:, self._kept].toarray())
+        return scipy.sparse.kron(points, csr_matrix(own), format="csc")[:, self._kept]
 
     def mass(self, g: Any = one) -> Any:
         """∫ u v."""

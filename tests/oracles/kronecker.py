@@ -1,17 +1,24 @@
-"""Λ(p) for even p and a state of any dimension, from the moments of order p: Kronecker powers of the state.
+"""Λ(p) for even p and a state of any dimension, from the moments of order p: monomials of the state.
 
-E x⊗…⊗x, p factors, obeys a linear equation, whose matrix is the sum of A over all factors; white noise by B adds half
-the square of that of B, a chain and Ornstein-Uhlenbeck noise have such moments for each state or Hermite polynomial.
+E x^a, |a| = p, obey a linear equation, as d/dt x^a = Σ aᵢ x^(a − eᵢ) Aᵢⱼ xⱼ; white noise by B adds half the
+square of the matrix of B, a chain and Ornstein-Uhlenbeck noise have such moments for each state or Hermite polynomial.
 """
+
+from itertools import combinations_with_replacement
 
 import numpy as np
 
 
 def power(matrix, p):
-    """Σ 1 ⊗ … ⊗ A ⊗ … ⊗ 1."""
+    """d/dt of the monomials of degree p by those."""
     matrix = np.asarray(matrix, dtype=float)
-    n = len(matrix)
-    return sum(np.kron(np.kron(np.eye(n**k), matrix), np.eye(n ** (p - 1 - k))) for k in range(p))
+    monomials = {factors: k for k, factors in enumerate(combinations_with_replacement(range(len(matrix)), p))}
+    found = np.zeros((len(monomials), len(monomials)))
+    for factors, row in monomials.items():
+        for k, i in enumerate(factors):
+            for j, rate in enumerate(matrix[i]):
+                found[row, monomials[tuple(sorted([*factors[:k], j, *factors[k + 1 :]]))]] += rate
+    return found
 
 
 def white(steady, driven, p):
