@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from fpsolve.analysis.regions import Region
+from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.error import Estimate, digits
 from fpsolve.exponent.quantities import CRITICAL_IMPACT_FACTOR, IMPACT_RATE
@@ -70,18 +72,17 @@ def equations_of(problem: Problem) -> list[str]:
     speed = float(still[0, 1])
     first = [still[0, 0], *(each for matrix in driven.values() for each in matrix[0])]
     rows: list[tuple[str, FloatArray, dict[str, FloatArray], Sequence[str]]]
-    is_second_order = n == 2 and speed != 0 and not any(first)
-    if is_second_order:
-        scale = np.array([speed, 1.0])
-        rows = [("ẍ", still[1] * scale, {name: each[1] * scale for name, each in driven.items()}, ("x", "ẋ"))]
+    names = problem.system.states
+    x = names[0].removesuffix("₁")
+    if n == 2 and speed != 0 and not any(first) and len(x) == 1:
+        scale, names = np.array([speed, 1.0]), (x, _dotted(x, 1))
+        rows = [(_dotted(x, 2), still[1] * scale, {name: each[1] * scale for name, each in driven.items()}, names)]
     else:
-        names = problem.system.states
         rows = [(f"d{names[i]}/dt", still[i], {key: each[i] for key, each in driven.items()}, names) for i in range(n)]
     lines = [f"{left} = {_sum(constant, by_noise, states)}" for left, constant, by_noise, states in rows]
     for jump in system.jumps:
         factor = f"{math.exp(jump.log_factor):.10g}"
         at_wall = math.isclose(math.cos(jump.phase), 0.0, abs_tol=1e-12)
-        names = ("x", "ẋ") if is_second_order else problem.system.states
         words = (
             f"|{names[1]}|⁺ = {factor} |{names[1]}|⁻ at {names[0]} = 0"
             if at_wall
@@ -89,6 +90,11 @@ def equations_of(problem: Problem) -> list[str]:
         )
         lines += [words] if jump.log_factor or not at_wall else []
     return lines
+
+
+def _dotted(letter: str, count: int) -> str:
+    """A derivative by time."""
+    return unicodedata.normalize("NFC", letter + "\u0307\u0308"[count - 1])
 
 
 def _sum(constant: FloatArray, by_noise: Mapping[str, FloatArray], states: Sequence[str]) -> str:
@@ -118,18 +124,18 @@ def noises_of(problem: Problem) -> list[str]:
     return lines
 
 
-def meanings(result: CurveResult) -> Iterator[str]:
+def meanings(result: CurveResult, time_unit: str) -> Iterator[str]:
     """What λ, Λ(2), δ_p, N and R_c of a curve say, for each that is there."""
     exponent, index = result.lyapunov_exponent, result.stability_index
     rate, critical = (result.estimates[each.name] for each in (IMPACT_RATE, CRITICAL_IMPACT_FACTOR))
     path = 0.0 if exponent is None else _sign(exponent.value, exponent.error_estimate)
     if exponent is not None:
-        yield f"λ = {_shown(exponent)}{_fate('almost every path', exponent.value, path)}"
+        yield f"λ = {_shown(exponent)}{_fate('almost every path', exponent.value, path, time_unit)}"
     found = result.moments
     for p, value, error in zip(found.p.tolist(), found.value.tolist(), found.error_estimate.tolist(), strict=True):
         if p == 2:
             sign = _sign(value, error)
-            yield f"Λ(2) = {digits(value, error, DIGITS)}{_fate('the mean square', value, sign)}"
+            yield f"Λ(2) = {digits(value, error, DIGITS)}{_fate('the mean square', value, sign, time_unit)}"
             if sign > 0 > path:
                 yield (
                     "Paths decay but their mean square grows: bursts of rare paths carry it. A design that is judged "
@@ -156,11 +162,31 @@ def meanings(result: CurveResult) -> Iterator[str]:
         )
 
 
-def simulated_meanings(simulated: SimulatedCurve) -> Iterator[str]:
+def simulated_meanings(simulated: SimulatedCurve, time_unit: str) -> Iterator[str]:
     """What λ of a simulation says."""
     value, error = simulated.result.lyapunov_exponent, simulated.result.lyapunov_exponent_error
     sign = _sign(value, SURE * error)
-    yield f"λ = {sampled(value, error)} ± {error:.1e}{_fate('almost every path', value, sign)}"
+    yield f"λ = {sampled(value, error)} ± {error:.1e}{_fate('almost every path', value, sign, time_unit)}"
+
+
+def region_meaning(region: Region, zeros: Iterable[Zero]) -> str:
+    """What becomes in a region of a chart: "Almost every path decays and the mean square grows."."""
+    told, signs = list[str](), set[int]()
+    for zero in sorted(zeros, key=lambda each: (each.kind == "moment", each.p)):
+        sign = region.signs.get(zero.name, 0)
+        if sign and zero.kind in ("lyapunov_exponent", "moment"):
+            what = (
+                "almost every path"
+                if zero.kind != "moment"
+                else "the mean square"
+                if zero.p == 2
+                else f"E‖x‖^{zero.p:g}"
+            )
+            told.append(f"{what} {'grows' if sign > 0 else 'decays'}")
+            signs.add(sign)
+    carried = ", which rare paths carry" if len(signs) == 2 and told[0].endswith("path decays") else ""
+    text = " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    return f" {text[0].upper()}{text[1:]}{carried}." if told else ""
 
 
 def _shown(estimate: Estimate) -> str:
@@ -172,9 +198,9 @@ def _sign(value: float, error: float) -> float:
     return math.copysign(1, value) if abs(value) > error else 0.0
 
 
-def _fate(what: str, rate: float, sign: float) -> str:
+def _fate(what: str, rate: float, sign: float, time_unit: str) -> str:
     """What becomes of something, and in which time."""
     if not sign:
         return f" cannot be told from 0 by its error: {what} is at the border of stability, or near it."
-    time = f"in a time of {math.log(2) / abs(rate):.3g}"
+    time = f"in a time of {math.log(2) / abs(rate):.3g}" + ("" if time_unit == "time" else f" {time_unit}")
     return f" > 0: {what} grows, doubling {time}." if sign > 0 else f" < 0: {what} decays, halving {time}."

@@ -27,7 +27,7 @@ from fpsolve.files import parsed_json, plain_text, write_text
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.output.charts import draw_chart
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
-from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, simulated_meanings
+from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, region_meaning, simulated_meanings
 from fpsolve.output.proofs import PROOF, between, proof_grid, proofs_grid
 from fpsolve.output.screen import Column, Grid
 from fpsolve.output.terminal import (
@@ -131,7 +131,7 @@ class Reporter:
             equations=equations_of(curve.problem),
             about=list(_about(case, found, curve)),
             parameters=list(_parameters(case, curve)),
-            meanings=list(_meanings(found, _proven(folder) if found.results else {})),
+            meanings=list(_meanings(case, found, _proven(folder) if found.results else {})),
             figures=list(_figures(case, found, folder)),
             plots=plots,
             plotly=_plotly() if plots else "",
@@ -173,16 +173,17 @@ def _proven(folder: Path) -> dict[frozenset[Any], list[str]]:
         return {}
 
 
-def _meanings(found: Found, proven: Mapping[frozenset[Any], list[str]]) -> Iterator[tuple[str, list[str]]]:
+def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str]]) -> Iterator[tuple[str, list[str]]]:
     """By curves what their numbers say, and what is proven of them; of many curves, whose table is enough, nothing."""
+    time_unit = case.figure.time_unit
     if len(found.results) <= MOST_DRAWN:
         for result in found.results:
             parameters = frozenset(result.curve.parameters.items())
-            if told := [*meanings(result), *proven.get(parameters, [])]:
+            if told := [*meanings(result, time_unit), *proven.get(parameters, [])]:
                 yield result.curve.label, told
     if not found.results and len(found.simulated) <= MOST_DRAWN:
         for each in found.simulated:
-            yield each.curve.label, list(simulated_meanings(each))
+            yield each.curve.label, list(simulated_meanings(each, time_unit))
     for proof in found.proofs[:MOST_DRAWN]:
         bounds = [(LYAPUNOV_EXPONENT.symbol, proof.exponent), (STABILITY_INDEX.symbol, proof.index)]
         told = [f"{symbol} is {between(each)}" for symbol, each in bounds if each is not None and each.is_proven]
@@ -190,7 +191,8 @@ def _meanings(found: Found, proven: Mapping[frozenset[Any], list[str]]) -> Itera
             yield proof.curve.label, [f"Proven: {each}." for each in told]
     if found.chart is not None and found.chart.regions is not None:
         ordered = sorted(found.chart.regions.each, key=lambda region: -region.share)
-        yield "", [f"{region.share:.1%} of the frame: {region.name}." for region in ordered]
+        zeros = [line.zero for line in found.chart.lines]
+        yield "", [f"{each.share:.1%} of the frame: {each.name}.{region_meaning(each, zeros)}" for each in ordered]
 
 
 def _figures(case: Case, found: Found, folder: Path) -> Iterator[Figure]:
@@ -308,7 +310,7 @@ def _more(found: Found, folder: Path) -> str:
     names += ["proof.json"] * bool(found.proofs)
     others = [name for name in _OTHERS if name not in names and (folder / name).is_file()]
     also = f" Other commands wrote {', '.join(others)} there; their own --report shows it." if others else ""
-    return f"All numbers are in {', '.join(names)} beside this page.{also}"
+    return f"All numbers are in {', '.join(names)}, in the folder of the results, {folder.name}.{also}"
 
 
 def _remarks(case: Case, found: Found) -> Iterator[dict[str, str]]:

@@ -42,7 +42,9 @@ def facts_of(case: Case, started: datetime, seconds: float) -> dict[str, Any]:
     packages |= dict(each.rsplit(" ", 1) for each in kinds)
     return {
         "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},
-        "command": shlex.join(["python", "-m", "fpsolve", *rest] if name.endswith("__main__.py") else [name, *rest]),
+        "command": shlex.join(
+            ["python", "-m", "fpsolve", *rest] if name.endswith("__main__.py") else [Path(name).name, *rest]
+        ),
         "host": socket.gethostname(),
         "started": started.isoformat(timespec="seconds"),
         "wall_seconds": round(seconds, 3),

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 import pyvista
 
+from fpsolve.analysis.regions import Region
+from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import load_case
 from fpsolve.cli import BAD_INPUT, main
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.model import PlaneSystem, Problem, White
 from fpsolve.output import pictures, report
-from fpsolve.output.meanings import Part, equations_of, meanings, noises_of, parts_of
+from fpsolve.output.meanings import Part, equations_of, meanings, noises_of, parts_of, region_meaning
 from fpsolve.output.tables import facts_of
 from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
 from fpsolve.workflow.reports import shown_at_the_end
@@ -274,11 +276,24 @@ def test_symbols_without_latex(latex, parts):
         ("theorem", ["ẍ = −x + 0.1 ẋ + ξ ẋ", "|ẋ|⁺ = 0.8 |ẋ|⁻ at x = 0"]),
         ("systems/own_equation", ["ẍ = −x − 0.2 ẋ − ξ x"]),
         ("systems/two_noises", ["ẍ = −x − 0.2 ẋ − ξ_axial x − ξ_lateral ẋ"]),
-        ("systems/turning", ["dx₁/dt = x₁ − ξ x₂", "dx₂/dt = −x₂ + ξ x₁"]),
+        ("systems/turning", ["dx/dt = x − ξ y", "dy/dt = −y + ξ x"]),
     ],
 )
 def test_equations_have_the_numbers_of_the_case(name, equations):
     assert equations_of(next(load_case(CASES / f"{name}.toml").curves()).problem) == equations
+
+
+def test_equations_have_the_variables_of_the_case():
+    problem = Problem(PlaneSystem.of_equations(("q", "v"), ("2*v", "-q - xi*v")), White(s=0.5))
+    assert equations_of(problem) == ["q̈ = −2 q − ξ q̇"]
+
+
+def test_a_region_tells_what_paths_and_moments_do():
+    zeros = Zero("moment", 2.0), Zero("lyapunov_exponent"), Zero("moment", 4.0)
+    signs = {"lyapunov_exponent": -1, "moment 2": -1, "moment 4": 1}
+    told = region_meaning(Region("some", signs, 0.5, (0.5, 0.5)), zeros)
+    expected = "Almost every path decays, the mean square decays and E‖x‖^4 grows, which rare paths carry."
+    assert told == f" {expected}"
 
 
 @pytest.mark.parametrize(("sense", "words"), [("ito", "Itô's"), ("stratonovich", "Stratonovich's")])
@@ -290,7 +305,7 @@ def test_white_noise_is_told_with_its_sense(sense, words):
 @pytest.mark.parametrize("called", ["/somewhere/bin/fpsolve", "/somewhere/fpsolve/__main__.py"])
 def test_the_command_can_be_typed_again(called, monkeypatch):
     monkeypatch.setattr("sys.argv", [called, "run", "a case.toml"])
-    command = "/somewhere/bin/fpsolve" if called.endswith("fpsolve") else "python -m fpsolve"
+    command = "fpsolve" if called.endswith("fpsolve") else "python -m fpsolve"
     case = load_case(CASES / "minimal.toml")
     assert facts_of(case, datetime.now(UTC), 1.0)["command"] == f"{command} run 'a case.toml'"
 
@@ -308,8 +323,9 @@ def test_an_interrupt_is_told_where_the_report_of_what_was_done_cannot_be_writte
 def test_rare_paths_that_carry_the_mean_square_are_told_of():
     """λ < 0 < Λ(2), as the theorem's case has them."""
     [result] = solve_case(load_case(CASES / "theorem.toml", ["moments.p=[2.0]", "expect=[]"]))
-    told = " ".join(meanings(result))
+    told = " ".join(meanings(result, "s"))
     assert "almost every path decays" in told
     assert "the mean square grows" in told
+    assert re.search(r"halving in a time of \S+ s\.", told)
     assert "bursts of rare paths" in told
     assert "falls as A to the power" in told

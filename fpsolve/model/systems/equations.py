@@ -278,8 +278,7 @@ class EquationSystem(System):
 
     @property
     def states(self) -> Sequence[str]:
-        """The names of its variables; of a pair x₁ and x₂, as of any system in the plane."""
-        return self.variables if len(self.variables) > 2 else super().states
+        return self.variables
 
     @property
     def values(self) -> Mapping[str, float | str]:
