@@ -120,7 +120,8 @@ INDICES = """for result in results[:6]:
 """
 CHART = """
 # %%
-# Its chart takes minutes, so it is drawn here from what ``fpsolve chart`` wrote:
+# Its chart takes minutes, so it is drawn here from what ``fpsolve chart`` wrote, which docs/charts of the repository
+# has; with a chart of your own, write its folder of results in that place:
 
 from pathlib import Path
 
@@ -272,7 +273,8 @@ def _fields(fields) -> str:
         required = "**required**" if each.is_required() else default
         symbol = symbol_of(each)
         meaning = f"{symbol}: {meaning_of(each)}" if symbol else meaning_of(each)
-        text += _row(f"`{name}`", meaning, _range(each), required, f"`{example_of(each)}`")
+        example = example_of(each)
+        text += _row(f"`{name}`", meaning, _range(each), required, f"`{example}`" if example else "")
     return text
 
 
@@ -284,9 +286,11 @@ def keys() -> str:
         text += f'\n## `[system]` with `kind = "{name}"`\n\n{_first(kind)}\n'
         text += _fields({**kind.stated, **kind.fields()})
     for name in NOISES:
-        for kind in (noise_kind(name), *noise_kind(name).variants):
-            also = "" if kind is noise_kind(name) else ", or"
-            text += f'\n## `[noise]` with `kind = "{name}"`{also}\n\n{_first(kind)}\n'
+        usual = noise_kind(name)
+        for kind in (usual, *usual.variants):
+            own = [f"`{key}`" for key in kind.fields() if kind is not usual and key not in usual.fields()]
+            by = f", stated by {' and '.join(own)}" if own else ""
+            text += f'\n## `[noise]` with `kind = "{name}"`{by}\n\n{_first(kind)}\n'
             text += _fields({**kind.stated, **kind.fields()})
     for section, field in Case.model_fields.items():
         made = Budget if section == "budget" else _section_of(field.annotation)

@@ -204,7 +204,7 @@ def _on_one_pattern(matrices: Sequence[Any]) -> tuple[csc_matrix, FloatArray]:
     pattern = csc_matrix(sum(abs(matrix) for matrix in columnwise))
     pattern.sort_indices()
     columns = np.repeat(np.arange(pattern.shape[1]), np.diff(pattern.indptr))
-    return pattern, np.stack([np.ravel(matrix[pattern.indices, columns]) for matrix in columnwise])
+    return pattern, np.array([np.ravel(matrix[pattern.indices, columns]) for matrix in columnwise], dtype=float)
 
 
 class TensorSpace:
