@@ -204,7 +204,9 @@ def _on_one_pattern(matrices: Sequence[Any]) -> tuple[csc_matrix, FloatArray]:
     pattern = csc_matrix(sum(abs(matrix) for matrix in columnwise))
     pattern.sort_indices()
     columns = np.repeat(np.arange(pattern.shape[1]), np.diff(pattern.indptr))
-    return pattern, np.array([np.ravel(matrix[pattern.indices, columns]) for matrix in columnwise], dtype=float)
+    if not columns.size:  # of no indices scipy returns no array
+        return csc_matrix(pattern, dtype=float), np.zeros((len(columnwise), 0))
+    return pattern, np.stack([np.ravel(matrix[pattern.indices, columns]) for matrix in columnwise])
 
 
 class TensorSpace:
