@@ -189,7 +189,7 @@ def test_a_simulation_is_compared_with_the_finite_elements(tmp_path):
 @pytest.mark.slow
 def test_a_simulation_has_a_page(tmp_path):
     assert run(tmp_path, ONE, "--report", "--paths", "64", "--time", "40", command="simulate") == 0
-    assert "effective paths" in Page(tmp_path / "test/report.html").text
+    assert "effective windows" in Page(tmp_path / "test/report.html").text
 
 
 def test_a_fault_in_the_report_costs_nothing_else(tmp_path, monkeypatch, capsys):
