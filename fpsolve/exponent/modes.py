@@ -3,7 +3,8 @@
 The functions are those of directions in coordinates that the second moments choose. E‖x‖² grows with Λ(2), and
 T = xᵀQx is its eigenfunction for p = 2: in the coordinates of the eigenvectors of Q the strong modes are one group and
 the weak ones the other. Where the noise is weak against the difference of their dampings, T has a layer of the width
-√(q_weak/q_strong) beside the weak ones, for which the elements are graded.
+√(q_weak/q_strong) beside the weak ones, for which the elements are graded; where both grow alike there is none, and
+harmonics of the sphere take the place of the elements.
 
 Any search begins at p = 0, where T = 1, and goes from p to p on the coarsest space; on finer ones it begins with what
 the coarser one has found. What two degrees of waves change tells their error, that of all else comes from the highest
@@ -26,6 +27,7 @@ from fpsolve.exponent.adapt import SHARE, NearPlace, _Search
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.fem.discretisation import Discretisation, first_part
+from fpsolve.fem.harmonics import HarmonicCells
 from fpsolve.fem.sphere import Coordinates, SphereCells, SphereGenerator
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
@@ -33,6 +35,8 @@ from fpsolve.model.problem import Problem
 FIRST_WAVES, FIRST_DEGREE = 4, 6
 LARGEST_STEP = 1.0
 """Of p, from one pair to the next one on the coarsest space."""
+ROUND = 0.6
+"""Width of a layer from which on there is none to speak of, and harmonics of the sphere settle the soonest."""
 WEAK, STEP = 0.2, 1.3
 """Width of a layer for which elements are graded, and their size in ln tan η."""
 THINNEST = 1e-3
@@ -117,9 +121,11 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float]:
     return tuple(map(tuple, (own @ axes).tolist())), width
 
 
-def first_cells(problem: Problem) -> SphereCells:
+def first_cells(problem: Problem) -> SphereCells | HarmonicCells:
     """The coarsest functions of directions."""
     coordinates, width = modal_coordinates(problem)
+    if width >= ROUND:
+        return HarmonicCells(coordinates, FIRST_WAVES)
     lines = np.linspace(0, math.pi / 2, 3)
     if width < WEAK:
         reach = math.log(1 / width) + 1
@@ -200,13 +206,16 @@ class SpherePlace(NearPlace):
         search.check(chosen)
 
     def _finer(self, chosen: Discretisation, effects: Sequence[Any], allowed: float) -> Discretisation:
-        of_elements, *of_noises = effects
-        share = SHARE * allowed
+        count, share = len(effects) - len(chosen.noises), SHARE * allowed
+        of_elements, of_noises = effects[:count], effects[count:]
         noises = tuple(
             part if each is None or each.error <= share else part.refined(each, share, may_coarsen=False)
             for part, each in zip(chosen.noises, of_noises, strict=True)
         )
-        phase = chosen.phase.finer_elements() if of_elements.error > 0.1 * allowed else chosen.phase
+        phase = chosen.phase
+        for each in of_elements:
+            if each.error > 0.1 * allowed:
+                phase = phase.finer_elements()
         found = Discretisation(phase, noises)
         return found if found.size > chosen.size else chosen.enriched()
 

@@ -45,6 +45,11 @@ Parts = list[tuple[FloatArray, Any]]
 """Σ f(η) ⊗ g: values at points of η, shape (points, nodes), and waves, shape (all, own)."""
 
 
+def group_dimensions(n: int) -> tuple[int, int]:
+    """Of the two groups of coordinates."""
+    return n // 2, (n + 1) // 2
+
+
 @dataclass(frozen=True, eq=False)
 class SphereCells:
     """Which functions there are of directions, in the place of those of the phase.
@@ -64,7 +69,7 @@ class SphereCells:
     @property
     def dimensions(self) -> tuple[int, int]:
         """Of the two groups of coordinates."""
-        return len(self.coordinates) // 2, (len(self.coordinates) + 1) // 2
+        return group_dimensions(len(self.coordinates))
 
     @property
     def size(self) -> int:
@@ -123,14 +128,14 @@ class Waves:
     def of(dimensions: tuple[int, int], most: int) -> Waves:
         """Those up to a total degree."""
         reach = most + 2
-        groups = [_group(dimension, reach) for dimension in dimensions]
-        first, second = (np.ravel(each) for each in np.meshgrid(*(group.degrees for group in groups), indexing="ij"))
+        groups = [group(dimension, reach) for dimension in dimensions]
+        first, second = (np.ravel(each) for each in np.meshgrid(*(each.degrees for each in groups), indexing="ij"))
         kept = np.flatnonzero(((first + second) % 2 == 0) & (first + second <= reach))
 
         def product(*factors: Any) -> Any:
             return csr_matrix(scipy.sparse.kron(*map(csr_matrix, factors)))[kept][:, kept]
 
-        ones = [np.eye(group.degrees.size) for group in groups]
+        ones = [np.eye(each.degrees.size) for each in groups]
 
         def products(i: int, lefts: Sequence[FloatArray], j: int) -> list[list[Any]]:
             def of_pair(left: FloatArray, right: FloatArray) -> Any:
@@ -142,7 +147,7 @@ class Waves:
             return [[of_pair(left, right) for right in groups[j].unit] for left in lefts]
 
         pairs = [(i, j) for i in (0, 1) for j in (0, 1)]
-        slopes = [group.slope for group in groups]
+        slopes = [each.slope for each in groups]
         first, second = first[kept], second[kept]
         return Waves(
             first,
@@ -159,7 +164,7 @@ class Waves:
 
 
 @dataclass(frozen=True, eq=False)
-class _Group:
+class Group:
     """Waves of one unit vector: of their degrees, multiplication by components of it and of its tangent, and ∂θ."""
 
     degrees: Any
@@ -169,10 +174,11 @@ class _Group:
     samples: FloatArray
 
 
-def _group(dimension: int, most: int) -> _Group:
+def group(dimension: int, most: int) -> Group:
+    """Those up to a degree."""
     if dimension == 1:  # functions of ±1
         signs = np.array([[1.0, 1.0], [1.0, -1.0]])
-        return _Group(np.arange(2), [np.array([[0.0, 1.0], [1.0, 0.0]])], [], None, signs)
+        return Group(np.arange(2), [np.array([[0.0, 1.0], [1.0, 0.0]])], [], None, signs)
     k = np.arange(1, most + 1)
     degrees = np.concatenate([[0], np.repeat(k, 2)])
 
@@ -191,10 +197,63 @@ def _group(dimension: int, most: int) -> _Group:
     cosines, sines = 2 * k - 1, 2 * k
     slope[sines, cosines], slope[cosines, sines] = -k, k
     unit = [multiplied(np.cos(theta)), multiplied(np.sin(theta))]
-    return _Group(degrees, unit, [-unit[1], unit[0]], slope, values(max(SIDE, most))[1])
+    return Group(degrees, unit, [-unit[1], unit[0]], slope, values(max(SIDE, most))[1])
 
 
-class SphereAxis(Axis):
+class DirectionAxis(Axis):
+    """Functions of directions, and what a matrix X does to them: h·∇u and q u of ẋ = Xx.
+
+    Attributes:
+        n: the dimension.
+        chosen: which functions.
+        degrees: the total degree of the wave, or of the harmonic, of each unknown, shape (size,).
+        identity: ∫ u v, shape (size, size).
+    """
+
+    is_full = True
+    n: int
+    chosen: Any
+    degrees: Any
+    identity: FloatArray
+
+    def _moved(self, matrix: FloatArray) -> tuple[Any, Any]:
+        """h·∇u and q u of a matrix."""
+        raise NotImplementedError
+
+    @property
+    def _itself(self) -> Any:
+        """u."""
+        raise NotImplementedError
+
+    def _form(self, left: Any, right: Any) -> FloatArray:
+        """∫ v̂ û of functions of v and of u."""
+        raise NotImplementedError
+
+    def driven(self, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """∫ v h·∇u and ∫ v q u."""
+        moved, growth = self._moved(matrix)
+        return self._form(self._itself, moved), self._form(self._itself, growth)
+
+    def diffusion(self, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """∫ v D_a D_b u, D = h·∇ + p q of two matrices, D* v = −h·∇v − tr v + (p + n) q v: by p⁰, p¹ and p²."""
+        moved, growth = self._moved(a)
+
+        def by(right: Any) -> tuple[FloatArray, FloatArray]:
+            stretched = self._form(growth, right)
+            adjoint = (
+                self.n * stretched - self._form(moved, right) - float(np.trace(a)) * self._form(self._itself, right)
+            )
+            return adjoint, stretched
+
+        (free, crossed), (linear, square) = map(by, self._moved(b))
+        return free, linear + crossed, square
+
+    def penalty(self) -> FloatArray:
+        """What is added against pairs that no path has."""
+        return 0.0 * np.asarray(self.identity)
+
+
+class SphereAxis(DirectionAxis):
     """Continuous elements in η times waves of the other angles, see the module.
 
     Args:
@@ -202,12 +261,10 @@ class SphereAxis(Axis):
 
     Attributes:
         identity: ∫ u v, which is no identity, shape (size, size).
-        degrees: the total degree of the wave of each unknown, shape (size,).
         inner_values: values at points of the sphere, shape (points, size).
         ladders: of the elements alone; that of the waves is told by what two degrees more change.
     """
 
-    is_full = True
     ladders: tuple[tuple[Any, Any, Any], ...] = ()
 
     def __init__(self, chosen: SphereCells) -> None:
@@ -308,19 +365,6 @@ class SphereAxis(Axis):
         """u."""
         every = scipy.sparse.identity(self.waves.first.size, format="csc")
         return [(self._of_line, every[:, self.waves.own])]
-
-    def driven(self, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """∫ v h·∇u and ∫ v q u."""
-        moved, growth = self._moved(matrix)
-        return self._form(self._itself, moved), self._form(self._itself, growth)
-
-    def diffusion(self, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """∫ v D_a D_b u, D = h·∇ + p q of two matrices, D* v = −h·∇v − tr v + (p + n) q v: by p⁰, p¹ and p²."""
-        (moved_a, growth_a), (moved_b, growth_b) = self._moved(a), self._moved(b)
-        parts = ((-1.0, moved_a), (-float(np.trace(a)), self._itself), (float(self.n), growth_a))
-        adjoint = [(c * of_eta, of) for c, each in parts for of_eta, of in each]
-        linear = self._form(adjoint, growth_b) + self._form(growth_a, moved_b)
-        return self._form(adjoint, moved_b), linear, self._form(growth_a, growth_b)
 
     def penalty(self) -> FloatArray:
         """−Σ γ h² N⁻³ (cs)² w [∂u/∂η] [∂v/∂η] over the inner vertices."""
