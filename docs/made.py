@@ -29,10 +29,10 @@ TWO_AXES = "filtered", "two_noises", "coupled"
 OWN_P = "stochastic_mathieu", "flutter"
 """Cases of which their own p are drawn."""
 ROOMS = {
-    "model": "what is studied: systems in the plane and their noises",
+    "model": "linear systems of two to four variables, and their noises",
     "exponent": "Λ(p), its eigenpairs and what follows from them",
     "analysis": "densities, sensitivities, where stability ends",
-    "simulation": "an independent witness by Monte Carlo",
+    "simulation": "Monte Carlo, independent of the finite elements",
     "proofs": "bounds that hold with certainty",
     "theory": "what is known in closed form",
     "fem": "meshes and the matrices of the generator",
@@ -85,8 +85,8 @@ GALLERY = """\
 Gallery
 =======
 
-Every case file that comes with fpsolve, with its figure. Each page has the file as it stands, and the lines of Python
-that draw it. On the command line the same is ``fpsolve run cases/fig1.toml``.
+These are all case files that come with fpsolve, with their figures. Each page shows the file, and the lines of Python
+that draw the figure. On the command line, for example, ``fpsolve run cases/fig1.toml`` does the same.
 """
 
 
@@ -120,8 +120,8 @@ INDICES = """for result in results[:6]:
 """
 CHART = """
 # %%
-# Its chart takes minutes, so it is drawn here from what ``fpsolve chart`` wrote, which docs/charts of the repository
-# has; with a chart of your own, write its folder of results in that place:
+# Its chart takes minutes. So these lines draw it from the files that ``fpsolve chart`` wrote, which are in docs/charts
+# of the repository. To draw a chart of your own, write its folder of results instead:
 
 from pathlib import Path
 

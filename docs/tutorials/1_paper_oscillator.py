@@ -2,15 +2,15 @@ r"""
 1. A first oscillator
 =====================
 
-A mass on a spring hits a wall at :math:`x = 0` and loses a share of its speed. Noise drives its damping:
+A mass on a spring hits a wall at :math:`x = 0` and loses a share of its speed. Noise acts on its damping:
 
 .. math::
 
    \ddot x + \omega^2 x - \varepsilon^2 c_1 \dot x = \varepsilon\,\xi(t)\,\dot x \quad (x > 0),
    \qquad \dot x_+ = -R\,\dot x_- \quad (x = 0).
 
-The damping :math:`c_1 > 0` feeds energy in; each impact takes energy out. Who wins? The answer depends on which average
-you look at. This tutorial computes all of them.
+The damping :math:`c_1 > 0` feeds energy in, and each impact takes energy out. Does the motion grow or decay? That
+depends on which average you look at. This tutorial computes all of them.
 """
 
 import matplotlib.pyplot as plt
@@ -29,8 +29,8 @@ from fpsolve import (
 # %%
 # State the system and the noise
 # ------------------------------
-# ``epsilon`` scales the noise; its square scales the damping and the loss at the wall. ``omega`` is in rad/time, the
-# other rates are in 1/time.
+# ``epsilon`` scales the noise. Its square scales the damping and the loss at the wall. ``omega`` is in rad/time, ``c1``
+# and ``D0`` are in 1/time, ``tau0`` is in time.
 oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
 
@@ -43,13 +43,13 @@ second = moment_lyapunov(oscillator, noise, 2.0)
 print(second.value[0], "+-", second.error_estimate[0])
 
 # %%
-# It is positive: the mean square grows. What of almost every single path? That is the largest Lyapunov exponent,
+# It is positive: the mean square grows. Almost every single path grows or decays by the largest Lyapunov exponent,
 # :math:`\lambda = \Lambda'(0)`.
 print("lambda =", lyapunov_exponent(oscillator, noise))
 
 # %%
 # The noise has two treatments. ``noise`` is the bounded noise of Eq. (7). ``noise.ou_reduction()`` is the
-# Ornstein-Uhlenbeck noise that the paper puts in its place, Eqs. (12)-(15). Here is the price of the reduction:
+# Ornstein-Uhlenbeck noise that the paper puts in its place, Eqs. (12)-(15). This is the error of the reduction:
 reduced = moment_lyapunov(oscillator, noise.ou_reduction(), 2.0)
 print(f"{reduced.value[0]:.10f} reduced, {second.value[0]:.10f} exact")
 print(f"the reduction is off by {(reduced.value[0] / second.value[0] - 1):.1%}")
@@ -58,7 +58,7 @@ print(f"the reduction is off by {(reduced.value[0] / second.value[0] - 1):.1%}")
 # All moments
 # -----------
 # :math:`\Lambda` is a convex function of :math:`p` with :math:`\Lambda(0) = 0`. ``MomentLyapunovFunction`` makes it a
-# function that costs nine solves, whatever the number of points you look at.
+# Python function. This takes nine solves, however many points you evaluate.
 exponent = MomentLyapunovFunction(oscillator, noise, (-2.0, 6.0))
 p = np.linspace(-2, 6, 201)
 figure, axes = plt.subplots(layout="constrained")
@@ -68,16 +68,16 @@ axes.set(xlabel="$p$", ylabel=r"$\Lambda(p)$ in 1/time", title="Moment Lyapunov 
 
 # %%
 # The other zero is the stability index :math:`\delta_p`. It is negative here, as :math:`\lambda > 0`: almost every
-# path grows, and only moments of an order between :math:`\delta_p` and 0 fall.
+# path grows, and only moments of an order between :math:`\delta_p` and 0 decay.
 print("delta_p =", stability_index(oscillator, noise))
 
 # %%
-# Where the second moment lives
-# -----------------------------
-# A moment is carried by few paths. Their phase and noise have the tilted density. For :math:`p = 2` the mean of the
-# noise on these paths is positive, although its stationary mean is zero:
+# The paths that carry the second moment
+# --------------------------------------
+# Few paths carry a moment. The tilted density is the density of phase and noise on these paths. For :math:`p = 2` the
+# mean of the noise on them is positive, although its stationary mean is zero:
 density = tilted_density(second.pairs[0])
-print("mean of the noise on the paths that count:", density.mean(lambda phi, xi: xi))
+print("mean of the noise on these paths:", density.mean(lambda phi, xi: xi))
 density.plot(cmap="magma")
 
 # %%

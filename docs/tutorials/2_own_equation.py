@@ -2,15 +2,16 @@ r"""
 2. Your own equation
 ====================
 
-Any linear system in the plane can be written as it stands in your notes. Here a beam is loaded along its axis, with a
-stop on one side:
+You can write any linear system of two variables in your own notation. Here a beam is loaded along its axis, with a stop
+on one side:
 
 .. math::
 
    \ddot x + 2\zeta\omega\dot x + (\omega^2 + \xi_1(t))\,x + \dot W\,s\,x = 0, \qquad \dot x_+ = -R\,\dot x_-
    \quad\text{at } x = 0.
 
-The load jumps between two values, which is telegraph noise. White noise shakes the support.
+The load :math:`\xi_1` is telegraph noise, which jumps between two values. The support shakes by white noise
+:math:`\dot W`.
 """
 
 import math
@@ -34,7 +35,8 @@ problem = Problem(system, loads)
 print("Lambda(2) =", moment_lyapunov(problem, 2.0).value[0])
 
 # %%
-# Every parameter has a key. A problem can be asked with another value, or differentiated by all of them.
+# Every parameter has a key. ``at`` makes the problem with other values, and ``sensitivities`` differentiates by all
+# parameters.
 print("with twice the damping:", moment_lyapunov(problem.at({"system.zeta": 0.2}), 2.0).value[0])
 for key, slope in sensitivities(problem, 2.0).moments[0].items():
     print(f"d Lambda(2) / d {key}: {slope.value:.8f}")
@@ -42,7 +44,7 @@ for key, slope in sensitivities(problem, 2.0).moments[0].items():
 # %%
 # As matrices
 # -----------
-# The same without the stop, :math:`\dot x = (A_0 + \xi_1 A_1 + \ldots)\,x`. A term has an order in
+# The same system can be stated by matrices, :math:`\dot x = (A_0 + \xi_1 A_1 + \ldots)\,x`. A term has an order in
 # :math:`\varepsilon`, a matrix, a function of the noise and the name of the noise. The two numbers must agree.
 stiffness = ((0.0, 0.0), (-1.0, 0.0))
 
@@ -65,18 +67,19 @@ assert math.isclose(first, again, rel_tol=1e-7)
 # %%
 # A wall
 # ------
-# A jump multiplies the state on a ray. In the plane of :math:`x` and :math:`v` the wall :math:`x = 0` is the ray at
-# :math:`\varphi = \pi/2`; :math:`\ln R` is its factor. It takes energy out at every passage.
+# A jump multiplies the state by :math:`R` where it crosses a ray. In the plane of :math:`x` and :math:`v` the wall
+# :math:`x = 0` is the ray at :math:`\varphi = \pi/2`. ``Jump`` takes the phase of the ray and :math:`\ln R`. The wall
+# takes energy out at every crossing.
 wall = Jump(math.pi / 2, math.log(0.9))
 walled = Problem(PlaneSystem(terms, [wall]), loads)
 print("lambda without a wall:", lyapunov_exponent(by_matrices))
 print("lambda with a wall:   ", lyapunov_exponent(walled))
 
 # %%
-# A witness
-# ---------
-# The simulation moves paths of the system itself. It shares no line with the finite elements. Compare its result with
-# theirs in units of its standard error.
+# An independent check
+# --------------------
+# The simulation moves paths of the system itself. It shares no line of code with the finite elements. Compare the two
+# results in units of the standard error.
 alone = Problem(PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.2*v - xi*x")), Telegraph(a=0.5, k=1.0))
 expected = moment_lyapunov(alone, 1.0).value[0]
 estimate = simulate(alone, [1.0], paths=4096, time=200.0, seed=1).estimates[0]

@@ -2,9 +2,9 @@ r"""
 3. A chart of stability
 =======================
 
-A chart divides a plane of two parameters into regions. Its lines are where an exponent is zero. White noise in the
-stiffness is the example, :math:`\ddot x + 2b\dot x + (1 + s\dot W)x = 0`, as one of its lines is known: the mean square
-is neutral at :math:`s^2 = 4b`.
+A chart divides a plane of two parameters into regions. On its lines an exponent is zero. The example is white noise in
+the stiffness, :math:`\ddot x + 2b\dot x + (1 + s\dot W)x = 0`. One of its lines is known exactly:
+:math:`\Lambda(2) = 0` where :math:`s^2 = 4b`.
 """
 
 import matplotlib.pyplot as plt
@@ -17,8 +17,8 @@ from fpsolve.model import White
 # %%
 # Two lines
 # ---------
-# ``boundary`` looks for a line on a grid and then follows it with its gradient. The grid here is a coarse one of
-# 5 × 5 nodes, as the lines are simple; the default is 13 × 13.
+# ``boundary`` looks for a line on a grid and then follows it with its gradient. The lines here are simple, so that a
+# coarse grid of 5 × 5 nodes is enough; the default is 13 × 13.
 system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 2*b*v - xi*x"), {"b": 0.1})
 problem = Problem(system, White(s=0.5))
 frame = Axis("noise.s", 0.3, 1.2), Axis("system.b", 0.02, 0.3)
@@ -26,7 +26,7 @@ paths = boundary(problem, "lyapunov_exponent", *frame, nodes=5)
 square = boundary(problem, {"moment": 2.0}, *frame, nodes=5)
 
 # %%
-# Every point of a line is solved to 1e-10 of the scale. So the known line must be met:
+# Every point of a line is solved to 1e-10 of the scale. So the line must agree with the known one:
 branch = square.branches[0]
 print("largest distance from s^2 = 4 b:", np.max(np.abs(branch.x**2 - 4 * branch.y)))
 assert np.allclose(branch.x**2, 4 * branch.y, rtol=1e-7)
@@ -45,13 +45,13 @@ axes.text(1.08, 0.06, "almost every\npath grows", ha="center")
 axes.legend(loc="lower right")
 
 # %%
-# Between the two lines lies the dangerous region: a test of a few specimens shows decay, but the mean square, and so
-# the mean energy, grows. Large excursions are rare there and decide.
+# The region between the two lines is dangerous: a test of a few specimens shows decay, but the mean square, and so the
+# mean energy, grows. It grows by rare large excursions.
 for s in (0.5, 0.8, 1.1):
     here = problem.at({"noise.s": s})
     paths, square = lyapunov_exponent(here).value, moment_lyapunov(here, 2.0).value[0]
     print(f"s = {s}: lambda = {paths:+.4f}, Lambda(2) = {square:+.4f}")
 
 # %%
-# On the command line the same is ``fpsolve chart cases/systems/white_noise_chart.toml``. It names the regions and
-# shades them, see :doc:`/guide/charts`. Next: :doc:`a thousand sets <4_sweep>`.
+# On the command line ``fpsolve chart cases/systems/white_noise_chart.toml`` makes this chart. It also names and shades
+# the regions, see :doc:`/guide/charts`. Next: :doc:`a thousand sets <4_sweep>`.

@@ -17,8 +17,8 @@ import fpsolve
 # %%
 # A case with two varied keys
 # ---------------------------
-# ``[vary]`` with ``mode = "product"`` makes all combinations: 40 frequencies and 25 intensities. ``quantities`` says
-# what is wanted; what is not wanted costs nothing.
+# ``[vary]`` with ``mode = "product"`` makes all combinations of 40 frequencies and 25 intensities. ``quantities`` names
+# what is wanted; nothing else is computed.
 CASE = """
 title = "A thousand oscillators"
 
@@ -51,21 +51,21 @@ folder = Path(tempfile.mkdtemp())
 # %%
 # Solve
 # -----
-# ``jobs=None`` uses all processors. Each set that is finished is kept at once: after a kill the same line goes on from
-# where it was. On the command line it is ``fpsolve run thousand.toml``.
+# ``jobs=None`` uses all processors. Each finished set is written at once: if the process is killed, the same line
+# goes on where it stopped. The command is ``fpsolve run thousand.toml``.
 results = fpsolve.run(folder / "thousand.toml", folder / "results", jobs=None)
 print(len(results), "sets")
 
 # %%
 # Look at it
 # ----------
-# ``results.nc`` is a labelled array. It needs no fpsolve to be read.
+# ``results.nc`` has labelled arrays. Reading it does not need fpsolve.
 found = xr.open_dataset(folder / "results/thousand/results.nc")
 print(found.sizes)
 print(found.moment.attrs["long_name"], "in", found.moment.attrs["units"])
 
 # %%
-# The second moment over both keys, with the line where it is neutral:
+# Here is :math:`\Lambda(2)` over both keys, with the line on which it is zero:
 moment = found.moment.sel(p=2.0).rename(None)
 names = list(moment.dims)
 figure, axes = plt.subplots(layout="constrained")
@@ -75,9 +75,9 @@ axes.set(xlabel=names[0], ylabel=names[1], yscale="log")
 figure.colorbar(colours, label=r"$\Lambda(2)$ in 1/time")
 
 # %%
-# How many of the thousand are safe on almost every path but not in the mean square?
+# For how many of the thousand sets does almost every path decay, but the mean square grow?
 both = (found.lyapunov_exponent < 0) & (found.moment.sel(p=2.0) > 0)
 print(int(both.sum()), "of", both.size)
 
 # %%
-# Several runs at once are one table with ``fpsolve.open_results("results/*")``, see :doc:`/guide/sweeps`.
+# ``fpsolve.open_results("results/*")`` reads several runs as one table, see :doc:`/guide/sweeps`.
