@@ -1,6 +1,6 @@
-"""Moment Lyapunov exponents of linear systems in the plane under coloured or white noise, by finite elements.
+"""Moment Lyapunov exponents of linear systems of two to four variables under random loads, by finite elements.
 
-A vibro-impact oscillator is the first of them; `PlaneSystem.of_equations` takes any other one as equations.
+`VibroImpactOscillator` is the system of the paper. `PlaneSystem.of_equations` states others as equations.
 
 >>> from fpsolve import NonGaussianNoise, VibroImpactOscillator, moment_lyapunov
 >>> oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)

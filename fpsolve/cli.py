@@ -35,9 +35,9 @@ CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130,
 
 app = App(
     name="fpsolve",
-    help="""Moment Lyapunov exponents of linear systems in the plane under coloured or white noise, by finite elements.
+    help="""Moment Lyapunov exponents of linear systems of two to four variables under random loads, by finite elements.
 
-    A case file states a vibro-impact oscillator, [oscillator], or any other linear system as equations, [system].
+    A case file states a vibro-impact oscillator, [oscillator], or any other linear system, [system].
 
     Example: fpsolve run cases/fig1.toml
 
@@ -64,17 +64,17 @@ def _whole(_: type, tokens: Sequence[Token]) -> int:
 
 
 Count = Annotated[int, Parameter(converter=_whole)]
-Jobs = Annotated[Count | None, Parameter(help="How many processes; as many as there are processors if omitted.")]
+Jobs = Annotated[Count | None, Parameter(help="Number of processes; if omitted, the number of processors.")]
 Out = Annotated[Path, Parameter(help="Folder for the results.")]
 Scheduler = Annotated[
     str, Parameter(help="Address of a Dask scheduler whose workers do the work, e.g. tcp://host:8786.")
 ]
-Fresh = Annotated[bool, Parameter(help="Solve or simulate again what an earlier run has finished.", negative="")]
+Fresh = Annotated[bool, Parameter(help="Also solve or simulate again what an earlier run has finished.", negative="")]
 Quiet = Annotated[
     bool,
     Parameter(
-        help='Print the last line only, and on the standard error what is wrong or "not converged". Tables, notes and '
-        "warnings are in the files.",
+        help='Print only the last line, and on the standard error only errors and what is "not converged". Tables, '
+        "notes and warnings are in the files.",
         negative="",
     ),
 ]
@@ -82,12 +82,12 @@ Quiet = Annotated[
 
 Report = Annotated[
     bool,
-    Parameter(help="Write report.html too: all of it on one page, with figures, which opens from disk.", negative=""),
+    Parameter(help="Also write report.html: one page with all results and figures.", negative=""),
 ]
 Interactive = Annotated[
     bool,
     Parameter(
-        help="Write report.html with numbers where the pointer is, by plotly: pip install 'fpsolve[interactive]'.",
+        help="Also write report.html, in which the pointer shows numbers. Needs pip install 'fpsolve[interactive]'.",
         negative="",
     ),
 ]
@@ -161,12 +161,12 @@ def _drop_blocked_output() -> None:
 
 @app.command
 def new(
-    name: Annotated[str, Parameter(help="A case that comes with fpsolve; all of them are listed if omitted.")] = "",
-    file: Annotated[Path | None, Parameter(help="The new file, or its folder; NAME.toml here if omitted.")] = None,
+    name: Annotated[str, Parameter(help="A case that comes with fpsolve; if omitted, all are listed.")] = "",
+    file: Annotated[Path | None, Parameter(help="The new file, or its folder; if omitted, NAME.toml here.")] = None,
 ) -> int:
-    """Copy a case that comes with fpsolve, to start from, or list these cases with what each is about.
+    """Copy a case that comes with fpsolve, or list these cases with their titles.
 
-    The copy names fpsolve.schema.json beside it, by which editors complete and check it.
+    Beside the copy is fpsolve.schema.json, with which editors complete and check it.
 
     Example: fpsolve new fig1 my_case.toml
     """
@@ -183,9 +183,9 @@ def new(
 
 @app.command
 def schema() -> int:
-    """Print the JSON Schema of case files, by which editors complete and check them.
+    """Print the JSON Schema of case files, with which editors complete and check them.
 
-    A case file names it in its first line, "#:schema fpsolve.schema.json", as Taplo and Even Better TOML read it.
+    A case file names it in its first line, "#:schema fpsolve.schema.json", for the editors Taplo and Even Better TOML.
 
     Example: fpsolve schema > fpsolve.schema.json
     """
@@ -201,7 +201,7 @@ def run(
     *,
     out: Out = Path("results"),
     monte_carlo: Annotated[
-        bool, Parameter(help="Simulate too, as [monte_carlo] of the case says, and draw both.", negative="")
+        bool, Parameter(help="Also simulate, as [monte_carlo] of the case says, and draw both.", negative="")
     ] = False,
     jobs: Jobs = None,
     scheduler: Scheduler = "",
@@ -216,9 +216,9 @@ def run(
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
 
-    What an earlier run has finished, also one that was killed, is not solved again.
+    Curves that an earlier run has finished are not solved again, even if that run was killed.
 
-    Without [output] quantities a case computes all of: moment,
+    Without [output] quantities a case computes all of them: moment,
     lyapunov_exponent, stability_index, variance_rate, impact_rate,
     critical_impact_factor, critical_restitution, sensitivities, eigenfunctions.
 
@@ -256,14 +256,21 @@ def simulate(
     cases: Cases,
     *,
     out: Out = Path("results"),
-    paths: Annotated[Count | None, Parameter(help="How many paths; 32768 if nothing is stated.")] = None,
-    time: Annotated[float | None, Parameter(help="Length of the paths; 64 transients if nothing is stated.")] = None,
-    seed: Annotated[Count | None, Parameter(help="Seed of the random numbers; 0 if nothing is stated.")] = None,
+    paths: Annotated[Count | None, Parameter(help="Number of paths; 32768 if the case does not state it.")] = None,
+    time: Annotated[
+        float | None,
+        Parameter(
+            help="Length of the paths; if the case does not state it, 64 transients, or 16 for more than two variables."
+        ),
+    ] = None,
+    seed: Annotated[
+        Count | None, Parameter(help="Seed of the random numbers; 0 if the case does not state it.")
+    ] = None,
     estimator: Annotated[
         str | None,
-        Parameter(help="direct (if nothing is stated), or population for strong noise or large |p|."),
+        Parameter(help="direct, or population for strong noise or large |p|; direct if the case does not state it."),
     ] = None,
-    jobs: Annotated[Count | None, Parameter(help="How many processors; all if omitted.")] = None,
+    jobs: Annotated[Count | None, Parameter(help="Number of processors; all if omitted.")] = None,
     scheduler: Scheduler = "",
     fresh: Fresh = False,
     report: Report = False,
@@ -273,7 +280,8 @@ def simulate(
 ) -> int:
     """Simulate the system with its impacts and estimate the exponents; write monte_carlo.json into OUT/<case>/.
 
-    Ctrl-C ends it early and keeps what is done; curves that an earlier simulation has finished are not simulated again.
+    Ctrl-C ends the simulation early and keeps what is done.
+    Curves that an earlier simulation has finished are not simulated again.
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
@@ -309,8 +317,8 @@ def check(
     hierarchy: Annotated[
         bool,
         Parameter(
-            help="Compare Λ of the even p of [moments] with the moment hierarchy instead, an eigenvalue without phase; "
-            "for white noise and chains without walls.",
+            help="Compare Λ of the even p of [moments] with the moment hierarchy instead, the equations of moments; "
+            "for two variables without walls under white noise, chains and impulses.",
             negative="",
         ),
     ] = False,
@@ -319,9 +327,9 @@ def check(
     quiet: Quiet = False,
     overrides: Overrides = None,
 ) -> int:
-    """Solve case files and compare with the values that they expect; write nothing.
+    """Solve case files and compare the results with the values that they expect; write nothing.
 
-    A noise of a kind that another package registers is checked: each of its members against what the others make of it.
+    If another package registers the noise, each member of its class is compared with what follows from the others.
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
@@ -364,9 +372,9 @@ def chart(
 ) -> int:
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
 
-    [budget] line_seconds limits the time of a line: what is traced by then is kept, with exit code 3.
-    [budget] seconds limits a row of nodes of the scan, of which each may take half of what is left.
-    Both are times of the processor.
+    [budget] line_seconds limits a line: what is traced by then is kept, and the exit code is 3.
+    [budget] seconds limits a row of points of the grid; a point may take half of the time that is left for its row.
+    Both limits are processor time.
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """
@@ -398,9 +406,12 @@ def prove(
     cases: ProvenCases = None,
     *,
     width: Annotated[
-        float | None, Parameter(help="Wanted upper - lower, in 1/time; 1e-7 of the scale of each number if omitted.")
+        float | None,
+        Parameter(help="Wanted distance of the bounds, in 1/time; if omitted, 1e-7 of the scale of each number."),
     ] = None,
-    check: Annotated[Path | None, Parameter(help="Verify a proof.json from its certificates alone instead.")] = None,
+    check: Annotated[
+        Path | None, Parameter(help="Prove nothing, but verify a proof.json from its certificates alone.")
+    ] = None,
     out: Out = Path("results"),
     jobs: Jobs = None,
     scheduler: Scheduler = "",
@@ -408,13 +419,13 @@ def prove(
     quiet: Quiet = False,
     overrides: Overrides = None,
 ) -> int:
-    """Prove bounds on the exponents that hold with certainty; write them with certificates, OUT/<case>/proof.json.
+    """Prove bounds on the exponents that hold with certainty; write them with certificates into OUT/<case>/proof.json.
 
-    A bound takes at most [budget] seconds of the processor and a third more.
+    A bound takes at most [budget] seconds of processor time and a third more.
     The bounds on δ_p together take at most twice as much.
     Needs python-flint: pip install 'fpsolve[proof]'.
 
-    Exit codes: 0 proven, 3 a width is not met; with --check 0 accepted, 1 rejected, 2 malformed.
+    Exit codes: 0 proven, 3 bounds are farther apart than wanted; with --check 0 accepted, 1 rejected, 2 malformed.
 
     Example: fpsolve prove cases/fig1.toml --width 1e-9
     """
@@ -461,16 +472,18 @@ def prove(
 def mesh(
     output: Annotated[Path, Parameter(help="The file to write: .vtu for ParaView, .msh for Gmsh.")],
     *,
-    phi_cells: Annotated[Count, Parameter(help="Cells in the phase from one impact to the next.")] = 2,
+    phi_cells: Annotated[Count, Parameter(help="Cells in the phase, from one impact to the next.")] = 2,
     phi_degree: Annotated[Count, Parameter(help="Degree of the elements in the phase.")] = 10,
     xi_cells: Annotated[Count, Parameter(help="Cells in the noise.")] = 4,
     xi_degree: Annotated[Count, Parameter(help="Degree of the elements in the noise.")] = 9,
     xi_min: Annotated[float, Parameter(help="Lower end of the noise, in standard deviations.")] = -8.0,
     xi_max: Annotated[float, Parameter(help="Upper end of the noise, in standard deviations.")] = 8.0,
     grading: Annotated[
-        float, Parameter(help="Size of the outermost noise cells over the innermost; 1 is uniform.")
+        float, Parameter(help="Size of the outermost noise cells divided by that of the innermost; 1 is uniform.")
     ] = 1.0,
-    full_circle: Annotated[bool, Parameter(help="Mesh the whole circle instead of one half.", negative="")] = False,
+    full_circle: Annotated[
+        bool, Parameter(help="Mesh the whole circle of phases instead of one half.", negative="")
+    ] = False,
 ) -> int:
     """Write a mesh that a case can name as [mesh] file.
 

@@ -25,7 +25,7 @@ def refuse_no_hierarchy(case: Case) -> None:
     """Refuse a case without an even p, or some curve of which has no hierarchy. Raises `FpsolveError`."""
     orders = even_moments(case)
     if not orders.size:
-        raise FpsolveError(f"{case.path}: moments.p: has no even p > 0, for which alone moments close; add 2.0")
+        raise FpsolveError(f"{case.path}: moments.p: has no even p > 0, and the hierarchy is for these; add 2.0")
     for curve in case.curves():
         try:
             refuse_open_hierarchy(curve.problem, float(orders.max()))

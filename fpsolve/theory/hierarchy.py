@@ -57,16 +57,22 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
     """Refuse a problem whose moments of order p do not close, or are too many. Raises `NoHierarchy`."""
     noises = problem.coloured.parts.values()
     if not (p > 0 and p % 2 == 0):
-        raise NoHierarchy(f"got p = {p:g}; the moments close for even p > 0 only; choose p = 2, 4, …")
+        raise NoHierarchy(f"got p = {p:g}; the equations of the moments close for even p > 0 only; choose p = 2, 4, …")
+    if problem.dimension > 2:
+        raise NoHierarchy(
+            f"got {problem.dimension} variables; the moment hierarchy is for two variables only; compare with "
+            "`fpsolve simulate`"
+        )
     for noise in (each for each in noises if not each.has_states):
         raise NoHierarchy(
-            f"the moments close for white noise and for chains, but not for {noise.kind} noise, where each needs one "
-            "with a higher power of the noise; compare with `fpsolve simulate`"
+            "the equations of the moments close for white noise, impulses and chains, but not for "
+            f"{noise.kind} noise, where each contains a moment with a higher power of the noise; compare with "
+            "`fpsolve simulate`"
         )
     if any(jump.log_factor for jump in problem.system.jumps):
         raise NoHierarchy(
-            "the moments do not close where a wall changes the state, as that takes place at one phase; compare with "
-            "`fpsolve simulate`, or without the wall"
+            "the equations of the moments do not close where a wall changes the state, as that happens at one phase; "
+            "compare with `fpsolve simulate`, or remove the wall"
         )
     count = math.prod(noise.reached.size for noise in noises) * (int(p) + 1)
     if count > MOST:

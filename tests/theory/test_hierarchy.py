@@ -9,7 +9,7 @@ from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, main
 from fpsolve.errors import NoHierarchy
-from fpsolve.model import CoefficientMatrix, MarkovChain, ParametricOscillator, Telegraph, White
+from fpsolve.model import CoefficientMatrix, LinearSystem, MarkovChain, ParametricOscillator, Telegraph, White
 from fpsolve.theory.hierarchy import hierarchy_exponent
 from tests.oracles import moment_hierarchy
 
@@ -44,6 +44,7 @@ def test_any_matrices_with_white_noise(rng, sense):
         (ParametricOscillator(1.0, 0.1, 0.9), White(0.5), 2.0, "where a wall changes the state"),
         (ParametricOscillator(1.0, 0.1), OrnsteinUhlenbeck(1.0, 1.0), 2.0, "but not for ornstein-uhlenbeck noise"),
         (ParametricOscillator(1.0, 0.1), Telegraph(0.5, 1.0), 1e6, "2000002 equations are more than 2000"),
+        (LinearSystem([CoefficientMatrix(0, np.eye(3).tolist(), identity)]), White(0.5), 2.0, "got 3 variables"),
     ],
 )
 def test_what_does_not_close_is_refused(system, noise, p, words):
@@ -85,8 +86,8 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeyp
 @pytest.mark.parametrize(
     ("override", "words"),
     [
-        ("system.restitution=0.9", "with noise.k = 0.5: the moments do not close where a wall changes the state"),
-        ("moments.p=[1.0, 3.0]", "moments.p: has no even p > 0, for which alone moments close; add 2.0"),
+        ("system.restitution=0.9", "with noise.k = 0.5: the equations of the moments do not close where a wall"),
+        ("moments.p=[1.0, 3.0]", "moments.p: has no even p > 0, and the hierarchy is for these; add 2.0"),
     ],
 )
 def test_the_command_refuses_what_does_not_close(
