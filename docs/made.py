@@ -127,16 +127,20 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
+from fpsolve.drawing import label_axes, scale_axis
 from fpsolve.output.charts import read_line
 
 x, y = case.chart.x.axis, case.chart.y.axis
 figure, axes = plt.subplots(layout="constrained")
 for number, zero in enumerate(case.chart.zero):
     lines, _ = read_line(Path("../../charts/{name}"), (x.key, y.key), zero, case.curve({{}}).parameters)
-    for line in lines:
-        axes.plot(*line, color=f"C{{number}}", label=zero.latex)
-axes.set(xscale=x.scale, yscale=y.scale, xlabel=x.key, ylabel=y.key, xlim=(x.start, x.stop), ylim=(y.start, y.stop))
+    for branch, line in enumerate(lines):
+        axes.plot(*line, color=f"C{{number}}", label=zero.latex if branch == 0 else None)
+label_axes(axes, case.about(x.key).attributes, case.about(y.key).attributes)
+scale_axis(axes.xaxis, x.scale, (x.start, x.stop))
+scale_axis(axes.yaxis, y.scale, (y.start, y.stop))
 axes.legend()
+plt.show()
 """
 
 

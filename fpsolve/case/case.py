@@ -52,8 +52,8 @@ from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
 
-COMPUTED = ("oscillator", "system", "noise", "moments", "vary", "mesh")
-"""The sections that say what is computed."""
+COMPUTED = ("oscillator", "system", "noise", "vary", "mesh")
+"""The sections that say of what the numbers are."""
 MOST_DRAWN = 10
 """Of so many curves at most eigenfunctions are written unasked."""
 USUAL_P = 2.0
