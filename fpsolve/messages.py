@@ -12,7 +12,7 @@ from typing import Any
 from unicodedata import category
 
 ALMOST_EVERY = "growth rate of almost every path (Furstenberg-Khasminskii)"
-_RARE = "Λ(p) > 0 for every p ≠ 0, as rare paths that hold the noise far out carry the moments in the end"
+_RARE = "Λ(p) > 0 for every p ≠ 0, as in the end rare paths whose noise stays far out carry the moments"
 
 
 class Severity(StrEnum):
@@ -28,10 +28,10 @@ class Remedy(StrEnum):
 
     MESH = "use more cells or a wider noise interval, or let the mesh be chosen"
     CELLS = "use more cells in a given mesh, or a smaller rtol where it is chosen"
-    REACH = "use a mesh that reaches there, or let it be chosen"
+    REACH = "use a mesh that reaches there, or let the mesh be chosen"
     BUDGET = "use a larger rtol or a larger budget"
     SMALLER_RTOL = "use a smaller rtol"
-    ROUNDING = "keep this, which rounding limits"
+    ROUNDING = "accept this accuracy, which rounding limits"
     BOTH_AXES = "use more cells, in the phase and in the noise"
     PHASE = "use more cells in the phase"
     DEGREES = "use more or higher-degree cells"
@@ -65,42 +65,43 @@ class Code(Enum):
 
     INFINITE = (
         "failure: Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
-        "hide it; choose p in [{low:g}, {high:g}], r0 <= 1, {remedy}"
+        "hide this; choose p in [{low:g}, {high:g}], r0 <= 1, {remedy}"
     )
     INFINITE_ON_RAY = (
-        "failure: Λ({p:g}) is infinite or out of reach: the noise moves the phase to and fro over the ray at "
-        "{phase:.6g}, where ‖x‖^p grows by a factor > {factor:.3g} each time; choose a p nearer to 0, or a ray on "
-        "which no noise acts"
+        "failure: Λ({p:g}) is infinite or cannot be computed: the noise moves the phase to and fro over the ray at "
+        "phi = {phase:.6g}, where ‖x‖^p grows by a factor > {factor:.3g} each time; choose a p nearer to 0, or a ray "
+        "on which no noise acts"
     )
     INVARIANT_RAY = (
-        "failure: Λ({p:g}) is not known: the phase never leaves the ray at {phase:.6g}, whatever the noise does"
-        "{has_jumps:?, and how often it passes a jump depends on the start; leave jumps out¦, so that for p < -1 rare "
+        "failure: Λ({p:g}) is not known: the phase never leaves the ray at phi = {phase:.6g}, whatever the noise does"
+        "{has_jumps:?, and how often it passes a jump depends on the start; remove the jumps¦, so that for p < -1 rare "
         "cancellations count, which are not computed; choose p >= -1}"
     )
     NO_EIGENFUNCTION = (
-        "failure: there is no positive eigenfunction at p = {p:g}: the phase never leaves the ray at {phase:.6g}, "
-        "whatever the noise does; Λ(p) for p > 0 is the largest of that on the ray and of the distance from it"
+        "failure: there is no positive eigenfunction at p = {p:g}: the phase never leaves the ray at "
+        "phi = {phase:.6g}, whatever the noise does; for p > 0 Λ(p) is the larger of the growth rates on the ray and "
+        "across it"
     )
     NO_COMMON_RATE = (
-        "failure: Λ″(0) does not exist: λ is {value:.6g} on the ray that the phase never leaves and across it, so that "
-        "Λ″(p) jumps at p = 0"
+        "failure: Λ″(0) does not exist: λ is {value:.6g} both on the ray that the phase never leaves and across it, so "
+        "that Λ″(p) jumps at p = 0"
     )
     START_MATTERS = (
-        "note: Λ(p) for p < -1 depends on the start: the noise never moves the phase into a set around the slower "
-        "mode; what is given is that of starts there, for others it is smaller"
+        "note: Λ(p) for p < -1 depends on the start: there is a set of phases around the slower mode into which the "
+        "noise never moves the phase; Λ(p) is given for starts in this set, and is smaller for other starts"
     )
     INVARIANT_CLASSES = (
-        "note: the phase never leaves the ray at {phase:.6g}: λ on it is {along:.6g}, across it {across:.6g}; Λ(p) is "
-        "that of starts off such rays"
+        "note: the phase never leaves the ray at phi = {phase:.6g}: λ is {along:.6g} on the ray and {across:.6g} "
+        "across it; Λ(p) is given for starts outside such rays"
     )
     INFINITE_VARIANCE = (
-        "failure: the noise has infinite variance, so that it has no unit of length to mesh; choose r0 < 5/3"
+        "failure: the noise has infinite variance, and its standard deviation is the unit of the mesh; choose r0 < 5/3"
     )
     NO_VARIANCE_RATE = (
-        "failure: Λ″(0) does not exist: with such tails of the noise the variance of ln ‖x‖ grows faster than time"
+        "failure: Λ″(0) does not exist: with algebraic tails of the noise the variance of ln ‖x‖ grows faster than time"
     )
     RARE_NOWHERE_ZERO = (
-        "failure: Λ({p:g}) is that of rare paths, which hold the noise far out in its tails, and zero nowhere; choose "
+        "failure: rare paths, whose noise stays far out in its tails, carry Λ({p:g}), which is zero nowhere; choose "
         "r0 <= 1, {remedy}"
     )
     NO_BOUND = (
@@ -110,8 +111,8 @@ class Code(Enum):
 
     UNDERFLOW = "failure: P_s underflows in a cell of the noise; use a narrower interval"
     DEPENDENT = (
-        "failure: elements of degree {degree} are linearly dependent to rounding, as P_s falls too far within a cell "
-        "of the noise; use more or lower-degree cells, or a narrower interval"
+        "failure: elements of degree {degree} are linearly dependent up to rounding, as P_s falls too far within a "
+        "cell of the noise; use more or lower-degree cells, or a narrower interval"
     )
     NO_IMPACT_LINE = (
         "failure: {wanted} impact line(s) expected at phi = {place} + k pi, {found} found; put a line of the mesh at "
@@ -121,32 +122,33 @@ class Code(Enum):
     NOT_CONVERGED = "failure: Λ({p:g}) did not converge: {reason}"
     NOT_SOLVED = "failure: Λ({p:g}) cannot be solved ({reason})"
     OUT_OF_RANGE = "failure: Λ({p:g}) is beyond floating-point numbers ({reason})"
-    FAR_OUT = "failure: {reason}; this moment is carried by rare paths, with noise far out in its tails"
-    NEAR_ZERO = "failure: p near 0 goes with p = {p:g}: {reason}"
+    FAR_OUT = "failure: {reason}; rare paths, with noise far out in its tails, carry this moment"
+    NEAR_ZERO = "failure: Λ(p) near p = 0 follows from Λ({p:g}): {reason}"
     NOT_FINER = "failure: p = {p:g} did not converge on a finer mesh: {reason}"
     HELD_BEYOND = (
-        "failure: Λ({p:g}) did not converge: it is at least {rate:.3g}, as much as paths grow that hold the noise "
-        "beyond {z:g} standard deviations, and no eigenfunction belongs to them"
+        "failure: Λ({p:g}) did not converge: it is at least {rate:.3g}, the growth rate of paths whose noise stays "
+        "beyond {z:g} standard deviations, and these have no eigenfunction"
     )
     HELD_TOO_FAR = (
-        "failure: Λ({p:g}) did not converge: it is positive, as paths grow that hold the noise beyond {z:g} standard "
-        "deviations, and not the {value:.3g} of all others"
+        "failure: Λ({p:g}) did not converge: it is positive, as paths grow whose noise stays beyond {z:g} standard "
+        "deviations; all other paths give {value:.3g}"
     )
     NO_EIGENVALUE = (
-        "failure: the principal eigenvalue at p = {p:g} was not found on this mesh: backward error {residual:.1e} (at "
-        "most {limit:g}), and {size:.1e} of the more positive of T and T* has the wrong sign (at most {most:g})"
+        "failure: the principal eigenvalue at p = {p:g} was not found on this mesh: its backward error is "
+        "{residual:.1e} (at most {limit:g}), and {size:.1e} of T or T*, whichever is more positive, has the wrong sign "
+        "(at most {most:g})"
     )
     LARGER_EIGENVALUE = (
-        "failure: at p = {p:g} the eigenvalue {rightmost:.6g} lies right of {value:.6g}, though that has "
-        "eigenfunctions of one sign"
+        "failure: at p = {p:g} the eigenvalue {rightmost:.6g} lies to the right of {value:.6g}, although the "
+        "eigenfunctions of {value:.6g} have one sign"
     )
-    NO_ARNOLDI = "failure: the Arnoldi iteration for p = {p:g} did not settle"
+    NO_ARNOLDI = "failure: the Arnoldi iteration for p = {p:g} did not converge"
     UNKNOWNS_SPENT = "failure: the next mesh has {unknowns} unknowns, more than budget.unknowns = {most}"
     SECONDS_SPENT = (
-        "failure: the next mesh needs some {seconds:.2g} s by the clock, more than budget.seconds = {most:g}"
+        "failure: the next mesh needs some {seconds:.2g} s of processor time, more than budget.seconds = {most:g}"
     )
     MESHES_SPENT = "failure: {count} meshes were tried"
-    ROUNDED = "failure: rounding alone may change it by {size:.1e}: use a larger rtol"
+    ROUNDED = "failure: rounding alone may change it by {size:.1e}; use a larger rtol"
     NOTHING_RESOLVED = (
         "failure: Λ({p:g}) did not converge: {reason}; no mesh resolved it{is_thin:?, as the layers of slow, strong "
         "noise are too thin}{last:? ({last})}"
@@ -159,16 +161,16 @@ class Code(Enum):
         "failure: {p:?Λ({p:g})¦{symbol}} = {value:.6g} has an estimated error of {size:.1g}, too much to mean anything"
     )
     NOT_CONVEX = (
-        "failure: Λ(p) is not convex between p = {p:g} and p = {other:g}, which the exponent always is: a wrong "
+        "failure: the computed Λ(p) is not convex between p = {p:g} and p = {other:g}, while the exponent is: a wrong "
         "eigenvalue was found"
     )
     KINKED = (
-        "failure: Λ(p) is not smooth in p: noise with algebraic tails carries the moment far out for some p; use "
-        "moment_lyapunov, which takes each p by itself"
+        "failure: Λ(p) is not smooth in p: for some p the noise carries the moment far out in its algebraic tails; use "
+        "moment_lyapunov, which solves each p by itself"
     )
-    NOT_INCREASING = "failure: Λ(p)/p does not increase at p = {p:g}, as convexity demands"
-    INDEX_UNSETTLED = "failure: the stability index did not settle, last near p = {p:g}"
-    NEGATIVE_DENSITY = "failure: the {name} at p = {p:g} is not resolved, {size:.0%} of it is negative"
+    NOT_INCREASING = "failure: Λ(p)/p does not increase at p = {p:g}, while it must, as Λ is convex"
+    INDEX_UNSETTLED = "failure: the search for the stability index did not converge; it ended near p = {p:g}"
+    NEGATIVE_DENSITY = "failure: the {name} at p = {p:g} is not resolved: {size:.0%} of it is negative"
     SIMULATION_OVERFLOWED = "failure: the simulation overflowed: some ξ is too large for this step; use a smaller step"
 
     RTOL_MISSED = (
@@ -177,40 +179,40 @@ class Code(Enum):
     )
     INDEX_RTOL_MISSED = (
         "warning: rtol = {rtol:g} is not met by {symbol}: {value:.6g} has an estimated error of {error:.1e}; "
-        "{remedy:?{remedy}, or use a larger rtol¦accept it by a larger rtol, or refine its mesh by a smaller one}"
+        "{remedy:?{remedy}, or use a larger rtol¦use a larger rtol to accept it, or a smaller one to refine its mesh}"
     )
     CARRIED_ELSEWHERE = (
         "warning: Λ({p:g}) may be larger: {has_tails:?noise with heavy tails¦slow noise} may carry the moment near "
         "{z:.3g} standard deviations"
     )
     UNREADABLE = (
-        "warning: {name} at p = {p:g} is not resolved, {size:.0%} of it has the wrong sign; its errors have next to no "
-        "effect on Λ, but do not read its picture"
+        "warning: {name} at p = {p:g} is not resolved: {size:.0%} of it has the wrong sign; this hardly affects Λ, but "
+        "do not rely on a picture of it"
     )
     NOTHING_DRAWN = "warning: neither the stationary density nor eigenfunctions are written: {reason}"
 
     INDEX_FAILED = "failure: no {symbols}: {reason}"
     INDEX_MISSING = "warning: no {symbols}: {reason}"
     INDEX_ABSENT = "note: no {symbols}: {reason}"
-    NO_MOMENT = "failure: as there is no Λ({p:g})"
+    NO_MOMENT = "failure: there is no Λ({p:g})"
     NO_INDEX = f"note: {_RARE}"
     NO_ROOT = (
         "note: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded "
         "noise P(sup ‖x‖ > A) may fall faster than any power of A}"
     )
-    NOT_ONE_RAY = "note: the motion has impacts on {count:?{count}¦no} rays; their rate is told where there is one ray"
+    NOT_ONE_RAY = "note: the motion has impacts on {count:?{count}¦no} rays, and it is computed for one ray only"
     RARE_IMPACTS = (
-        "note: N cannot be told from 0, N < {most:.1g}, as where the motion does not turn; so R does not change λ"
+        "note: N < {most:.1g} cannot be distinguished from 0, as if the motion did not turn; so R does not change λ"
     )
     LOG_OUT_OF_RANGE = "note: its logarithm is {value:.3g}, beyond ±{most:g}"
     NO_RESTITUTION = "note: the motion has no coefficient of restitution"
     ALWAYS_STABLE = "note: almost surely stable for every {symbol} in (0, 1], as λ without loss is {value:.3g}"
-    ALWAYS_UNSTABLE = "note: unstable for every {symbol} in (0, 1]: it would have to be {value:.3g}"
+    ALWAYS_UNSTABLE = "note: unstable for every {symbol} in (0, 1]: λ = 0 would need {symbol} = {value:.3g}"
 
     RARE_PATHS = (
-        "note: at p = {p:g} rare paths carry the moment{first:?, at p = {first:g} those¦, those} with noise around "
-        "{z:.3g} standard deviations, of probability 1e-{decades:.0f}{near:?; for times up to about {wait:.1g} they "
-        "hardly count, and E‖x‖^p grows at {near:.3g}}"
+        "note: at p = {p:g} rare paths carry the moment{first:?; at p = {first:g} these are paths¦: paths} with noise "
+        "around {z:.3g} standard deviations, of probability 1e-{decades:.0f}{near:?; up to times of about {wait:.1g} "
+        "they hardly count, and E‖x‖^p grows at the rate {near:.3g}}"
     )
     HEAVY_TAILS = (
         f"note: algebraic tails: {_RARE}; there is no stability index, and λ is the {ALMOST_EVERY}"
@@ -220,23 +222,24 @@ class Code(Enum):
         f"note: algebraic tails: {_RARE}; a simulation shows Λ(p) without these paths, and λ is the {ALMOST_EVERY}"
     )
     FAR_FROM_GAUSSIAN = (
-        "note: the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = {departure:.3g} > {most:g}: it "
-        "gives the noise the variance {reduced:.4g} instead of {variance:.4g}, Eq. (10)"
+        "note: the Ornstein-Uhlenbeck reduction is meant for r0 near 1, but |r0 - 1| = {departure:.3g} > {most:g}: its "
+        "variance is {reduced:.4g}, and that of the noise, Eq. (10), is {variance:.4g}"
     )
     IMPOSSIBLE_BOUNCE = (
-        "note: 1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much; R = {factor:.3g} belongs "
-        "to the delta law alone"
+        "note: 1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much; R = {factor:.3g} follows "
+        "from the delta law only"
     )
     STRONG_NOISE = (
-        "note: Eq. (37) is for weak noise{is_reduced:?, and here for the reduced one}: do not rely on it from "
-        "|p| = {first:.3g} on, as Λ(p) differs from it by more than {most:.0%} of its terms; most at p = {p:.3g}, by "
-        "{rest:.3g}, which is {size:.0%}"
+        "note: perturbation theory, Eq. (37), is for weak noise{is_reduced:?, and here for the reduced noise}: do not "
+        "rely on it from |p| = {first:.3g} on, as Λ(p) differs from it by more than {most:.0%} of its terms; the "
+        "difference is largest at p = {p:.3g}, {rest:.3g}, which is {size:.0%}"
     )
     NO_SENSITIVITIES = "note: no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
-    UNUSED = "note: {keys}: in no rate and in no restitution, so that nothing depends on it"
+    UNUSED = "note: {keys}: in no rate and in no restitution, so that no result depends on it"
     NO_DERIVATIVE = "note: no sensitivities to {key}: the derivative of the system by it is not finite at {value:g}"
     ONE_SIDED = (
-        "note: the sensitivities to {key} = {value:g} are derivatives from below: above, Λ is infinite or another one"
+        "note: the sensitivities to {key} = {value:g} are derivatives from below: above this value Λ is infinite, or "
+        "rare paths carry it"
     )
 
     NO_PROBLEM = "failure: no such problem: {reason}"
@@ -245,11 +248,11 @@ class Code(Enum):
     ONE_SIGN = "note: {side} {is_whole:?everywhere¦wherever it exists} in the frame"
     LINE_ENDS = "note: the line {line} ends inside of the frame: {reason}"
     HOLES = "note: {symbol} is missing in part of the frame: {reason}"
-    NEWTON_UNSETTLED = "failure: Newton's method does not settle on it"
-    TOO_SHARP = "failure: it turns too sharply, as where it meets another branch"
-    TOO_LONG = "failure: it has more than {count} points"
-    ROW_SPENT = "failure: a row of the scan has used up its {most:.3g} s by the clock; use a larger {key}"
-    LINE_SPENT = "failure: budget.line_seconds = {most:g} is used up by the clock"
+    NEWTON_UNSETTLED = "failure: Newton's method for the line does not converge"
+    TOO_SHARP = "failure: the line turns too sharply, as it does where it meets another branch"
+    TOO_LONG = "failure: the line has more than {count} points"
+    ROW_SPENT = "failure: a row of the grid has used up its {most:.3g} s of processor time; use a larger {key}"
+    LINE_SPENT = "failure: budget.line_seconds = {most:g} of processor time are used up"
     LINE_STOPPED = "note: the line {line} is not traced to its end, and may have more branches: {reason}"
 
     NOISE_DIFFERS = (
@@ -258,12 +261,12 @@ class Code(Enum):
     NOISE_SIZE = "failure: {member}{xi:? at xi = {xi:.4g}} is {value:.6g}; it must be a finite number > 0"
     NOISE_FAILS = "failure: {member}: {reason}"
     NOISE_REFUSED = (
-        "warning: no sensitivities under {kind} noise: {reason}; correct its class until `check_noise` is silent"
+        "warning: no sensitivities under {kind} noise: {reason}; correct its class until `check_noise` finds no fault"
     )
 
     NO_PATH_VARIANCE = (
-        "warning: no estimate of Λ(p) at p = {p:g}: ‖x‖^p has no variance, as for r0 > 1 the moment of order 2p is "
-        "infinite; use the finite elements"
+        "warning: no estimate of Λ(p) at p = {p:g}: ‖x‖^p has infinite variance, as for r0 > 1 the moment of order 2p "
+        "is infinite; use the finite elements"
     )
     FEW_PATHS = (
         "warning: no estimate of Λ(p) at p = {p:g}: too few effective {is_direct:?windows¦paths} carry the mean, "
@@ -271,26 +274,26 @@ class Code(Enum):
         "paths¦more paths}"
     )
     TWO_PLACES = (
-        "warning: Λ({p:g}): populations that start in two places differ by {gap:.3g}, {size:.0f} standard errors: the "
-        "noise is too slow to pass between them; the larger value is given"
+        "warning: Λ({p:g}): the values of populations that start in two places of the noise differ by {gap:.3g}, which "
+        "is {size:.0f} standard errors: the noise is too slow to pass between the places; the larger value is given"
     )
     DRIFTING = (
-        "warning: Λ({p:g}) still drifts: over the simulation it changes by {size:.1f} standard errors, more than "
-        "{most:g}, which its standard error does not cover; use {is_direct:?a longer window¦more time}"
+        "warning: Λ({p:g}) still drifts: over the simulation it changes by {size:.1f} standard errors, which is more "
+        "than {most:g}, and its standard error does not include this; use {is_direct:?a longer window¦more time}"
     )
     STOPPED = "warning: stopped early, after {share:.0%} of the time"
     AT_REST = (
         "warning: no stationary response: λ = {value:.3g} ± {error:.1e} {most:?is not {most:g} standard errors above "
-        "0¦is not positive}, and with λ < 0 almost every path comes to rest"
+        "0¦is not positive}, and if λ < 0 almost every path comes to rest"
     )
-    RESPONSE_STOPPED = "warning: the response was stopped early, after {time:.3g}"
+    RESPONSE_STOPPED = "warning: the simulation of the response was stopped early, after the time {time:.3g}"
     RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"
 
-    NO_REPORT = "warning: no report.html: {kind}: {text} (a fault of fpsolve; all other files are there)"
+    NO_REPORT = "warning: no report.html: {kind}: {text} (a fault of fpsolve; all other files are written)"
     NO_PICTURE = "note: this picture could not be drawn: {reason}"
 
     NO_MEMORY = "failure: not enough memory"
-    WORKER_DIED = "failure: its worker died, perhaps for lack of memory; {remedy}, and run it again"
+    WORKER_DIED = "failure: its worker process died, perhaps for lack of memory; {remedy}, and run it again"
     FAULT = "failure: {kind}: {text} (a fault of fpsolve, in {file}:{line})"
     BEING_WRITTEN = "failure: {place} is being written by another run; wait for it, or {remedy}"
 

@@ -607,11 +607,13 @@ def test_theories_outside_their_range_are_noted(tmp_path, capsys):
     sets = [f"--set={text}" for text in stated]
     assert main(["run", str(CASES / "minimal.toml"), *sets, "--out", str(tmp_path)]) == 0
     err = " ".join(capsys.readouterr().err.split())
-    assert "note: minimal: the Ornstein-Uhlenbeck reduction is made for r0 near 1, but |r0 - 1| = 0.3 > 0.1" in err
-    assert "note: minimal: Eq. (37) is for weak noise" in err
+    assert "note: minimal: the Ornstein-Uhlenbeck reduction is meant for r0 near 1, but |r0 - 1| = 0.3 > 0.1" in err
+    assert "note: minimal: perturbation theory, Eq. (37), is for weak noise" in err
     capsys.readouterr()
     assert main(["check", str(CASES / "minimal.toml"), *sets]) == CHECK_FAILED
-    assert "Eq. (37) is for weak noise" not in capsys.readouterr().err  # a check shows no Eq. (37)
+    assert (
+        "perturbation theory, Eq. (37), is for weak noise" not in capsys.readouterr().err
+    )  # a check shows no Eq. (37)
 
 
 def test_json_prints_the_summary_and_nothing_else(case, tmp_path, capsys):

@@ -263,7 +263,7 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     row = {"p": 0.0, "value": 0.0, "derivative": None, "perturbation": 0.0, "error_estimate": 0.0, "residual": None}
     assert curve["moments"] == ([] if small else [row])
     assert curve["warnings"][0].startswith("no δ_p, λ, Λ″(0), N, R_c, r_c: ")
-    assert curve["warnings"][0].endswith("as there is no Λ(0.001)") == bool(small)
+    assert curve["warnings"][0].endswith("there is no Λ(0.001)") == bool(small)
     with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
         assert [row["derivative"] for row in csv.DictReader(file)] == [""] * (not small)
 
@@ -641,7 +641,9 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
     )
     (solved,) = solve_sets(case)
     pair = solved.eigenpairs[0]
-    told = [text for text in solved.result.warnings if text.startswith("T") and "do not read its picture" in text]
+    told = [
+        text for text in solved.result.warnings if text.startswith("T") and "do not rely on a picture of it" in text
+    ]
     assert len(told) == sum(defect > UNRESOLVED for defect in pair.sign_defects) == 1
     assert min(pair.sign_defects) < 1e-4
 
@@ -664,7 +666,7 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     (result,) = run_case(case, tmp_path / "out").results  # whose λ does not converge either
     told = f"neither the stationary density nor eigenfunctions are written: {refused.value.reason}; use more cells"
     assert any(warning.startswith(told) for warning in result.warnings)
-    assert "do not read its picture" not in " ".join(result.warnings)
+    assert "do not rely on a picture of it" not in " ".join(result.warnings)
     assert not list((tmp_path / "out").rglob("*.vtu"))
 
 

@@ -67,7 +67,7 @@ def test_lower_rooms_know_no_sections_and_no_options(room: str) -> None:
 
 def test_rtol_is_made_smaller_for_a_better_number_and_larger_to_accept_one() -> None:
     missed = Message(Code.INDEX_RTOL_MISSED, symbol="λ", value=3.0, error=1e-3, size=1e-3, rtol=1e-8, remedy=None)
-    assert missed.endswith("; accept it by a larger rtol, or refine its mesh by a smaller one")
+    assert missed.endswith("; use a larger rtol to accept it, or a smaller one to refine its mesh")
     on_a_mesh = Message(Code.INDEX_RTOL_MISSED, **{**missed.data, "remedy": Remedy.MESH})
     assert on_a_mesh.endswith("or let the mesh be chosen, or use a larger rtol")
 

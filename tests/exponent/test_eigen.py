@@ -90,7 +90,7 @@ def test_a_mesh_that_resolves_nothing_raises_with_the_partial_pair():
 
 
 def test_dependent_elements_are_refused():
-    with pytest.raises(MeshError, match=r"linearly dependent to rounding.*use more or lower-degree cells"):
+    with pytest.raises(MeshError, match=r"linearly dependent up to rounding.*use more or lower-degree cells"):
         Generator(Problem(FIG1, UNIT_NOISE), make_mesh(xi_cells=2, xi_degree=20, xi_min=-30, xi_max=30))
 
 

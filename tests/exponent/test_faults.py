@@ -35,7 +35,7 @@ def test_a_density_that_is_none_is_refused():
     """Slow, strong noise: a fifth of the adjoint eigenfunction at p = 0 is negative, though λ is right."""
     pair = ExponentSolver(SLOW, rtol=1e-4).pair(0.0)
     with pytest.raises(
-        NotConverged, match=r"the stationary density at p = 0 is not resolved, 2\d% of it is negative"
+        NotConverged, match=r"the stationary density at p = 0 is not resolved: 2\d% of it is negative"
     ) as e:
         stationary_density(pair)
     assert np.min(e.value.partial.values) < 0
@@ -124,11 +124,11 @@ def test_where_there_is_no_stability_index_the_reason_is_told():
 
 def test_near_zero_the_reason_names_the_moment_that_stands_for_it():
     solver = ExponentSolver(SLOW, budget=Budget(unknowns=100))
-    with pytest.raises(NotConverged, match=r"^p near 0 goes with p = 0\.01: Λ\(0\.01\) did not converge"):
+    with pytest.raises(NotConverged, match=r"^Λ\(p\) near p = 0 follows from Λ\(0\.01\): Λ\(0\.01\) did not converge"):
         solver.lyapunov_exponent()
 
 
 def test_near_zero_the_moment_is_named_whatever_the_reason(monkeypatch):
     monkeypatch.setattr(NearPlace, "searched", lambda *_: (_ for _ in ()).throw(np.linalg.LinAlgError("singular")))
-    with pytest.raises(NotConverged, match=r"^p near 0 goes with p = 0\.01: Λ\(0\.01\) cannot be solved"):
+    with pytest.raises(NotConverged, match=r"^Λ\(p\) near p = 0 follows from Λ\(0\.01\): Λ\(0\.01\) cannot be solved"):
         lyapunov_exponent(FIG1)

@@ -218,7 +218,7 @@ def test_an_overdamped_motion_has_no_impacts():
     system = ParametricOscillator(stiffness=1.0, damping=3.0, restitution=0.9)
     found = critical_impact_factor(ExponentSolver(Problem(system, Telegraph(a=0.5, k=1.0))))
     assert found.reason.code is Code.RARE_IMPACTS
-    assert "as where the motion does not turn" in found.reason
+    assert "as if the motion did not turn" in found.reason
 
 
 @pytest.mark.parametrize(("is_map", "is_shown"), [("true", False), ("false", True)])
@@ -355,7 +355,7 @@ def test_parameters_that_nothing_depends_on_are_named(tmp_path):
     text = own("telegraph").replace("s = 0.1", "s = 0.1, unused = 3.0, loss = 0.1")
     case = case_in(tmp_path, text + MOMENTS)
     assert list(case.problem.remarks) == [
-        "system.unused, system.loss: in no rate and in no restitution, so that nothing depends on it"
+        "system.unused, system.loss: in no rate and in no restitution, so that no result depends on it"
     ]
     assert case.problem.remarks[0] in solve_case(case)[0].notes
     walled = text.replace("[noise.axial]", 'walls = [{ at = "x = 0", restitution = "1 - loss" }]\n[noise.axial]')

@@ -120,7 +120,7 @@ def test_what_is_missing_is_told_before_what_is_only_remarkable(case, capsys, mo
     first, second, third = capsys.readouterr().err.splitlines()
     assert re.fullmatch("not converged: .*: a reason", first)
     assert re.fullmatch("warning: .*: a warning", second)
-    assert re.fullmatch(r"note: .*: as there is no Λ\(0\); .*", third)
+    assert re.fullmatch(r"note: .*: there is no Λ\(0\); .*", third)
 
 
 def result(curve, D0, **more):
@@ -260,11 +260,14 @@ def test_sentences_that_differ_in_numbers_are_one(tmp_path, capsys):
     warning, note = capsys.readouterr().err.splitlines()
     worst = results[89].curve.label
     assert note.startswith(
-        "note: many: 200 of 200 curves: Eq. (37) is for weak noise: do not rely on it from |p| = 89 on"
+        "note: many: 200 of 200 curves: perturbation theory, Eq. (37), is for weak noise: do not rely on it from "
+        "|p| = 89 on"
     )
-    assert note.endswith(f"by 0.89, which is 89%; most for {worst} (all in summary.json)")
+    assert note.endswith(f", 0.89, which is 89%; most for {worst} (all in summary.json)")
     largest = results[3].curve.label  # 3 * 7 % 11 = 10
-    assert "rtol = 1e-08 is not met by λ: 3 has an estimated error of 1.0e-05; accept it by a larger rtol" in warning
+    assert (
+        "rtol = 1e-08 is not met by λ: 3 has an estimated error of 1.0e-05; use a larger rtol to accept it" in warning
+    )
     assert warning.endswith(f"most for {largest} (all in summary.json)")
 
 
@@ -284,7 +287,7 @@ def test_several_sentences_of_one_curve_are_counted(tmp_path, capsys):
         tmp_path, 1, ["vary={}"], failures=lambda _: tuple(Failure(p, Message(Code.NO_MOMENT, p=p)) for p in (2, 3, 4))
     )
     print_remarks(case, results, file="")
-    assert capsys.readouterr().err == "not converged: many: as there is no Λ(2); and 2 more like this one\n"
+    assert capsys.readouterr().err == "not converged: many: there is no Λ(2); and 2 more like this one\n"
 
 
 @pytest.mark.parametrize("count", [12, 60])
@@ -322,7 +325,7 @@ def test_weak_noise_is_spoken_of_where_its_equation_is_shown(tmp_path, capsys, c
     told = Message(Code.STRONG_NOISE, first=2.0, most=0.05, p=6.0, rest=1.0, size=0.5)
     case, results = many(tmp_path, count, overrides, notes=lambda _: (told,))
     print_remarks(case, results)
-    assert ("Eq. (37) is for weak noise" in capsys.readouterr().err) == is_shown
+    assert ("perturbation theory, Eq. (37), is for weak noise" in capsys.readouterr().err) == is_shown
     print_remarks(case, results, file="")
     assert capsys.readouterr().err == ""
 

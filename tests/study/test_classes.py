@@ -33,7 +33,9 @@ def test_both_classes_are_told_by_name_from_records_too(tmp_path):
     case = load_case(path)
     [curve] = case.curves()
     result = solve_curve(curve, everything(case), Numerics.of(case)).result
-    assert [str(note) for note in result.notes if "the ray at 1.5708: λ on it is -1, across it -0.3" in note]
+    assert [
+        str(note) for note in result.notes if "the ray at phi = 1.5708: λ is -1 on the ray and -0.3 across it" in note
+    ]
     summaries = []
     for each in (result, result_of(json.loads(json.dumps(record_of(result))), curve)):
         write_results(case, [each], tmp_path, {})

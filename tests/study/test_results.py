@@ -76,8 +76,8 @@ def test_what_did_not_converge_is_printed_once(case, tmp_path, capsys):
     printed = capsys.readouterr()
     assert "┃" not in printed.out
     said = " ".join(printed.err.split())
-    assert said.count("p near 0 goes with p = 0.01") == 1
-    assert "no δ_p, λ, Λ″(0), N, R_c, r_c: p near 0 goes with p = 0.01: Λ(0.01) did not converge" in said
+    assert said.count("Λ(p) near p = 0 follows from Λ(0.01)") == 1
+    assert "no δ_p, λ, Λ″(0), N, R_c, r_c: Λ(p) near p = 0 follows from Λ(0.01): Λ(0.01) did not converge" in said
     assert "[mesh]" not in said  # there is none
 
 

@@ -24,7 +24,10 @@ def test_the_variances_of_the_reduction_and_of_the_noise(r0):
     ou = noise.ou_reduction()
     assert ou.sigma**2 / (2 * ou.alpha) == pytest.approx((2 - r0) * noise.variance, rel=1e-12)
     [note] = ou.remarks
-    assert f"the variance {(2 - r0) * noise.variance:.4g} instead of {noise.variance:.4g}, Eq. (10)" in note
+    assert (
+        f"its variance is {(2 - r0) * noise.variance:.4g}, and that of the noise, Eq. (10), is {noise.variance:.4g}"
+        in note
+    )
     assert f"|r0 - 1| = {abs(r0 - 1):.3g} > 0.1" in note
 
 
@@ -45,4 +48,4 @@ def test_weak_noise_needs_no_note_and_strong_noise_gets_its_size():
     rest = values[1] - perturbation.moment_exponent(strong, noise, p)
     shares = np.abs(rest[p != 0]) / perturbation.moment_scale(strong, noise, p[p != 0])
     worst = shares.argmax()
-    assert f"; most at p = {p[p != 0][worst]:g}, by {rest[p != 0][worst]:.3g}, which is {shares.max():.0%}" in note
+    assert f"is largest at p = {p[p != 0][worst]:g}, {rest[p != 0][worst]:.3g}, which is {shares.max():.0%}" in note
