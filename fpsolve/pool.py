@@ -185,7 +185,9 @@ class Pool:
                         suspects.append((number, item))
                         continue
                     except CancelledError:
-                        raise FpsolveError("the scheduler is gone; the same command goes on where it was") from None
+                        raise FpsolveError(
+                            "the scheduler has stopped; the same command goes on where this one stopped"
+                        ) from None
                     except Exception as failure:
                         if type(failure).__name__ != "KilledWorker":  # of Dask, where several workers died on the task
                             raise

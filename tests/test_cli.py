@@ -164,9 +164,9 @@ def test_what_refers_to_other_p_can_be_left_out(capsys):
     command = ["check", str(CASES / "fig1.toml"), "--set", "moments.p=[1.5]", "--set", "vary={}"]
     assert main(command) == BAD_INPUT
     err = capsys.readouterr().err
-    remedies = set(re.findall(r"or go without by --set '(.+)'", err))
+    remedies = set(re.findall(r"or remove it by --set '(.+)'", err))
     assert remedies == {"output.eigenfunctions=[]", "expect=[]"}
-    assert all("or go without by" in line for line in err.splitlines())
+    assert all("or remove it by" in line for line in err.splitlines())
     assert main([*command, *(f"--set={remedy}" for remedy in remedies)]) == 0
 
 

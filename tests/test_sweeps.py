@@ -331,7 +331,7 @@ def test_a_scheduler_that_dies_is_told_in_one_sentence(place):
         scheduler.kill()
         _, said = process.communicate(timeout=120)
     assert process.returncode == 2
-    assert said == "the scheduler is gone; the same command goes on where it was\n"
+    assert said == "the scheduler has stopped; the same command goes on where this one stopped\n"
 
 
 def test_batches_follow_from_the_case_alone(place):

@@ -139,7 +139,7 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
         ValueError: the pair is not the one at p = 0, or several noises have values.
     """
     if len(pair.generator.problem.coloured.parts) > 1:
-        raise ValueError("the formula is for one noise that has values, but there are several; use lyapunov_exponent")
+        raise ValueError("the formula is for one noise that is not white, but there are several; use lyapunov_exponent")
     space, problem, at = _of_zero(pair).space, pair.generator.problem, pair.space.xi.samples()
     system, phi = problem.motion, space.phi.points[:, None]
     rate = growth_rate(system, at.xi)(phi)

@@ -160,7 +160,7 @@ class Boundary(Result):
         """
         other = replace(self, x=x or self.x, y=y or self.y, scan=None, **_ANEW)
         if (other.x.key, other.y.key) != (self.x.key, self.y.key):
-            raise ValueError(f"a frame of {other.x.key}, {other.y.key}: use `started_from` for other parameters")
+            raise ValueError(f"got a frame of {other.x.key}, {other.y.key}; use `started_from` for other parameters")
         check_axes(self.problem, other.x, other.y)
         seeds = (
             np.array([other.x.share(x), other.y.share(y)])

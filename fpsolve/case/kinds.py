@@ -122,7 +122,7 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
     try:
         kind = (system_kind if half == "system" else noise_kind)(name or USUAL[half])
     except ValueError as error:
-        refuse([(("kind",), name, f"{error}; mend its package, or write another kind")])
+        refuse([(("kind",), name, f"{error}; correct its package, or write another kind")])
         raise
     return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))
 

@@ -20,7 +20,7 @@ _OWN, _RANGE = "own sentence", "range"
 LIST = "<list>"
 TABLE = "<table>"
 """Tags of a discriminated union: parts of pydantic's error locations that are no keys."""
-DEPENDENT = "cannot be judged, as the kinds of the system and the noise are not known; mend these"
+DEPENDENT = "cannot be judged, as the kinds of the system and the noise are not known; correct these"
 """Of a section; which kinds are wrong is another fault."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 _KINDS = {bool: "a boolean", str: "a string", list: "a list", dict: "a table", int: "a number", float: "a number"}

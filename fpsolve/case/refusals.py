@@ -189,14 +189,14 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
         return
     if figure.map and vary.crossing(figure.x) is None:
         text = (
-            "got true; a map needs a [vary] of all combinations of two keys of numbers and no others, each with two "
-            "values or more; vary these, or remove it"
+            'got true; a map needs a [vary] with mode = "product" of exactly two keys, each with two numbers or more; '
+            "vary two such keys, or remove it"
         )
         yield ("map",), figure.map, text
     for name, key, limits in (("xlim", figure.x, figure.xlim), ("ylim", map_key(figure, vary), figure.ylim)):
         if key in vary.keys and limits and limits[0] <= 0 and is_log_spaced(vary.values(key)):
-            text = f"got {shown(limits)}; must be > 0, as the values of {key} are spread by factors, on a "
-            yield (name,), limits, f"{text}logarithmic axis; raise the smaller one"
+            text = f"got {shown(limits)}; must be > 0, as the values of {key} differ by factors, so that its axis is "
+            yield (name,), limits, f"{text}logarithmic; raise the smaller one"
 
 
 def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -254,8 +254,8 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
                 stops = {name: axis.stop for name, axis in zip("xy", axes, strict=True) if axis.key == key}
                 highest = max(float(problem.values[key]), *stops.values())
                 text = (
-                    f"{key} reaches {highest:g} in the frame; for {limit} > {most:g} Λ(p) is infinite or carried by "
-                    f"rare paths, and no line of stability; let it end at {most:g}, or {remedy}"
+                    f"{key} reaches {highest:g} in the frame; for {limit} > {most:g} Λ(p) is infinite, or rare paths "
+                    f"carry it, and there is no line of stability; let the axis end at {most:g}, or {remedy}"
                 )
                 yield (next(iter(stops)), "stop") if stops else (), highest, text
                 return
@@ -288,7 +288,7 @@ def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo])
 
 
 def _without(key: str) -> str:
-    return f"or go without by --set '{key}=[]'"
+    return f"or remove it by --set '{key}=[]'"
 
 
 def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float]], remedy: str) -> Iterator[Refusal]:

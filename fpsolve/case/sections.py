@@ -39,7 +39,7 @@ SENSITIVITIES, EIGENFUNCTIONS = "sensitivities", "eigenfunctions"
 QUANTITY_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS)
 """What may be asked for; eigenfunctions with the stationary density."""
 _LARGEST = 1e30
-WANTED = f"wanted relative error; where it is not stated {RTOL_BEYOND_PLANE:g} for more than two variables"
+WANTED = f"wanted relative error; if omitted {RTOL_BEYOND_PLANE:g} for more than two variables"
 _APART = 1e-9
 """How far the ends of an axis are from each other at least, relative to their size."""
 MOST_NAMED = 8
@@ -118,8 +118,8 @@ class Sweep(Section):
     def _increases(self) -> Self:
         if not 0 < self.stop - self.start < math.inf:
             raise ValueError(
-                f"got start = {self.start}, stop = {self.stop}; must be start < stop, a finite way apart; "
-                "exchange the two, or list a single value as in [2.0]"
+                f"got start = {self.start}, stop = {self.stop}; must be start < stop, with a finite "
+                "difference; exchange the two, or list a single value as in [2.0]"
             )
         if self.scale == "log" and self.start <= 0:
             text = f'got {self.start}; must be > 0 where scale = "log"; use a positive start, or scale = "linear"'
@@ -286,8 +286,8 @@ def _limits(value: Any) -> tuple[float, float]:
         if max(abs(start), abs(stop)) <= _LARGEST and stop - start > _APART * max(abs(start), abs(stop)):
             return float(start), float(stop)
     raise ValueError(
-        f"got {shown_with_kind(value)}; must be a list of two numbers, the smaller one first, from -1e30 to 1e30 and "
-        "not equal to 9 digits; write, for example, [0.0, 4.0]"
+        f"got {shown_with_kind(value)}; must be a list of two numbers, the smaller one first, from -1e30 to 1e30, "
+        "which differ in their first 9 digits; write, for example, [0.0, 4.0]"
     )
 
 
@@ -308,7 +308,7 @@ class FigureSection(Section):
 
     x: Annotated[Text, parameter("the abscissa", 'x = "p"')] = "p"
     y: Annotated[DrawnName | MomentAt, BeforeValidator(_ordinate), parameter("the ordinate", 'y = "moment"')] = "moment"
-    map: Annotated[bool | None, parameter("whether colours show it over two keys", "map = true")] = None
+    map: Annotated[bool | None, parameter("whether the figure is a map in colours over two keys", "map = true")] = None
     title: Annotated[Text | None, parameter("the heading instead of that of the case", 'title = "Stability"')] = None
     width: Annotated[
         Literal["single column", "double column"], parameter("how wide it is printed", 'width = "single column"')
@@ -379,7 +379,12 @@ class OutputSection(Section):
     ] = QUANTITY_NAMES
     eigenfunctions: Annotated[
         Values | None,
-        parameter("the p written as VTK", "eigenfunctions = [1.0, 2.0]", strict=False, max_length=MAX_MOMENTS),
+        parameter(
+            "the p whose eigenfunctions are written for ParaView",
+            "eigenfunctions = [1.0, 2.0]",
+            strict=False,
+            max_length=MAX_MOMENTS,
+        ),
     ] = None
     figure: Annotated[bool, parameter("whether the figure is drawn", "figure = false")] = True
     sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
@@ -420,7 +425,10 @@ class ChartAxis(Section):
     start: Annotated[float, parameter("its smallest value", "start = 0.3")]
     stop: Annotated[float, parameter("its largest value", "stop = 5.0")]
     scale: Annotated[Scale, parameter("how it is spread", 'scale = "log"')] = "linear"
-    at: Annotated[Values, parameter("values wanted exactly", "at = [1.0, 2.0]", strict=False, max_length=1000)] = ()
+    at: Annotated[
+        Values,
+        parameter("values at which lines have a point exactly", "at = [1.0, 2.0]", strict=False, max_length=1000),
+    ] = ()
 
     @property
     def axis(self) -> Axis:
@@ -468,7 +476,9 @@ class ChartSection(Section):
     ]
     nodes: Annotated[
         int | None,
-        parameter("nodes of the scan for lines, each way; 13 if omitted", "nodes = 25", ge=2, le=MAX_NODES),
+        parameter(
+            "points of the grid that is searched for lines, each way; 13 if omitted", "nodes = 25", ge=2, le=MAX_NODES
+        ),
     ] = None
 
     @model_validator(mode="after")

@@ -172,7 +172,7 @@ class Document:
             text = _quoted_if_bare(text)
             assigned = _Scanner(text).scan().assigned
             if len(assigned) != 1:
-                raise ValueError(f"must be one key=value, but {len(assigned)} stand here")
+                raise ValueError(f"must be one key=value, but there are {len(assigned)} here")
             path: Keys = assigned[0]
             value: Any = _loads(text)
             for key in path:
@@ -267,4 +267,4 @@ def _syntax_remedy(line: str) -> str:
         return f"write the number alone, without a unit: {line}"
     if re.fullmatch(r"[A-Za-z][\w./-]*", value):
         return f'write a text in quotes, as in {key} = "{value}"'
-    return f"mend the syntax{' of: ' + line if line else ''}, see https://toml.io"
+    return f"correct the syntax{' of: ' + line if line else ''}, see https://toml.io"

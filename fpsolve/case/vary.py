@@ -198,10 +198,10 @@ def _of_file(table: Mapping[str, Any], parameters: Known, folder: Path) -> Vary:
         text = f'got {shown_with_kind(file)}; must be the path of a file of sets; write, for example, file = "sets.csv"'
         refuse([(("file",), file, text)])
     if others:
-        text = f"gives every value, so nothing may stand beside it, but {', '.join(others)} does; remove that, or file"
+        text = f"gives all values, so that [vary] may have no other key; leave out {', '.join(others)}"
         refuse([(("file",), file, f"{text}, as by --set 'vary={{ file = {shown(file)} }}'")])
     if mode != "zip":
-        text = f"got {shown(mode)}; the rows of a file are sets side by side; remove it"
+        text = f"got {shown(mode)}; each row of a file is a set; remove it"
         refuse([(("mode",), mode, text)])
     try:
         return read_sets(file, folder, parameters)
@@ -307,7 +307,7 @@ def read_sets(file: str, folder: Path, parameters: Known) -> Vary:
                 rows[line] = cells
             line = reader.line_num + 1
     except csv.Error as error:
-        raise Unreadable(f"cannot be read as comma-separated values ({error}); mend its quotes", line) from None
+        raise Unreadable(f"cannot be read as comma-separated values ({error}); correct its quotes", line) from None
     if not (rows or faults):
         raise Unreadable("has a header but no sets; write a row of values for each set")
     columns, lines, wrong = Columns(), list(rows), set[int]()

@@ -272,8 +272,8 @@ class EigenfunctionPlot:
             return picture_in_space(surface, cmap, cylinder=cylinder)
         if cylinder:
             warnings.warn(
-                "nothing can be rendered here, so that the plane is drawn; for a cylinder install OpenGL, as by "
-                "apt-get install libegl1 libgl1-mesa-dri",
+                "this machine cannot render, so that the plane is drawn; to draw a cylinder install OpenGL, as "
+                "by apt-get install libegl1 libgl1-mesa-dri",
                 stacklevel=2,
             )
         return flat_picture(surface, cmap)

@@ -172,7 +172,7 @@ class ExponentSolver:
                 raise TypeError(f"got {name} = {shown(getattr(self, name))}; must be {words}")
         if self.mesh is not None and self.problem.dimension > 2:
             raise ValueError(
-                "got a mesh; its lines are those of a phase, which there is in the plane alone: leave it out"
+                "got a mesh, but meshes are for two variables only, as their lines are those of a phase; leave it out"
             )
         if not (self.problem.noise.is_white or math.isfinite(self.problem.noise.standard_deviation)):
             raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))

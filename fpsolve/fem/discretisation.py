@@ -351,11 +351,11 @@ class Discretisation:
                 have values.
         """
         if len(noise.parts) > 1:
-            raise MeshError("a mesh is for one noise that has values, but there are several; leave it out")
+            raise MeshError("a mesh is for one noise that is not white, but there are several; leave it out")
         if noise.is_diffusion != bool(mesh.z_lines.size):
             raise MeshError(
-                "noise with states, with an angle or of a filter needs a mesh without z_lines, and noise on a line one "
-                "with them; leave the mesh out, and one is chosen for each p"
+                "noise with states, with an angle or of a filter needs a mesh without z_lines, and other noise a mesh "
+                "with z_lines; leave the mesh out, and one is chosen for each p"
             )
         lines = mesh.phi_lines if frame is None else frame.phase(mesh.phi_lines)
         phase = PhaseCells(lines, np.full(mesh.phi_lines.size - 1, mesh.phi_degree))

@@ -44,8 +44,8 @@ from fpsolve.model.problem import ParameterDerivative, Problem
 
 ALL_ORDERS = slice(None)
 SEVERAL_OVER_RAY = (
-    "two noises with a density move the phase over the ray of a jump, for which nothing is solved; let one of them "
-    "leave the phase there alone"
+    "two noises with a density move the phase across the ray of a jump, which is not solved; let at most one of them "
+    "move the phase there"
 )
 
 

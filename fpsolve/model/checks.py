@@ -461,7 +461,7 @@ def _of_step(noise: Noise, law: Law | None, spectrum: Spectrum | MatrixSpectrum 
     middle = 0.5 * (before + end)
     off = (sums / count) * (middle - noise.mean) / noise.standard_deviation**2
     if abs(float(off.mean())) > 0.02 + SURE * float(off.std()) / math.sqrt(PATHS):
-        told = "xi_mean is not the mean of ξ over the step, as it does not go with its beginning and end"
+        told = "xi_mean is not the mean of ξ over the step, as it does not fit the values at its beginning and end"
         yield Message(Code.NOISE_FAILS, member="step", reason=told)
     if spectrum is not None:
         products = (start - noise.mean) * (end - noise.mean) / noise.standard_deviation**2

@@ -111,13 +111,14 @@ class Problem:
             _ = self._moved, self._struck  # refuses what has no meaning
         if self.dimension > 2 and (self._struck or self.noise.has_algebraic_tails):
             raise ValueError(
-                f"got {self.noise.kind} noise for {self.dimension} variables; beyond the plane nothing is solved under "
-                "impulses, nor under noise with algebraic tails: take another kind, such as r0 <= 1"
+                f"got {self.noise.kind} noise for {self.dimension} variables; impulses and noise with algebraic tails "
+                "are for two variables only: take another kind, or r0 <= 1"
             )
         if not self.noise.is_random:
             raise ValueError(
-                "nothing but the start of this noise is random, and Λ(p) is p times the largest real part of Floquet's "
-                "exponents: take the multipliers of the equation over one period, or add noise that diffuses"
+                "only the start of this noise is random, as of a harmonic load, so that Λ(p) is p times the largest "
+                "real part of the Floquet exponents: compute these from the equation over one period, or add a random "
+                "noise"
             )
 
     @cached_property
@@ -140,17 +141,17 @@ class Problem:
         """Why functions of it are neither; empty where they are."""
         if self.dimension > 2:
             return (
-                f"functions of the directions of {self.dimension} variables are no surface over phase and noise; look "
-                "at Λ(p)"
+                f"an eigenfunction of {self.dimension} variables is not a function of phase and noise, which could be "
+                "drawn; look at Λ(p)"
             )
         if len(self.coloured.parts) > 1:
-            several = "functions of the phase and of several noises are no surface and no lines over the phase"
+            several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
             return f"{several}; make all of these noises white but one"
         if self.coloured.is_drawn:
             return ""
         return (
-            f"functions of the phase and of {self.coloured.kind} noise, which is no Markov process by itself, are no "
-            "surface over phase and noise; look at Λ(p), or at densities of a simulation"
+            f"{self.coloured.kind} noise is no Markov process by itself, so that an eigenfunction is not a function of "
+            "phase and noise, which could be drawn; look at Λ(p), or at densities of a simulation"
         )
 
     def named_noise(self, name: str) -> Noise:

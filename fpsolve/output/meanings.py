@@ -201,6 +201,6 @@ def _sign(value: float, error: float) -> float:
 def _fate(what: str, rate: float, sign: float, time_unit: str) -> str:
     """What becomes of something, and in which time."""
     if not sign:
-        return f" cannot be told from 0 by its error: {what} is at the border of stability, or near it."
+        return f" cannot be distinguished from 0 within its error: {what} is at the border of stability, or near it."
     time = f"in a time of {math.log(2) / abs(rate):.3g}" + ("" if time_unit == "time" else f" {time_unit}")
     return f" > 0: {what} grows, doubling {time}." if sign > 0 else f" < 0: {what} decays, halving {time}."

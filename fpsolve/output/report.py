@@ -144,7 +144,7 @@ class Reporter:
 def _about(case: Case, found: Found, curve: Curve) -> Iterator[str]:
     yield from noises_of(curve.problem)
     if case.system.is_nonlinear:
-        yield "The nonlinear damping is in the simulated response alone: Λ(p), λ and δ_p are of the linear system."
+        yield "The nonlinear damping acts on the simulated response only: Λ(p), λ and δ_p are of the linear system."
     if found.chart is not None:
         keys = f"{charted(case).x.key} and {charted(case).y.key}"
         yield f"The chart is over {keys}; the equation above has the values of the case."

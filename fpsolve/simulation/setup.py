@@ -37,7 +37,7 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
     """
     system, noise = problem.system, problem.noise
     if len(noise.parts) > 1 and any(jump.log_factor and not is_steady(system, jump) for jump in system.jumps):
-        told = "simulation of several noises is for walls over which none of them moves the phase"
+        told = "under several noises a simulation needs walls across which none of them moves the phase"
         raise FpsolveError(f"{told}; use the finite elements")
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
@@ -151,7 +151,7 @@ def obstacles(
         )
     elif (h if step is None else step) < least:
         found["step"] = (
-            f"one transient, {settling:.3g}, takes {settling / h:.2g} steps of {h:.3g}, which {reason} asks for; must "
+            f"one transient, {settling:.3g}, takes {settling / h:.2g} steps of {h:.3g}, which {reason} requires; must "
             f"be at most {_LONGEST:.0e}; bring the times of noise and oscillator nearer to each other"
         )
     if time is not None and not 2 * settling * (1 - 1e-12) <= time:

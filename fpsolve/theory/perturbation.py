@@ -123,9 +123,9 @@ def second_order(problem: Problem) -> SecondOrder:
     """
     system, noises = problem.motion, problem.noise.parts
     if problem.dimension > 2:
-        raise NoPerturbationTheory("perturbation theory is for systems in the plane")
+        raise NoPerturbationTheory("perturbation theory is for two variables only")
     if problem.impulses:
-        raise NoPerturbationTheory("perturbation theory is for noise of small effects, not for impulses")
+        raise NoPerturbationTheory("perturbation theory is for weak noise, not for impulses")
     driven = {name: np.zeros((2, 2)) for name, noise in noises.items() if not (noise.is_white and len(noises) > 1)}
     steady = matrix_at(system, 0.0, slice(0, 1))
     for term in system.terms if has_mean(problem) else ():
@@ -153,8 +153,8 @@ def second_order(problem: Problem) -> SecondOrder:
         most = 2 * noise.standard_deviation / system.epsilon  # that of ½S, as ln ‖x‖ grows at ε|q̂||ξ| at most
         if noise.has_peak and not max(q.amplitude * at_twice, abs(q.mean) * at_rest) <= most:
             raise NoPerturbationTheory(
-                f"perturbation theory is for noise of a band that is broad against its effect, but {noise.kind} noise "
-                f"has S(0) = {at_rest:.3g} and S({2 * omega:.3g}) = {at_twice:.3g} with the standard deviation "
+                f"perturbation theory is for noise whose band is broad compared with its effect, but {noise.kind} "
+                f"noise has S(0) = {at_rest:.3g} and S({2 * omega:.3g}) = {at_twice:.3g} with the standard deviation "
                 f"{noise.standard_deviation:.3g}"
             )
         of_noise.append((q, at_rest, at_twice))

@@ -78,7 +78,7 @@ def test_what_is_too_long_to_show(tmp_path: Path, old: str, new: str, words: str
 
 def test_an_override_of_two_lines(tmp_path: Path) -> None:
     message = only_message(write(tmp_path, GOOD), ["noise.tau0=0.4", "a=1\nb=2"])
-    assert message.startswith(f"{tmp_path / 'bad.toml'}: --set a=1\nb=2: must be one key=value, but 2 stand here")
+    assert message.startswith(f"{tmp_path / 'bad.toml'}: --set a=1\nb=2: must be one key=value, but there are 2 here")
 
 
 @pytest.mark.parametrize(

@@ -168,14 +168,14 @@ def test_a_case_of_three_variables(tmp_path: Path, capsys: pytest.CaptureFixture
     path = write(tmp_path, VOLTAGE)
     assert load_case(path).rtol == RTOL_BEYOND_PLANE
     assert main(["run", str(path), "--out", str(tmp_path), "--report"]) == 0
-    assert "directions of 3 variables are no surface" in capsys.readouterr().err
+    assert "an eigenfunction of 3 variables is not a function" in capsys.readouterr().err
     [curve] = json.loads((tmp_path / "mine/summary.json").read_text(encoding="utf-8"))["curves"]
     expected, [found] = kronecker.white(STEADY, DRIVEN, 2), curve["moments"]
     assert abs(found["value"] - expected) <= found["error_estimate"] <= 1e-5
     assert curve["discretisation"]["waves"] >= 4
     assert "du/dt = −0.5 v − u" in (tmp_path / "mine/report.html").read_text(encoding="utf-8")
     assert main(["prove", str(path), "--out", str(tmp_path)]) == BAD_INPUT
-    assert "proofs are for systems in the plane" in capsys.readouterr().err
+    assert "proofs are for two variables only" in capsys.readouterr().err
 
 
 def test_a_hundred_thousand_signs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

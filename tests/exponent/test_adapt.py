@@ -262,7 +262,7 @@ def test_p_of_any_size_ends_at_once_without_a_warning():
 
 
 def test_a_tolerance_below_rounding_is_refused():
-    with pytest.raises(NotConverged, match=r"rounding alone may change it by .*: use a larger rtol") as told:
+    with pytest.raises(NotConverged, match=r"rounding alone may change it by .*; use a larger rtol") as told:
         moment_lyapunov(FIG1, WEAK_NOISE, 2.0, rtol=1e-17)
     assert "budget" not in str(told.value)
 

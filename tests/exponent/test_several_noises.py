@@ -141,7 +141,7 @@ def test_second_orders_add_up():
 
 
 def test_what_several_noises_may_be():
-    with pytest.raises(ValueError, match="functions of at most 2 noises"):
+    with pytest.raises(ValueError, match="at most 2 noises may be other than white"):
         Noises({name: OrnsteinUhlenbeck(alpha=1.0, sigma=0.1) for name in "abc"})
     with pytest.raises(ValueError, match="algebraic tails"):
         Noises({"a": NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.2), "b": GAUSSIAN})
@@ -160,5 +160,5 @@ def test_what_several_noises_may_be():
         ExponentSolver(solver.problem, make_mesh()).solution(2.0)
     turning = [CoefficientMatrix(1, ((0.0, 1.0), (0.0, 0.0)), identity, name) for name in "ab"]
     system = PlaneSystem([CoefficientMatrix(0, STEADY), *turning], [Jump(math.pi / 2, -0.1)])
-    with pytest.raises(Exception, match="two noises with a density move the phase over the ray"):
+    with pytest.raises(Exception, match="two noises with a density move the phase across the ray"):
         ExponentSolver(Problem(system, {"a": GAUSSIAN, "b": GAUSSIAN})).solution(2.0)

@@ -117,9 +117,9 @@ def test_sensitivities_are_differences_of_moment_equations():
 
 
 def test_a_harmonic_load_alone_is_refused():
-    with pytest.raises(ValueError, match=r"^nothing but the start of this noise is random.*Floquet"):
+    with pytest.raises(ValueError, match=r"^only the start of this noise is random.*Floquet"):
         of(sigma=0.0)
-    with pytest.raises(ValueError, match="ξ would rest"):
+    with pytest.raises(ValueError, match="ξ would be constant"):
         Bounded(1.0, 0.0, 0.0)
 
 
@@ -197,6 +197,6 @@ def test_in_resonance_perturbation_theory_measures_no_errors():
     for sigma in (0.3, 1e-3):
         scale = ExponentSolver(of(sigma=sigma)).scale(2.0)
         assert 0.05 < scale < 1.0
-    with pytest.raises(NoPerturbationTheory, match="broad against its effect"):
+    with pytest.raises(NoPerturbationTheory, match="broad compared with its effect"):
         second_order(of(sigma=0.3))
     assert second_order(of(nu=5.0, sigma=0.1)).quadratic > 0

@@ -57,7 +57,7 @@ def test_rates_with_and_without_their_diagonal():
         ((1.0, math.inf), ((0, 1), (1, 0)), "finite numbers that differ"),
         ((1.0, 2.0), ((0, -1), (1, 0)), "must be >= 0"),
         ((1.0, 2.0), ((-2, 1), (1, -1)), "minus the sum of its row"),
-        ((1.0, 2.0), ((0, 1), (0, 0)), "every state must be reached"),
+        ((1.0, 2.0), ((0, 1), (0, 0)), "every state must be reachable"),
     ],
 )
 def test_what_is_no_chain_is_refused(states, rates, message):
@@ -72,5 +72,5 @@ def test_many_states_that_are_hardly_connected():
     np.fill_diagonal(rates, 0.0)
     assert MarkovChain(states=np.linspace(-1, 1, 240), rates=rates).longest_jump == 119
     rates[119, 120] = 0.0
-    with pytest.raises(ValueError, match="every state must be reached"):
+    with pytest.raises(ValueError, match="every state must be reachable"):
         MarkovChain(states=np.linspace(-1, 1, 240), rates=rates)

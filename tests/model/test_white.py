@@ -184,7 +184,7 @@ def test_refused():
     terms = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))), CoefficientMatrix(1, STIFFNESS, np.sin)
     with pytest.raises(ValueError, match=r"g = sin\(ξ\) of it has no meaning"):
         Problem(PlaneSystem(terms), White(1.0))
-    with pytest.raises(ValueError, match="moves the phase over the ray of a jump"):
+    with pytest.raises(ValueError, match="moves the phase across the ray of a jump"):
         oscillator(jumps=[Jump(0.0, -0.1)])
     with pytest.raises(ValueError, match="interpretation"):
         White(1.0, "backwards")

@@ -302,7 +302,7 @@ def test_eigenfunctions_of_several_noises_with_values_are_refused_in_words(tmp_p
     assert not solved.eigenpairs
     assert solved.stationary is None
     note_missing(case, monte_carlo=False)
-    assert "no eigenfunctions are written: functions of the phase and of several noises" in " ".join(
+    assert "no eigenfunctions are written: an eigenfunction of the phase and of several noises" in " ".join(
         capsys.readouterr().err.split()
     )
     pair = ExponentSolver(case.problem).pair(2.0)
@@ -315,7 +315,7 @@ def test_eigenfunctions_of_several_noises_with_values_are_refused_in_words(tmp_p
 
 def test_noise_without_a_picture_is_named():
     problem = Problem(ParametricOscillator(stiffness=1.0, damping=0.1), Bounded(mu=0.4, nu=2.0, sigma=0.3))
-    assert problem.no_picture.startswith("functions of the phase and of bounded noise")
+    assert problem.no_picture.startswith("bounded noise is no Markov process by itself")
     assert not Problem(problem.system, White(s=0.5)).no_picture
 
 

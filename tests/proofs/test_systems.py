@@ -219,7 +219,7 @@ ALONG = Jump(math.pi / 2, math.log(0.8))
         ),
         (plane(((0.0, 1.0), (-1.0, 0.0)), TURN, ALONG), SineWiener(1.0, 1.0), ValueError, "one way only"),
         (plane(((0.0, 1.0), (-1.0, 0.0)), TURN, ALONG), Telegraph(1.5, 1.0), ValueError, "one way only"),
-        (plane(((0.0, 1.0), (-1.0, 0.0)), TURN, ALONG), White(0.1), ValueError, "over the ray of a jump"),
+        (plane(((0.0, 1.0), (-1.0, 0.0)), TURN, ALONG), White(0.1), ValueError, "across the ray of a jump"),
         (spring(), fpsolve.NonGaussianNoise(1.0, 1.0, 1.2), NoSuchExponent, "algebraic tails"),
         (
             spring(),

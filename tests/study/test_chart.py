@@ -207,7 +207,7 @@ def test_a_case_states_the_nodes_of_its_scan(path):
     first = next(solve_chart(case, map=noting))
     assert (given, chart_work(case)) == ([3], 9)
     assert first.lines[0].scan.values.shape == (3, 3)
-    with pytest.raises(CaseError, match=r"chart.nodes: got 1; must be a whole number >= 2 and <= 1000 \(nodes of"):
+    with pytest.raises(CaseError, match=r"chart.nodes: got 1; must be a whole number >= 2 and <= 1000 \(points of"):
         load_case(path, ["chart.nodes=1"])
 
 

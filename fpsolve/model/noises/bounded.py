@@ -77,7 +77,7 @@ class Bounded(Noise):
 
     def __post_init__(self) -> None:
         if not (self.nu or self.sigma):
-            raise ValueError("got nu = 0 and sigma = 0; ξ would rest; let nu or sigma be positive")
+            raise ValueError("got nu = 0 and sigma = 0; ξ would be constant; let nu or sigma be positive")
 
     @cached_property
     def _still(self) -> SineWiener:

@@ -170,7 +170,7 @@ class MarkovChain(Chain):
                 "rates from one state to another must be >= 0, and each diagonal entry 0 or minus the sum of its row"
             )
         if connected_components(jumps > 0, connection="strong")[0] > 1:
-            raise ValueError("every state must be reached from every other one; leave out those that are not")
+            raise ValueError("every state must be reachable from every other one; leave out those that are not")
         object.__setattr__(self, "states", tuple(states.tolist()))
         object.__setattr__(self, "rates", tuple(map(tuple, (jumps - np.diag(leaving)).tolist())))
 

@@ -136,8 +136,8 @@ class Poisson(Memoryless):
             for each in found:
                 if jump.log_factor and not each.keeps(jump.phase):
                     raise ValueError(
-                        f"impulses move the state over the ray of a jump, {jump.phase:.6g}; let them drive a term that "
-                        "leaves the phase there alone"
+                        f"impulses move the phase across the ray of a jump, phi = {jump.phase:.6g}; let them drive a "
+                        "term that does not move the phase there"
                     )
         return found
 

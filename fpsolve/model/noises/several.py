@@ -51,16 +51,16 @@ class Noises(Noise):
                 raise TypeError(f"got {shown(noise)} as the noise {shown(name)}; must be one noise with a name")
             if noise.has_algebraic_tails:
                 raise ValueError(
-                    f"the noise {name} has algebraic tails, which is solved for one noise alone; choose one with r0 <= "
-                    "1 beside another noise, or simulate it alone"
+                    f"the noise {name} has algebraic tails, and such noise must be the only noise; choose r0 <= 1, or "
+                    "use this noise without others"
                 )
         if len(dict(pairs)) < 2:
             raise ValueError(f"got {len(pairs)} noises; must be two or more with names that differ")
         valued = [name for name, noise in pairs if not noise.is_white]
         if len(valued) > MOST_WITH_AXES:
             raise ValueError(
-                f"the noises {', '.join(valued)} all have values, but functions of at most {MOST_WITH_AXES} noises are "
-                "solved for; make others white, or leave them out"
+                f"got the noises {', '.join(valued)}; at most {MOST_WITH_AXES} noises may be other than white noise "
+                "and impulses; make the others white, or leave them out"
             )
 
     @cached_property

@@ -102,8 +102,9 @@ class White(Memoryless):
         for jump, diffusion in ((jump, each) for jump in system.jumps for each in diffusions):
             if jump.log_factor and abs(float(diffusion.h(jump.phase))) > 1e-12 * diffusion.h.amplitude:
                 raise ValueError(
-                    f"white noise moves the phase over the ray of a jump, {jump.phase:.6g}; ‖x‖ would change there "
-                    "infinitely often; let it drive a term that leaves the phase there alone, or use coloured noise"
+                    f"white noise moves the phase across the ray of a jump, phi = {jump.phase:.6g}, where ‖x‖ would "
+                    "change infinitely often; let it drive a term that does not move the phase there, or use coloured "
+                    "noise"
                 )
         if self.interpretation == Interpretation.ITO and diffusions:
             drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))

@@ -196,11 +196,11 @@ class EquationSystem(System):
         if not self.terms:
             raise TableError("no rate has a term; write terms with the variables", "drift")
         if self.walls and len(self.variables) > 2:
-            why = "a wall is solved in the plane alone: beyond it a wall holds many directions of the state, not one"
+            why = "a wall is for two variables only"
             raise TableError(f"got a wall for {len(self.variables)} variables; {why}; leave walls out", "walls")
         jumps = self.jumps
         if len({jump.phase for jump in jumps}) < len(jumps):
-            raise TableError("two walls are at one place; remove one of them", "walls")
+            raise TableError("two walls are at the same place; remove one of them", "walls")
 
     def _given_names(self) -> Iterator[tuple[Any, tuple[str | int, ...]]]:
         """All names with their places."""

@@ -212,7 +212,7 @@ class _Rates:
                 except ExpressionError as error:
                     raise TableError(str(error), *path, i, j) from None
                 if path[0] == "mass" and isinstance(entry, str) and EPSILON in names_in(entry):
-                    raise TableError(f"has {EPSILON}, of which masses are no powers; give it another name", *path, i, j)
+                    raise TableError(f"has {EPSILON}, which a mass may not contain; give it another name", *path, i, j)
                 is_free = is_number or not names_in(str(entry))
                 rows[i][j] = number[0] if is_free and number is not None else str(entry)
         return rows
@@ -228,7 +228,7 @@ class _Rates:
         if np.max(np.abs(values + values.T)) > _SKEW * np.max(np.abs(values)):
             other = "damping" if key == "gyroscopic" else "stiffness"
             must = "must be skew-symmetric, each entry minus the one across the diagonal"
-            raise TableError(f"got {shown(values.tolist())}; {must}; write what is not in {other}", key)
+            raise TableError(f"got {shown(values.tolist())}; {must}; write the rest into {other}", key)
 
     def _inverse(self, mass: list[list[Entry]]) -> list[list[Entry]]:
         """Of the masses, as text where they have names."""

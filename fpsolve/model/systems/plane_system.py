@@ -162,8 +162,8 @@ class PlaneSystem(System):
             )
         if self.jumps and sizes[0] > 2:
             raise ValueError(
-                f"got {len(self.jumps)} jumps of a system of {sizes[0]} variables; a wall stretches the state at a "
-                "single ray in the plane alone, beyond it nothing is solved: leave jumps out"
+                f"got {len(self.jumps)} jumps of a system of {sizes[0]} variables; jumps are for two "
+                "variables only: leave them out"
             )
 
     @classmethod
