@@ -273,7 +273,7 @@ def _fields(fields) -> str:
     text = _table("key", "meaning", "range", "if omitted", "example")
     for name, each in fields.items():
         default = "" if each.is_required() else each.get_default(call_default_factory=True)
-        default = "" if default in (None, "", ()) else f"`{_shown(default)}`"
+        default = "" if default in (None, "", ()) or _shown(default) == "..." else f"`{_shown(default)}`"
         required = "**required**" if each.is_required() else default
         symbol = symbol_of(each)
         meaning = f"{symbol}: {meaning_of(each)}" if symbol else meaning_of(each)
@@ -312,7 +312,9 @@ def _section_of(annotation):
 
 
 def _first(item) -> str:
-    return (inspect.getdoc(item) or "").partition("\n\n")[0].replace("\n", " ").replace("*", "\\*").replace("`[", "[")
+    first = (inspect.getdoc(item) or "").partition("\n\n")[0].replace("\n", " ").replace("*", "\\*").replace("`[", "[")
+    text = re.sub(r"^\[+\w+\]+: ", "", first)  # the heading names the section
+    return text[:1].upper() + text[1:]
 
 
 # Validation

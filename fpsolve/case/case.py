@@ -123,30 +123,32 @@ class Case(Section):
         InstanceOf[System],
         BeforeValidator(partial(half_of, "system")),
         parameter(
-            "Eq. (3)",
+            "the system, such as the oscillator of Eq. (3)",
             "[oscillator], or [system] for your own equation",
             validation_alias=AliasChoices("oscillator", "system"),
         ),
     ]
     noise: Annotated[
-        InstanceOf[Noise], BeforeValidator(partial(half_of, "noise")), parameter("Eqs. (7)-(8)", "[noise]")
+        InstanceOf[Noise],
+        BeforeValidator(partial(half_of, "noise")),
+        parameter("the noise, such as that of Eqs. (7)-(8)", "[noise]"),
     ]
-    moments: Annotated[Moments, parameter("which p", "[moments]")]
+    moments: Annotated[Moments, parameter("the orders p of the moments", "[moments]")]
     budget: Annotated[
         Budget,
         BeforeValidator(lambda value: Budget(**value) if isinstance(value, dict) else value),
-        parameter("what one p may cost", "[budget]"),
+        parameter("the limits of the cost of one p", "[budget]"),
     ] = Budget()
     vary: Annotated[
-        InstanceOf[Vary], BeforeValidator(vary_of), parameter("one curve for each parameter set", EXAMPLE)
+        InstanceOf[Vary], BeforeValidator(vary_of), parameter("the parameter sets, with a curve for each", EXAMPLE)
     ] = Vary()
-    mesh: Annotated[MeshSection, parameter("the finite elements", "[mesh]")] = MeshSection()
+    mesh: Annotated[MeshSection, parameter("a mesh, instead of one that is chosen", "[mesh]")] = MeshSection()
     monte_carlo: Annotated[MonteCarloSection, parameter("how the system is simulated", "[monte_carlo]")] = (
         MonteCarloSection()
     )
     figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
     output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
-    chart: Annotated[ChartSection | None, parameter("where stability ends", "[chart]")] = None
+    chart: Annotated[ChartSection | None, parameter("the lines of a chart, on which stability ends", "[chart]")] = None
     expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
     _path: Path = PrivateAttr(default=Path("case.toml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())

@@ -46,9 +46,12 @@ class VarySection(BaseModel):
     __pydantic_extra__: dict[str, Column | dict[str, Column | dict[str, Any]]]
 
     mode: Annotated[
-        Literal["product", "zip"], Field(description="all combinations, the last key fastest; or values side by side")
+        Literal["product", "zip"],
+        Field(description="product: all combinations, the last key fastest; zip: the n-th values of all keys together"),
     ] = "product"
-    file: Annotated[Text, Field(description="a file of sets, a row for each below a header that names the keys")] = ""
+    file: Annotated[Text, Field(description="a file of sets: a header that names the keys, and a row for each set")] = (
+        ""
+    )
 
 
 class _Generator(GenerateJsonSchema):
@@ -72,7 +75,7 @@ def schema() -> dict[str, Any]:
         if name == "system":
             oscillator = _described("the vibro-impact oscillator, Eq. (3)", "[oscillator]")
             fields["oscillator"] = system, oscillator
-            fields["system"] = system, _described("the system, of a kind or written as equations", "[system]")
+            fields["system"] = system, _described("the system, written as equations or of another kind", "[system]")
         elif name == "noise":
             fields[name] = noise | named, _described("the noise; or a table of noises by their names", "[noise]")
         elif name == "vary":

@@ -112,7 +112,7 @@ class Sweep(Section):
     start: Annotated[float, parameter("the first value", "start = 1.0")]
     stop: Annotated[float, parameter("the last value", "stop = 6.0")]
     num: Annotated[int, parameter("how many values", "num = 33", ge=2, le=MAX_MOMENTS)]
-    scale: Annotated[Scale, parameter("how they are spread", 'scale = "log"')] = "linear"
+    scale: Annotated[Scale, parameter("whether they differ by a constant step or factor", 'scale = "log"')] = "linear"
 
     @model_validator(mode="after")
     def _increases(self) -> Self:
@@ -194,7 +194,7 @@ class MeshSection(Section):
 
     file: Annotated[
         str | None,
-        parameter("a mesh file, by its path from the case file", 'file = "../meshes/default.vtu"', min_length=1),
+        parameter("a mesh file, as a path from the folder of the case", 'file = "../meshes/default.vtu"', min_length=1),
     ] = None
     phi_cells: Annotated[Cells, parameter("cells around the phase", "phi_cells = 2")] = None
     phi_degree: Annotated[Degree, parameter("degree of the elements in the phase", "phi_degree = 10")] = None
@@ -309,9 +309,9 @@ class FigureSection(Section):
     x: Annotated[Text, parameter("the abscissa", 'x = "p"')] = "p"
     y: Annotated[DrawnName | MomentAt, BeforeValidator(_ordinate), parameter("the ordinate", 'y = "moment"')] = "moment"
     map: Annotated[bool | None, parameter("whether the figure is a map in colours over two keys", "map = true")] = None
-    title: Annotated[Text | None, parameter("the heading instead of that of the case", 'title = "Stability"')] = None
+    title: Annotated[Text | None, parameter("the title instead of that of the case", 'title = "Stability"')] = None
     width: Annotated[
-        Literal["single column", "double column"], parameter("how wide it is printed", 'width = "single column"')
+        Literal["single column", "double column"], parameter("printed width", 'width = "single column"')
     ] = "double column"
     xlim: Annotated[Limits | None, parameter("ends of the abscissa", "xlim = [0.0, 4.0]")] = None
     ylim: Annotated[Limits | None, parameter("ends of the ordinate", "ylim = [-0.1, 0.1]")] = None
@@ -424,7 +424,7 @@ class ChartAxis(Section):
     key: Annotated[Text, parameter("the parameter", 'key = "oscillator.omega"')]
     start: Annotated[float, parameter("its smallest value", "start = 0.3")]
     stop: Annotated[float, parameter("its largest value", "stop = 5.0")]
-    scale: Annotated[Scale, parameter("how it is spread", 'scale = "log"')] = "linear"
+    scale: Annotated[Scale, parameter("whether it is linear or logarithmic", 'scale = "log"')] = "linear"
     at: Annotated[
         Values,
         parameter("values at which lines have a point exactly", "at = [1.0, 2.0]", strict=False, max_length=1000),

@@ -97,9 +97,11 @@ class Budget:
         ParameterError: a number is out of its range.
     """
 
-    unknowns: Annotated[int, parameter("unknowns of the largest system", "unknowns = 60000", ge=100)] = 60_000
-    seconds: Annotated[float, parameter("time for one p", "seconds = 60.0", gt=0)] = 60.0
-    line_seconds: Annotated[float | None, parameter("time for a line of a chart", "line_seconds = 600.0", gt=0)] = None
+    unknowns: Annotated[int, parameter("number of unknowns of the largest system", "unknowns = 60000", ge=100)] = 60_000
+    seconds: Annotated[float, parameter("seconds of processor time for one p", "seconds = 60.0", gt=0)] = 60.0
+    line_seconds: Annotated[
+        float | None, parameter("seconds of processor time for a line of a chart", "line_seconds = 600.0", gt=0)
+    ] = None
 
 
 @dataclass(frozen=True)

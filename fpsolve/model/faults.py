@@ -20,7 +20,7 @@ from fpsolve.model.parameters import meaning_of
 
 Kind = TypeVar("Kind")
 _BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
-_NOUNS: dict[Any, str] = {float: "finite number", int: "whole number", str: "string"}
+_NOUNS: dict[Any, str] = {float: "finite number", int: "whole number", str: "string", bool: "boolean"}
 
 
 class ParameterError(ValidationError):

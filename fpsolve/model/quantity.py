@@ -33,8 +33,8 @@ EFFECTIVE_PATHS = Quantity(
     "effective_paths", "effective paths", "effective number of paths that carry the mean", dims=("p",)
 )
 IMPACTS = Quantity("impacts", "impacts", "number of impacts of the paths without weights")
-STATUS = Quantity("status", "status", "what became of the parameter set")
-SECONDS = Quantity("seconds", "seconds", "time of the processor", unit="s")
+STATUS = Quantity("status", "status", "status of the parameter set")
+SECONDS = Quantity("seconds", "seconds", "processor time", unit="s")
 RARE = Quantity("rare", "rare", "whether rare paths carry the moment", dims=("p",))
 LYAPUNOV_EXPONENT = Quantity(
     "lyapunov_exponent", "λ", "largest Lyapunov exponent", r"$\lambda$", "1/time", (), "(2)", "(39)", _MODES

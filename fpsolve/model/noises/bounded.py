@@ -68,7 +68,9 @@ class Bounded(Noise):
     nu: Annotated[float, parameter("mean frequency", "nu = 2.0", r"$\nu$", "rad/time", ge=0.0, le=SIZE["le"])]
     sigma: Annotated[
         float,
-        parameter("intensity of the phase's noise", "sigma = 0.3", r"$\sigma$", "1/time^(1/2)", ge=0.0, le=SIZE["le"]),
+        parameter(
+            "intensity of the noise in the phase", "sigma = 0.3", r"$\sigma$", "1/time^(1/2)", ge=0.0, le=SIZE["le"]
+        ),
     ]
 
     kind: ClassVar[str] = "bounded"

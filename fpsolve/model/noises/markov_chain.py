@@ -118,7 +118,7 @@ class Chain(Noise):
 
 @dataclass(frozen=True)
 class MarkovChain(Chain):
-    """ξ(t) with values among some states, from one of which to another it jumps at given rates.
+    """ξ(t) jumps between given values, the states, at given rates.
 
     >>> MarkovChain.telegraph(amplitude=0.5, rate=1.0).correlation_time  # ξ = ±0.5, each state left at rate 1
     0.5

@@ -25,7 +25,10 @@ from fpsolve.model.parameters import SIZE, STRICT, parameter, stated_field
 Departure = Annotated[
     float,
     parameter(
-        "departure from Gaussian noise; from 5/3 on the variance (10) is infinite", "r0 = 0.95", "$r_0$", ge=-1e6
+        "departure from Gaussian noise; 1 is Gaussian, and from 5/3 on the variance (10) is infinite",
+        "r0 = 0.95",
+        "$r_0$",
+        ge=-1e6,
     ),
 ]
 NEAR_GAUSSIAN = 0.1
@@ -93,7 +96,7 @@ class TreatedNoise(Noise):
         "treatment": stated_field(
             Annotated[
                 Literal["ou-reduction", "exact"],
-                parameter("Eqs. (12)-(14) or Eq. (7) itself", 'treatment = "ou-reduction"'),
+                parameter("the reduction of Eqs. (12)-(14), or Eq. (7) itself", 'treatment = "ou-reduction"'),
             ],
             "ou-reduction",
         )

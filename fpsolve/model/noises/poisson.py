@@ -75,7 +75,9 @@ class Poisson(Memoryless):
     ]
     weights: Annotated[
         tuple[float, ...],
-        parameter("how likely each size is; all alike if omitted", "weights = [0.5, 0.5]", strict=False),
+        parameter(
+            "probabilities of the sizes up to a factor; all equal if omitted", "weights = [0.5, 0.5]", strict=False
+        ),
         AfterValidator(_weights),
     ] = ()
 

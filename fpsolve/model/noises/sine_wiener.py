@@ -58,7 +58,7 @@ class SineWiener(Noise):
 
     amplitude: Annotated[float, parameter("amplitude", "amplitude = 1.0", "$A$", "1/time", **SIZE)]
     sigma: Annotated[
-        float, parameter("intensity of the phase's noise", "sigma = 1.0", r"$\sigma$", "1/time^(1/2)", **SIZE)
+        float, parameter("intensity of the noise in the phase", "sigma = 1.0", r"$\sigma$", "1/time^(1/2)", **SIZE)
     ]
 
     kind: ClassVar[str] = "sine-wiener"

@@ -36,7 +36,7 @@ class Telegraph(Chain):
     """
 
     a: Annotated[float, parameter("amplitude", "a = 0.5", "$a$", "1/time", **SIZE)]
-    k: Annotated[float, parameter("rate at which each value is left", "k = 1.0", "$k$", "1/time", **SIZE)]
+    k: Annotated[float, parameter("rate of leaving each value", "k = 1.0", "$k$", "1/time", **SIZE)]
 
     kind: ClassVar[str] = "telegraph"
     of_xi: ClassVar[Sequence[str]] = ("a",)

@@ -135,7 +135,9 @@ class EquationSystem(System):
             {},
         ),
         "noises": stated_field(
-            Annotated[dict[str, str], parameter("what noises are called in drift", 'noises = { xi = "noise" }')],
+            Annotated[
+                dict[str, str], parameter("the names of the noises, with their sections", 'noises = { xi = "noise" }')
+            ],
             {"xi": "noise"},
         ),
         "walls": stated_field(

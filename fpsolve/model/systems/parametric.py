@@ -44,7 +44,9 @@ class ParametricOscillator(System):
     ]
     damping: Annotated[
         float,
-        parameter("damping; the force is twice it times the velocity", "damping = 0.1", "$b$", "1/time", **ANY_SIGN),
+        parameter(
+            "damping; the damping force is twice this times the velocity", "damping = 0.1", "$b$", "1/time", **ANY_SIGN
+        ),
     ]
     restitution: Annotated[
         float, parameter("coefficient of restitution at x = 0; 1 means no wall", "restitution = 0.8", "$R$", gt=0, le=1)
