@@ -95,7 +95,7 @@ def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
     assert main(["run", case, *(f"--set={text}" for text in sets), *WITH_FIGURE]) == 0
     assert drawn == ["A test\nwith oscillator.omega = 2.0"]  # its values of p are on the axis
     told = " ".join(capsys.readouterr().out.split())
-    assert told.startswith("A test: noise.D0 = 0.1 with oscillator.omega = 2.0, moments.p = [1.0] ┏")
+    assert told.startswith("A test: noise.D0 = 0.1 with oscillator.omega = 2.0 ┏")
     assert main(["run", case, *WITH_FIGURE]) == 0
     assert drawn[1:] == ["A test"]
 
