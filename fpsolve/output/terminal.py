@@ -53,6 +53,7 @@ MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
 """Failed curves that are named among more, p whose Λ has a column, and quantities whose extremes are shown."""
 DIGITS = 7
 MAIN = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
+THEORY = "Eqs. (38)-(39): perturbation theory"
 STAR = "* for the noise reduced by Eqs. (12)-(14)"
 
 
@@ -82,8 +83,9 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
     columns = [*varied_columns(case), *quantities]
     is_whole = all(result.status == Status.CONVERGED for _, result in chosen)
     columns += [Column("status", 1 if is_whole else 0)] * has_status + [Column("which", is_text=True)] * is_digest
-    is_starred = any("*" in each.heading for each in quantities)
-    grid = Grid(case.headline, columns, remark=STAR if is_starred else "")
+    theory = [each.heading for each in quantities if each.heading.startswith("Eq.")]
+    told = [THEORY] * bool(theory) + [STAR] * any("*" in each for each in theory)
+    grid = Grid(case.headline, columns, remark="; ".join(told))
     for which, result in chosen:
         varied, numbers = map(written, result.curve.varied.values()), (each.text(result) for each in quantities)
         grid.rows.append([*varied, *numbers, *[result.status.word] * has_status, *[which] * is_digest])
