@@ -32,6 +32,7 @@ suppress_warnings = ["ref.python"]  # an attribute that several classes have
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
+autodoc_default_options = {"exclude-members": "model_config, model_post_init"}
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
@@ -44,6 +45,7 @@ sphinx_gallery_conf = {
     "image_scrapers": ["matplotlib", "made.pictures_of_results"],
     "show_memory": False,
     "min_reported_time": 10_000,
+    "capture_repr": (),
     "show_signature": False,
     "write_computation_times": False,
     "download_all_examples": False,
@@ -72,5 +74,6 @@ def setup(app):
     """Make the pages that follow from the code before the galleries look for theirs."""
     made.write_all(Path(__file__).parent / "generated")
     app.connect("autodoc-process-docstring", made.plain_docstring, priority=100)
+    app.connect("autodoc-process-docstring", made.plain_types, priority=900)
     app.connect("autodoc-process-docstring", made.parameter_list, priority=900)
     app.connect("autodoc-process-signature", made.plain_signature)

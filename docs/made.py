@@ -239,6 +239,14 @@ def plain_signature(app, what, name, obj, options, signature, returned):
     return f"({', '.join(shown)})", ""
 
 
+def plain_types(app, what, name, obj, options, lines):
+    """Write types as users write them."""
+    for number, line in enumerate(lines):
+        if line.startswith(":vartype "):
+            line = re.sub(r"numpy[\w.]*NDArray\[[^\[\]]*\]", "numpy.ndarray", line)
+            lines[number] = line.replace("collections.abc.", "").replace("contextlib.", "")
+
+
 def parameter_list(app, what, name, obj, options, lines):
     """Add the parameters of a kind of system or noise, with units and ranges."""
     if what != "class" or not (inspect.isclass(obj) and issubclass(obj, Parametrised)):
@@ -260,8 +268,14 @@ def _shown(value: object) -> str:
 SIGNS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤", "min_length": "at least", "max_length": "at most"}
 
 
+LENGTHS = ("min_length", "max_length")
+
+
 def _range(field) -> str:
     found = []
+    lengths = {name: value for rule in field.metadata for name in LENGTHS if (value := getattr(rule, name, None))}
+    if len(lengths) == 2:
+        return f"{' to '.join(str(lengths[name]) for name in LENGTHS)} entries"
     for rule in field.metadata:
         for name, sign in SIGNS.items():
             if (value := getattr(rule, name, None)) is not None:
@@ -331,7 +345,7 @@ def oracles() -> str:
 
 def expected() -> str:
     """What every case expects beside what is computed now."""
-    text = _table("case", "quantity", "expected", "computed", "difference", "source of the expected value")
+    text = _table("case", "quantity, and the source of the expected value", "expected", "computed", "difference")
     for path in CASES:
         for each in check_case(fpsolve.load_case(path)).comparisons:
             if not each.met:
@@ -342,5 +356,6 @@ def expected() -> str:
             difference = f"{abs(each.value - asked.value):.0e}"
             name = f"{{doc}}`{path.stem} </generated/gallery/plot_{path.stem}>`"
             what = f"{what.replace('_', ' ')}, {where}" if where else what.replace("_", " ")
-            text += _row(name, what, f"{asked.value:.13g}", f"{each.value:.13g}", difference, asked.source)
+            cell = f"{what}<br><small>{asked.source}</small>" if asked.source else what
+            text += _row(name, cell, f"{asked.value:.13g}", f"{each.value:.13g}", difference)
     return text

@@ -66,13 +66,12 @@ print(found.moment.attrs["long_name"], "in", found.moment.attrs["units"])
 
 # %%
 # Here is :math:`\Lambda(2)` over both keys, with the line on which it is zero:
-moment = found.moment.sel(p=2.0).rename(None)
-names = list(moment.dims)
+moment = found.moment.sel(p=2.0)
 figure, axes = plt.subplots(layout="constrained")
-colours = axes.pcolormesh(moment[names[0]], moment[names[1]], moment.T, cmap="RdBu_r", vmin=-0.03, vmax=0.03)
-axes.contour(moment[names[0]], moment[names[1]], moment.T, levels=[0], colors="black")
-axes.set(xlabel=names[0], ylabel=names[1], yscale="log")
-figure.colorbar(colours, label=r"$\Lambda(2)$ in 1/time")
+sides = {"x": "oscillator.omega", "y": "noise.D0", "ax": axes}
+moment.plot.pcolormesh(**sides, cmap="RdBu_r", vmin=-0.03, vmax=0.03)
+moment.plot.contour(**sides, levels=[0], colors="black")
+axes.set(yscale="log", title=r"$\Lambda(2)$, and where it is zero")
 
 # %%
 # For how many of the thousand sets does almost every path decay, but the mean square grow?
