@@ -20,7 +20,7 @@ import numpy as np
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, find_zero, trace_branch
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.zero import RTOL, Axis, Zero, ZeroField, check_axes, zero_of
+from fpsolve.analysis.zero import Axis, Zero, ZeroField, check_axes, line_rtol, zero_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-SCAN_RTOL = 1e-5
-"""Of F on the grid of a scan."""
+SCAN_RTOL, COARSER = 1e-5, 10.0
+"""Of F on the grid of a scan, relative to its scale; at least so many times that of the line."""
 NODES = 13
 """Of a scan, each way."""
 LINE_KEY, SCAN_SHARE = "budget.line_seconds", 0.5
@@ -121,10 +121,20 @@ class Boundary(Result):
         )
 
     @property
+    def rtol(self) -> float:
+        """Of F on the line, relative to its scale."""
+        return line_rtol(self.problem, self.zero)
+
+    @property
+    def scan_rtol(self) -> float:
+        """Of F in the scan, relative to its scale."""
+        return max(SCAN_RTOL, COARSER * self.rtol)
+
+    @property
     def zero_field(self) -> ZeroField:
         """F over the unit square, with the time that is left for the line."""
         most = self.budget.line_seconds
-        limit = () if most is None else (RTOL, most - self.seconds, Message(Code.LINE_SPENT, most=most))
+        limit = () if most is None else (None, most - self.seconds, Message(Code.LINE_SPENT, most=most))
         return ZeroField(self.zero, self.problem, (self.x, self.y), self.budget, *limit)
 
     @property
@@ -192,7 +202,7 @@ class Boundary(Result):
         seconds, key = min((self.budget.seconds, "budget.seconds"), (share, LINE_KEY))
         spent = Message(Code.ROW_SPENT, most=seconds, key=key)
         frame = self.zero, self.problem, (self.x, self.y)
-        rough = partial(ZeroField, *frame, self.budget, SCAN_RTOL, seconds, spent)
+        rough = partial(ZeroField, *frame, self.budget, self.scan_rtol, seconds, spent)
         axis = rough().easy_axis
         return [Row(rough, count, number, axis) for number in range(count)]
 

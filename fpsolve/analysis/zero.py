@@ -20,13 +20,14 @@ from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, Countdown
 from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Solution
+from fpsolve.exponent.modes import EVEN
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT
 from fpsolve.model.problem import Problem, refuse_infinite
 
-RTOL = 1e-10
+RTOL, RTOL_BEYOND_PLANE = 1e-10, 1e-4
 """Of F, relative to its scale."""
 HALF = 0.5
 """Of the time that is left, for one value."""
@@ -181,6 +182,11 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
         raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
 
 
+def line_rtol(problem: Problem, zero: Zero) -> float:
+    """Of F on a line, relative to its scale: coarser beyond the plane, except for moments with closed equations."""
+    return RTOL if problem.dimension == 2 or zero.p in EVEN else RTOL_BEYOND_PLANE
+
+
 class ZeroField:
     """F over the unit square: λ or Λ(p)/p, with its gradient.
 
@@ -192,7 +198,7 @@ class ZeroField:
         problem: the problem with the values of all other parameters.
         axes: the parameters.
         budget: for a solve.
-        rtol: of F, relative to its scale.
+        rtol: of F, relative to its scale; `line_rtol` if None.
         seconds: of the processor for all values together; each may take half of what is left.
         spent: what is said where they do not suffice.
 
@@ -207,11 +213,12 @@ class ZeroField:
         problem: Problem,
         axes: tuple[Axis, Axis],
         budget: Budget,
-        rtol: float = RTOL,
+        rtol: float | None = None,
         seconds: float = math.inf,
         spent: Message | None = None,
     ) -> None:
-        self._zero, self._problem, self._axes, self._rtol, self._budget = zero, problem, axes, rtol, budget
+        self._zero, self._problem, self._axes, self._budget = zero, problem, axes, budget
+        self._rtol = line_rtol(problem, zero) if rtol is None else rtol
         self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
         self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
         self._starts: Mapping[float, Solution] = {}
@@ -271,7 +278,7 @@ class ZeroField:
         """
         p = self._zero.p
         refuse_infinite(problem, p)
-        own: Any = {"rtol": self._rtol, "budget": self._budget, "countdown": countdown}
+        own: Any = {"rtol": self._rtol, "budget": self._budget, "countdown": countdown, "is_alone": True}
         solver = ExponentSolver(problem, starts=self._starts, **own)
         value, error = solver.ratio_alone(p)
         if value > 0 > p and problem.noise.has_algebraic_tails:

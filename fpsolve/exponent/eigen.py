@@ -185,11 +185,26 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
         raise ValueError(f"{size} unknowns; the whole spectrum takes at most {MAX_DENSE_UNKNOWNS}: use a coarser mesh")
     if not 1 <= k <= size:
         raise ValueError(f"k is {k}; it must be from 1 to the number of unknowns, {size}")
+    values = scipy.linalg.eigvals(_standard(generator, p)[1], overwrite_a=True)
+    return values[np.lexsort((values.imag, -values.real))][:k]
+
+
+def rightmost_pair(generator: Generator, p: float, clock: Callable[[], None] = lambda: None) -> PrincipalPair:
+    """The pair of the rightmost eigenvalue, for spaces in which no other lies further to the right than Λ(p)."""
+    root, matrix = _standard(generator, p)
+    clock()
+    values, left, right = scipy.linalg.eig(matrix, left=True)
+    best = int(np.argmax(values.real))
+    x, y = (scipy.linalg.solve_triangular(root, each[:, best].real, lower=True, trans="T") for each in (right, left))
+    pencil = generator.at(p)
+    return _pair(generator, pencil, rayleigh_iteration(pencil, x, y, clock))
+
+
+def _standard(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
+    """The Cholesky factor C of the mass matrix, and C⁻¹ L(p) C⁻ᵀ, dense."""
     root = scipy.linalg.cholesky(finite(generator.space(p).mass.toarray()), lower=True)
     half = scipy.linalg.solve_triangular(root, finite(generator.matrix(p).toarray()), lower=True)
-    matrix = scipy.linalg.solve_triangular(root, half.T, lower=True).T
-    values = scipy.linalg.eigvals(matrix, overwrite_a=True)
-    return values[np.lexsort((values.imag, -values.real))][:k]
+    return root, scipy.linalg.solve_triangular(root, half.T, lower=True).T
 
 
 def _carried(pairs: Sequence[PrincipalPair], pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray]:

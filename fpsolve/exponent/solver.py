@@ -151,6 +151,7 @@ class ExponentSolver:
         budget: what the choice of a discretisation may cost.
         starts: solutions of a problem with parameters close by, by their p, see `NearPlace`.
         countdown: that all p share; each has the seconds of the budget if None.
+        is_alone: whether no derivative by p is asked for, which saves time for more than two variables and p = 2, 4.
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
@@ -165,6 +166,7 @@ class ExponentSolver:
     budget: Budget = field(default_factory=Budget)
     starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
     countdown: Countdown | None = field(default=None, repr=False)
+    is_alone: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind, words in _KINDS:
@@ -187,7 +189,7 @@ class ExponentSolver:
         if self.classes:  # near p = 0
             return max(self.classes, key=lambda each: each.lyapunov_exponent().value).near
         if self.problem.dimension > 2:
-            return SpherePlace(self.problem, **self._own)
+            return SpherePlace(self.problem, is_alone=self.is_alone, **self._own)
         return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **self._own)
 
     @property

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.analysis.regions import P_BIFURCATIONS, Regions
-from fpsolve.analysis.stability import SCAN_RTOL
-from fpsolve.analysis.zero import RTOL, Axis, Zero
+from fpsolve.analysis.zero import Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
@@ -54,13 +53,13 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
             side: {"key": axis.key, "start": axis.start, "stop": axis.stop, "scale": axis.scale, "at": list(axis.at)}
             for side, axis in frame.items()
         },
-        "rtol": RTOL,
         "lines": [
             {
                 "line": line.zero.name,
                 "equation": line.zero.equation,
                 "appears": _appears(line.zero),
-                "scan": None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": SCAN_RTOL},
+                "rtol": line.rtol,
+                "scan": None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": line.scan_rtol},
                 "branches": [
                     {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
                     for branch in line.branches

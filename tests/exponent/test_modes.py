@@ -18,6 +18,7 @@ from fpsolve import (
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.modes import second_moments
+from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
 from fpsolve.simulation.response import stationary_response
 from tests.oracles import kronecker
@@ -92,6 +93,37 @@ def test_even_moments_of_two_modes():
     found = moment_lyapunov(problem(OU), [2.0, 4.0], rtol=1e-5)
     expected = [kronecker.ornstein_uhlenbeck(FREE, COUPLED, 1.0, 0.5, p, 2 + 6 * (6 - p)) for p in (2, 4)]
     assert np.all(np.abs(found.value - expected) <= found.error_estimate)
+
+
+@pytest.mark.parametrize("noise", [White(s=1.0), OU], ids=["white", "ou"])
+def test_even_moments_alone_are_solutions_of_moment_equations(noise):
+    solver = ExponentSolver(problem(noise), rtol=1e-11, is_alone=True)
+    for p in (2, 4):
+        if noise is OU:
+            expected = kronecker.ornstein_uhlenbeck(FREE, COUPLED, 1.0, 0.5, p, 14)
+        else:
+            expected = kronecker.white(FREE, COUPLED, p)
+        assert solver.solution(float(p)).pair.value == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(21))
+def test_even_moments_alone_have_all_digits(seed):
+    """Polynomials of the state are harmonics times r^p, whatever layers other p have."""
+    steady, driven = random_system(100 + seed, 3 + seed % 2)
+    noise, expected = {
+        0: (White(s=1.0), lambda p: kronecker.white(steady, driven, p)),
+        1: (
+            Telegraph(a=0.7, k=0.6),
+            lambda p: kronecker.chain(steady, driven, (-0.7, 0.7), ((0, 0.6), (0.6, 0)), p),
+        ),
+        2: (
+            OrnsteinUhlenbeck(alpha=1.5, sigma=1.0),
+            lambda p: kronecker.ornstein_uhlenbeck(steady, driven, 1.5, 1 / math.sqrt(3), p, 24),
+        ),
+    }[seed % 3]
+    solver = ExponentSolver(problem(noise, steady, driven), rtol=1e-10, is_alone=True)
+    for p in (2, 4):
+        assert solver.solution(float(p)).pair.value == pytest.approx(expected(p), abs=1e-10)
 
 
 # by elements and by harmonics of the sphere of another code, to the last digit written
