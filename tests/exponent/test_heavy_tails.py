@@ -240,7 +240,7 @@ def test_rare_moments_are_told_whatever_else_is_asked():
     alone, together = (moment_lyapunov(case, p, rtol=1e-5) for p in ([-0.5], [-0.9, -0.5]))
     assert alone.rare.tolist() == [-0.5]
     assert together.rare.tolist() == [-0.9, -0.5]
-    rates = [result.notes[0].rpartition("grows at ")[2] for result in (alone, together)]
+    rates = [result.notes[0].rpartition("grows at the rate ")[2] for result in (alone, together)]
     assert float(rates[0]) == pytest.approx(float(rates[1]), rel=1e-2)
     assert float(rates[0]) < 0.05 * alone.value[0]
 
