@@ -147,6 +147,12 @@ def find_branches(
         yield known[-1]
 
 
+def with_branch(known: tuple[Trace, ...], trace: Trace) -> tuple[Trace, ...]:
+    """A branch more, without those that broke off somewhere on it."""
+    left = (each for each in known if not each.obstacles or not all(trace.holds(point.sample) for point in each.points))
+    return (*left, trace)
+
+
 def _shows(scan: Scan, trace: Trace, rough: Sample, within: float) -> bool:
     """Whether a zero of a scan, off as F is interpolated, shows a branch: it is next to one, on its normal."""
     at, along = trace.nearest(rough.at)

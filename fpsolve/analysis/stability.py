@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, find_zero, trace_branch
+from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, find_zero, trace_branch, with_branch
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
 from fpsolve.analysis.zero import Axis, Zero, ZeroField, check_axes, line_rtol, zero_of
@@ -225,7 +225,7 @@ class Boundary(Result):
         yield now
         zero_field = now.zero_field
         for trace in find_branches(zero_field, scan, self.step, stepped):
-            now = replace(now, traces=(*now.traces, self._special(zero_field, trace)))
+            now = replace(now, traces=with_branch(now.traces, self._special(zero_field, trace)))
             yield now
         yield now._ended(zero_field)
 

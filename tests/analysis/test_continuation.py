@@ -1,16 +1,18 @@
 """Curves F(u, v) = 0 of polynomials and sines, whose points, lengths, folds and crossings are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fpsolve.analysis.continuation import FRAME, LONGEST, SHORTEST, find_branches, find_zero
+from fpsolve.analysis.continuation import FRAME, LONGEST, SHORTEST, find_branches, find_zero, with_branch
 from fpsolve.analysis.scan import FINE, TOLERANCE, Row, Sample, scan_row, scanned
 from fpsolve.analysis.special_points import crossings, with_folds, with_points, with_values
 from fpsolve.errors import NotConverged
+from fpsolve.messages import Code, Message
 from tests.conftest import sampled
 
 NODES = 13
@@ -566,3 +568,12 @@ def test_random_cubics(coefficients):
     for k, m in np.argwhere((values[1:] * values[:-1] < 0) & (slope[1:] > 0.1) & (slope[:-1] > 0.1)):
         between = np.array([fine[k] + abs(values[k, m]) / abs(values[k + 1, m] - values[k, m]) / 60, fine[m]])
         assert any(apart(branch, [between]) < 0.02 for branch in branches), between
+
+
+def test_a_branch_that_broke_off_goes_where_another_runs_through_it():
+    [whole] = lines(line(1.0, -1.0, 0.1))
+    [other] = lines(line(1.0, -1.0, 0.5))
+    broken = replace(whole, points=whole.points[:3], obstacles=(Message(Code.LINE_SPENT, most=1.0),))
+    assert with_branch((broken, other), whole) == (other, whole)
+    assert with_branch((broken,), other) == (broken, other)
+    assert with_branch((other,), whole) == (other, whole)
