@@ -1,20 +1,25 @@
 """Λ(p) of systems of three and four variables: moment equations, the plane, other codes, and other coordinates."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from fpsolve import (
     NonGaussianNoise,
     OrnsteinUhlenbeck,
     PlaneSystem,
     Problem,
+    boundary,
+    load_case,
     lyapunov_exponent,
     make_mesh,
     moment_lyapunov,
     stability_index,
 )
+from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.modes import second_moments
@@ -207,3 +212,21 @@ def test_what_is_refused():
         moment_lyapunov(problem(OU), 1.0, mesh=make_mesh())
     with pytest.raises(ValueError, match="two rows"):
         CoefficientMatrix(0, np.eye(5).tolist())
+
+
+def test_flutter_of_a_bridge_deck():
+    """Λ(2) = 0 over wind and turbulence, by the moment hierarchy at its points; it begins where the deck flutters."""
+    case = load_case(Path(__file__).parents[2] / "cases/systems/flutter.toml")
+    wind, turbulence = case.chart.x.axis, Axis("noise.standard_deviation", 1e-4, 0.3)
+    [branch] = boundary(case.problem, {"moment": 2.0}, wind, turbulence, nodes=5).branches
+
+    def matrices(u):
+        terms = case.problem.at({"system.U": u}).motion.terms
+        steady, driven = (sum((t.g(xi) - t.g(0.0) * xi) * np.array(t.matrix) for t in terms) for xi in (0.0, 1.0))
+        return steady, driven
+
+    for k in range(0, branch.x.size, 10):
+        expected = kronecker.ornstein_uhlenbeck(*matrices(branch.x[k]), 0.5, branch.y[k], 2, 16)
+        assert expected == pytest.approx(0.0, abs=1e-9)
+    flutters = brentq(lambda u: np.linalg.eigvals(matrices(u)[0]).real.max(), 40.0, 56.0)
+    assert branch.x[np.argmin(branch.y)] == pytest.approx(flutters, abs=1e-4)
