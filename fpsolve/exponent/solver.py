@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -194,8 +194,8 @@ class ExponentSolver:
 
     @property
     def _own(self) -> dict[str, Any]:
-        names = ("rtol", "budget", "tolerance", "countdown")
-        return {name: getattr(self, name) for name in names}
+        tolerance = partial(tolerated, self.rtol, self.scales)  # not a method: a cycle would keep matrices for long
+        return {"rtol": self.rtol, "budget": self.budget, "tolerance": tolerance, "countdown": self.countdown}
 
     @cached_property
     def place(self) -> NearPlace | AllPlaces:
@@ -287,7 +287,7 @@ class ExponentSolver:
 
     def tolerance(self, p: float, value: float) -> float:
         """The largest error allowed of a value of Λ(p)."""
-        return self.rtol * max(abs(value), self.scale(p))
+        return tolerated(self.rtol, self.scales, p, value)
 
     def moments(self, p: ArrayLike, *, progress: Callable[[], None] = lambda: None) -> MomentLyapunov:
         """Λ(p) at several p; `progress` is called after each, also after one that fails.
@@ -393,6 +393,11 @@ class ExponentSolver:
         near = self.near.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
         return float(np.mean([pair.derivative for pair in pairs])), error
+
+
+def tolerated(rtol: float, scales: Scale, p: float, value: float) -> float:
+    """rtol of a value of Λ(p), or of the terms of Eq. (37) before they cancel, whichever is larger."""
+    return rtol * max(abs(value), float(scales.moment(p)))
 
 
 def best_order(p: FloatArray) -> Any:

@@ -1,6 +1,8 @@
 """Λ(p) of systems of three and four variables: moment equations, the plane, other codes, and other coordinates."""
 
+import gc
 import math
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -230,3 +232,15 @@ def test_flutter_of_a_bridge_deck():
         assert expected == pytest.approx(0.0, abs=1e-9)
     flutters = brentq(lambda u: np.linalg.eigvals(matrices(u)[0]).real.max(), 40.0, 56.0)
     assert branch.x[np.argmin(branch.y)] == pytest.approx(flutters, abs=1e-4)
+
+
+def test_matrices_are_freed_with_the_solver():
+    """They may take a gigabyte: nothing waits for the search for cycles."""
+    gc.disable()
+    try:
+        solver = ExponentSolver(problem(White(s=1.0)), rtol=1e-3)
+        left = weakref.ref(solver.solution(1.0).pair.generator)
+        del solver
+        assert left() is None
+    finally:
+        gc.enable()
