@@ -49,18 +49,24 @@ class NoiseDerivative:
 
 
 class Noise(Parametrised):
-    """A stationary process that drives a system; what follows holds for most kinds.
+    """A stationary process ξ(t) that drives a system. Most kinds are diffusions dξ = b(ξ) dt + σ(ξ) dW.
+
+    P_s is the stationary density of ξ, and z = ξ/std is ξ in noise units. The defaults below hold for most kinds; a
+    kind overrides those that do not hold for it.
 
     Attributes:
-        has_states: whether ξ jumps between states; it then has no density, and what is said of that does not apply.
-        mixes_slowly: whether ξ may hardly ever leave some states for others, so that these have a positive eigenpair.
-        approximates_spectrum: whether `spectral_density` is that of a process which stands for this one.
-        tails_beyond: the name of a parameter, the value above which P_s has algebraic tails, and what else to do.
-        may_tilt: whether functions of ξ gain by a factor exp(s ξ), as where P_s falls to both sides.
-        has_peak: whether its spectral density may be largest, and very large, at a frequency of its own.
-        is_white: whether it has no value; it then has one state, ξ = 0, and moves what it drives by diffusion, see
-            `motion`, or by impulses.
-        of_xi: the names of parameters whose unit is that of ξ, or made of it; it is stated for ξ in 1/time.
+        has_states: whether ξ jumps between states. Such noise has no density, so that `log_density`, `diffusion` and
+            what follows from them do not apply.
+        mixes_slowly: whether ξ may stay among some of its states almost for ever, so that these states have a positive
+            eigenpair of their own.
+        approximates_spectrum: whether `spectral_density` is that of a simpler process which replaces this one.
+        tails_beyond: the name of a parameter, the value above which P_s has algebraic tails, and what to do then; None
+            for noise that never has such tails.
+        may_tilt: whether a factor exp(s ξ) makes functions of ξ easier to resolve, as where P_s has a single peak.
+        has_peak: whether the spectral density may have a high peak at a frequency of the noise itself.
+        is_white: whether ξ has no value, as for white noise and impulses. Solvers see such noise as a chain with the
+            only state ξ = 0; it moves the system by diffusion, see `motion`, or by `impulses`.
+        of_xi: the names of the parameters whose unit contains that of ξ. Their declared unit is that for ξ in 1/time.
     """
 
     section: ClassVar[str] = "noise"
@@ -75,12 +81,12 @@ class Noise(Parametrised):
 
     @property
     def sense(self) -> str:
-        """Whose sense the equation is meant in, as "Itô's"; empty where all senses are the same."""
+        """Whose definition of the stochastic integral holds, such as "Itô's"; empty where all of them agree."""
         return ""
 
     @property
     def parts(self) -> Mapping[str, Noise]:
-        """The independent noises that it is made of, by the names that terms have; here only itself."""
+        """The independent noises that this one consists of, by their names in the terms; by default itself alone."""
         return {"": self}
 
     @property
@@ -91,11 +97,11 @@ class Noise(Parametrised):
     @property
     @abstractmethod
     def correlation_time(self) -> float:
-        """About how long ξ remembers its value."""
+        """The time over which ξ is correlated; it need only be right up to a factor."""
 
     @abstractmethod
     def spectral_density(self, omega: float) -> float:
-        """S(ω) = ∫ C(t) cos ωt dt over all t, C the autocovariance."""
+        """S(ω) = ∫ C(t) cos ωt dt over −∞ < t < ∞, where C is the autocovariance of ξ."""
 
     @property
     def mean(self) -> float:
@@ -104,67 +110,71 @@ class Noise(Parametrised):
 
     @property
     def moments(self) -> tuple[float, float]:
-        """The p for which Λ(p) of a system linear in ξ is finite, as a closed interval."""
+        """The smallest and the largest p for which Λ(p) of a system linear in ξ is finite."""
         return -math.inf, math.inf
 
     @property
     def has_algebraic_tails(self) -> bool:
-        """Whether P_s falls like a power of ξ only, so that not all moments are finite."""
+        """Whether P_s falls off like a power of ξ, so that some moments are infinite."""
         return math.isfinite(self.moments[1])
 
     @property
     def basis(self) -> Literal["polynomials", "cells", "states", "waves", "pairs"]:
-        """What the functions of the noise are made of: orthogonal polynomials of P_s, cells of a line, states, waves.
+        """The basis in which functions of the noise are expanded.
 
-        The waves are those of an angle, of which ξ is a function; the noise then states `nu`, `sigma` and `of_angle`.
-        Pairs are products of Hermite polynomials of u, du = −Mu dt + N dW with the stationary covariance 1 and
-        ξ = std u₁; the noise then states M as `drift_matrix`.
+        "polynomials" are orthogonal with the weight P_s. "cells" are finite elements on the line of ξ. "states" are the
+        values at the states of a chain. "waves" are Fourier modes of an angle, of which ξ is a function; the noise then
+        states `nu`, `sigma` and `of_angle`. "pairs" are products of Hermite polynomials of two variables u that obey
+        du = −Mu dt + N dW with the stationary covariance 1, and ξ = std u₁; the noise then states M as `drift_matrix`.
         """
         return "states" if self.has_states else "cells" if self.has_algebraic_tails else "polynomials"
 
     @property
     def is_diffusion(self) -> bool:
-        """Whether ξ by itself is a diffusion, so that b, σ and P_s tell all of it."""
+        """Whether ξ is a diffusion by itself, so that b, σ and P_s define it."""
         return self.basis in ("polynomials", "cells")
 
     @property
     def is_drawn(self) -> bool:
-        """Whether T makes a picture: a surface over (φ, ξ), or a line for each state."""
+        """Whether the eigenfunction T can be drawn, as a surface over (φ, ξ) or as a line for each state."""
         return self.is_diffusion or self.has_states
 
     @property
     def is_random(self) -> bool:
-        """Whether more of it is random than where it starts."""
+        """Whether ξ is random after its start; False for a harmonic load with a random phase."""
         return True
 
     @property
     def period(self) -> float:
-        """After which it repeats itself for ever; 0 where it does not."""
+        """The period of a periodic noise; 0 for others."""
         return 0.0
 
     @property
     def shaped_by(self) -> Sequence[str]:
-        """The names of the parameters on which the law of ξ in noise units depends, more than on its words."""
+        """The names of the parameters, besides the `words`, on which the law of z = ξ/std depends."""
         return tuple(name for name in self.values if name not in self.words)
 
     @property
     def half_width(self) -> float:
-        """The support of ξ is (−half_width, half_width); ∞ where it is the whole line."""
+        """Half the width of the support of ξ, which is (−half_width, half_width); ∞ for the whole line."""
         return math.inf
 
     @property
     def is_bounded(self) -> bool:
-        """Whether ξ stays within an interval."""
+        """Whether ξ stays within a finite interval."""
         return self.has_states or math.isfinite(self.half_width)
 
     @property
     def end_exponent(self) -> float:
-        """a in P_s ~ (half_width − |ξ|)^a at the ends of a bounded support; 0 on the whole line."""
+        """The exponent a of P_s ~ (half_width − |ξ|)^a at the ends of a bounded support; 0 on the whole line."""
         return 0.0
 
     @property
     def reached(self) -> FloatArray:
-        """Values of ξ, increasing or its states, that go as far as the noise does where that matters, shape (n,)."""
+        """Values of ξ that sample its whole range, at most 1e6 std wide to each side; shape (n,).
+
+        They increase; those of a chain are its states, in their order.
+        """
         return np.asarray(min(self.half_width, 1e6 * self.standard_deviation) * np.linspace(-1, 1, 1001))
 
     @property
@@ -174,33 +184,37 @@ class Noise(Parametrised):
 
     @property
     def longest_jump(self) -> int:
-        """How many states further ξ jumps at most; 0 for continuous paths."""
+        """The largest difference of the numbers of two states between which ξ jumps; 0 for continuous paths."""
         return 0
 
     @property
     def diffusion(self) -> float:
-        """σ, the coefficient of dW, where it is constant; else its value at ξ = 0."""
+        """σ, the coefficient of dW; where it is not constant, its value at ξ = 0."""
         raise NotImplementedError
 
     def squared_diffusion(self, xi: ArrayLike) -> FloatArray:
-        """σ²(ξ), of the shape of ξ."""
+        """σ²(ξ), in the shape of ξ; by default the square of the constant `diffusion`."""
         return np.full_like(np.asarray(xi, dtype=float), self.diffusion**2)
 
     @property
     def relaxation_time(self) -> float:
-        """2⟨ξ²⟩/σ², the time in which ξ forgets its value: 1/α₀ for the Ornstein-Uhlenbeck process."""
+        """The relaxation time 2⟨ξ²⟩/σ², which is 1/α₀ for the Ornstein-Uhlenbeck process."""
         return 2 * (self.standard_deviation / self.diffusion) ** 2
 
     def log_density(self, xi: ArrayLike) -> FloatArray:
-        """ln P_s(ξ) of the stationary density; −∞ outside the support."""
+        """ln P_s(ξ), in the shape of ξ; −∞ outside the support."""
         raise NotImplementedError
 
     def density(self, xi: ArrayLike) -> FloatArray:
-        """P_s(ξ); 0 outside the support."""
+        """The stationary density P_s(ξ), in the shape of ξ; 0 outside the support."""
         return np.exp(self.log_density(xi))
 
     def holding_cost(self, xi: FloatArray) -> FloatArray:
-        """At which rate paths that hold ξ at these increasing values get rarer, about ⅛σ²((ln P_s)′)²."""
+        """The rate at which the probability falls that ξ stays near a value, about ⅛σ²((ln P_s)′)².
+
+        Args:
+            xi: values of ξ, increasing, shape (n,).
+        """
         return 0.125 * self.squared_diffusion(xi) * np.gradient(self.log_density(xi), xi) ** 2
 
     def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
@@ -208,34 +222,36 @@ class Noise(Parametrised):
         raise NotImplementedError
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
-        """What paths of a simulation start from, by the stationary law: ξ, or the numbers of states, shape (size,).
+        """Stationary initial values of the paths of a simulation: ξ, or the numbers of states, shape (size,).
 
-        Of noise that is no Markov process by itself it has more rows, shape (numbers, size): ξ, and what else its
-        future depends on.
+        Noise that is no Markov process by itself returns an array of the shape (rows, size). The first row is ξ, and
+        the others are the variables on which its future depends.
         """
         return self.sample(size, rng)
 
     def step(self, h: float, bias: float = 0.0) -> Any:
-        """One step of length h of dξ = (f(ξ) + σ² b) dt + σ dW, b the bias, for the simulation.
+        """One step of length h of dξ = (f(ξ) + σ²·bias) dt + σ dW, for the simulation.
 
-        It is written from this equation alone, without P_s, so that the simulation is a witness of what is made of P_s.
+        It follows from this equation alone, without P_s, so that the simulation is independent of what follows from
+        P_s. A kind without `step` is not simulated.
 
         Returns:
             A named tuple of numbers whose class has a static method `draw(step, xi, xi_mean, xi_end, push, rng)` that
-            numba can compile: it draws the mean and the end of ξ in one step that begins at `xi`, all of shape (n,),
-            and adds ∫f(ξ) dt to `push` where there may be a bias. Where `start` has more rows so has `xi`: its step
-            moves all of them but the first, ξ, which its caller sets to the end. Kinds without it are not simulated.
+            numba can compile. For a step that begins at `xi` it draws the mean of ξ over the step into `xi_mean` and
+            its end into `xi_end`, all of the shape (n,), and where there may be a bias it adds ∫f(ξ) dt to `push`. If
+            `start` returns several rows, `xi` has them too: `draw` then moves all rows but the first, ξ, which its
+            caller sets to `xi_end`.
         """
         raise NotImplementedError
 
     @property
     def largest_step(self) -> float:
-        """The longest step of which `step` makes an error of some 1e-4."""
+        """The longest time step with which `step` has an error of about 1e-4."""
         raise NotImplementedError
 
     @property
     def marks(self) -> Sequence[float]:
-        """What numbers in `step` stand for: the values of states, or the sizes of impulses; nothing for others."""
+        """What the numbers that `step` draws stand for: the values of states, or the sizes of impulses; else empty."""
         return ()
 
     @property
@@ -244,42 +260,48 @@ class Noise(Parametrised):
         return type(self).step is not Noise.step
 
     def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
-        """A system as this noise moves it: the motion at ξ, and matrices B of Bx ∘ dW, which have no ξ."""
+        """The motion of a system along a path of ξ, and the matrices B of the diffusions Bx ∘ dW by white noise."""
         return system, ()
 
     def changed_motion(
         self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
     ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
-        """∂/∂θ of `motion`, from that of the terms of the system, or by a parameter of the noise with this name."""
+        """The derivative ∂/∂θ of both parts of `motion`.
+
+        Args:
+            system: the system.
+            terms: ∂/∂θ of its terms; empty if θ is a parameter of the noise.
+            name: the name of θ if it is a parameter of the noise, else empty.
+        """
         return terms, ()
 
     def impulses(self, system: System) -> Sequence[Impulse]:
-        """Those by which this noise multiplies the state of a system, independent of each other."""
+        """The independent impulses by which this noise multiplies the state of a system; by default none."""
         return ()
 
     def changed_impulses(
         self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
     ) -> Sequence[ImpulseDerivative]:
-        """∂/∂θ of each of the `impulses`; arguments as in `changed_motion`."""
+        """The derivative ∂/∂θ of each of the `impulses`. The arguments are those of `changed_motion`."""
         return ()
 
     @property
     def replaces(self) -> Noise | None:
-        """The noise that it stands for, as the reduction (12)-(14) does for that of Eq. (7)."""
+        """The noise that this one approximates, as the reduction (12)-(14) does that of Eq. (7); else None."""
         return None
 
     @property
     def one_sided(self) -> Sequence[str]:
-        """The names of parameters by which derivatives are taken from below here."""
+        """The names of the parameters by which only the derivative from below exists, at their present values."""
         return ()
 
     def derivative(self, name: str) -> NoiseDerivative:
-        """∂/∂θ, θ one of the `differentiable` parameters."""
+        """The derivative of the noise by one of its `differentiable` parameters."""
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
 
     @classmethod
     def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw | None:
-        """The law in exact numbers, for parameters as decimals by name; None where no proof is known.
+        """The law of the noise in exact numbers, from its parameters as decimals by name; None if no proof exists.
 
         Raises:
             NoSuchExponent: no bound can be proven for these parameters.
@@ -287,7 +309,7 @@ class Noise(Parametrised):
         return None
 
     def check_existence(self, p: float) -> None:
-        """Refuse a p for which E‖x‖^p is infinite. Raises `NoSuchExponent` for a p that is not among the `moments`."""
+        """Check that E‖x‖^p is finite. Raises `NoSuchExponent` for a p outside `moments`."""
         low, high = self.moments
         if not low <= p <= high:
             raise NoSuchExponent(Message(Code.INFINITE, p=p, low=low, high=high, remedy=Remedy.REDUCTION))
@@ -314,7 +336,7 @@ class Memoryless(Noise):
 
     @property
     def probabilities(self) -> FloatArray:
-        """Of the states, shape (1,)."""
+        """The probability of the only state, 1; shape (1,)."""
         return np.ones(1)
 
     @property

@@ -47,9 +47,9 @@ class TurningStep(NamedTuple):
 class Bounded(Noise):
     """Bounded noise ξ = μ cos θ, dθ = ν dt + σ dW, θ₀ uniform: its correlation is ½μ² exp(−½σ²|t|) cos νt.
 
-    See W.-C. Xie, J. Sound Vib. 263, 2003. ξ has the law of sine-Wiener noise, but is no
-    Markov process by itself: functions of the noise are those of θ. With ν = 0 they are of ξ alone, and it is solved as
-    the sine-Wiener noise that it then is. With σ = 0 it is a harmonic load, ξ = μ cos(νt + θ₀).
+    See W.-C. Xie, J. Sound Vib. 263, 2003. ξ has the stationary density of sine-Wiener noise, but is no Markov process
+    by itself, so that functions of the noise are functions of θ. With ν = 0 the noise is sine-Wiener noise, and is
+    solved as such. With σ = 0 it is a harmonic load, ξ = μ cos(νt + θ₀).
 
     >>> Bounded(mu=0.4, nu=2.0, sigma=0.5).standard_deviation ** 2  # ½μ²
     0.08
@@ -92,6 +92,7 @@ class Bounded(Noise):
 
     @property
     def has_peak(self) -> bool:  # type: ignore[override]
+        """Whether ν > 0, so that the spectral density has peaks at ±ν."""
         return self.nu > 0
 
     @property
@@ -100,7 +101,7 @@ class Bounded(Noise):
 
     @property
     def period(self) -> float:
-        """2π/ν of a harmonic load."""
+        """2π/ν for a harmonic load, σ = 0; else 0."""
         return 0.0 if self.sigma else 2 * math.pi / self.nu
 
     @property
@@ -118,7 +119,7 @@ class Bounded(Noise):
 
     @property
     def correlation_time(self) -> float:
-        """2/σ², in which ξ forgets its phase; ∞ for a harmonic load."""
+        """2/σ², the time in which the phase is forgotten; ∞ for a harmonic load."""
         return 2 / self.sigma**2 if self.sigma else math.inf
 
     relaxation_time = correlation_time
@@ -126,7 +127,7 @@ class Bounded(Noise):
     def spectral_density(self, omega: float) -> float:
         """S(ω) = ½μ²σ²(ω² + ν² + ¼σ⁴)/((ω² − ν² − ¼σ⁴)² + σ⁴ω²), the sum of a peak at ν and one at −ν.
 
-        A harmonic load has no other frequency than ν.
+        For a harmonic load it is ∞ at |ω| = ν and 0 at all other frequencies.
         """
         half = 0.5 * self.sigma**2
         if not half:
@@ -148,7 +149,7 @@ class Bounded(Noise):
         return self._still.holding_cost(xi)
 
     def of_angle(self, theta: FloatArray) -> FloatArray:
-        """ξ, of the shape of θ."""
+        """ξ = μ cos θ, in the shape of θ."""
         return np.asarray(self.mu * np.cos(theta))
 
     def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
@@ -160,18 +161,21 @@ class Bounded(Noise):
         return np.array([self.of_angle(theta), theta])
 
     def step(self, h: float, bias: float = 0.0) -> TurningStep:
-        """Without a bias."""
+        """One step of length h for the simulation, see `Noise.step`; this noise takes no bias."""
         kick = self.sigma * math.sqrt(h)
         fade = math.exp(-(kick**2) / 12) * float(np.sinc(0.5 * self.nu * h / math.pi))
         return TurningStep(self.mu, self.nu * h, kick, kick / math.sqrt(12), fade)
 
     @property
     def largest_step(self) -> float:
-        """A tenth of the times in which the phase diffuses by 1, and of those in which it turns by π."""
+        """The smaller of 0.1/σ² and 0.1π/ν, a tenth of the times in which the phase diffuses by 1 or turns by π."""
         return min(0.1 / self.sigma**2 if self.sigma else math.inf, 0.1 * math.pi / self.nu if self.nu else math.inf)
 
     def derivative(self, name: str) -> NoiseDerivative:
-        """∂/∂μ stretches ξ, ∂/∂ν turns its phase, and ∂/∂σ is that of σ alone; Λ is even in ν and in σ."""
+        """The derivative by μ, ν or σ: μ scales ξ, ν changes the speed of the phase, σ its diffusion.
+
+        Λ is even in ν and in σ.
+        """
         if name == "nu":
             return NoiseDerivative(turning=1.0)
         if name == "mu":

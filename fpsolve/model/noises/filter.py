@@ -57,9 +57,9 @@ class FilterStep(NamedTuple):
 class Filter(Noise):
     """Filtered white noise ξ = c₀y + c₁y′ with y″ + 2ζω y′ + ω²y = s Ẇ, y and y′ stationary.
 
-    c₀ = 1, c₁ = 0 is noise of a narrow band where ζ is small; c₀ = 0, c₁ = 1 is that of sea waves, without a spectrum
-    at 0; c₀ = ω², c₁ = 2ζω is the ground motion of Kanai and Tajimi. Var y = s²/(4ζω³), Var y′ = s²/(4ζω), and y and y′
-    are uncorrelated. ξ is no Markov process by itself: functions of the noise are those of y and y′.
+    c₀ = 1, c₁ = 0 gives narrow-band noise if ζ is small. c₀ = 0, c₁ = 1 gives noise like that of sea waves, with S(0) =
+    0. c₀ = ω², c₁ = 2ζω gives the ground motion of Kanai and Tajimi. Var y = s²/(4ζω³), Var y′ = s²/(4ζω), and y and y′
+    are uncorrelated. ξ is no Markov process by itself, so that functions of the noise are functions of y and y′.
 
     >>> Filter(omega=2.0, zeta=0.1, s=0.5).spectral_density(0.0)  # s²c₀²/ω⁴
     0.015625
@@ -95,7 +95,11 @@ class Filter(Noise):
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> Filter:
-        """`output` stands for c₀ and c₁."""
+        """The noise that a table of a case file states, where `output = [c0, c1]` may replace c0 and c1.
+
+        Raises:
+            ValueError: a parameter is out of its range, c0 or c1 is stated alone, or one of them beside `output`.
+        """
         known = dict(table)
         stated = [name for name in ("c0", "c1") if name in known]
         if "output" in known:
@@ -122,13 +126,13 @@ class Filter(Noise):
 
     @property
     def direction(self) -> tuple[float, float]:
-        """The cosine and the sine of the angle of ξ in the plane of u = y/std(y) and w = y′/std(y′)."""
+        """(cos α, sin α) in ξ/std(ξ) = u cos α + w sin α, where u = y/std(y) and w = y′/std(y′)."""
         size = math.hypot(self.c0, self.c1 * self.omega)
         return self.c0 / size, self.c1 * self.omega / size
 
     @property
     def correlation_time(self) -> float:
-        """That of the envelope, 1/(ζω) for ζ ≤ 1, else of the slower of its two exponentials."""
+        """The decay time of the envelope, 1/(ζω) for ζ ≤ 1, or of the slower of two exponentials for ζ > 1."""
         return (self._overdamped if self.zeta > 1 else 1 / self.zeta) / self.omega
 
     relaxation_time = correlation_time
@@ -139,17 +143,18 @@ class Filter(Noise):
         return max(self.zeta, 1.0) + math.sqrt(max(self.zeta**2 - 1, 0.0))
 
     def spectral_density(self, omega: float) -> float:
-        """S(ω) = s²(c₀² + c₁²ω²)/((ω_f² − ω²)² + 4ζ²ω_f²ω²)."""
+        """S(ω) = s²(c₀² + c₁²ω²)/((ω_f² − ω²)² + 4ζ²ω_f²ω²), where ω_f is the frequency of the filter."""
         of_output = self.s * math.hypot(self.c0, self.c1 * omega)
         own, other = (self.omega - omega) * (self.omega + omega), 2 * self.zeta * self.omega * omega
         return (of_output / math.hypot(own, other)) ** 2
 
     @property
     def drift_matrix(self) -> FloatArray:
-        """M of du = −Mu dt + N dW, M + Mᵀ = NNᵀ, for u of the stationary covariance 1 with ξ = std u₁, shape (2, 2).
+        """M in du = −Mu dt + N dW, for u with the stationary covariance 1 and ξ = std(ξ) u₁, shape (2, 2).
 
-        In the plane of y/std(y) and y′/std(y′) it is ω((0, −1), (1, 2ζ)); turned, n = (sin, cos) of the angle of ξ,
-        M = ω(2ζ n nᵀ + ((0, −1), (1, 0))).
+        The covariance is 1 because M + Mᵀ = NNᵀ. For u = (y/std(y), y′/std(y′)) the matrix would be
+        ω((0, −1), (1, 2ζ)). Rotated by the angle α of `direction` it is M = ω(2ζ n nᵀ + ((0, −1), (1, 0))) with
+        n = (sin α, cos α).
         """
         return self.omega * (2 * self.zeta * np.outer(*2 * (self._normal,)) + _TURN)
 
@@ -159,7 +164,7 @@ class Filter(Noise):
         return np.array([sine, cosine])
 
     def derivative(self, name: str) -> NoiseDerivative:
-        """∂/∂θ of M and of ln std(ξ), u held; by c₀ and c₁ the angle of ξ turns."""
+        """The derivative of M and of ln std(ξ) at fixed u; ω, c₀ and c₁ also change the angle of `direction`."""
         c, damping = np.array([self.c0, self.c1 * self.omega]), np.outer(self._normal, self._normal)
         square = float(c @ c)
 
@@ -187,7 +192,7 @@ class Filter(Noise):
         return self.c1 * self.s
 
     def log_density(self, xi: ArrayLike) -> FloatArray:
-        """Logarithm of the Gaussian density."""
+        """The logarithm of the Gaussian density of ξ, in the shape of ξ."""
         z = np.asarray(xi, dtype=float) / self.standard_deviation
         return -0.5 * z**2 - math.log(math.sqrt(2 * math.pi) * self.standard_deviation)
 
@@ -201,12 +206,14 @@ class Filter(Noise):
 
     @property
     def largest_step(self) -> float:
-        """Half of the shortest time of the filter."""
+        """Half of the shortest time constant of the filter."""
         return 0.5 / (self.omega * self._overdamped)
 
     def step(self, h: float, bias: float = 0.0) -> FilterStep:
-        """Of u′ = ωw, dw = −ω(u + 2ζw) dt + 2√(ζω) dW, without a bias: all but the flow are integrals of the responses
-        to dW, of w, of u, and of the mean of u over the step.
+        """One exact step of length h of u′ = ωw, dw = −ω(u + 2ζw) dt + 2√(ζω) dW, see `Noise.step`, without a bias.
+
+        Here u = y/std(y) and w = y′/std(y′). The random part has the covariance of w, u and the mean of u over the
+        step, which are integrals of the responses to dW.
         """
         t, unit = h * _NODES, self._unit
         sums = np.array([at * _WEIGHTS @ self._flow(at * _NODES)[:, 1] for at in t])  # ∫u dt

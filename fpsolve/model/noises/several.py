@@ -20,7 +20,7 @@ MOST_WITH_AXES = 2
 
 @dataclass(frozen=True)
 class Noises(Noise):
-    """Independent noises by the names that the terms of a system have, see `CoefficientMatrix`.
+    """Several independent noises, by the names that the terms of a system give them, see `CoefficientMatrix`.
 
     >>> from fpsolve import OrnsteinUhlenbeck
     >>> from fpsolve.model.noises.white import White
@@ -28,14 +28,15 @@ class Noises(Noise):
     >>> noises.coloured.kind
     'ornstein-uhlenbeck'
 
-    A function of all of them is one of as many variables as there are noises that have values; white ones have none.
+    A function of the noises has one variable for each noise that has a value; white noise and impulses have none.
 
     Args:
-        named: a mapping from names to noises, or pairs of both; two noises or more.
+        named: two or more noises, as a mapping from their names or as pairs (name, noise).
 
     Raises:
-        TypeError: one of them is no noise, or itself several.
-        ValueError: they are less than two, more than two have values, or one has algebraic tails.
+        TypeError: one of them is not a `Noise`, or consists of several noises itself.
+        ValueError: there are fewer than two names, more than two of the noises are neither white nor impulses, or one
+            has algebraic tails.
     """
 
     named: tuple[tuple[str, Noise], ...]
@@ -65,11 +66,12 @@ class Noises(Noise):
 
     @cached_property
     def parts(self) -> Mapping[str, Noise]:
+        """The noises by their names."""
         return dict(self.named)
 
     @cached_property
     def coloured(self) -> Noise:
-        """What has values: one noise, or several; of white noises alone the first, whose value is always 0."""
+        """The noise, or the noises, that have values; if all are white, the first of them, with the value 0."""
         valued = [(name, noise) for name, noise in self.named if not noise.is_white] or [self.named[0]]
         return valued[0][1] if len(valued) == 1 else self if len(valued) == len(self.named) else Noises(tuple(valued))
 
@@ -79,7 +81,7 @@ class Noises(Noise):
 
     @property
     def values(self) -> Mapping[str, float | str]:
-        """The parameters of each, by keys such as "axial.alpha"."""
+        """The values of the parameters of all noises, by keys such as "axial.alpha"."""
         return {f"{name}.{key}": value for name, noise in self.named for key, value in noise.values.items()}
 
     @property
@@ -92,14 +94,17 @@ class Noises(Noise):
 
     @property
     def is_white(self) -> bool:  # type: ignore[override]
+        """Whether all of the noises are white noise or impulses."""
         return all(noise.is_white for _, noise in self.named)
 
     @property
     def has_states(self) -> bool:  # type: ignore[override]
+        """Whether all `coloured` noises jump between states."""
         return all(noise.has_states for noise in self._valued)
 
     @property
     def is_diffusion(self) -> bool:
+        """Whether only one noise has values, and is a diffusion by itself."""
         return self.coloured is not self and self.coloured.is_diffusion
 
     @property
@@ -108,29 +113,31 @@ class Noises(Noise):
 
     @property
     def mixes_slowly(self) -> bool:  # type: ignore[override]
+        """Whether one of the noises may stay among some of its states almost for ever."""
         return any(noise.mixes_slowly for _, noise in self.named)
 
     @property
     def approximates_spectrum(self) -> bool:  # type: ignore[override]
+        """Whether the `spectral_density` of one of the noises is that of a simpler process which replaces it."""
         return any(noise.approximates_spectrum for _, noise in self.named)
 
     @property
     def standard_deviation(self) -> float:
-        """The largest of those that have one."""
+        """The largest standard deviation of the `coloured` noises."""
         return max(noise.standard_deviation for noise in self._valued)
 
     @property
     def correlation_time(self) -> float:
-        """The longest."""
+        """The longest correlation time of the noises."""
         return max(noise.correlation_time for _, noise in self.named)
 
     @property
     def relaxation_time(self) -> float:
-        """The longest."""
+        """The longest relaxation time of the noises."""
         return max(noise.relaxation_time for _, noise in self.named)
 
     def spectral_density(self, omega: float) -> float:
-        """Raises `NotImplementedError`: each has its own."""
+        """Raises `NotImplementedError`, as each noise has its own spectral density, see `parts`."""
         raise NotImplementedError("several noises have a spectral density each, see `parts`")
 
     @property
@@ -139,6 +146,7 @@ class Noises(Noise):
 
     @property
     def largest_jump_rate(self) -> float:
+        """The sum of the highest rates at which the noises leave a state; 0 for continuous paths."""
         return sum(noise.largest_jump_rate for noise in self._valued)
 
     @property
@@ -146,7 +154,7 @@ class Noises(Noise):
         return max(noise.longest_jump for noise in self._valued)
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
-        """The states of all, row by row."""
+        """The initial values of all noises, one below the other, shape (rows, size)."""
         return np.vstack([noise.start(size, rng) for _, noise in self.named])
 
     @property
@@ -162,7 +170,7 @@ class Noises(Noise):
             noise.check_existence(p)
 
     def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
-        """The diffusions of all white ones, and what they leave of the drift, each in its own sense."""
+        """The motion besides the white noises, and the diffusions by all white noises, each in its own `sense`."""
         drift, diffusions = list(_besides(system.terms, self.named)), list[CoefficientMatrix]()
         for own, noise, _ in self._white_motions(system):
             moved, more = noise.motion(own)
