@@ -26,7 +26,7 @@ _TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
 """Of regions, the darker the more of the quantities grow there."""
 _NAMED = 0.01
 """Share of the frame from which on a region has room for a letter; smaller ones are in chart.json only."""
-_CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "color": "black", "linewidth": 1.1, "zorder": 3}
+_CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "linewidth": 1.4, "zorder": 3}
 _FORM = Format(height=4.0)
 _SPECIAL = {"fold": ("fold", "^"), "crossing": ("crossing", "o"), "at ": ("value asked for", "s")}
 """Beginnings of labels, what the legend calls such points, and their markers."""
@@ -88,7 +88,7 @@ def draw_chart(case: Case, chart: Chart, folder: Path, *, into: Path | None = No
     keys = frame[0].key, frame[1].key
     held = held_in_words(case.curve({}), keys, unit)
     paths = [into] if into else [folder / "chart.png", folder / "chart.pdf"]
-    with figure_for(paths, case.headline, held, _FORM) as figure:
+    with figure_for(paths, "" if into else case.headline, held, _FORM) as figure:
         axes = figure.add_subplot()
         label_axes(axes, *(case.about(key).attributes for key in keys))
         for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
@@ -107,9 +107,10 @@ def draw_chart(case: Case, chart: Chart, folder: Path, *, into: Path | None = No
                 name = f"{line.zero.latex}: {appears}" if appears else line.zero.latex
                 axes.plot([], [], color=colour, linewidth=2, label=name)
             for points in chart.closed_forms[i]:
-                axes.plot(points[:, 0], points[:, 1], **_CLOSED_FORM)
+                axes.plot(points[:, 0], points[:, 1], color=colour, **_CLOSED_FORM)
         if any(chart.closed_forms):
-            axes.plot([], [], label="closed form, Eqs. (38)-(39)", **_CLOSED_FORM)
+            words = "closed form, Eqs. (38)-(39), in the colour of its line"
+            axes.plot([], [], label=words, color="0.35", **_CLOSED_FORM)
         labels = [label for line in chart.lines for branch in line.branches for label in branch.labels]
         for start, (name, marker) in _SPECIAL.items():
             if any(start in label for label in labels):

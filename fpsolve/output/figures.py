@@ -151,7 +151,7 @@ def draw(
     if not case.output.figure or setting.needed not in case.output.quantities or not results:
         return
     held = held_in_words(results[0].curve, case.vary.keys, setting.time_unit)
-    with figure_for(_paths(folder, "figure", into), case.caption, held, FORMATS[setting.width]) as figure:
+    with figure_for(*_headed(folder, "figure", into, case.caption), held, FORMATS[setting.width]) as figure:
         axes = figure.add_subplot()
         if other := map_key(setting, case.vary):
             _draw_map(axes, case, results, (setting.x, other), folder)
@@ -178,7 +178,8 @@ def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path,
             size = float(scale.moment(p)) if p else scale.linear
             bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
         held = held_in_words(result.curve, (), case.figure.time_unit)
-        with figure_for(_paths(folder, f"sensitivities{result.curve.suffix}", into), case.headline, held) as figure:
+        name = f"sensitivities{result.curve.suffix}"
+        with figure_for(*_headed(folder, name, into, case.headline), held) as figure:
             words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
             draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).shown for key in found.theta])
 
@@ -187,17 +188,18 @@ def draw_response(case: Case, simulated: SimulatedCurve, folder: Path, *, into: 
     """Draw response.png and .pdf of a curve, if it has one: the joint density of x and ẋ, and that of the amplitude."""
     if simulated.response is None:
         return
-    paths = _paths(folder, f"response{simulated.curve.suffix}", into)
+    name = f"response{simulated.curve.suffix}"
     held = held_in_words(simulated.curve, (), "time")
-    with figure_for(paths, case.headline, held, Format(width=10.5)) as figure:
+    with figure_for(*_headed(folder, name, into, case.headline), held, Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
         simulated.response.plot(plane)
         figure.get_layout_engine().set(wspace=0.1)
         simulated.response.plot_amplitude(radial)
 
 
-def _paths(folder: Path, name: str, into: Path | None) -> list[Path]:
-    return [into] if into else [folder / f"{name}.{ending}" for ending in ("png", "pdf")]
+def _headed(folder: Path, name: str, into: Path | None, heading: str) -> tuple[list[Path], str]:
+    """Where a figure goes, and its heading; one drawn into a page has none, as the page has it."""
+    return ([into], "") if into else ([folder / f"{name}.{ending}" for ending in ("png", "pdf")], heading)
 
 
 def _some(count: int) -> set[int]:
