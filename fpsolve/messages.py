@@ -144,6 +144,10 @@ class Code(Enum):
     )
     NO_ARNOLDI = "failure: the Arnoldi iteration for p = {p:g} did not converge"
     UNKNOWNS_SPENT = "failure: the next mesh has {unknowns} unknowns, more than budget.unknowns = {most}"
+    MEMORY_SPENT = (
+        "failure: the next mesh needs some {size:.2g} GB of memory, more than the {most:.2g} GB that "
+        "budget.unknowns = {unknowns} stands for"
+    )
     SECONDS_SPENT = (
         "failure: the next mesh needs some {seconds:.2g} s of processor time, more than budget.seconds = {most:g}"
     )

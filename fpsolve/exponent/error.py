@@ -141,12 +141,19 @@ class Solution:
     Attributes:
         pair: the principal pair.
         finer: that on a finer mesh, which measures the error of a given mesh: it may have few modes.
-        search: the error of the place among several problems where the value is the least.
+        search: the error of the place among several problems where the value is the least, or of the correction.
+        correction: what functions beyond those of the pair change in Λ(p), to first order.
     """
 
     pair: PrincipalPair
     finer: PrincipalPair | None = None
     search: float = 0.0
+    correction: float = 0.0
+
+    @property
+    def value(self) -> float:
+        """Λ(p)."""
+        return self.pair.value + self.correction
 
     @cached_property
     def effects(self) -> tuple[ModeEffects | None, ...]:
@@ -167,7 +174,7 @@ class Solution:
 
     @cached_property
     def error(self) -> float:
-        """Estimate of the error of `pair.value`: discretisation, truncation and rounding."""
+        """Estimate of the error of `value`: discretisation, truncation and rounding."""
         if self.finer is not None:
             return self._beside(self.finer) + self._other
         if not self.corners:

@@ -23,7 +23,7 @@ import scipy.linalg
 
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.errors import MeshError, NotConverged, SingularMatrix
-from fpsolve.exponent.adapt import SHARE, NearPlace, _Search
+from fpsolve.exponent.adapt import GIGABYTES, SHARE, NearPlace, _Search
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair, rightmost_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.fem.discretisation import Discretisation, first_part
@@ -32,7 +32,7 @@ from fpsolve.fem.sphere import Coordinates, SphereCells, SphereGenerator
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 
-FIRST_WAVES, FIRST_DEGREE = 4, 6
+FIRST_WAVES, FIRST_DEGREE = 2, 6
 EVEN = (2.0, 4.0)
 """The p whose moments have equations of their own: T is a polynomial of the degree p in the state."""
 LARGEST_STEP = 1.0
@@ -45,12 +45,10 @@ THINNEST = 1e-3
 """The least width: of modes that nothing couples the layer has none."""
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
-BEYOND = 1.5
-"""All waves of higher degrees by what the next two degrees change."""
-LEFT = 0.1
-"""Share of the last change that the error is at least; the change to come is one of it where there was none."""
-MOST_DIRECTIONS = 3200
-"""Functions of directions at most: every matrix of theirs is full."""
+ALONE = 3.0
+"""What is left after the correction by what two degrees change, over this change, where no coarser space tells more."""
+LEFT = 0.5
+"""The same, over what two degrees more changed in the corrected value."""
 DIGITS = 10.0
 
 
@@ -186,7 +184,6 @@ class SpherePlace(NearPlace):
                 search.failure, pair, values = failure, None, []
                 level += 1
                 continue
-            values.append(pair.value)
             allowed = search.tolerance(search.p, pair.value)
             effects = mode_effects(pair)
             rest = sum(each.error for each in effects if each)
@@ -195,9 +192,10 @@ class SpherePlace(NearPlace):
                 level, values = max(0, level - 1), []
                 continue
             level += 1
-            change = abs(self._change(pair, level))
-            left = max(BEYOND * change, LEFT * abs(values[-1] - values[-2])) if len(values) > 1 else change / LEFT
-            solution = Solution(pair, search=left)
+            change = self._change(pair, level)
+            values.append(pair.value + change)
+            left = max(abs(change), LEFT * abs(values[-1] - values[-2])) if len(values) > 1 else ALONE * abs(change)
+            solution = Solution(pair, search=left, correction=change)
             if solution.error <= allowed:
                 return solution
             search.note(solution, solution.error, allowed)
@@ -209,7 +207,7 @@ class SpherePlace(NearPlace):
         operator, new = pencil.matrix.shifted(pair.value), space.phi.degrees > pair.generator.chosen.phase.waves
         right = space.table(operator @ space.carry(pair.right, old))[new].ravel()
         left = space.table(operator.T @ space.carry(pair.left, old))[new].ravel()
-        factors = replace(pencil, matrix=pencil.matrix.on(new)).factorised(pair.value)
+        factors = pencil.on(new).factorised(pair.value)
         return float(-left @ factors.solve(right) / (pair.left @ old.weighed(pair.right)))
 
     def _begin(self, chosen: Discretisation) -> None:
@@ -222,8 +220,12 @@ class SpherePlace(NearPlace):
         return replace(first, phase=replace(first.phase, waves=first.phase.waves + 2 * level))
 
     def _check(self, search: _Search, chosen: Discretisation) -> None:
-        if chosen.phase.size > MOST_DIRECTIONS:
-            search.stop(Message(Code.UNKNOWNS_SPENT, unknowns=chosen.phase.size, most=MOST_DIRECTIONS))
+        """Refuse a stage beyond the budget; memory is that of elimination, over the noise or over elements in η."""
+        directions, noises = chosen.phase.size, chosen.size // chosen.phase.size
+        numbers = min(4 * directions**2 * noises, 2.5 * chosen.size**2 / chosen.phase.elements)
+        limits = {"most": GIGABYTES * self.budget.unknowns, "unknowns": self.budget.unknowns}
+        if (size := 8e-9 * numbers) > limits["most"]:
+            search.stop(Message(Code.MEMORY_SPENT, size=size, **limits))
         search.check(chosen)
 
     def _finer(self, chosen: Discretisation, effects: Sequence[Any], allowed: float) -> Discretisation:

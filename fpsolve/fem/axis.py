@@ -144,6 +144,10 @@ class KroneckerSum:
         unit = None if self.unit is None else self.unit[at]
         return KroneckerSum([(first[at], *others) for first, *others in self.terms], unit)
 
+    def with_dense_first(self) -> KroneckerSum:
+        """The same, the factors of the first axis as arrays."""
+        return KroneckerSum([(dense(first), *others) for first, *others in self.terms], self.unit)
+
     @cached_property
     def is_sparse(self) -> bool:
         return any(issparse(factor) for term in self.terms for factor in term)
@@ -163,7 +167,7 @@ class KroneckerSum:
     @cached_property
     def band(self) -> int:
         """How many diagonals the matrices of the last axis have on each side; all for sparse ones."""
-        if self.is_sparse:
+        if any(issparse(term[-1]) for term in self.terms):
             return self.shape[-1] - 1
         rows, columns = np.nonzero(sum(abs(term[-1]) for term in self.terms))
         return int(np.max(np.abs(rows - columns), initial=0))

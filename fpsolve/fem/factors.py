@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from itertools import pairwise
@@ -67,10 +67,10 @@ def factorised(operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: b
     if operator.size <= MAX_DENSE_UNKNOWNS and not operator.is_sparse:
         return DenseFactors(operator.toarray())
     m, n = operator.halves
-    if operator.is_sparse:
-        return SparseFactors(operator)
     if is_full:
         return _of_full(operator, levels)
+    if operator.is_sparse:
+        return SparseFactors(operator)
     if len(operator.shape) == 3 and operator.shape[1] > n:
         return SwappedFactors(operator, levels)
     most = MAX_THICK_BLOCK if len(operator.shape) == 3 else MAX_BLOCK
@@ -82,19 +82,39 @@ def factorised(operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: b
         if max(level.size for level in own) <= MAX_LEVEL * n:
             for each in (own, paired(own)):
                 with suppress(SingularMatrix):
-                    return LevelFactors(operator, each)
+                    return LevelFactors(operator, along_last(operator, each))
     return SparseFactors(operator)
 
 
 def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
-    n = operator.shape[-1]
+    """By levels of the first axis or of the last one, by blocks, or dense: what takes the fewest operations."""
+    (m, n), band = operator.halves, operator.band
+    choices: list[tuple[float, Callable[[], Factors]]] = [
+        (_dense_cost(operator.size), lambda: DenseFactors(operator.toarray())),
+    ]
     if n > 2 and levels and levels[-1] is not None:
-        own = levels[-1] or levels_of(operator)
-        with suppress(SingularMatrix):
-            return LevelFactors(operator, own)
-    elif 2 * operator.band < n:
-        return BlockFactors(operator)
-    return DenseFactors(operator.toarray())
+        choices.append(_by_levels(operator, along_last(operator, levels[-1] or levels_of(operator))))
+    elif 2 * band < n:
+        choices.append(
+            (n * (_dense_cost(m) + 2 * band * (1 + band) * m**3), lambda: BlockFactors(operator.with_dense_first()))
+        )
+    if levels and levels[0] is not None:
+        choices.append(_by_levels(operator, along_first(operator, levels[0])))
+    *cheapest, (_, last) = sorted(choices, key=lambda choice: -choice[0])
+    with suppress(SingularMatrix):
+        return last()
+    return cheapest[-1][1]()
+
+
+def _by_levels(operator: KroneckerSum, levels: Sequence[Any]) -> tuple[float, Callable[[], Factors]]:
+    sizes = [level.size for level in levels]
+    cost = sum(_dense_cost(size) for size in sizes) + sum(2 * a**2 * b for a, b in pairwise(reversed(sizes)))
+    return cost, lambda: LevelFactors(operator, levels)
+
+
+def _dense_cost(size: int) -> float:
+    """Operations of an LU of a dense matrix."""
+    return 2 / 3 * size**3
 
 
 class DenseFactors:
@@ -169,16 +189,19 @@ class SwappedFactors:
 
 
 class LevelFactors:
-    """Block elimination over levels of the last axis, from the last on: its matrices only couple neighbours.
+    """Block elimination over levels, from the last on: the matrix only couples neighbours.
 
-    The unknowns of a level are its functions, each with all of the other axes. Raises `SingularMatrix` where that of
-    one level alone is: functions of what noise moves only by way of others.
+    Args:
+        operator: the sum.
+        levels: the unknowns of each level.
+
+    Raises:
+        SingularMatrix: that of one level alone is: functions of what noise moves only by way of others.
     """
 
     def __init__(self, operator: KroneckerSum, levels: Sequence[Any]) -> None:
-        m, n = operator.halves
-        self._order = np.add.outer(np.concatenate(levels), n * np.arange(m)).ravel()
-        ends = np.cumsum([0, *(m * level.size for level in levels)])
+        self._order = np.concatenate(levels)
+        ends = np.cumsum([0, *(level.size for level in levels)])
         self._parts = [slice(*pair) for pair in pairwise(ends.tolist())]
         matrix = operator.tocsc()[:, self._order].tocsr()[self._order]
         rows = [matrix[part] for part in self._parts]
@@ -188,7 +211,9 @@ class LevelFactors:
         for i in range(len(rows) - 1, -1, -1):
             rest = rows[i][:, self._parts[i]].toarray(order="F")
             if self._pivots:
-                rest -= self._up[i] @ self._pivots[-1].solve(self._down[i].toarray(order="F"))
+                touched = np.unique(self._down[i].indices)
+                below = self._down[i][:, touched].toarray(order="F")
+                rest[:, touched] -= self._up[i] @ self._pivots[-1].solve(below)
             if not np.abs(rest).max() < LARGEST_GROWTH * operator.norm:
                 raise SingularMatrix("the pivot of a level is singular")
             self._pivots.append(DenseFactors(rest))
@@ -209,6 +234,18 @@ class LevelFactors:
         found = np.empty_like(b)
         found[self._order] = np.concatenate(rest)
         return found
+
+
+def along_first(operator: KroneckerSum, levels: Sequence[Any]) -> list[Any]:
+    """The unknowns of levels of the first axis."""
+    others = operator.size // operator.shape[0]
+    return [np.add.outer(others * level, np.arange(others)).ravel() for level in levels]
+
+
+def along_last(operator: KroneckerSum, levels: Sequence[Any]) -> list[Any]:
+    """The unknowns of levels of the last axis."""
+    m, n = operator.halves
+    return [np.add.outer(level, n * np.arange(m)).ravel() for level in levels]
 
 
 def levels_of(operator: KroneckerSum) -> list[Any]:

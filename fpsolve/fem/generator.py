@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -48,15 +48,28 @@ class Pencil:
         p: the moment.
         space: the trial and test functions.
         matrix: that of L(p), its first term with the matrices of noise that `space.mass` has.
+        first_levels: levels of the first axis, see `Axis.levels`.
     """
 
     p: float
     space: TensorSpace
     matrix: KroneckerSum
+    first_levels: Any
+
+    @staticmethod
+    def of(p: float, space: TensorSpace, matrix: KroneckerSum) -> Pencil:
+        """That of all functions."""
+        return Pencil(p, space, matrix, space.phi.levels)
+
+    def on(self, kept: Any) -> Pencil:
+        """What it is on some functions of the first axis, where a mask is true."""
+        place = np.cumsum(kept) - 1
+        levels = self.first_levels and [place[level[kept[level]]] for level in self.first_levels]
+        return replace(self, matrix=self.matrix.on(kept), first_levels=levels)
 
     def factorised(self, shift: float) -> Factors:
-        """LU factors of L(p) − σM: dense, by blocks along the last axis, or sparse."""
-        levels = [axis.levels for axis in self.space.axes]
+        """LU factors of L(p) − σM: dense, by blocks along an axis, or sparse."""
+        levels = [self.first_levels, *(axis.levels for axis in self.space.axes[1:])]
         return factorised(self.matrix.shifted(shift), levels, is_full=self.space.phi.is_full)
 
 
@@ -107,7 +120,7 @@ class Generator:
     def at(self, p: float) -> Pencil:
         """What is solved at p; the last one is kept."""
         if self._last is None or self._last.p != p:
-            self._last = Pencil(p, self.space(p), self.matrix(p))
+            self._last = Pencil.of(p, self.space(p), self.matrix(p))
         return self._last
 
     def enriched(self) -> Generator:

@@ -36,10 +36,12 @@ class HarmonicCells:
     Attributes:
         coordinates: S of y = S⁻¹x, whose directions they are of, n rows.
         waves: the largest degree, even.
+        elements: 1, as every function is of the whole sphere.
     """
 
     coordinates: Coordinates
     waves: int
+    elements = 1
 
     @property
     def size(self) -> int:

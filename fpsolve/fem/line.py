@@ -39,12 +39,15 @@ class LineSpace:
         degree: polynomial degree.
         weight: the weight w(x) > 0 of every integral.
         end_exponents: powers with which the weight vanishes at the two ends, honoured by Gauss-Jacobi rules.
+        is_flat: whether the function of a vertex has no slope at the next vertices, by what it has of the first
+            bubble: jumps of slopes then only couple the functions of one vertex and the bubbles beside it.
 
     Attributes:
         size: number of unknowns.
         points: points of the quadrature rules, increasing, shape (n,).
         measure: their weights times w, shape (n,).
         cells: for each unknown the cell that it belongs to, -1 for one shared by two, shape (size,).
+        first_cells: for each unknown the first cell that it belongs to, shape (size,).
         modes: for each unknown the degree of its polynomial, 1 for vertex functions, shape (size,).
         ends: the two unknowns whose functions do not vanish at the ends.
 
@@ -59,6 +62,7 @@ class LineSpace:
         weight: Coefficient = one,
         *,
         end_exponents: tuple[float, float] = (0.0, 0.0),
+        is_flat: bool = False,
     ) -> None:
         self.lines, self.degree, self._sizes = lines, degree, np.diff(lines)
         dofs = skfem.Dofs(skfem.MeshLine(lines), _element(degree))
@@ -67,6 +71,8 @@ class LineSpace:
         for j, own in enumerate(self._dofs):  # in each cell skfem numbers two vertex functions, then bubbles by degree
             self.cells[own] = np.where(self.cells[own] == -2, j, -1)
             self.modes[own[2:]] = np.arange(2, own.size)
+        self.first_cells = np.full(self.size, lines.size)
+        np.minimum.at(self.first_cells, self._dofs, np.arange(lines.size - 1)[:, None])
         self.ends = self._dofs[[0, -1], [0, 1]]
         count, (left, right), last = degree + EXTRA_POINTS, end_exponents, lines.size - 2
         rules = [_gauss_rule(count, left * (j == 0), right * (j == last)) for j in range(last + 1)]
@@ -81,9 +87,15 @@ class LineSpace:
         squares = np.einsum("cq,cqi->ci", self._measure, (values @ self._transform) ** 2)
         self._norms = np.sqrt(np.bincount(self._dofs.ravel(), squares.ravel(), minlength=self.size))
         self._transform /= self._norms[self._dofs][:, None, :]
-        self._values, self._slopes = values @ self._transform, slopes @ self._transform
         norms = self._norms[self._dofs]
         self._shares = shares * norms[:, 2:, None] / norms[:, None, :2]
+        self._flat = np.zeros((lines.size - 1, 2))
+        if is_flat:
+            sides = self._slopes_at_ends()
+            self._flat = -sides[:, [1, 0], [0, 1]] / sides[:, [1, 0], 2]
+            self._transform[:, :, :2] += self._transform[:, :, 2:3] * self._flat[:, None, :]
+            self._shares[:, 0] += self._flat
+        self._values, self._slopes = values @ self._transform, slopes @ self._transform
 
     @cached_property
     def values(self) -> csr_matrix:
@@ -100,8 +112,7 @@ class LineSpace:
 
     def jumps_of_slope(self) -> csr_matrix:
         """u′(x⁺) − u′(x⁻) at the inner vertices, shape (m − 1, size)."""
-        _, slopes = _reference(self.degree, np.array([0.0, 1.0]).tobytes())
-        sides = (slopes / self._sizes[:, None, None]) @ self._transform
+        sides = self._slopes_at_ends()
         rows = np.repeat(np.arange(self.lines.size - 2), self.degree + 1)
         right, left = (
             csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(self.lines.size - 2, self.size))
@@ -109,9 +120,17 @@ class LineSpace:
         )
         return right - left
 
+    def _slopes_at_ends(self) -> FloatArray:
+        """Those of the functions of each cell at both of its ends, shape (m, 2, k + 1)."""
+        _, slopes = _reference(self.degree, np.array([0.0, 1.0]).tobytes())
+        return np.asarray((slopes / self._sizes[:, None, None]) @ self._transform)
+
     def constant(self) -> FloatArray:
-        """Coefficients of the function 1, shape (size,): the vertex functions add up to it."""
-        return np.where(self.modes == 1, self._norms, 0.0)
+        """Coefficients of the function 1, shape (size,): the vertex functions add up to it, but for first bubbles."""
+        found = np.where(self.modes == 1, self._norms, 0.0)
+        if self.degree > 1:
+            found[self._dofs[:, 2]] = -np.sum(self._flat * self._norms[self._dofs[:, :2]], axis=1)
+        return found
 
     @cached_property
     def nested(self) -> csr_matrix:

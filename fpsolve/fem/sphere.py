@@ -78,6 +78,11 @@ class SphereCells:
         return int(first.size * nodes - np.count_nonzero(first) - np.count_nonzero(second))
 
     @property
+    def elements(self) -> int:
+        """How many there are in η."""
+        return self.lines.size - 1
+
+    @property
     def _degrees(self) -> tuple[Any, Any]:
         waves = Waves.of(self.dimensions, self.waves)
         return waves.first[waves.own], waves.second[waves.own]
@@ -214,7 +219,7 @@ class DirectionAxis(Axis):
     n: int
     chosen: Any
     degrees: Any
-    identity: FloatArray
+    identity: Any
 
     def _moved(self, matrix: FloatArray) -> tuple[Any, Any]:
         """h·∇u and q u of a matrix."""
@@ -225,20 +230,20 @@ class DirectionAxis(Axis):
         """u."""
         raise NotImplementedError
 
-    def _form(self, left: Any, right: Any) -> FloatArray:
+    def _form(self, left: Any, right: Any) -> Any:
         """∫ v̂ û of functions of v and of u."""
         raise NotImplementedError
 
-    def driven(self, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def driven(self, matrix: FloatArray) -> tuple[Any, Any]:
         """∫ v h·∇u and ∫ v q u."""
         moved, growth = self._moved(matrix)
         return self._form(self._itself, moved), self._form(self._itself, growth)
 
-    def diffusion(self, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def diffusion(self, a: FloatArray, b: FloatArray) -> tuple[Any, Any, Any]:
         """∫ v D_a D_b u, D = h·∇ + p q of two matrices, D* v = −h·∇v − tr v + (p + n) q v: by p⁰, p¹ and p²."""
         moved, growth = self._moved(a)
 
-        def by(right: Any) -> tuple[FloatArray, FloatArray]:
+        def by(right: Any) -> tuple[Any, Any]:
             stretched = self._form(growth, right)
             adjoint = (
                 self.n * stretched - self._form(moved, right) - float(np.trace(a)) * self._form(self._itself, right)
@@ -248,9 +253,9 @@ class DirectionAxis(Axis):
         (free, crossed), (linear, square) = map(by, self._moved(b))
         return free, linear + crossed, square
 
-    def penalty(self) -> FloatArray:
+    def penalty(self) -> Any:
         """What is added against pairs that no path has."""
-        return 0.0 * np.asarray(self.identity)
+        return 0.0 * self.identity
 
 
 class SphereAxis(DirectionAxis):
@@ -275,7 +280,8 @@ class SphereAxis(DirectionAxis):
         def weight(eta: Any) -> Any:
             return np.cos(eta) ** (first - 1) * np.sin(eta) ** (second - 1)
 
-        line = self.line = LineSpace(chosen.lines, chosen.degree, weight, end_exponents=(second - 1, first - 1))
+        ends = second - 1, first - 1
+        line = self.line = LineSpace(chosen.lines, chosen.degree, weight, end_exponents=ends, is_flat=True)
         waves = self.waves = Waves.of(chosen.dimensions, chosen.waves)
         degrees = waves.first[waves.own], waves.second[waves.own]
         kept = np.ones((line.size, waves.own.size), dtype=bool)
@@ -287,16 +293,19 @@ class SphereAxis(DirectionAxis):
         node = self._kept // waves.own.size
         of_elements = np.where(line.modes[node] == 1, -1, line.cells[node])
         self.ladders = ((of_elements, line.modes[node], self._on_kept(line.nested)),)
+        self.levels = [np.flatnonzero(line.first_cells[node] == k) for k in range(line.lines.size - 1)]
         constant = np.zeros((line.size, waves.own.size))
         constant[:, 0] = line.constant()
         self.constant = constant.ravel()[self._kept]
         self._of_line, self._slopes = line.values.toarray(), line.slopes.toarray()
         self.identity = self.unit = self._form(self._itself, self._itself)
 
-    def _assembled(self, of_line: Sequence[FloatArray], of_waves: Sequence[Any]) -> FloatArray:
-        """Σ A_k ⊗ B_k of matrices in η and of the waves, shape (size, size)."""
+    def _assembled(self, of_line: Sequence[FloatArray], of_waves: Sequence[Any]) -> Any:
+        """Σ A_k ⊗ B_k of matrices in η and of the waves, sparse, shape (size, size)."""
         total = KroneckerSum(list(zip(of_line, of_waves, strict=True))).tocsc()
-        return np.asarray(total[self._kept][:, self._kept].toarray())
+        found = total[:, self._kept].tocsr()[self._kept]
+        found.eliminate_zeros()
+        return found
 
     def _on_kept(self, of_line: Any) -> Any:
         whole = scipy.sparse.kron(of_line, scipy.sparse.identity(self.waves.own.size), format="csr")
@@ -353,7 +362,7 @@ class SphereAxis(DirectionAxis):
         growth = [(c * c * values, a[0, 0]), (c * s * values, a[0, 1] + a[1, 0]), (s * s * values, a[1, 1])]
         return [(of_eta, of[:, own]) for of_eta, of in moved], [(of_eta, of[:, own]) for of_eta, of in growth]
 
-    def _form(self, left: Parts, right: Parts) -> FloatArray:
+    def _form(self, left: Parts, right: Parts) -> Any:
         """∫ v̂ û of functions of v and of u."""
         measure = self.line.measure[:, None]
         pairs = [(a, b) for a in left for b in right]
@@ -366,7 +375,7 @@ class SphereAxis(DirectionAxis):
         every = scipy.sparse.identity(self.waves.first.size, format="csc")
         return [(self._of_line, every[:, self.waves.own])]
 
-    def penalty(self) -> FloatArray:
+    def penalty(self) -> Any:
         """−Σ γ h² N⁻³ (cs)² w [∂u/∂η] [∂v/∂η] over the inner vertices."""
         inner, sizes, degree = self.line.lines[1:-1], np.diff(self.line.lines), self.chosen.degree
         first, second = self.chosen.dimensions

@@ -6,7 +6,15 @@ from scipy.sparse import csr_matrix, kron, random
 
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, BlockFactors, DenseFactors, LevelFactors, SparseFactors, factorised
+from fpsolve.fem.factors import (
+    MAX_DENSE_UNKNOWNS,
+    BlockFactors,
+    DenseFactors,
+    LevelFactors,
+    SparseFactors,
+    along_first,
+    factorised,
+)
 
 
 def banded(rng, n, band):
@@ -87,3 +95,20 @@ def test_levels_that_are_singular_alone_go_in_pairs(rng):
     matrix = operator.toarray()
     np.testing.assert_allclose(found.solve(b), np.linalg.solve(matrix, b), rtol=1e-9, atol=1e-11)
     np.testing.assert_allclose(found.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-9, atol=1e-11)
+
+
+def test_levels_of_the_first_axis(rng):
+    """Taken where they are many: a thin band of the first axis, each of its functions with all of the noise's."""
+    first = [banded(rng, 90, 3) + 9 * np.eye(90) for _ in range(2)]
+    noises = [np.eye(6), banded(rng, 6, 1)]
+    operator = KroneckerSum([(csr_matrix(phase), noise) for phase, noise in zip(first, noises, strict=True)])
+    levels = np.split(np.arange(90), range(3, 90, 3))
+    found, matrix = factorised(operator, [levels, None], is_full=True), operator.toarray()
+    assert isinstance(found, LevelFactors)
+    assert [level.size for level in along_first(operator, levels)] == [18] * 30
+    b = rng.standard_normal(operator.size)
+    np.testing.assert_allclose(found.solve(b), np.linalg.solve(matrix, b), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-9, atol=1e-12)
+    few = factorised(operator, [np.split(np.arange(90), 2), None], is_full=True)
+    assert isinstance(few, BlockFactors)
+    np.testing.assert_allclose(few.solve(b), found.solve(b), rtol=1e-9, atol=1e-12)

@@ -127,6 +127,25 @@ def test_nested_modes_of_cells_are_those_of_lower_degrees():
     assert np.max(np.abs(coefficients[line.modes > 4])) > 1e-6
 
 
+def test_flat_vertex_functions_span_the_same():
+    """They have no slope at the next vertices, 1 is among them, and all polynomials of the degree are, as before."""
+    line = LineSpace(np.array([0.0, 0.4, 1.0, 1.5]), 6, np.sin, end_exponents=(1.0, 0.0), is_flat=True)
+    np.testing.assert_allclose(line.values @ line.constant(), 1, atol=1e-12)
+    jumps, (low, high) = line.jumps_of_slope().toarray(), line.ends
+    for row in jumps:
+        at, *others = sorted(np.flatnonzero(line.modes == 1), key=lambda k: -abs(row[k]))
+        assert abs(row[at]) > 1
+        np.testing.assert_allclose(row[others], 0, atol=1e-11)
+    root = np.sqrt(line.measure)[:, None]
+    values = np.stack([line.points, (line.points - 0.7) ** 6], axis=1)
+    fitted = np.linalg.lstsq(line.values.toarray() * root, root * values, rcond=None)[0]
+    np.testing.assert_allclose(line.at(np.array([0.1, 0.9, 1.4])) @ fitted[:, 0], [0.1, 0.9, 1.4], atol=1e-11)
+    np.testing.assert_allclose(line.values @ fitted, values, atol=1e-10)
+    np.testing.assert_allclose(jumps @ fitted, 0, atol=1e-8)
+    assert np.max(np.abs((line.nested @ fitted[:, 0])[line.modes > 1])) < 1e-10
+    assert low != high
+
+
 class Arcsine(Noise):
     """ξ = A sin θ, dθ = σ dW: P_s = 1/(π√(A² − ξ²)) and σ²(ξ) = σ²(A² − ξ²)."""
 

@@ -32,7 +32,7 @@ def pencil(p, cells=4, degree=8, count=11):
         CoefficientMatrix(1, DAMPING, identity, "lateral"),
     ]
     problem = Problem(PlaneSystem(terms), dict(zip(("axial", "lateral"), NOISES, strict=True)))
-    return Pencil(p, space, TermSum(Terms(problem, space).whole()).matrix(space, p))
+    return Pencil.of(p, space, TermSum(Terms(problem, space).whole()).matrix(space, p))
 
 
 def test_two_noises_against_the_moment_hierarchy():
