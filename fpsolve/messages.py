@@ -255,6 +255,18 @@ class Code(Enum):
     LINE_SPENT = "failure: budget.line_seconds = {most:g} of processor time are used up"
     LINE_STOPPED = "note: the line {line} is not traced to its end, and may have more branches: {reason}"
 
+    UNREACHED = (
+        "failure: {target} cannot be reached with {frame}: {symbol} is from {least:.6g} to {most:.6g} there, and "
+        "nearest at {place}; use a wider range, or other parameters"
+    )
+    INDEX_UNREACHED = (
+        "failure: {target} cannot be reached with {frame}: {side} everywhere there, and nearest at {place}; use a wider "
+        "range, or other parameters"
+    )
+    DESIGN_GAPS = (
+        "failure: {target} was not found{count:?, and Λ could not be solved at {count} of the values tried}: {reason}"
+    )
+
     NOISE_DIFFERS = (
         "failure: {member}{xi:? at xi = {xi:.4g}} is {value:.6g}, but {source} gives {must:.6g}; correct one of the two"
     )
