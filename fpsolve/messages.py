@@ -256,11 +256,11 @@ class Code(Enum):
     LINE_STOPPED = "note: the line {line} is not traced to its end, and may have more branches: {reason}"
 
     UNREACHED = (
-        "failure: {target} cannot be reached with {frame}: {symbol} is from {least:.6g} to {most:.6g} there, and "
+        "warning: {target} cannot be reached with {frame}: {symbol} is from {least:.6g} to {most:.6g} there, and "
         "nearest at {place}; use a wider range, or other parameters"
     )
     INDEX_UNREACHED = (
-        "failure: {target} cannot be reached with {frame}: {side} everywhere there, and nearest at {place}; use a wider "
+        "warning: {target} cannot be reached with {frame}: {side} everywhere there, and nearest at {place}; use a wider "
         "range, or other parameters"
     )
     DESIGN_GAPS = (

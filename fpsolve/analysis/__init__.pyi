@@ -9,4 +9,10 @@ from .sensitivity import Sensitivities as Sensitivities
 from .sensitivity import sensitivities as sensitivities
 from .stability import Boundary as Boundary
 from .stability import boundary as boundary
+from .uncertainty import Law as Law
+from .uncertainty import Spread as Spread
+from .uncertainty import Uncertainty as Uncertainty
+from .uncertainty import latin_hypercube as latin_hypercube
+from .uncertainty import laws_of as laws_of
+from .uncertainty import uncertainty as uncertainty
 from .zero import Axis as Axis

@@ -28,7 +28,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from scipy.stats import qmc
 
 from fpsolve.analysis.scan import Sample
 from fpsolve.analysis.target import Distance, Target, start_and_stop, target_of
@@ -106,7 +105,7 @@ class Design(Result):
 @of_problem
 def design(
     problem: Problem,
-    target: str,
+    target: str | Target,
     by: str | Axis | Sequence[str | Axis],
     *,
     units: Mapping[str, float] | None = None,
@@ -122,7 +121,7 @@ def design(
     Args:
         oscillator, noise: a motion and its noise, where the search starts; or one `Problem` of both, in their place or
             as `problem`.
-        target: such as "stability_index = 1", "lyapunov_exponent = -0.01" or "moment(2) = 0".
+        target: such as "stability_index = 1", "lyapunov_exponent = -0.01" or "moment(2) = 0"; or a `Target`.
         by: the parameters by their keys, each with its range as an `Axis`; of a key alone that is from half to twice
             its value.
         units: what a change of a parameter is measured by, for some keys; if not stated, the absolute value of the
@@ -135,14 +134,17 @@ def design(
         NotConverged: some values on the way were not resolved.
         NoSuchExponent: Λ(p) exists nowhere in the range.
     """
-    wanted, axes = target_of(target), axes_of(problem, by)
+    wanted, axes = target if isinstance(target, Target) else target_of(target), axes_of(problem, by)
     measures = units_of(problem, axes, units or {})
     distance = Distance(problem, wanted, [axis.key for axis in axes], budget or Budget(), progress)
     found = _along_axis(distance, axes[0]) if len(axes) == 1 else _nearest(distance, axes, np.array([*measures.values()]))
     if isinstance(found, Absent):
         return found
-    scaled = found.gradient * np.array([*measures.values()])
-    errors = (abs(found.value) + found.error) * np.abs(scaled) / float(scaled @ scaled) * [*measures.values()]
+    unit = np.array([*measures.values()])
+    scaled = found.gradient * unit
+    errors = (abs(found.value) + found.error) * np.abs(scaled) / float(scaled @ scaled) * unit
+    if len(axes) > 1:  # how near to the nearest point of F = 0
+        errors += SAME * np.maximum(unit, np.abs(found.at))
     parameters, solved = problem.parameters, distance.at(found.at)
     return Design(
         target=wanted,
@@ -370,6 +372,8 @@ def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sam
     start = np.clip(here, low, high)
     if (found := search.from_point(start)) is not None:
         return found
+    from scipy.stats import qmc  # not before it is needed, as it takes a while
+
     corners, inner = product((0.0, 1.0), repeat=len(axes)), qmc.LatinHypercube(len(axes), seed=0)
     shares = [*map(np.array, corners), *inner.random(POINTS * len(axes))]
     places = [start, *(np.array([axis.value(u) for axis, u in zip(axes, each, strict=True)]) for each in shares)]

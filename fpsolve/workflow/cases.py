@@ -17,12 +17,14 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.checks import check_noise
 from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
+from fpsolve.output.designs import write_design
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_simulation
 from fpsolve.output.vtk import write_response
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
+from fpsolve.study.design import DesignOutcome, refuse_no_design, solve_design
 from fpsolve.study.hierarchy import compare_with_hierarchy, even_moments
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
@@ -31,6 +33,7 @@ from fpsolve.workflow.folders import (
     AGAIN,
     ANEW,
     CHART,
+    DESIGNED,
     SIMULATED,
     SOLVED,
     kept,
@@ -38,7 +41,7 @@ from fpsolve.workflow.folders import (
     own_folder,
     saying_if_interrupted,
 )
-from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Phase, Watch, ignore
+from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, SOLVES, Phase, Watch, ignore
 from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 from fpsolve.workflow.sets import Simulations, Sweep
 
@@ -267,6 +270,27 @@ def chart_case(
             for chart in solve_chart(case, progress=progress, stepped=stepped, map=rows):
                 write_chart(case, chart, folder)
     return chart
+
+
+def design_case(case: Case, out: str | Path = "results", *, watch: Watch = SILENT) -> DesignOutcome:
+    """Find the design of a case, and write design.json and, where there is one, design.toml into `out`/<case>/.
+
+    Raises:
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        FpsolveError: the case has no design, or several curves; nothing is written.
+        KeyboardInterrupt: nothing is kept.
+    """
+    refuse_no_design(case)
+    started = datetime.now(UTC)
+    with (
+        own_folder(case, out, (DESIGNED,)) as folder,
+        saying_if_interrupted(lambda: "; nothing is kept", ANEW),
+        writable(folder),
+    ):
+        with watch.bar(Phase(case.name, "design", unit=SOLVES)) as progress:
+            found = solve_design(case, progress)
+        write_design(case, found, folder, facts_since(case, started))
+    return found
 
 
 def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:

@@ -17,7 +17,7 @@ from fpsolve.case.case import Case
 from fpsolve.messages import Message
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
-SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT = "sets", "p", "nodes", "points", "bounds", "%"
+SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT, SOLVES = "sets", "p", "nodes", "points", "bounds", "%", "solves"
 """What a phase counts."""
 LINE_SECONDS, LINE_SHARE = 10.0, 0.1
 """A line in a file comes after as long at least, and as far."""
