@@ -1,9 +1,9 @@
 """Design: the values of parameters at which λ, Λ(p) or δ_p has a wanted value, by its exact derivatives.
 
 One parameter: Newton's iteration on F(θ) = 0 of `Distance`, within a bracket as soon as F has both signs. Where it
-leads out of the range, or F cannot be solved on its way, F is scanned over the range, and its smallest values are sought
-between the points by the cubic that has their values and slopes. If F has one sign everywhere, the target cannot be
-reached.
+leads out of the range, or F cannot be solved on its way, F is scanned over the range, and where it turns between two
+points the least |F| is sought by the cubic that has their values and slopes. If F has one sign everywhere, the target
+cannot be reached.
 
 Several parameters: of all θ with F(θ) = 0 the one that is nearest to the θ⁰ of the problem,
 
@@ -37,7 +37,7 @@ from fpsolve.data import Result, dataset, written
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate
-from fpsolve.messages import Code, Message, Remedy
+from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import Quantity
 
@@ -137,7 +137,9 @@ def design(
     wanted, axes = target if isinstance(target, Target) else target_of(target), axes_of(problem, by)
     measures = units_of(problem, axes, units or {})
     distance = Distance(problem, wanted, [axis.key for axis in axes], budget or Budget(), progress)
-    found = _along_axis(distance, axes[0]) if len(axes) == 1 else _nearest(distance, axes, np.array([*measures.values()]))
+    found = (
+        _along_axis(distance, axes[0]) if len(axes) == 1 else _nearest(distance, axes, np.array([*measures.values()]))
+    )
     if isinstance(found, Absent):
         return found
     unit = np.array([*measures.values()])
@@ -266,7 +268,7 @@ class _Path:
             new = u - sample.value / rise if rise else math.nan
             if bracket is None:
                 new = min(max(new, 0.0), 1.0)
-                if not new == new or new in self.known:
+                if math.isnan(new) or new in self.known:
                     return sample if _is_close(sample) else None
             else:
                 low, high = bracket
@@ -314,9 +316,11 @@ class _Path:
 
 def _turn(one: float, other: float, rise: float, fall: float) -> float:
     """Where on [0, 1] the cubic with two values and two slopes at the ends turns."""
-    cubic = Polynomial([one, rise, 3 * (other - one) - 2 * rise - fall, 2 * (one - other) + rise + fall])
-    turns = [root.real for root in cubic.deriv().roots() if abs(root.imag) < 1e-9 and 0 < root.real < 1]
-    return min(turns, key=lambda u: abs(cubic(u)), default=0.5)
+    second, third = 3 * (other - one) - 2 * rise - fall, 2 * (one - other) + rise + fall
+    cubic = Polynomial([one, rise, second, third])
+    roots = [complex(root) for root in Polynomial([rise, 2 * second, 3 * third]).roots()]
+    turns = [root.real for root in roots if abs(root.imag) < 1e-9 and 0 < root.real < 1]
+    return min(turns, key=lambda u: abs(float(cubic(u))), default=0.5)
 
 
 def _along_axis(distance: Distance, axis: Axis) -> Sample | Absent:
@@ -390,7 +394,9 @@ def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sam
         if (found := search.from_point(best.at)) is not None:
             return found
         if others:
-            raise NotConverged(Message(Code.DESIGN_GAPS, target=str(distance.target), reason=Message(Code.NEWTON_UNSETTLED)))
+            raise NotConverged(
+                Message(Code.DESIGN_GAPS, target=str(distance.target), reason=Message(Code.NEWTON_UNSETTLED))
+            )
     return _unreached(distance, axes, samples, search.reasons)
 
 
@@ -454,9 +460,9 @@ class _Search:
         """
         for _ in range(MOST_HALVINGS):
             new = self.tried(np.clip(sample.at + step * self._units, *self._limits))
-            if new is not None and new is not sample:
-                if self._merit(new) < self._merit(sample) or (is_small and abs(new.value) < 0.25 * abs(sample.value)):
-                    return new
+            is_better = new is not None and new is not sample and self._merit(new) < self._merit(sample)
+            if new is not None and (is_better or (is_small and abs(new.value) < 0.25 * abs(sample.value))):
+                return new
             step = 0.5 * step
         return None
 

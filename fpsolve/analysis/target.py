@@ -151,4 +151,3 @@ def start_and_stop(problem: Problem, key: str) -> Axis | None:
         start = max(start, getattr(limit, "ge", start))
         stop = min(stop, getattr(limit, "le", stop), math.nextafter(getattr(limit, "lt", math.inf), -math.inf))
     return Axis(key, start, stop)
-

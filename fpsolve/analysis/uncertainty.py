@@ -1,7 +1,7 @@
 """What is uncertain of λ, δ_p and Λ(p) where parameters are: to first order by the derivatives, and by samples.
 
-Each parameter θᵢ has a normal law around its value, cut at the ends of its range, and is independent of the others. With
-mᵢ the mean and sᵢ the standard deviation of that law, to first order
+Each parameter θᵢ has a normal law around its value, cut at the ends of its range, and is independent of the others.
+With mᵢ the mean and sᵢ the standard deviation of that law, to first order
 
     Q ≈ Q₀ + Σ ∂Q/∂θᵢ (θᵢ − θᵢ⁰),   mean Q₀ + Σ ∂Q/∂θᵢ (mᵢ − θᵢ⁰),   variance Σ (∂Q/∂θᵢ sᵢ)²,
 
@@ -222,7 +222,9 @@ class Uncertainty(Result):
         return dataset("uncertainty to first order", "finite elements", numbers, {P: self.p}, held, level=LEVEL)
 
     def _said(self) -> str:
-        parts = [f"{RECORDS[name].symbol} from {each.low:.4g} to {each.high:.4g}" for name, each in self.indices.items()]
+        parts = [
+            f"{RECORDS[name].symbol} from {each.low:.4g} to {each.high:.4g}" for name, each in self.indices.items()
+        ]
         return f"with {LEVEL:.0%}: {', '.join(parts) or f'{self.p.size} p'}"
 
 

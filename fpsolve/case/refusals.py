@@ -18,7 +18,6 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from fpsolve.analysis.target import start_and_stop
 from fpsolve.analysis.zero import axis_faults, said
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of, varying
@@ -280,16 +279,11 @@ def _of_design(design: DesignSection | None, valid: Known, context: Known) -> It
             stand_in = ChartAxis(key=each.key, start=0.0, stop=1.0)
             yield from ((("by", i, *path), *rest) for path, *rest in _of_axis(stand_in, problem, parameters))
         else:
-            usual = start_and_stop(problem, each.key)
-            start, stop = (
-                own if (own := getattr(each, name)) is not None else getattr(usual, name, None)
-                for name in ("start", "stop")
-            )
-            if start is None or stop is None:
+            if (ends := each.ends(problem)) is None:
                 text = "is 0, so that its range must be stated; write start and stop, or --from and --to"
                 yield ("by", i), each.key, f"{each.key} {text}"
                 continue
-            axis = ChartAxis(key=each.key, start=start, stop=stop, scale=each.scale)
+            axis = ChartAxis(key=each.key, start=ends[0], stop=ends[1], scale=each.scale)
             yield from ((("by", i, *path), *rest) for path, *rest in _of_axis(axis, problem, parameters))
 
 

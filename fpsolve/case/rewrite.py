@@ -40,7 +40,9 @@ def rewritten(case: Case, values: Mapping[str, float], expect: Mapping[str, Any]
         data["mesh"]["file"] = Path(os.path.relpath(case.path.parent / file, folder)).as_posix()
     for name in [name for name, each in data.items() if name == "expect" or each in ({}, [])]:
         del data[name]
-    end = "" if expect is None else "\n[[expect]]\n" + "".join(f"{key} = {_toml(each)}\n" for key, each in expect.items())
+    end = (
+        "" if expect is None else "\n[[expect]]\n" + "".join(f"{key} = {_toml(each)}\n" for key, each in expect.items())
+    )
     with suppress(ValueError, LookupError):
         text = _edited(was, data)
         if loads(text) == data:
@@ -56,13 +58,11 @@ def _set(data: dict[str, Any], key: str, value: float) -> None:
             table: Any = data
             for part in (*base.split("."), *inner):
                 table = table_of(table).get(part)
-            stated = table_of(table).get(name)
-            if is_number(stated):
-                table[name] = value
-                return
-            if is_number(table_of(stated).get("value")):
-                stated["value"] = value
-                return
+            stated: Any = table_of(table).get(name)
+            for place, last in ((table, name), (stated, "value")):
+                if is_number(table_of(place).get(last)):
+                    place[last] = value
+                    return
     data.setdefault("vary", {})[key] = [value]
 
 

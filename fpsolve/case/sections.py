@@ -517,14 +517,12 @@ class DesignParameter(Section):
         parameter("what its change is measured by; the absolute value if omitted", "unit = 0.1", gt=0),
     ] = None
 
-    def axis(self, problem: Problem) -> Axis | None:
-        """Its range; None where its value is 0 and no range is stated."""
+    def ends(self, problem: Problem) -> tuple[float, float] | None:
+        """Its range; None where its value is 0 and not both ends are stated."""
         usual = start_and_stop(problem, self.key)
-        start, stop = (
-            getattr(self, name) if getattr(self, name) is not None else usual and getattr(usual, name)
-            for name in ("start", "stop")
-        )
-        return None if start is None or stop is None else Axis(self.key, start, stop, self.scale)
+        start = self.start if self.start is not None or usual is None else usual.start
+        stop = self.stop if self.stop is not None or usual is None else usual.stop
+        return None if start is None or stop is None else (start, stop)
 
 
 class DesignSection(Section):

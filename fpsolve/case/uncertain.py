@@ -19,9 +19,7 @@ from fpsolve.model.problem import Problem
 
 EXAMPLE = '"noise.D0" = 0.05 or "oscillator.restitution" = { sd = 0.02 }'
 FEWEST_SAMPLES = 20
-Count = Annotated[
-    int, parameter("how many sets are sampled", "sample = 200", ge=FEWEST_SAMPLES, le=MOST_SAMPLES)
-]
+Count = Annotated[int, parameter("how many sets are sampled", "sample = 200", ge=FEWEST_SAMPLES, le=MOST_SAMPLES)]
 Seed = Annotated[int, parameter("seed of the sample", "seed = 0", ge=0)]
 
 
@@ -56,7 +54,9 @@ def uncertain_of(value: Any, info: ValidationInfo) -> Uncertain:
     if isinstance(value, Uncertain):
         return value
     if not isinstance(value, dict):
-        raise ValueError(f"got {shown_with_kind(value)}; must be a table; write, for example, [uncertain] with {EXAMPLE}")
+        raise ValueError(
+            f"got {shown_with_kind(value)}; must be a table; write, for example, [uncertain] with {EXAMPLE}"
+        )
     parameters, problem = parameters_of(info.data, info.context or {}), problem_of(info.data)
     if parameters is None or problem is None:
         refuse([((), value, DEPENDENT)])
@@ -82,9 +82,7 @@ def uncertain_of(value: Any, info: ValidationInfo) -> Uncertain:
     return Uncertain(deviations, **numbers)
 
 
-def _deviation(
-    key: str, stated: Any, problem: Problem, vary: Vary, found: dict[str, Deviation]
-) -> Iterator[Refusal]:
+def _deviation(key: str, stated: Any, problem: Problem, vary: Vary, found: dict[str, Deviation]) -> Iterator[Refusal]:
     """What is wrong with a parameter and its deviation; without faults it joins those that are found."""
     known = problem.differentiable
     if key not in known:

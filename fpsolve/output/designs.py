@@ -10,9 +10,9 @@ from fpsolve.case.case import Case
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import rewritten
 from fpsolve.case.vary import short_names
+from fpsolve.data import plain_unit
 from fpsolve.exponent.error import digits
 from fpsolve.files import write_json, write_text
-from fpsolve.data import plain_unit
 from fpsolve.output.screen import Column, Grid, Screen
 from fpsolve.output.tables import head
 from fpsolve.output.terminal import plural, print_message
@@ -25,10 +25,7 @@ def write_design(case: Case, outcome: DesignOutcome, folder: Path, facts: Mappin
     found = outcome.found
     if found is not None:
         values = {key: each.value for key, each in found.values.items()}
-        expected = outcome.expectation
-        if expected is not None and not case.moments.has(expected.get("p", case.p[0])):
-            expected = None
-        write_text(folder / "design.toml", rewritten(case, values, expected, folder))
+        write_text(folder / "design.toml", rewritten(case, values, outcome.expectation(case), folder))
 
 
 def summary(case: Case, outcome: DesignOutcome, facts: Mapping[str, Any]) -> dict[str, Any]:
@@ -40,7 +37,13 @@ def summary(case: Case, outcome: DesignOutcome, facts: Mapping[str, Any]) -> dic
         "complete": found is not None,
         "target": {"quantity": target.kind, "p": target.p if target.kind == "moment" else None, "value": target.value},
         "by": [
-            {"key": axis.key, "start": axis.start, "stop": axis.stop, "scale": axis.scale, "unit": outcome.units[axis.key]}
+            {
+                "key": axis.key,
+                "start": axis.start,
+                "stop": axis.stop,
+                "scale": axis.scale,
+                "unit": outcome.units[axis.key],
+            }
             | {"before": before[axis.key]}
             | {"after": changed[axis.key].value if found else None}
             | {"error_estimate": changed[axis.key].error_estimate if found else None}
@@ -66,7 +69,11 @@ def print_design(case: Case, outcome: DesignOutcome) -> None:
     grid = Grid(case.headline, columns)
     for key, name in zip(keys, short_names(keys), strict=True):
         value, unit = found.values[key], case.about(key).unit
-        numbers = [f"{found.start.values[key]:.10g}", digits(value.value, value.error_estimate), f"{value.error_estimate:.0e}"]
+        numbers = [
+            f"{found.start.values[key]:.10g}",
+            digits(value.value, value.error_estimate),
+            f"{value.error_estimate:.0e}",
+        ]
         grid.rows.append([name, *numbers, "" if unit in ("1", "unknown") else plain_unit(unit)])
     screen.show(grid)
     symbol, value = outcome.target.quantity.symbol, found.found
@@ -75,7 +82,8 @@ def print_design(case: Case, outcome: DesignOutcome) -> None:
     screen.say(f"{symbol} = {met} ± {value.error_estimate:.0e}; wanted {outcome.target.value:.10g}; {solves}")
     if len(keys) > 1:
         measures = ", ".join(f"{key} / {outcome.units[key]:.6g}" for key in keys)
-        screen.say(f"the nearest such point: its changes are {found.distance:.6g} together, the root of the sum of squares of {measures}")
+        told = f"the square root of the sum of the squares of the changes of {measures}"
+        screen.say(f"the nearest such point, at a distance of {found.distance:.6g}: {told}")
 
 
 def found_of(outcome: DesignOutcome) -> str:

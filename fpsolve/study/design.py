@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fpsolve.analysis.design import Design, design, units_of
@@ -12,6 +12,7 @@ from fpsolve.analysis.zero import Axis
 from fpsolve.case.case import Case
 from fpsolve.case.sections import DesignSection
 from fpsolve.errors import FpsolveError
+from fpsolve.exponent.error import Absent
 from fpsolve.messages import Code, Message
 
 
@@ -38,13 +39,13 @@ class DesignOutcome:
         """Whether there is none, and that is known."""
         return self.reason is not None and self.reason.code in (Code.UNREACHED, Code.INDEX_UNREACHED)
 
-    @property
-    def expectation(self) -> dict[str, Any] | None:
-        """What a case with these values expects, as its file states it; None where there is no design."""
-        if self.found is None:
+    def expectation(self, case: Case) -> dict[str, Any] | None:
+        """What a case with these values expects, as its file states it; None where its p are others."""
+        if self.found is None or (self.target.kind == "moment" and not case.moments.has(self.target.p)):
             return None
         order = {"p": self.target.p} if self.target.kind == "moment" else {}
-        least = max(10 * self.found.found.error_estimate, 1e-9 * max(self.found.found.scale, abs(self.target.value)))
+        scale = max(self.found.found.scale, abs(self.target.value))
+        least = max(10 * self.found.found.error_estimate, case.rtol * scale)
         return {
             "quantity": self.target.kind, **order, "value": self.target.value, "atol": float(f"{least:.1g}"),
             "source": "the design that this case is",
@@ -56,7 +57,7 @@ def designed(case: Case) -> DesignSection:
     if case.design is not None:
         return case.design
     raise FpsolveError(
-        f'{case.path}: design: missing; name what is wanted and by which parameter, as with '
+        f"{case.path}: design: missing; name what is wanted and by which parameter, as with "
         '--for "stability_index = 1" --by oscillator.c1 --from -2 --to 0'
     )
 
@@ -77,11 +78,11 @@ def solve_design(case: Case, progress: Callable[[], None] = lambda: None) -> Des
         progress: called after each solve.
     """
     wanted, problem = designed(case), case.problem
-    axes = tuple(axis for each in wanted.by if (axis := each.axis(problem)) is not None)
+    axes = tuple(Axis(each.key, *ends, each.scale) for each in wanted.by if (ends := each.ends(problem)) is not None)
     units = units_of(problem, axes, {each.key: each.unit for each in wanted.by if each.unit is not None})
-    begun = {"target": wanted.target, "by": axes, "units": units}
+    begun = DesignOutcome(wanted.target, axes, units)
     try:
         found = design(problem, wanted.target, axes, units=units, budget=case.budget, progress=progress)
     except FpsolveError as failure:
-        return DesignOutcome(**begun, reason=failure.message)
-    return DesignOutcome(**begun, found=found) if found else DesignOutcome(**begun, reason=found.reason)
+        return replace(begun, reason=failure.message)
+    return replace(begun, reason=found.reason) if isinstance(found, Absent) else replace(begun, found=found)

@@ -19,7 +19,7 @@ from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
 from fpsolve.output.designs import write_design
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
-from fpsolve.output.tables import write_simulation
+from fpsolve.output.tables import write_samples, write_simulation
 from fpsolve.output.vtk import write_response
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.signals import signals_held
@@ -29,6 +29,7 @@ from fpsolve.study.hierarchy import compare_with_hierarchy, even_moments
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
 from fpsolve.study.solve import Numerics, Order, Wanted, batches, compare, expected, lost, result_alone, solve_batch
+from fpsolve.study.uncertain import Samples, sampled_case, samples_of
 from fpsolve.workflow.folders import (
     AGAIN,
     ANEW,
@@ -61,6 +62,7 @@ class Outcome:
         faults: of a noise that is no kind of fpsolve, see `check_noise`.
         known: how many of its curves an earlier run had finished.
         outdated: how many records of its curves another version has written; these are not used.
+        samples: what the samples of its uncertain parameters say; None where there are none.
     """
 
     results: Sequence[CurveResult] = ()
@@ -70,6 +72,7 @@ class Outcome:
     faults: tuple[Message, ...] = ()
     known: int = 0
     outdated: int = 0
+    samples: Samples | None = None
 
     @property
     def failures(self) -> tuple[Message, ...]:
@@ -146,6 +149,7 @@ def run_case(
     if monte_carlo:
         refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
+    samples: Samples | None = None
     interruption = ""
     simulators = pool if pool and pool.is_elsewhere else None
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
@@ -172,11 +176,20 @@ def run_case(
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
         with told, shown_at_the_end(show):
             watch.solved(case, sweep.results)
+            if case.uncertain.sample:
+                samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)
             if monte_carlo:
                 simulations = Simulations(case, folder, is_fresh=is_fresh)
                 interruption = _simulate(simulations, watch, simulated, simulators)
                 watch.simulated(case, simulated, sweep.results)
-    return Outcome(sweep.results, tuple(simulated), interruption, known=sweep.known, outdated=sweep.records.outdated)
+    return Outcome(
+        sweep.results,
+        tuple(simulated),
+        interruption,
+        known=sweep.known,
+        outdated=sweep.records.outdated,
+        samples=samples,
+    )
 
 
 def simulate_case(
@@ -340,6 +353,18 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
         with watch.bar(Phase(case.name, "tables")), signals_held():
             sweep.write_all()
     return sweep
+
+
+def _sample(case: Case, sweep: Sweep, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Samples:
+    """Solve the samples of a case, in a folder of their own, and write what they say."""
+    drawn = sampled_case(case)
+    with own_folder(drawn, folder, (SOLVED,)) as inner:
+        solved = _solve(drawn, inner, pool, watch, is_fresh=is_fresh)
+    samples = samples_of(case, sweep.results[0], solved.results)
+    with writable(folder):
+        write_samples(case, samples, folder)
+    watch.sampled(case, samples)
+    return samples
 
 
 def _simulate(simulations: Simulations, watch: Watch, simulated: list[SimulatedCurve], pool: Pool | None) -> str:

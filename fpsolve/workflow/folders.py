@@ -15,6 +15,7 @@ AGAIN, ANEW = "run it again to go on", "run it again to start over"
 SOLVED = (
     r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu"
     r"|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
+    r"|sample\.json|sample/(summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc)"
 )
 SIMULATED = r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)"
 REPORT = r"report\.html"
