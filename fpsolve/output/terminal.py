@@ -54,7 +54,7 @@ MOST_TABLES, MOST_ROWS = 10, 50
 MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
 """Failed curves that are named among more, p whose Λ has a column, and quantities whose extremes are shown."""
 DIGITS = 7
-MAIN: tuple[Index, ...] = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
+MAIN = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
 THEORY = "Eqs. (38)-(39): perturbation theory"
 INTERVAL = f"{LEVEL:.0%} interval"
 STAR = "* for the noise reduced by Eqs. (12)-(14)"
