@@ -451,7 +451,7 @@ def design(
 
     Exit codes: 0 found, 1 it cannot be reached in the range, 2 bad input, 3 not converged.
 
-    Example: fpsolve design cases/theorem.toml --for "stability_index = 1" --by oscillator.c1 --from -2 --to 0
+    Example: fpsolve design cases/theorem.toml --for "stability_index = 1" --by oscillator.c1 --from -1 --to 1
     """
     from fpsolve.output.designs import found_of, print_design, print_reason
     from fpsolve.output.terminal import print_written

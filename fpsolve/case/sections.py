@@ -22,13 +22,12 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
-    InstanceOf,
     Tag,
     model_validator,
 )
 
-from fpsolve.analysis.design import MOST_PARAMETERS
-from fpsolve.analysis.target import Target, start_and_stop, target_of
+from fpsolve.analysis.inverse import MOST_PARAMETERS
+from fpsolve.analysis.target import start_and_stop, target_of
 from fpsolve.analysis.zero import Axis, Zero, zero_of
 from fpsolve.arrays import FloatArray
 from fpsolve.case.messages import LIST, TABLE, Refusal, is_list, nearest, quoted, refuse, shown, shown_with_kind
@@ -525,15 +524,16 @@ class DesignParameter(Section):
         return None if start is None or stop is None else (start, stop)
 
 
+def _checked_target(text: str) -> str:
+    target_of(text)
+    return text
+
+
 class DesignSection(Section):
     """[design]: what is wanted, and which parameters may change for it."""
 
     target: Annotated[
-        InstanceOf[Target],
-        BeforeValidator(
-            lambda value: value if isinstance(value, Target) else target_of(value), json_schema_input_type=Text
-        ),
-        parameter("what is wanted", 'target = "stability_index = 1"'),
+        Text, AfterValidator(_checked_target), parameter("what is wanted", 'target = "stability_index = 1"')
     ]
     by: Annotated[
         tuple[DesignParameter, ...],

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import TypeAdapter, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 
-from fpsolve.analysis.uncertainty import MOST_SAMPLES, Deviation, Law, deviation_of, laws_of
+from fpsolve.analysis.spreads import MOST_SAMPLES, Deviation, Law, deviation_of, laws_of
 from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.messages import DEPENDENT, Refusal, nearest, refuse, shown, shown_with_kind
 from fpsolve.case.sections import flat
@@ -17,7 +17,8 @@ from fpsolve.case.vary import Vary
 from fpsolve.model.parameters import STRICT, parameter, stated_field
 from fpsolve.model.problem import Problem
 
-EXAMPLE = '"noise.D0" = 0.05 or "oscillator.restitution" = { sd = 0.02 }'
+_EXAMPLE = '"noise.D0" = 0.05 or "oscillator.restitution" = { sd = 0.02 }'
+EXAMPLE = f"[uncertain] with {_EXAMPLE}"
 FEWEST_SAMPLES = 20
 Count = Annotated[int, parameter("how many sets are sampled", "sample = 200", ge=FEWEST_SAMPLES, le=MOST_SAMPLES)]
 Seed = Annotated[int, parameter("seed of the sample", "seed = 0", ge=0)]
@@ -55,7 +56,7 @@ def uncertain_of(value: Any, info: ValidationInfo) -> Uncertain:
         return value
     if not isinstance(value, dict):
         raise ValueError(
-            f"got {shown_with_kind(value)}; must be a table; write, for example, [uncertain] with {EXAMPLE}"
+            f"got {shown_with_kind(value)}; must be a table; write, for example, [uncertain] with {_EXAMPLE}"
         )
     parameters, problem = parameters_of(info.data, info.context or {}), problem_of(info.data)
     if parameters is None or problem is None:
@@ -74,7 +75,7 @@ def uncertain_of(value: Any, info: ValidationInfo) -> Uncertain:
     for key, stated in table.items():
         refusals += _deviation(key, stated, problem, vary, deviations)
     if not table and not refusals:
-        refusals.append(((), value, f"names no parameter; write, for example, {EXAMPLE}"))
+        refusals.append(((), value, f"names no parameter; write, for example, {_EXAMPLE}"))
     if numbers["sample"] and vary:
         text = "a sample is of one parameter set; remove [vary], or write --set vary={}, or leave it out"
         refusals.append((("sample",), numbers["sample"], f"got {numbers['sample']}; {text}"))
@@ -93,7 +94,7 @@ def _deviation(key: str, stated: Any, problem: Problem, vary: Vary, found: dict[
         found[key] = deviation_of(stated)
     except ValueError:
         must = "must be a share of the value > 0, or { sd = number } with a standard deviation > 0, and finite"
-        yield (key,), stated, f"got {shown(stated)}; {must}; write, for example, {EXAMPLE}"
+        yield (key,), stated, f"got {shown(stated)}; {must}; write, for example, {_EXAMPLE}"
         return
     if key not in vary.keys and problem.values[key] == 0 and found[key].is_relative:
         yield (key,), stated, f"got {shown(stated)}, but a share of {key} = 0 is 0; write {{ sd = number }}"

@@ -19,7 +19,7 @@ from typing import Any
 
 from fpsolve import __version__
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
-from fpsolve.analysis.uncertainty import LEVEL, UNCERTAIN, Spread
+from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import SENSITIVITIES

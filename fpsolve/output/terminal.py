@@ -14,7 +14,7 @@ from typing import Any
 
 from rich.text import Text
 
-from fpsolve.analysis.uncertainty import LEVEL, UNCERTAIN, Spread
+from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.vary import map_key, short_names

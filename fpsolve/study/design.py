@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fpsolve.analysis.design import Design, design, units_of
-from fpsolve.analysis.target import Target
+from fpsolve.analysis.inverse import Design, design, units_of
+from fpsolve.analysis.target import Target, target_of
 from fpsolve.analysis.zero import Axis
 from fpsolve.case.case import Case
 from fpsolve.case.sections import DesignSection
@@ -80,7 +80,7 @@ def solve_design(case: Case, progress: Callable[[], None] = lambda: None) -> Des
     wanted, problem = designed(case), case.problem
     axes = tuple(Axis(each.key, *ends, each.scale) for each in wanted.by if (ends := each.ends(problem)) is not None)
     units = units_of(problem, axes, {each.key: each.unit for each in wanted.by if each.unit is not None})
-    begun = DesignOutcome(wanted.target, axes, units)
+    begun = DesignOutcome(target_of(wanted.target), axes, units)
     try:
         found = design(problem, wanted.target, axes, units=units, budget=case.budget, progress=progress)
     except FpsolveError as failure:

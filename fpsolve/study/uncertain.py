@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fpsolve.analysis.uncertainty import LEVEL, UNCERTAIN, Spread, latin_hypercube, spread_of
+from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread, latin_hypercube, spread_of
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.uncertain import Uncertain

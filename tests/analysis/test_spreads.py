@@ -8,7 +8,7 @@ from scipy.stats import kstest, norm, truncnorm
 
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.analysis import Law, latin_hypercube, laws_of, uncertainty
-from fpsolve.analysis.uncertainty import deviation_of
+from fpsolve.analysis.spreads import deviation_of
 
 A, SIGMA, ALPHA = -0.3, 0.5, 0.8
 """Of ẋ = (J + a + ξ) x, whose Λ(p) is pa + p² S(0)/2 with S(0) = σ²/α², and δ_p = −2a/S(0)."""
@@ -74,7 +74,7 @@ def test_a_deviation_that_is_none_is_refused(value):
 
 
 def test_parameters_that_are_none_are_refused():
-    with pytest.raises(ValueError, match="must be one of system.a"):
+    with pytest.raises(ValueError, match=r"must be one of system.a"):
         laws_of(PROBLEM, {"system.b": 0.1})
     with pytest.raises(ValueError, match="is 0, and so is a share"):
         laws_of(PROBLEM.at({"system.a": 0.0}), {"system.a": 0.1})

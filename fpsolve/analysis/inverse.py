@@ -105,7 +105,7 @@ class Design(Result):
 @of_problem
 def design(
     problem: Problem,
-    target: str | Target,
+    target: str,
     by: str | Axis | Sequence[str | Axis],
     *,
     units: Mapping[str, float] | None = None,
@@ -121,7 +121,7 @@ def design(
     Args:
         oscillator, noise: a motion and its noise, where the search starts; or one `Problem` of both, in their place or
             as `problem`.
-        target: such as "stability_index = 1", "lyapunov_exponent = -0.01" or "moment(2) = 0"; or a `Target`.
+        target: such as "stability_index = 1", "lyapunov_exponent = -0.01" or "moment(2) = 0".
         by: the parameters by their keys, each with its range as an `Axis`; of a key alone that is from half to twice
             its value.
         units: what a change of a parameter is measured by, for some keys; if not stated, the absolute value of the
@@ -134,7 +134,7 @@ def design(
         NotConverged: some values on the way were not resolved.
         NoSuchExponent: Λ(p) exists nowhere in the range.
     """
-    wanted, axes = target if isinstance(target, Target) else target_of(target), axes_of(problem, by)
+    wanted, axes = target_of(target), axes_of(problem, by)
     measures = units_of(problem, axes, units or {})
     distance = Distance(problem, wanted, [axis.key for axis in axes], budget or Budget(), progress)
     found = (

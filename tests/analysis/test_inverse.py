@@ -18,7 +18,7 @@ from fpsolve import (
     stability_index,
 )
 from fpsolve.analysis import Axis, design
-from fpsolve.analysis.design import _quadratic
+from fpsolve.analysis.inverse import _quadratic
 from fpsolve.analysis.target import target_of
 from fpsolve.messages import Code
 from fpsolve.model import SineWiener, Telegraph
