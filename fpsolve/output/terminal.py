@@ -156,7 +156,7 @@ def _interval(case: Case, index: Index) -> list[_Shown]:
 
     def text(result: CurveResult) -> str:
         spread = spreads_of(case, result).indices.get(index.name)
-        return "" if spread is None else between(spread)
+        return "" if spread is None else interval_text(spread)
 
     is_told = bool(case.uncertain) and index.name in UNCERTAIN
     return [_Shown(f"{LEVEL:.0%} of {index.symbol}", rank=1, text=text)] * is_told
@@ -236,7 +236,7 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
                 if index == IMPACT_RATE:
                     groups.append([])
                 spread = spreads.indices.get(index.name)
-                interval = f" ({LEVEL:.0%}: {between(spread)})" if spread else ""
+                interval = f" ({LEVEL:.0%}: {interval_text(spread)})" if spread else ""
                 groups[-1].append(f"{index.symbol} = {index_text(index, result)}{error}{interval}")
             for group in groups:
                 screen.packed(group)
@@ -259,7 +259,7 @@ def verdicts(spreads: Spreads) -> Iterator[str]:
         yield f"{symbol} {'<' if is_below else '>'} 0 with {percent(spread.below if is_below else 1 - spread.below)}"
 
 
-def between(spread: Spread | Sampled) -> str:
+def interval_text(spread: Spread | Sampled) -> str:
     """An interval with three digits of its width: "-0.0123 to 0.0045"."""
     width = spread.high - spread.low
     if not 0 < width < math.inf:
@@ -284,9 +284,9 @@ def sample_grid(case: Case, samples: Samples) -> Grid:
     grid = Grid(case.headline, [*columns, Column(f"first order, {LEVEL:.0%}"), Column("apart", 2)], remark=remark)
     for each in samples.rows:
         is_there = each.count > 0
-        numbers = [between(each), f"{each.median:.6g}", percent(each.below)] if is_there else ["none", "", ""]
+        numbers = [interval_text(each), f"{each.median:.6g}", percent(each.below)] if is_there else ["none", "", ""]
         apart = f"{each.apart:.0%}" if is_there else ""
-        grid.rows.append([each.quantity.symbol, *numbers, between(each.spread), apart])
+        grid.rows.append([each.quantity.symbol, *numbers, interval_text(each.spread), apart])
     return grid
 
 
@@ -445,7 +445,7 @@ def moment_grid(case: Case, result: CurveResult) -> Grid:
     ):
         shown = f"{error:.0e}" if error else "0"
         spread = spreads.get(float(p))
-        interval = ["", ""] if spread is None else [between(spread), percent(spread.below)]
+        interval = ["", ""] if spread is None else [interval_text(spread), percent(spread.below)]
         compared = [f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"] if has_theory else []
         grid.rows.append([f"{p + 0.0:g}", digits(value, error), shown, *interval * bool(intervals), *compared])
     return grid

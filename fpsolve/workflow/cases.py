@@ -170,6 +170,7 @@ def run_case(
                     facts=sweep.facts(),
                     results=sweep.results,
                     simulated=simulated,
+                    samples=samples,
                     complete=is_whole and len(sweep.results) == case.planned,
                 )
 
