@@ -6,6 +6,7 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.case.rewrite import rewritten
+from tests.conftest import sampled
 from tests.test_docs import ROOT
 
 PLAIN = """\
@@ -63,7 +64,9 @@ def test_comments_and_lines_stay(tmp_path):
     assert not case.vary
 
 
-@pytest.mark.parametrize("name", ["coupled", "flutter", "own_equation", "stochastic_mathieu", "filtered"])
+@pytest.mark.parametrize(
+    "name", sampled("own_equation", "filtered", "stochastic_mathieu", "coupled", "flutter", keep=2)
+)
 def test_a_value_is_found_wherever_a_case_states_it(name, tmp_path):
     """In a table of parameters, in that of a noise with a name, or where it is a part of something, in [vary]."""
     case = load_case(ROOT / f"cases/systems/{name}.toml", ["expect=[]", "vary={}", "figure={}", "output={}"])
