@@ -1,4 +1,4 @@
-"""The command line, fpsolve run | check | simulate | chart | prove | mesh | new | schema, and its messages."""
+"""The command line, fpsolve run | check | simulate | chart | design | prove | mesh | new | schema, and its messages."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ app = App(
 
     Example: fpsolve run cases/fig1.toml
 
-    Exit codes: 0 success, 1 a checked value differs, 2 bad input, 3 not converged, 130 interrupted""",
+    Exit codes: 0 success, 1 a checked value differs or a design is out of reach, 2 bad input, 3 not converged,
+    130 interrupted""",
     version=lambda: f"fpsolve {__version__}",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
@@ -209,6 +210,10 @@ def run(
     json: Annotated[
         bool, Parameter(help="Print the summaries, one line of JSON for each case, instead of tables.", negative="")
     ] = False,
+    sample: Annotated[
+        Count | None,
+        Parameter(help="Also solve so many samples of the parameters that [uncertain] of the case names."),
+    ] = None,
     report: Report = False,
     interactive: Interactive = False,
     quiet: Quiet = False,
@@ -225,11 +230,15 @@ def run(
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
     from fpsolve.output.terminal import done_of, known_of, note_missing, print_written
+    from fpsolve.study.uncertain import refuse_wrong_samples
     from fpsolve.workflow.cases import run_case
 
     code, reporter = 0, reporter_of(report, interactive)
-    loaded = load_to_write(cases, overrides, monte_carlo=monte_carlo)
-    pool = pool_of(jobs, scheduler, loaded)
+    options = {} if sample is None else {f"--sample {sample}": f"uncertain.sample={sample}"}
+    loaded = load_to_write(cases, overrides, options, monte_carlo=monte_carlo)
+    for case in loaded:
+        refuse_wrong_samples(case)
+    pool = pool_of(jobs, scheduler) if sample else pool_of(jobs, scheduler, loaded)
     for case in loaded:
         start, watch = monotonic(), _watch(is_json=json, is_quiet=quiet)
         how: dict[str, Any] = {"monte_carlo": monte_carlo, "is_fresh": fresh, "reporter": reporter}
@@ -246,7 +255,7 @@ def run(
             print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known, outcome.outdated))
         if outcome.interruption:
             return INTERRUPTED
-        if outcome.failures:
+        if outcome.failures or (outcome.samples and outcome.samples.failed):
             code = NOT_CONVERGED
     return code
 
@@ -399,6 +408,104 @@ def chart(
         if found.failures:
             code = NOT_CONVERGED
     return code
+
+
+@app.command
+def design(
+    cases: Cases,
+    *,
+    target: Annotated[
+        str | None,
+        Parameter(
+            name="--for",
+            help="What is wanted: 'stability_index = 1', 'lyapunov_exponent = -0.01' or 'moment(2) = 0'; as [design] "
+            "target of the case states it if omitted.",
+        ),
+    ] = None,
+    by: Annotated[
+        list[str] | None,
+        Parameter(
+            help="A parameter that may change, such as oscillator.c1. With several the nearest point is found: that "
+            "with the smallest relative changes.",
+            negative="",
+        ),
+    ] = None,
+    start: Annotated[
+        list[float] | None,
+        Parameter(
+            name="--from", help="Its smallest value, one for each --by; half of its value if omitted.", negative=""
+        ),
+    ] = None,
+    stop: Annotated[
+        list[float] | None,
+        Parameter(name="--to", help="Its largest value, one for each --by; twice its value if omitted.", negative=""),
+    ] = None,
+    out: Out = Path("results"),
+    json: Annotated[bool, Parameter(help="Print design.json, one line for each case.", negative="")] = False,
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
+    """Find the values of parameters with which λ, Λ(p) or δ_p has a wanted value.
+
+    Write design.toml, the case with these values, and design.json into OUT/<case>/.
+
+    Exit codes: 0 found, 1 it cannot be reached in the range, 2 bad input, 3 not converged.
+
+    Example: fpsolve design cases/theorem.toml --for "stability_index = 1" --by oscillator.c1 --from -1 --to 1
+    """
+    from fpsolve.output.designs import found_of, print_design, print_reason
+    from fpsolve.output.terminal import print_written
+    from fpsolve.study.design import refuse_no_design
+    from fpsolve.workflow.cases import design_case
+
+    code, options = 0, design_options(target, by, start, stop)
+    loaded = load_to_write(cases, overrides, options)
+    for case in loaded:
+        refuse_no_design(case)
+    for case in loaded:
+        begun = monotonic()
+        outcome = design_case(case, out, watch=_watch(is_json=json, is_quiet=quiet))
+        if json:
+            lines = (out / case.name / "design.json").read_text(encoding="utf-8").splitlines()
+            print(" ".join(line.strip() for line in lines))
+        if quiet or json:
+            print_reason(case, outcome)
+        else:
+            print_design(case, outcome)
+        if not json:
+            print_written(out / case.name, found_of(outcome), monotonic() - begun)
+        if outcome.is_out_of_reach:
+            code = max(code, CHECK_FAILED)
+        elif outcome.found is None:
+            code = NOT_CONVERGED
+    return code
+
+
+def design_options(
+    target: str | None, by: Sequence[str] | None, start: Sequence[float] | None, stop: Sequence[float] | None
+) -> dict[str, str]:
+    """The keys of [design] that options state, by what was typed."""
+    from json import dumps
+
+    stated = (
+        {f"--for {dumps(target, ensure_ascii=False)}": f"design.target={dumps(target)}"} if target is not None else {}
+    )
+    ends = {"--from": ("start", start or ()), "--to": ("stop", stop or ())}
+    for option, (_, values) in ends.items():
+        if len(values) not in (0, len(by or ())):
+            raise FpsolveError(
+                f"got {len(values)} {option} for {len(by or ())} --by; must be one for each --by, or none"
+            )
+    if by:
+        entries = []
+        for i, key in enumerate(by):
+            own = [f"{name} = {values[i]!r}" for name, values in ends.values() if values]
+            entries.append(f"{{ {', '.join([f'key = {dumps(key)}', *own])} }}")
+        typed = [f"--by {key}" for key in by] + [
+            f"{option} {each:g}" for option, (_, some) in ends.items() for each in some
+        ]
+        stated[" ".join(typed)] = f"design.by=[{', '.join(entries)}]"
+    return stated
 
 
 @app.command
@@ -572,13 +679,24 @@ def reporter_of(report: bool, interactive: bool = False) -> Reporter | None:
 
 def _watch(*, is_json: bool = False, is_quiet: bool = False) -> Watch:
     """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
-    from fpsolve.output.terminal import print_message, print_remarks, print_results, print_simulation
+    from fpsolve.output.terminal import (
+        print_message,
+        print_remarks,
+        print_results,
+        print_sample_remarks,
+        print_samples,
+        print_simulation,
+    )
     from fpsolve.workflow.progress import Bars, Watch
 
     if is_quiet:
-        return Watch(solved=partial(print_remarks, severities=[Severity.FAILURE]), said=print_message)
+        failed = [Severity.FAILURE]
+        solved, sampled = partial(print_remarks, severities=failed), partial(print_sample_remarks, severities=failed)
+        return Watch(solved=solved, said=print_message, sampled=sampled)
     bar, said = Bars().bar, print_message
-    return Watch(bar, print_remarks, said=said) if is_json else Watch(bar, print_results, print_simulation, said)
+    if is_json:
+        return Watch(bar, print_remarks, said=said, sampled=print_sample_remarks)
+    return Watch(bar, print_results, print_simulation, said, print_samples)
 
 
 if __name__ == "__main__":

@@ -564,7 +564,16 @@ def test_help_and_reference_name_all_quantities(capsys):
 def test_help_names_the_exit_codes(capsys):
     assert main(["--help"]) == 0
     words = " ".join(capsys.readouterr().out.split())
-    assert "Exit codes: 0 success, 1 a checked value differs, 2 bad input, 3 not converged, 130 interrupted" in words
+    assert all(
+        f"{code}" in words
+        for code in (
+            "0 success",
+            "1 a checked value differs or a design is out of reach",
+            "2 bad input",
+            "3 not converged",
+        )
+    )
+    assert "130 interrupted" in words
 
 
 def test_version(capsys):

@@ -3,8 +3,16 @@ from .density import adjoint_density as adjoint_density
 from .density import furstenberg_khasminskii as furstenberg_khasminskii
 from .density import stationary_density as stationary_density
 from .density import tilted_density as tilted_density
+from .inverse import Design as Design
+from .inverse import design as design
 from .sensitivity import Sensitivities as Sensitivities
 from .sensitivity import sensitivities as sensitivities
+from .spreads import Law as Law
+from .spreads import Spread as Spread
+from .spreads import Uncertainty as Uncertainty
+from .spreads import latin_hypercube as latin_hypercube
+from .spreads import laws_of as laws_of
+from .spreads import uncertainty as uncertainty
 from .stability import Boundary as Boundary
 from .stability import boundary as boundary
 from .zero import Axis as Axis

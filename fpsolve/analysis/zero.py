@@ -25,7 +25,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT
-from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.model.problem import ParameterDerivative, Problem, refuse_infinite
 
 RTOL, RTOL_BEYOND_PLANE = 1e-10, 1e-4
 """Of F, relative to its scale."""
@@ -187,6 +187,28 @@ def line_rtol(problem: Problem, zero: Zero) -> float:
     return RTOL if problem.dimension == 2 or zero.p in EVEN else RTOL_BEYOND_PLANE
 
 
+def ratio_with_slopes(
+    solver: ExponentSolver, p: float, along: Sequence[ParameterDerivative]
+) -> tuple[float, float, FloatArray]:
+    """Λ(p)/p, at p = 0 λ, with its error, and its derivatives along some directions.
+
+    Raises:
+        NotConverged: it is not resolved, or the phase never leaves a ray, so that there is no eigenfunction.
+        NoSuchExponent: Λ(p) < 0 is not the largest eigenvalue, as rare paths far out in algebraic tails grow.
+    """
+    value, error = solver.ratio_alone(p)
+    if value > 0 > p and solver.problem.noise.has_algebraic_tails:
+        near = solver.near.solution(p).pair
+        if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
+            raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
+    if abs(p) >= SMALL_P:
+        pair = solver.near.solution(p).pair
+        return value, error, np.array([changed_value(pair, by).value / p for by in along])
+    around = Bordered(solver.near.solution(0.0).pair)
+    more = [0.5 * p * changed_curvature(around, by).value if p else 0.0 for by in along]
+    return value, error, np.array([changed_slope(around, by).value for by in along]) + more
+
+
 class ZeroField:
     """F over the unit square: λ or Λ(p)/p, with its gradient.
 
@@ -271,31 +293,12 @@ class ZeroField:
         return known[log_factor] if log_factor in known else self._between(at, problem, log_factor, known, self._bounce)
 
     def _sample(self, at: FloatArray, problem: Problem, countdown: Countdown | None) -> Sample:
-        """F from a solve.
-
-        Raises:
-            NoSuchExponent: Λ(p) < 0 is not the largest eigenvalue, as rare paths far out in algebraic tails grow.
-        """
+        """F from a solve. Raises as `ratio_with_slopes`."""
         p = self._zero.p
         refuse_infinite(problem, p)
         own: Any = {"rtol": self._rtol, "budget": self._budget, "countdown": countdown, "is_alone": True}
         solver = ExponentSolver(problem, starts=self._starts, **own)
-        value, error = solver.ratio_alone(p)
-        if value > 0 > p and problem.noise.has_algebraic_tails:
-            near = solver.near.solution(p).pair
-            if (
-                solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair
-                is not near
-            ):
-                raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
-        along = [problem.derivative(axis.key) for axis in self._axes]
-        if abs(p) >= SMALL_P:
-            pair = solver.near.solution(p).pair
-            slopes = np.array([changed_value(pair, by).value / p for by in along])
-        else:
-            around = Bordered(solver.near.solution(0.0).pair)
-            more = [0.5 * p * changed_curvature(around, by).value if p else 0.0 for by in along]
-            slopes = np.array([changed_slope(around, by).value for by in along]) + more
+        value, error, slopes = ratio_with_slopes(solver, p, [problem.derivative(axis.key) for axis in self._axes])
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
         self._starts = solver.near.known
         return Sample(at, value, gradient, error, solver.scale(p) / abs(p) if p else solver.scales.linear)

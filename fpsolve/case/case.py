@@ -29,6 +29,7 @@ from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
     EIGENFUNCTIONS,
     ChartSection,
+    DesignSection,
     Expectation,
     FigureSection,
     MeshSection,
@@ -41,6 +42,8 @@ from fpsolve.case.sections import (
     Varied,
 )
 from fpsolve.case.toml import Place, read_document
+from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
+from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import EXAMPLE, Vary, assignments, vary_of
 from fpsolve.errors import CaseError, Fault
 from fpsolve.exponent.adapt import Budget
@@ -149,6 +152,10 @@ class Case(Section):
     figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
     output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
     chart: Annotated[ChartSection | None, parameter("the lines of a chart, on which stability ends", "[chart]")] = None
+    design: Annotated[DesignSection | None, parameter("what parameters shall be changed for", "[design]")] = None
+    uncertain: Annotated[
+        InstanceOf[Uncertain], BeforeValidator(uncertain_of), parameter("how uncertain parameters are", UNCERTAIN)
+    ] = Uncertain()
     expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
     _path: Path = PrivateAttr(default=Path("case.toml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())
@@ -227,8 +234,8 @@ class Case(Section):
 
     @property
     def differentiated(self) -> FloatArray:
-        """The p at which Λ is differentiated by the parameters: at most nine, evenly spread."""
-        return _spread(self.p)
+        """The p at which Λ is differentiated by the parameters: at most nine, evenly spread, or all for intervals."""
+        return self.p if self.uncertain else _spread(self.p)
 
     @property
     def simulated(self) -> FloatArray:

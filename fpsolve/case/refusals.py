@@ -26,6 +26,7 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
     ChartAxis,
     ChartSection,
+    DesignSection,
     Expectation,
     FigureSection,
     MeshSection,
@@ -266,6 +267,26 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
             return
 
 
+def _of_design(design: DesignSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
+    """Parameters that are none of this case, that stand twice, or whose ranges are none."""
+    problem, parameters = problem_of(valid), parameters_of(valid, context)
+    if design is None or problem is None or parameters is None:
+        return
+    for i, each in enumerate(design.by):
+        if each.key in [other.key for other in design.by[:i]]:
+            yield ("by", i, "key"), each.key, f'got "{each.key}" twice; parameters must differ; remove one of them'
+        elif each.key not in problem.differentiable:
+            stand_in = ChartAxis(key=each.key, start=0.0, stop=1.0)
+            yield from ((("by", i, *path), *rest) for path, *rest in _of_axis(stand_in, problem, parameters))
+        else:
+            if (ends := each.ends(problem)) is None:
+                text = "is 0, so that its range must be stated; write start and stop, or --from and --to"
+                yield ("by", i), each.key, f"{each.key} {text}"
+                continue
+            axis = ChartAxis(key=each.key, start=ends[0], stop=ends[1], scale=each.scale)
+            yield from ((("by", i, *path), *rest) for path, *rest in _of_axis(axis, problem, parameters))
+
+
 def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo]) -> Iterator[Refusal]:
     """A key that is none to differentiate by, or ends that are out of its range, or not in order."""
     known = problem.differentiable
@@ -309,6 +330,7 @@ REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
     "figure": _of_figure,
     "output": _of_output,
     "chart": _of_chart,
+    "design": _of_design,
     "expect": _of_expect,
 }
 """What is wrong with each section."""

@@ -19,6 +19,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from fpsolve.case.case import Case
 from fpsolve.case.kinds import EQUATIONS, USUAL, Half
 from fpsolve.case.sections import NonEmpty, Sweep, Text
+from fpsolve.case.uncertain import Count, Seed
 from fpsolve.data import plain_unit
 from fpsolve.model.faults import fields_of
 from fpsolve.model.kinds import kind_names, noise_kind, system_kind
@@ -54,6 +55,28 @@ class VarySection(BaseModel):
     )
 
 
+class StandardDeviation(BaseModel):
+    """{ sd }: a standard deviation in the unit of the parameter."""
+
+    model_config = STRICT
+
+    sd: Annotated[float, Field(gt=0, description="standard deviation")]
+
+
+Uncertain = Annotated[float, Field(gt=0)] | StandardDeviation
+"""How uncertain a parameter is: a share of its value, or a standard deviation."""
+
+
+class UncertainSection(BaseModel):
+    """How uncertain parameters are: by their keys, with quotes and dots or in tables; and samples of them."""
+
+    model_config = _OPEN
+    __pydantic_extra__: dict[str, Uncertain | dict[str, Uncertain | dict[str, Any]]]
+
+    sample: Count | None = None
+    seed: Seed = 0
+
+
 class _Generator(GenerateJsonSchema):
     """Without null, which TOML has not: a key that may be left out says so by not being required."""
 
@@ -80,6 +103,8 @@ def schema() -> dict[str, Any]:
             fields[name] = noise | named, _described("the noise; or a table of noises by their names", "[noise]")
         elif name == "vary":
             fields[name] = VarySection, Field(None, description=field.description, examples=field.examples)
+        elif name == "uncertain":
+            fields[name] = UncertainSection, Field(None, description=field.description, examples=field.examples)
         else:
             fields[name] = field.annotation, field
     model: Any = create_model("Case", __config__=STRICT, **fields)

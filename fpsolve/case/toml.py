@@ -31,13 +31,15 @@ def dotted(path: Sequence[str | int]) -> str:
     return ".".join(map(str, path))
 
 
-class _Scanner:
+class Scanner:
     """Walks TOML that `tomllib` has accepted, or all that comes before its error.
 
     Attributes:
         lines: line of each dotted key, table and list entry.
         assigned: path of each `key = value` outside inline tables, in order.
         repeated: the dotted key that is set twice first, and its second line; None where there is none.
+        spans: where the value of each dotted key begins and ends in the text.
+        headers: of each section its path, and where it begins.
     """
 
     def __init__(self, text: str) -> None:
@@ -45,11 +47,13 @@ class _Scanner:
         self.lines: dict[str, int] = {}
         self.assigned: list[Keys] = []
         self.repeated: tuple[str, int] | None = None
+        self.spans: dict[str, tuple[int, int]] = {}
+        self.headers: list[tuple[Keys, int]] = []
         self._newlines = [match.start() for match in re.finditer("\n", text)]
         self._explicit: set[str] = set()
         self._entries: dict[Keys, int] = {}  # the last one of each list of tables
 
-    def scan(self) -> _Scanner:
+    def scan(self) -> Scanner:
         base: Keys = ()
         while mark := self._peek():
             if mark == "[":
@@ -95,7 +99,7 @@ class _Scanner:
         return parts
 
     def _header(self) -> Keys:
-        is_list = self.text.startswith("[[", self.at)
+        start, is_list = self.at, self.text.startswith("[[", self.at)
         self.at += 1 + is_list
         path: Keys = ()
         keys = self._key()
@@ -106,6 +110,7 @@ class _Scanner:
             if path in self._entries:
                 path = (*path, self._entries[path])
         self._note(path)
+        self.headers.append((path, start))
         self.at += 1 + is_list
         return path
 
@@ -118,6 +123,12 @@ class _Scanner:
         return path
 
     def _value(self, path: Keys) -> None:
+        self._peek()
+        start = self.at
+        self._walk(path)
+        self.spans[dotted(path)] = start, start + len(self.text[start : self.at].rstrip())
+
+    def _walk(self, path: Keys) -> None:
         if self._skip("["):
             index = 0
             while not self._skip("]"):
@@ -170,11 +181,11 @@ class Document:
             if any(is_control(letter) and letter not in "\t\n" for letter in text):
                 raise ValueError("has control characters")
             text = _quoted_if_bare(text)
-            assigned = _Scanner(text).scan().assigned
+            assigned = Scanner(text).scan().assigned
             if len(assigned) != 1:
                 raise ValueError(f"must be one key=value, but there are {len(assigned)} here")
             path: Keys = assigned[0]
-            value: Any = _loads(text)
+            value: Any = loads(text)
             for key in path:
                 value = value[key]
             _assign(self.data, dotted(path).split("."), value)
@@ -222,8 +233,7 @@ def read_document(
     """
     try:
         text = read_text(Path(path), _WORDS)
-        data, lines = _loads(text), _Scanner(text).scan().lines
-        document = Document(data, {key: Place(line) for key, line in lines.items()}, text=text)
+        document = document_of(text)
     except Unreadable as error:
         raise CaseError(str(path), [Fault("", error.line, error.sentence)]) from None
     except RecursionError:
@@ -235,7 +245,13 @@ def read_document(
     return document
 
 
-def _loads(text: str) -> dict[str, Any]:
+def document_of(text: str) -> Document:
+    """What a text of TOML says. Raises `ValueError` or `RecursionError` where it is none."""
+    data, lines = loads(text), Scanner(text).scan().lines
+    return Document(data, {key: Place(line) for key, line in lines.items()}, text=text)
+
+
+def loads(text: str) -> dict[str, Any]:
     """The data of TOML, 0 without a sign. Raises ValueError where it is none."""
     return tomllib.loads(text, parse_float=lambda number: float(number) + 0.0)
 
@@ -245,7 +261,7 @@ def _syntax_fault(text: str, message: str) -> Fault:
     where = re.search(r" \(at (?:line (\d+), column \d+|end of document)\)", message)
     line = int(where[1]) if where and where[1] else text.count("\n") + 1 if where else None
     if re.search("overwrite|twice|[Dd]uplicate", message):
-        scanner = _Scanner(text)
+        scanner = Scanner(text)
         with suppress(ValueError, RecursionError):
             scanner.scan()
         if scanner.repeated:

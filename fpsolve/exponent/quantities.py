@@ -237,8 +237,8 @@ def _restitution_by_theory(problem: Problem) -> float:
     return system.impact_value(theory.critical_log_factor) if theory and len(system.jumps) == 1 else math.nan
 
 
-LYAPUNOV_EXPONENT = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())
-STABILITY_INDEX = _index(
+LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())
+STABILITY_INDEX: Index = _index(
     quantity.STABILITY_INDEX, lambda solver, root: nonzero_root(solver, guess=root), SEARCH_INTERVAL
 )
 VARIANCE_RATE = _index(quantity.VARIANCE_RATE, lambda solver, _: solver.variance_rate())

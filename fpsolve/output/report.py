@@ -31,20 +31,25 @@ from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of,
 from fpsolve.output.proofs import PROOF, between, proof_grid, proofs_grid
 from fpsolve.output.screen import Column, Grid
 from fpsolve.output.terminal import (
+    INTERVAL,
     MOST_TABLES,
     STYLES,
     chart_grid,
     curve_grid,
     exponent_grid,
+    interval_text,
     moment_grid,
+    sample_grid,
     simulation_grid,
+    verdicts,
 )
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.prove import CurveProof
 from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.study.uncertain import Samples, spreads_of
 
 REPORT = "report.html"
-_OTHERS = "summary.json", "monte_carlo.json", "chart.json", "proof.json"
+_OTHERS = "summary.json", "monte_carlo.json", "chart.json", "design.json", "proof.json"
 """What a command says that it has done."""
 MOST_PICTURES, MOST_REMARKS = 3, 100
 """Curves whose eigenfunctions are shown, and messages that are told."""
@@ -70,7 +75,7 @@ class Found:
     """What a report tells of a case, as far as it is there.
 
     Attributes:
-        results, simulated, chart, proofs: what was found.
+        results, simulated, chart, samples, proofs: what was found.
         facts: on the run, see `facts_of`.
         complete: whether all was done that was planned.
     """
@@ -79,6 +84,7 @@ class Found:
     results: Sequence[CurveResult] = ()
     simulated: Sequence[SimulatedCurve] = ()
     chart: Chart | None = None
+    samples: Samples | None = None
     proofs: Sequence[CurveProof] = ()
     complete: bool = True
 
@@ -179,7 +185,8 @@ def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str
     if len(found.results) <= MOST_DRAWN:
         for result in found.results:
             parameters = frozenset(result.curve.parameters.items())
-            if told := [*meanings(result, time_unit), *proven.get(parameters, [])]:
+            sure = [f"{each}, as parameters are uncertain." for each in verdicts(spreads_of(case, result))]
+            if told := [*meanings(result, time_unit), *sure, *proven.get(parameters, [])]:
                 yield result.curve.label, told
     if not found.results and len(found.simulated) <= MOST_DRAWN:
         for each in found.simulated:
@@ -279,6 +286,8 @@ def _grids(case: Case, found: Found) -> Iterator[Grid]:
         yield from (simulation_grid(case, *pair) for pair in pairs)
     elif pairs:
         yield exponent_grid(case, pairs)
+    if found.samples is not None:
+        yield sample_grid(case, found.samples)
     if found.chart is not None:
         yield chart_grid(case, found.chart)
     if len(found.proofs) > MOST_TABLES:
@@ -290,6 +299,8 @@ def _grids(case: Case, found: Found) -> Iterator[Grid]:
 def _index_grid(case: Case, result: CurveResult) -> Grid:
     """λ, δ_p and the other indices with their errors, beside perturbation theory."""
     columns = [Column("symbol"), Column("value"), Column("± error"), Column("unit"), Column("perturbation theory")]
+    spreads = spreads_of(case, result).indices
+    columns += [Column(INTERVAL)] * bool(spreads)
     grid = Grid(case.heading(result.curve), [Column("quantity", is_text=True), *columns])
     for name, index in INDICES.items():
         estimate = result.estimates[name]
@@ -299,7 +310,8 @@ def _index_grid(case: Case, result: CurveResult) -> Grid:
         told = f"{theory:.6g}, Eq. {index.closed_form}" if abs(theory) < float("inf") else ""
         number = digits(estimate.value, estimate.error_estimate)
         row = [index.words, index.symbol, number, f"{estimate.error_estimate:.0e}", "" if unit == "1" else unit, told]
-        grid.rows.append(row)
+        interval = interval_text(spreads[name]) if name in spreads else ""
+        grid.rows.append([*row, *[interval] * bool(spreads)])
     return grid
 
 
@@ -307,7 +319,7 @@ def _more(found: Found, folder: Path) -> str:
     """Where all numbers are, and what other commands have left beside them."""
     names = ["summary.json", "curves.csv", "moments.csv", "results.nc"] * bool(found.results)
     names += ["monte_carlo.json"] * bool(found.simulated) + ["chart.csv", "chart.json"] * (found.chart is not None)
-    names += ["proof.json"] * bool(found.proofs)
+    names += ["sample.json"] * (found.samples is not None) + ["proof.json"] * bool(found.proofs)
     others = [name for name in _OTHERS if name not in names and (folder / name).is_file()]
     also = f" Other commands wrote {', '.join(others)} there; their own --report shows it." if others else ""
     return f"All numbers are in {', '.join(names)}, in the folder of the results, {folder.name}.{also}"
@@ -321,7 +333,7 @@ def _remarks(case: Case, found: Found) -> Iterator[dict[str, str]]:
         for severity, messages in remarks.items():
             for message in messages:
                 whose.setdefault((severity, message_of(message).words(CASE_WORDS)), []).append(curve.label)
-    for message in found.chart.remarks if found.chart else ():
+    for message in (*(found.chart.remarks if found.chart else ()), *(found.samples.remarks if found.samples else ())):
         whose.setdefault((message.severity, message.words(CASE_WORDS)), []).append("")
     ordered = sorted(whose.items(), key=lambda pair: list(STYLES).index(pair[0][0]))
     for (severity, text), labels in ordered[:MOST_REMARKS]:

@@ -19,6 +19,7 @@ from typing import Any
 
 from fpsolve import __version__
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
+from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import SENSITIVITIES
@@ -29,7 +30,10 @@ from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
 from fpsolve.model.quantity import MOMENT, MOMENTS
 from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.study.uncertain import SAMPLE, Samples, spreads_of
 
+ENDS = ("low", "high")
+"""Of an interval."""
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
 
@@ -64,13 +68,15 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
     indent = 1 if case.planned <= MOST_INDENTED else None
     has_moments = MOMENT.name in case.output.quantities
     indices = [column.name for each in asked(case) for column in (each, each.error())]
+    ends = [f"{each.name}_{part}" for each in _uncertain(case) for part in ENDS]
+    more = ENDS if case.uncertain else ()
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
         )
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
-        by_moment.writerow([*case.vary.keys, *MOMENTS])
-        by_curve.writerow([*case.vary.keys, *indices, "p_solved", "p_failed", "status", "seconds"])
+        by_moment.writerow([*case.vary.keys, *MOMENTS, *more])
+        by_curve.writerow([*case.vary.keys, *indices, *ends, "p_solved", "p_failed", "status", "seconds"])
         summary.write(f'{start},\n "curves": [')
         for number, result in enumerate(results):
             varied, done = result.curve.varied.values(), result.moments
@@ -80,12 +86,65 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
             content = _summary(case, result, rows)
             text = json.dumps(content, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
             summary.write((",\n  " if number else "\n  ") + text)
-            by_moment.writerows([*varied, *row] for row in finite)
+            spreads = spreads_of(case, result)
+            for row in finite:
+                by_moment.writerow([*varied, *row, *(_ends(spreads.moments.get(float(row[0] or 0.0))) if more else ())])
+            intervals = [end for each in _uncertain(case) for end in _ends(spreads.indices.get(each.name))]
             found = [result.estimates[each.name] for each in asked(case)]
             numbers = [number for each in found for number in ((each.value, each.error_estimate) if each else ("", ""))]
             counts = [done.p.size, (case.p.size if has_moments else 0) - done.p.size]
-            by_curve.writerow([*varied, *numbers, *counts, result.status.word, round(result.seconds, 6)])
+            by_curve.writerow([*varied, *numbers, *intervals, *counts, result.status.word, round(result.seconds, 6)])
         summary.write("\n ]\n}\n")
+
+
+def _uncertain(case: Case) -> list[Index]:
+    """The indices whose intervals are asked for."""
+    return [each for each in asked(case) if each.name in UNCERTAIN] if case.uncertain else []
+
+
+def _ends(spread: Spread | None) -> list[Any]:
+    """The ends of an interval; nothing in their places where there is none."""
+    return ["", ""] if spread is None else [getattr(spread, part) for part in ENDS]
+
+
+def _spread(spread: Spread) -> dict[str, float]:
+    """To first order."""
+    return {name: getattr(spread, name) for name in ("mean", "deviation", *ENDS)} | {
+        "probability_below_0": spread.below
+    }
+
+
+def _spreads(case: Case, result: CurveResult) -> dict[str, Any]:
+    """What is uncertain of a curve, and how that of the parameters is."""
+    found, laws = spreads_of(case, result), case.uncertain.laws(result.curve.problem)
+    return {
+        "level": LEVEL,
+        "laws": {
+            key: {"value": each.value, "sd": each.sd, "mean": each.mean, "deviation": each.deviation}
+            for key, each in laws.items()
+        },
+        **{name: _spread(found.indices[name]) if name in found.indices else None for name in UNCERTAIN},
+        "moments": [{"p": p, **_spread(each)} for p, each in found.moments.items()],
+    }
+
+
+def write_samples(case: Case, samples: Samples, folder: Path) -> None:
+    """sample.json: the quantiles of the samples of a case, beside the first order."""
+    rows = [
+        {"quantity": each.quantity.name, "p": each.p}
+        | {name: getattr(each, name) for name in ("count", "mean", "deviation", "low", "median", "high")}
+        | {"share_below_0": each.below, "first_order": _spread(each.spread), "apart": each.apart}
+        for each in samples.rows
+    ]
+    content = {
+        **head(case),
+        "parameters": dict(case.curve({}).parameters),
+        "level": LEVEL,
+        **{name: getattr(samples, name) for name in ("planned", "seed", "failed")},
+        "rows": [{key: None if each != each else each for key, each in row.items()} for row in rows],
+        "warnings": in_case_words(samples.remarks),
+    }
+    write_json(folder / f"{SAMPLE}.json", content)
 
 
 def asked(case: Case) -> list[Index]:
@@ -167,6 +226,8 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
         ]
     if SENSITIVITIES in case.output.quantities:
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
+    if case.uncertain:
+        found["uncertainty"] = _spreads(case, result)
     return {
         **_parameters(result.curve),
         "status": result.status.word,

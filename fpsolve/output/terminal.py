@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.text import Text
 
+from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.vary import map_key, short_names
@@ -36,6 +37,7 @@ from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.tables import asked, in_case_words
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve, Status
+from fpsolve.study.uncertain import Sampled, Samples, Spreads, spreads_of
 from fpsolve.theory.far import grows_far_out
 
 SUMMARY, MONTE_CARLO = "summary.json", "monte_carlo*.json"
@@ -54,6 +56,7 @@ MOST_FAILED, MOST_MOMENTS, MOST_EXTREMES = 20, 3, 2
 DIGITS = 7
 MAIN = (LYAPUNOV_EXPONENT, STABILITY_INDEX)
 THEORY = "Eqs. (38)-(39): perturbation theory"
+INTERVAL = f"{LEVEL:.0%} interval"
 STAR = "* for the noise reduced by Eqs. (12)-(14)"
 
 
@@ -119,8 +122,17 @@ def _quantities(case: Case) -> list[_Shown]:
     """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
     ordered = sorted(_told(case), key=lambda index: index not in MAIN)
     if case.figure.x != "p":
-        return [each for index in ordered if index in MAIN for each in (_index(index, 0), _theory(case, index))]
-    found = [_index(each, rank + 1 if rank > 1 else 0) for rank, each in enumerate(ordered)]
+        return [
+            each
+            for index in ordered
+            if index in MAIN
+            for each in (_index(index, 0), *_interval(case, index), _theory(case, index))
+        ]
+    found = [
+        column
+        for rank, each in enumerate(ordered)
+        for column in (_index(each, rank + 1 if rank > 1 else 0), *_interval(case, each))
+    ]
     p = [float(each) for each in case.p if each] if MOMENT.name in case.output.quantities else []
     if len(p) > MOST_MOMENTS:
         p = [] if found else [p[0], p[-1]]
@@ -137,6 +149,17 @@ def _index(index: Index, rank: int) -> _Shown:
         return None if found is None else found.value
 
     return _Shown(index.symbol, rank, value=value, text=text)
+
+
+def _interval(case: Case, index: Index) -> list[_Shown]:
+    """Its interval, if the parameters of the case are uncertain."""
+
+    def text(result: CurveResult) -> str:
+        spread = spreads_of(case, result).indices.get(index.name)
+        return "" if spread is None else interval_text(spread)
+
+    is_told = bool(case.uncertain) and index.name in UNCERTAIN
+    return [_Shown(f"{LEVEL:.0%} of {index.symbol}", rank=1, text=text)] * is_told
 
 
 def _theory(case: Case, index: Index) -> _Shown:
@@ -206,19 +229,79 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
             if result.moments.p.size:
                 screen.show(moment_grid(case, result))
             groups: list[list[str]] = [[]]  # what concerns impacts apart from the others
+            spreads = spreads_of(case, result)
             for index in _told(case) if any(result.estimates.values()) else ():
                 estimate = result.estimates[index.name]
                 error = f" ± {estimate.error_estimate:.0e}" if estimate else ""
                 if index == IMPACT_RATE:
                     groups.append([])
-                groups[-1].append(f"{index.symbol} = {index_text(index, result)}{error}")
+                spread = spreads.indices.get(index.name)
+                interval = f" ({LEVEL:.0%}: {interval_text(spread)})" if spread else ""
+                groups[-1].append(f"{index.symbol} = {index_text(index, result)}{error}{interval}")
             for group in groups:
                 screen.packed(group)
             for ray, found in zip(result.curve.problem.system.jumps, result.jumps, strict=False):
                 numbers = [f"{INDICES[name].symbol} = {each}" for name, each in found.items() if each]
                 screen.packed([f"φ = {ray.phase:.6g}:", *numbers])
+            screen.packed(list(verdicts(spreads)))
             screen.lines([""])
     print_remarks(case, results)
+
+
+def verdicts(spreads: Spreads) -> Iterator[str]:
+    """With which probability λ and Λ(2), or else the first Λ(p), have their sign, to first order."""
+    exponent = spreads.indices.get(LYAPUNOV_EXPONENT.name)
+    chosen = [(LYAPUNOV_EXPONENT.symbol, exponent)] if exponent else []
+    p = 2.0 if 2.0 in spreads.moments else next(iter(spreads.moments), None)
+    chosen += [(moment_at(p).symbol, spreads.moments[p])] if p is not None else []
+    for symbol, spread in chosen:
+        is_below = spread.below >= 0.5
+        yield f"{symbol} {'<' if is_below else '>'} 0 with {percent(spread.below if is_below else 1 - spread.below)}"
+
+
+def interval_text(spread: Spread | Sampled) -> str:
+    """An interval with three digits of its width: "-0.0123 to 0.0045"."""
+    width = spread.high - spread.low
+    if not 0 < width < math.inf:
+        return f"{spread.low:.6g} to {spread.high:.6g}"
+    decimals = 2 - math.floor(math.log10(width))
+    if 0 <= decimals <= 9:
+        return f"{spread.low:.{decimals}f} to {spread.high:.{decimals}f}"
+    return f"{spread.low:.4g} to {spread.high:.4g}"
+
+
+def percent(share: float) -> str:
+    """A probability that is not rounded to certainty: "97 %", "> 99.9 %"."""
+    if share > 0.999:
+        return "> 99.9 %"
+    return "< 0.1 %" if share < 0.001 else f"{100 * share:.3g} %"
+
+
+def sample_grid(case: Case, samples: Samples) -> Grid:
+    """A row for each quantity: the interval of the samples, their median, and the interval to first order."""
+    columns = [Column("quantity"), Column(f"samples, {LEVEL:.0%}"), Column("median", 1), Column("P(< 0)")]
+    remark = f"{samples.planned} samples of a Latin hypercube, seed {samples.seed}"
+    grid = Grid(case.headline, [*columns, Column(f"first order, {LEVEL:.0%}"), Column("apart", 2)], remark=remark)
+    for each in samples.rows:
+        is_there = each.count > 0
+        numbers = [interval_text(each), f"{each.median:.6g}", percent(each.below)] if is_there else ["none", "", ""]
+        apart = f"{each.apart:.0%}" if is_there else ""
+        grid.rows.append([each.quantity.symbol, *numbers, interval_text(each.spread), apart])
+    return grid
+
+
+def print_samples(case: Case, samples: Samples) -> None:
+    """Print the intervals of the samples beside those to first order, and where these do not serve."""
+    Screen.of().show(sample_grid(case, samples))
+    print_sample_remarks(case, samples)
+
+
+def print_sample_remarks(case: Case, samples: Samples, severities: Iterable[Severity] = STYLES) -> None:
+    """Print what is said of the samples."""
+    wanted = set(severities)
+    for message in samples.remarks:
+        if message.severity in wanted:
+            print_message(case, message)
 
 
 def print_written(folder: Path, what: str, seconds: float, known: str = "") -> None:
@@ -349,17 +432,22 @@ def _deviation(value: float, error: float, exact: float) -> str:
 def moment_grid(case: Case, result: CurveResult) -> Grid:
     is_exact = result.curve.is_exact
     theory = Column(f"perturbation, Eq. {MOMENT.closed_form}{'*' if is_exact else ''}", 1)
+    spreads = spreads_of(case, result).moments
+    intervals = [Column(INTERVAL), Column("P(Λ < 0)")] * bool(spreads)
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
     moments = result.moments
     has_theory = any(map(math.isfinite, moments.perturbation))
     remark = STAR if is_exact and has_theory else ""
-    grid = Grid(case.heading(result.curve), columns if has_theory else columns[:3], remark=remark)
+    shown_columns = [*columns[:3], *intervals, *(columns[3:] if has_theory else [])]
+    grid = Grid(case.heading(result.curve), shown_columns, remark=remark)
     for p, value, error, closed in zip(
         moments.p, moments.value, moments.error_estimate, moments.perturbation, strict=True
     ):
         shown = f"{error:.0e}" if error else "0"
-        numbers = [digits(value, error), shown, f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"]
-        grid.rows.append([f"{p + 0.0:g}", *(numbers if has_theory else numbers[:2])])
+        spread = spreads.get(float(p))
+        interval = ["", ""] if spread is None else [interval_text(spread), percent(spread.below)]
+        compared = [f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"] if has_theory else []
+        grid.rows.append([f"{p + 0.0:g}", digits(value, error), shown, *interval * bool(intervals), *compared])
     return grid
 
 

@@ -97,7 +97,7 @@ def everything(case: Case, number: int = 1) -> Wanted:
         tuple(name for name in INDICES if name in names),
         shown=tuple(case.shown),
         density=draws and (number == 1 or case.shown.size > 0),
-        differentiated=slopes if SENSITIVITIES in names else None,
+        differentiated=slopes if SENSITIVITIES in names or case.uncertain else None,
         is_stated=case.output.states_quantities,
     )
 

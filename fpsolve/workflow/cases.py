@@ -17,20 +17,24 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.checks import check_noise
 from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
+from fpsolve.output.designs import write_design
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
-from fpsolve.output.tables import write_simulation
+from fpsolve.output.tables import write_samples, write_simulation
 from fpsolve.output.vtk import write_response
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
+from fpsolve.study.design import DesignOutcome, refuse_no_design, solve_design
 from fpsolve.study.hierarchy import compare_with_hierarchy, even_moments
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
 from fpsolve.study.solve import Numerics, Order, Wanted, batches, compare, expected, lost, result_alone, solve_batch
+from fpsolve.study.uncertain import Samples, sampled_case, samples_of
 from fpsolve.workflow.folders import (
     AGAIN,
     ANEW,
     CHART,
+    DESIGNED,
     SIMULATED,
     SOLVED,
     kept,
@@ -38,7 +42,7 @@ from fpsolve.workflow.folders import (
     own_folder,
     saying_if_interrupted,
 )
-from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Phase, Watch, ignore
+from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, SOLVES, Phase, Watch, ignore
 from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 from fpsolve.workflow.sets import Simulations, Sweep
 
@@ -58,6 +62,7 @@ class Outcome:
         faults: of a noise that is no kind of fpsolve, see `check_noise`.
         known: how many of its curves an earlier run had finished.
         outdated: how many records of its curves another version has written; these are not used.
+        samples: what the samples of its uncertain parameters say; None where there are none.
     """
 
     results: Sequence[CurveResult] = ()
@@ -67,6 +72,7 @@ class Outcome:
     faults: tuple[Message, ...] = ()
     known: int = 0
     outdated: int = 0
+    samples: Samples | None = None
 
     @property
     def failures(self) -> tuple[Message, ...]:
@@ -143,6 +149,7 @@ def run_case(
     if monte_carlo:
         refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
+    samples: Samples | None = None
     interruption = ""
     simulators = pool if pool and pool.is_elsewhere else None
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
@@ -163,17 +170,27 @@ def run_case(
                     facts=sweep.facts(),
                     results=sweep.results,
                     simulated=simulated,
+                    samples=samples,
                     complete=is_whole and len(sweep.results) == case.planned,
                 )
 
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
         with told, shown_at_the_end(show):
             watch.solved(case, sweep.results)
+            if case.uncertain.sample:
+                samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)
             if monte_carlo:
                 simulations = Simulations(case, folder, is_fresh=is_fresh)
                 interruption = _simulate(simulations, watch, simulated, simulators)
                 watch.simulated(case, simulated, sweep.results)
-    return Outcome(sweep.results, tuple(simulated), interruption, known=sweep.known, outdated=sweep.records.outdated)
+    return Outcome(
+        sweep.results,
+        tuple(simulated),
+        interruption,
+        known=sweep.known,
+        outdated=sweep.records.outdated,
+        samples=samples,
+    )
 
 
 def simulate_case(
@@ -269,6 +286,27 @@ def chart_case(
     return chart
 
 
+def design_case(case: Case, out: str | Path = "results", *, watch: Watch = SILENT) -> DesignOutcome:
+    """Find the design of a case, and write design.json and, where there is one, design.toml into `out`/<case>/.
+
+    Raises:
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        FpsolveError: the case has no design, or several curves; nothing is written.
+        KeyboardInterrupt: nothing is kept.
+    """
+    refuse_no_design(case)
+    started = datetime.now(UTC)
+    with (
+        own_folder(case, out, (DESIGNED,)) as folder,
+        saying_if_interrupted(lambda: "; nothing is kept", ANEW),
+        writable(folder),
+    ):
+        with watch.bar(Phase(case.name, "design", unit=SOLVES)) as progress:
+            found = solve_design(case, progress)
+        write_design(case, found, folder, facts_since(case, started))
+    return found
+
+
 def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:
     """Solve what a case expects, and return it with the `comparisons`; nothing is written.
 
@@ -316,6 +354,18 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
         with watch.bar(Phase(case.name, "tables")), signals_held():
             sweep.write_all()
     return sweep
+
+
+def _sample(case: Case, sweep: Sweep, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Samples:
+    """Solve the samples of a case, in a folder of their own, and write what they say."""
+    drawn = sampled_case(case)
+    with own_folder(drawn, folder, (SOLVED,)) as inner:
+        solved = _solve(drawn, inner, pool, watch, is_fresh=is_fresh)
+    samples = samples_of(case, sweep.results[0], solved.results)
+    with writable(folder):
+        write_samples(case, samples, folder)
+    watch.sampled(case, samples)
+    return samples
 
 
 def _simulate(simulations: Simulations, watch: Watch, simulated: list[SimulatedCurve], pool: Pool | None) -> str:

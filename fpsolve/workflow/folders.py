@@ -15,15 +15,17 @@ AGAIN, ANEW = "run it again to go on", "run it again to start over"
 SOLVED = (
     r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu"
     r"|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
+    r"|sample\.json|sample/(summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc)"
 )
 SIMULATED = r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)"
 REPORT = r"report\.html"
 """Pattern of the name of the report of what was done last, which whatever is done next makes stale."""
-CHART, PROVEN = r"chart\.(csv|json|png|pdf)", r"proof\.json"
-"""Patterns of the names of the files that a run writes, a simulation, a chart, and proofs."""
+CHART, PROVEN, DESIGNED = r"chart\.(csv|json|png|pdf)", r"proof\.json", r"design\.(json|toml)"
+"""Patterns of the names of the files that a run writes, a simulation, a chart, proofs, and a design."""
 _UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
 _FOLDERS = r"records|records/(solved|simulated)|eigenfunctions(-\d+)?"
-_TABLES = {SOLVED: r"summary\.json", SIMULATED: r"monte_carlo(-\d+)?\.json", CHART: r"chart\.json", PROVEN: PROVEN}
+_TABLES = {SOLVED: r"summary\.json", SIMULATED: r"monte_carlo(-\d+)?\.json", CHART: r"chart\.json"}
+_TABLES |= {PROVEN: PROVEN, DESIGNED: r"design\.json"}
 """Of each kind of files those that state the parameters."""
 
 

@@ -16,8 +16,9 @@ from rich.text import Text
 from fpsolve.case.case import Case
 from fpsolve.messages import Message
 from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.study.uncertain import Samples
 
-SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT = "sets", "p", "nodes", "points", "bounds", "%"
+SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT, SOLVES = "sets", "p", "nodes", "points", "bounds", "%", "solves"
 """What a phase counts."""
 LINE_SECONDS, LINE_SHARE = 10.0, 0.1
 """A line in a file comes after as long at least, and as far."""
@@ -64,12 +65,14 @@ class Watch:
         solved: takes a case and its curves once they are solved.
         simulated: takes a case, its simulated curves, and those that are solved too.
         said: takes a case and a message about its files.
+        sampled: takes a case and what its samples say.
     """
 
     bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(ignore)
     solved: Callable[[Case, Sequence[CurveResult]], None] = lambda *_: None
     simulated: Callable[[Case, Sequence[SimulatedCurve], Sequence[CurveResult]], None] = lambda *_: None
     said: Callable[[Case, Message], None] = lambda *_: None
+    sampled: Callable[[Case, Samples], None] = lambda *_: None
 
 
 SILENT = Watch()

@@ -1,0 +1,282 @@
+"""What is uncertain of λ, δ_p and Λ(p) where parameters are: to first order by the derivatives, and by samples.
+
+Each parameter θᵢ has a normal law around its value, cut at the ends of its range, and is independent of the others.
+With mᵢ the mean and sᵢ the standard deviation of that law, to first order
+
+    Q ≈ Q₀ + Σ ∂Q/∂θᵢ (θᵢ − θᵢ⁰),   mean Q₀ + Σ ∂Q/∂θᵢ (mᵢ − θᵢ⁰),   variance Σ (∂Q/∂θᵢ sᵢ)²,
+
+and the interval that holds Q with 95 % is that of a normal law.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtr, ndtri
+
+from fpsolve.analysis.sensitivity import RECORDS, Sensitivities, solve_sensitivities
+from fpsolve.arrays import FloatArray, is_whole, shown
+from fpsolve.data import Result, dataset
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.error import Absent, Estimate
+from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model.problem import Problem, checked_moments, of_problem
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P, Quantity
+
+if TYPE_CHECKING:
+    import xarray
+
+LEVEL = 0.95
+"""The probability that an interval holds."""
+_SIZE = float(ndtri(0.5 + 0.5 * LEVEL))
+UNCERTAIN = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
+"""The quantities besides Λ(p) of which intervals are given."""
+MOST_SAMPLES = 100_000
+
+
+class Deviation(NamedTuple):
+    """The standard deviation of a parameter before its law is cut: a number, or a share of its value."""
+
+    size: float
+    is_relative: bool = True
+
+    def at(self, value: float) -> float:
+        """Of a parameter with a value."""
+        return self.size * abs(value) if self.is_relative else self.size
+
+
+def deviation_of(value: Any) -> Deviation:
+    """What 0.05, a share, or {"sd": 0.02}, a number, says. Raises `ValueError`."""
+    size = value["sd"] if isinstance(value, Mapping) and value.keys() == {"sd"} else value
+    if isinstance(size, bool) or not isinstance(size, int | float) or not 0 < size < math.inf:
+        raise ValueError(
+            f"got {shown(value)}; must be a share of the value, such as 0.05, or a standard deviation such as "
+            '{"sd": 0.02}, > 0 and finite'
+        )
+    return Deviation(float(size), isinstance(value, int | float))
+
+
+@dataclass(frozen=True)
+class Law:
+    """A normal law, cut.
+
+    Attributes:
+        value: of the parameter, the middle before the cut.
+        sd: its standard deviation before that.
+        low, high: where it is cut.
+    """
+
+    value: float
+    sd: float
+    low: float = -math.inf
+    high: float = math.inf
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        return (self.low - self.value) / self.sd, (self.high - self.value) / self.sd
+
+    @property
+    def mean(self) -> float:
+        """Of the law that is cut."""
+        return self.value + self.sd * self._moments[0]
+
+    @property
+    def deviation(self) -> float:
+        """The standard deviation of the law that is cut."""
+        return self.sd * math.sqrt(self._moments[1])
+
+    @property
+    def _moments(self) -> tuple[float, float]:
+        """Mean and variance in units of `sd`."""
+        a, b = self._ends
+        whole = float(ndtr(b) - ndtr(a))
+        first, second = (math.exp(-0.5 * end * end) / math.sqrt(2 * math.pi) / whole for end in (a, b))
+        mean = first - second
+        edge = (a * first if math.isfinite(a) else 0.0) - (b * second if math.isfinite(b) else 0.0)
+        return mean, 1 + edge - mean * mean
+
+    def quantile(self, share: FloatArray) -> FloatArray:
+        """The values below which these shares of the law are."""
+        a, b = self._ends
+        below = ndtr(a) + share * (ndtr(b) - ndtr(a))
+        return np.clip(self.value + self.sd * ndtri(below), np.nextafter(self.low, math.inf), self.high)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How far a quantity spreads where parameters are uncertain.
+
+    Attributes:
+        value: with the parameters as they are.
+        mean, deviation: to first order.
+        low, high: the ends of the interval that holds with a probability of `LEVEL`.
+    """
+
+    value: float
+    mean: float
+    deviation: float
+
+    @property
+    def low(self) -> float:
+        return self.mean - _SIZE * self.deviation
+
+    @property
+    def high(self) -> float:
+        return self.mean + _SIZE * self.deviation
+
+    @property
+    def below(self) -> float:
+        """The probability that the quantity is negative."""
+        if self.deviation == 0:
+            return float(self.mean < 0)
+        return float(ndtr(-self.mean / self.deviation))
+
+
+def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
+    """The laws of some parameters by their keys.
+
+    Args:
+        problem: with their values and ranges.
+        uncertain: a share of the value, or {"sd": number}, by the key; or `Deviation`s.
+
+    Raises:
+        ValueError: a key is none of a parameter by which Λ can be differentiated, or a deviation is 0 or none.
+    """
+    known, found = problem.differentiable, dict[str, Law]()
+    for key, stated in uncertain.items():
+        if key not in known:
+            raise ValueError(f"got {shown(key)} as a parameter; must be one of {', '.join(known) or 'none'}")
+        deviation = stated if isinstance(stated, Deviation) else deviation_of(stated)
+        value, field = float(problem.values[key]), problem.parameters[key].field
+        if not deviation.at(value) > 0:
+            raise ValueError(f'{key} is 0, and so is a share of it; state {{"sd": number}} for it')
+        low, high = -math.inf, math.inf
+        for limit in () if field is None else field.metadata:
+            low = max(low, getattr(limit, "ge", low), getattr(limit, "gt", low))
+            high = min(high, getattr(limit, "le", high), getattr(limit, "lt", high))
+        found[key] = Law(value, deviation.at(value), low, high)
+    return found
+
+
+def spread_of(value: float, slopes: Mapping[str, Estimate], laws: Mapping[str, Law]) -> Spread | None:
+    """Of a quantity by its derivatives; None where some of these are missing."""
+    if not laws.keys() <= slopes.keys():
+        return None
+    shift = sum(slopes[key].value * (law.mean - law.value) for key, law in laws.items())
+    return Spread(value, value + shift, math.hypot(*(slopes[key].value * law.deviation for key, law in laws.items())))
+
+
+def latin_hypercube(laws: Mapping[str, Law], count: int, seed: int = 0) -> dict[str, FloatArray]:
+    """Values of parameters, as many of each as there are sets, so that each has one in each n-th part of its law.
+
+    Args:
+        laws: of the parameters, see `laws_of`.
+        count: how many sets.
+        seed: of the random numbers.
+
+    Raises:
+        ValueError: the count is none.
+    """
+    if not is_whole(count, 2, MOST_SAMPLES):
+        raise ValueError(f"got count = {shown(count)}; must be a whole number from 2 to {MOST_SAMPLES}")
+    from scipy.stats import qmc  # not before it is needed, as it takes a while
+
+    shares = qmc.LatinHypercube(len(laws), seed=seed).random(count)
+    return {key: law.quantile(shares[:, i]) for i, (key, law) in enumerate(laws.items())}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Uncertainty(Result):
+    """The spreads of λ, δ_p and Λ(p) to first order.
+
+    Attributes:
+        laws: of the uncertain parameters, by their keys.
+        p: the moments, shape (n,).
+        moments: of Λ(p), one for each p; None where it was not solved.
+        indices: of "lyapunov_exponent" and "stability_index", without those that do not exist.
+        sensitivities: by which they are found.
+    """
+
+    laws: Mapping[str, Law]
+    p: FloatArray
+    moments: tuple[Spread | None, ...]
+    indices: Mapping[str, Spread]
+    sensitivities: Sensitivities
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The values, and the ends of their intervals."""
+        numbers = dict[Quantity, Any]()
+        rows = [(RECORDS[name], [spread], ()) for name, spread in self.indices.items()]
+        for quantity, spreads, dims in [(MOMENT, self.moments, MOMENT.dims), *rows]:
+            for part in ("value", "low", "high"):
+                column = np.array([math.nan if each is None else getattr(each, part) for each in spreads])
+                numbers[interval_end(quantity, part)] = column if dims else column[0]
+        held = self.sensitivities.theta
+        return dataset("uncertainty to first order", "finite elements", numbers, {P: self.p}, held, level=LEVEL)
+
+    def _said(self) -> str:
+        parts = [
+            f"{RECORDS[name].symbol} from {each.low:.4g} to {each.high:.4g}" for name, each in self.indices.items()
+        ]
+        return f"with {LEVEL:.0%}: {', '.join(parts) or f'{self.p.size} p'}"
+
+
+def interval_end(quantity: Quantity, part: str) -> Quantity:
+    """The "low" or "high" end of an interval of a quantity; the quantity itself for "value"."""
+    if part == "value":
+        return quantity
+    words = f"{part} end of the {LEVEL:.0%} interval of the {quantity.words}"
+    plain = {each.name: getattr(quantity, each.name) for each in fields(Quantity)}
+    return Quantity(**{**plain, "name": f"{quantity.name}_{part}", "words": words})
+
+
+@of_problem
+def uncertainty(
+    problem: Problem,
+    uncertain: Mapping[str, Any],
+    p: ArrayLike = (),
+    *,
+    rtol: float = 1e-8,
+    budget: Budget | None = None,
+) -> Uncertainty:
+    """How far λ, δ_p and Λ(p) spread, to first order, where parameters are uncertain.
+
+    Args:
+        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        uncertain: for the keys of parameters a share of the value, such as 0.05, or {"sd": 0.02}: the standard
+            deviation of a normal law, which is cut at the range of the parameter.
+        p: one moment, or an array of shape (n,); none by default.
+        rtol, budget: as for `moment_lyapunov`.
+
+    Raises:
+        ValueError: a key or a deviation is none, or a p is not finite.
+        NoSuchExponent: Λ(p) is infinite for one of the p.
+        NotConverged: Λ(p) was not solved for one of the p.
+    """
+    laws = laws_of(problem, uncertain)
+    solver = ExponentSolver(problem, rtol=rtol, budget=budget or Budget())
+    points = checked_moments(p, problem, may_be_empty=True)
+    values: dict[str, Callable[[], Estimate | Absent]] = {
+        LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent,
+        STABILITY_INDEX.name: partial(nonzero_root, solver),
+    }
+    found = {name: each for name, solve in values.items() if (each := solve())}
+    root = found.get(STABILITY_INDEX.name)
+    along = {key: problem.derivative(key) for key in laws}
+    slopes = solve_sensitivities(solver, points, along, indices=[*found], root=None if root is None else root.value)
+    moments = [(solver.solution(each).pair.value if each else 0.0) for each in points.tolist()]
+    spreads = {name: spread_of(each.value, slopes.indices.get(name, {}), laws) for name, each in found.items()}
+    return Uncertainty(
+        laws=laws,
+        p=points,
+        moments=tuple(spread_of(value, row, laws) for value, row in zip(moments, slopes.moments, strict=True)),
+        indices={name: each for name, each in spreads.items() if each is not None},
+        sensitivities=slopes,
+    )

@@ -1,0 +1,161 @@
+"""Intervals of cases by first order and by samples, on the command line and in files."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from fpsolve.case.case import load_case
+from fpsolve.cli import main
+from fpsolve.messages import Code
+from fpsolve.study.solve import Numerics, everything, solve_curve
+from fpsolve.study.uncertain import sampled_case, samples_of, spreads_of
+from tests.conftest import sampled
+
+UNIFORM = """
+title = "A uniform phase"
+uncertain = {{ {uncertain} }}
+[system]
+variables = ["x", "y"]
+drift = ["a*x + y + xi*x", "-x + a*y + xi*y"]
+parameters = {{ a = -0.3 }}
+[noise]
+kind = "ornstein-uhlenbeck"
+alpha = 0.8
+sigma = 0.5
+[moments]
+p = [1.0, 2.0]
+[output]
+quantities = ["moment", "lyapunov_exponent", "stability_index"]
+"""
+WALL = """
+title = "A wall"
+[oscillator]
+epsilon = 0.3
+omega = 1.0
+restitution = 0.9
+c1 = -0.4
+[noise]
+D0 = 1.0
+tau0 = 0.5
+r0 = 0.9
+treatment = "exact"
+[moments]
+p = [2.0]
+[uncertain]
+"noise.D0" = 0.05
+oscillator.restitution = { sd = 0.02 }
+[output]
+quantities = ["moment", "lyapunov_exponent", "stability_index"]
+"""
+
+
+def case_of(folder, text, *overrides):
+    path = folder / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_case(path, overrides)
+
+
+def solved(case):
+    return [solve_curve(curve, everything(case, curve.number), Numerics.of(case)).result for curve in case.curves()]
+
+
+def test_a_verdict_is_the_probability_of_the_normal_law(tmp_path):
+    case = case_of(tmp_path, UNIFORM.format(uncertain='"system.a" = { sd = 0.05 }'))
+    [result] = solved(case)
+    spreads = spreads_of(case, result)
+    value = -0.6 + 2 * 0.25 / 0.64
+    assert spreads.moments[2.0].below == pytest.approx(norm.cdf(-value / 0.1), abs=1e-7)
+    assert spreads.indices["stability_index"].deviation == pytest.approx(0.1 * 0.64 / 0.25, rel=1e-7)
+
+
+CASES = [UNIFORM.format(uncertain='"system.a" = 0.1, "noise.sigma" = 0.03'), WALL]
+CASES += [WALL.replace("c1 = -0.4", "c1 = -0.2").replace('"noise.D0" = 0.05', '"noise.tau0" = 0.1')]
+
+
+@pytest.mark.parametrize("text", sampled(*CASES, keep=1))
+def test_samples_lie_in_the_intervals_as_stated(text, tmp_path):
+    """Of 200 some 95 %: by more than four standard errors of chance, 6 %, they are no others."""
+    case = case_of(tmp_path, text, "uncertain.sample=200", "moments.p=[2.0]")
+    [result], drawn = solved(case), solved(sampled_case(case))
+    spreads = spreads_of(case, result)
+    for name, spread in spreads.indices.items():
+        values = np.array([each.estimates[name].value for each in drawn])
+        assert np.mean((values > spread.low) & (values < spread.high)) == pytest.approx(0.95, abs=0.06)
+    samples = samples_of(case, result, drawn)
+    assert not samples.remarks
+    assert samples.failed == 0
+    for row in samples.rows:
+        assert row.count == 200
+        assert row.deviation == pytest.approx(row.spread.deviation, rel=0.15)
+
+
+def test_a_curved_quantity_is_named(tmp_path):
+    """Λ(2) = 2a + 2σ²/α² bends where α is uncertain by a quarter; its median is that at the median of α."""
+    text = UNIFORM.format(uncertain='"noise.alpha" = 0.25, sample = 100, seed = 5')
+    case = case_of(tmp_path, text, "moments.p=[2.0]", "output.quantities=['moment', 'lyapunov_exponent']")
+    [result], drawn = solved(case), solved(sampled_case(case))
+    samples = samples_of(case, result, drawn)
+    named = {each.data["symbol"] for each in samples.remarks if each.code is Code.CURVED}
+    assert named == {"Λ(2)"}  # λ = a does not depend on α
+    row = next(each for each in samples.rows if each.p == 2.0)
+    alpha = np.array([each.curve.varied["noise.alpha"] for each in drawn])
+    exact, linear = -0.6 + 0.5 / alpha**2, -0.6 + 0.5 / 0.64 * (1 - 2 * (alpha / 0.8 - 1))
+    ends = np.quantile(exact, [0.025, 0.5, 0.975], method="hazen")
+    assert [row.low, row.median, row.high] == pytest.approx(ends, abs=1e-8)
+    first = np.quantile(linear, [0.025, 0.975], method="hazen")
+    moved, width = ends[[0, 2]] - first, first[1] - first[0]
+    assert row.apart == pytest.approx(max(*abs(moved), abs(moved[1] - moved[0])) / width, rel=1e-6)
+    for share, end in zip((0.975, 0.5, 0.025), ends, strict=True):  # a value of α in each hundredth of its law
+        least, most = -0.6 + 0.5 / (0.8 * (1 + 0.25 * norm.ppf([share + 0.01, share - 0.01]))) ** 2
+        assert least < end < most
+
+
+def test_files_and_the_terminal_say_it(tmp_path, capsys):
+    case_of(tmp_path, UNIFORM.format(uncertain='"system.a" = { sd = 0.05 }'))
+    arguments = ["run", str(tmp_path / "case.toml"), "--out", str(tmp_path), "--sample", "20", "--jobs", "1"]
+    assert main([*arguments, "--set", "output.figure=false"]) == 0
+    said = capsys.readouterr().out
+    assert "95% interval" in said
+    assert "λ < 0 with > 99.9 %" in said
+    assert "Λ(2) > 0 with 96.5 %" in said  # norm.cdf(1.8125)
+    assert "20 samples of a Latin hypercube, seed 0" in said
+    [curve] = json.loads((tmp_path / "case/summary.json").read_text(encoding="utf-8"))["curves"]
+    size = norm.ppf(0.975) * 0.05
+    assert curve["uncertainty"]["lyapunov_exponent"]["high"] == pytest.approx(-0.3 + size, abs=1e-9)
+    with (tmp_path / "case/curves.csv").open(encoding="utf-8") as file:
+        [row] = csv.DictReader(file)
+    assert float(row["lyapunov_exponent_low"]) == pytest.approx(-0.3 - size, abs=1e-9)
+    with (tmp_path / "case/moments.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert float(rows[1]["low"]) == pytest.approx(-0.6 + 0.5 / 0.64 - 2 * size, abs=1e-9)
+    told = json.loads((tmp_path / "case/sample.json").read_text(encoding="utf-8"))
+    assert (told["planned"], told["seed"], told["failed"]) == (20, 0, 0)
+    with (tmp_path / "case/sample/curves.csv").open(encoding="utf-8") as file:
+        values = [float(each["system.a"]) for each in csv.DictReader(file)]
+    assert len(values) == 20
+    assert told["rows"][0]["median"] == pytest.approx(np.median(values), abs=1e-9)  # λ = a
+    assert main([*arguments, "--report", "--set", "output.figure=false"]) == 0
+    page = (tmp_path / "case/report.html").read_text(encoding="utf-8")
+    assert "Λ(2) &gt; 0 with 96.5 %, as parameters are uncertain." in page
+    assert "20 samples of a Latin hypercube, seed 0" in page
+    assert "1 of 1 known" in capsys.readouterr().out
+    assert main([*arguments[:4], "--jobs", "1", "--set", "output.figure=false"]) == 0  # a run without samples
+    assert not (tmp_path / "case/sample.json").exists()
+    assert not (tmp_path / "case/sample/curves.csv").exists()
+
+
+def test_a_law_that_is_cut_moves_the_interval(tmp_path):
+    """Of r = 1 − 0.01 ± 0.02 more than half is cut off: the mean is below 0.99."""
+    case = case_of(tmp_path, WALL.replace("restitution = 0.9", "restitution = 0.99"))
+    law = case.uncertain.laws(case.problem)["oscillator.restitution"]
+    assert (law.low, law.high) == (0.0, 1.0)
+    [result] = solved(case)
+    spread = spreads_of(case, result).indices["lyapunov_exponent"]
+    slope = result.sensitivities.indices["lyapunov_exponent"]["oscillator.restitution"].value
+    assert spread.mean - spread.value == pytest.approx(slope * (law.mean - 0.99), rel=1e-9)
+    assert spread.mean < spread.value  # less restitution, smaller λ
+    assert math.isclose(law.value, 0.99)
