@@ -3,6 +3,7 @@ from .density import adjoint_density as adjoint_density
 from .density import furstenberg_khasminskii as furstenberg_khasminskii
 from .density import stationary_density as stationary_density
 from .density import tilted_density as tilted_density
+from .directions import DirectionDensity as DirectionDensity
 from .sensitivity import Sensitivities as Sensitivities
 from .sensitivity import sensitivities as sensitivities
 from .stability import Boundary as Boundary
