@@ -217,7 +217,10 @@ class Strips(Nodes):
 
 def _refuse_more(pair: PrincipalPair) -> None:
     """Raises `OutputError` where T depends on more than φ and ξ."""
-    if why := pair.generator.problem.no_picture:
+    problem = pair.generator.problem
+    if problem.dimension > 2:
+        raise OutputError(f"T of {problem.dimension} variables is no function of phase and noise; use its `Directions`")
+    if why := problem.no_picture:
         raise OutputError(why)
 
 

@@ -70,7 +70,9 @@ def test_elements_and_harmonics_are_the_same_functions(n):
     points /= np.linalg.norm(points, axis=0)
     for axis in (elements, harmonics):
         np.testing.assert_allclose(axis.at(points) @ axis.constant, 1.0, atol=1e-12)
-        np.testing.assert_allclose((axis.at(points) @ np.eye(axis.size)), axis.at(-points) @ np.eye(axis.size), atol=1e-9)
+        np.testing.assert_allclose(
+            (axis.at(points) @ np.eye(axis.size)), axis.at(-points) @ np.eye(axis.size), atol=1e-9
+        )
     places, weights = rule(n)
     at_places = elements.at(places).toarray()
     mass = at_places.T @ (weights[:, None] * at_places) / elements.area
