@@ -190,8 +190,8 @@ class Code(Enum):
         "do not rely on a picture of it"
     )
     ROUGH_DENSITY = (
-        "warning: the densities of directions at p = {p:g} are {size:?rough, finer functions move {size:.0%} of them¦not "
-        "compared with those of finer functions}; this hardly affects Λ, but do not rely on their details"
+        "warning: the densities of directions at p = {p:g} are rough: {size:?finer functions move {size:.0%} of "
+        "them¦none of finer functions were compared}; this hardly affects Λ, but do not rely on their details"
     )
     FINE_DENSITY = (
         "warning: the densities of directions at p = {p:g} are finer than the nodes of their pictures, which miss "

@@ -213,12 +213,9 @@ class Case(Section):
         wanted = self.output.eigenfunctions
         if EIGENFUNCTIONS not in self.output.quantities or self.leaves_out_eigenfunctions or self.problem.no_picture:
             wanted = ()
-        most = 9 if self.problem.dimension == 2 else MOST_DENSITIES
-        return (
-            _spread(self.p, most)
-            if wanted is None
-            else np.array([self.p[np.argmin(np.abs(self.p - p))] for p in wanted])
-        )
+        if wanted is None:
+            return _spread(self.p, 9 if self.problem.dimension == 2 else MOST_DENSITIES)
+        return np.array([self.p[np.argmin(np.abs(self.p - p))] for p in wanted])
 
     @property
     def usual_p(self) -> float:

@@ -41,7 +41,7 @@ RESOLVED = 1e-3
 """By how much the integral of the tilted density over the nodes may miss 1."""
 CHUNK = 2**23
 """Numbers of a table of functions at points, at most."""
-SHARES = (0.0, 0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98, 1.0)
+SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """Of the second pair in ‖z‖², at which the axis of η has ticks."""
 LATITUDES = np.pi * np.arange(-2, 3) / 4, [r"$-\pi/2$", r"$-\pi/4$", "0", r"$\pi/4$", r"$\pi/2$"]
 
@@ -159,7 +159,7 @@ class DirectionGrid:
         if self.dimension == 4:
             axes.set_xticks(np.arcsin(np.sqrt(SHARES)), [f"{100 * share:g}" for share in SHARES])
             axes.set_yticks(*QUARTERS)
-            words = f"share of {self.names[1]} in the {self.what} (%), which is $\\sin^2\\eta$"
+            words = f"share of {self.names[1]} in the {self.what}, $\\sin^2\\eta$ (%)"
             label_axes(axes, {"long_name": words, "units": "1"}, second.attributes)
         else:
             axes.set_xticks(*QUARTERS)

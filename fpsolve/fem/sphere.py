@@ -412,7 +412,7 @@ class SphereAxis(DirectionAxis):
 
 
 def waves_at(dimensions: tuple[int, int], most: int, points: FloatArray) -> FloatArray:
-    """The products of the waves of both groups up to a degree, at directions, shape (m, products), the first slowest."""
+    """The products of the waves of both groups up to a degree, at directions; shape (m, products)."""
     tables, start = list[FloatArray](), 0
     for dimension in dimensions:
         own, start = points[start : start + dimension], start + dimension

@@ -138,7 +138,7 @@ class Problem:
 
     @property
     def no_picture(self) -> str:
-        """Why functions of it are neither; empty where they are, and of more variables, which are drawn by directions."""
+        """Why functions of it cannot be drawn; empty where they can, of more than two variables over directions."""
         if self.dimension > 2:
             return ""
         if len(self.coloured.parts) > 1:

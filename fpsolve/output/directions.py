@@ -1,4 +1,4 @@
-"""Densities of the directions of three and four variables as files: densities.nc, and figures that are drawn from it."""
+"""Densities of the directions of three and four variables as files: densities.nc, and its figures."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def write_densities(found: Sequence[SettledDirections], curve: Curve, folder: Pa
 
 
 def draw_densities(case: Case, results: Iterable[CurveResult], folder: Path, *, into: Path | None = None) -> None:
-    """Draw densities.png and .pdf of every curve of which there are densities: the stationary one, and some tilted ones."""
+    """Draw densities.png and .pdf of every curve with densities: the stationary one, and some tilted ones."""
     import xarray
 
     for result in results if case.output.figure and case.problem.dimension > 2 else ():
@@ -108,11 +108,17 @@ def _draw(case: Case, curve: Curve, found: xarray.Dataset, paths: list[Path], ti
             panels.append((f"tilted, p = {float(found.p[k]):g}", found["tilted_density"][k]))
     columns = 1 if len(panels) == 1 else 2
     rows = -(-len(panels) // columns)
-    form = Format(width=7.2 * (1 if columns == 1 else 1.7), height=3.4 if rows == 1 else 6.4)
+    form = Format(width=7.2 if columns == 1 else 11.5, height=3.6 if rows == 1 else 2.6, scale=1.1)
     with figure_for(paths, title, held_in_words(curve, (), case.figure.time_unit), form) as figure:
         axes = np.ravel(figure.subplots(rows, columns))
-        for axis, (words, values) in zip(axes, panels, strict=False):
-            grid.draw(axis, values.values, {"long_name": "density", "units": grid.unit})
+        for place, (axis, (words, values)) in enumerate(zip(axes, panels, strict=False)):
+            is_right = place % columns == columns - 1 or place == len(panels) - 1
+            about = {"long_name": "density", "units": grid.unit} if is_right else {"long_name": "", "units": "1"}
+            grid.draw(axis, values.values, about)
+            if place % columns:
+                axis.set_ylabel("")
+            if place + columns < len(panels):
+                axis.set_xlabel("")
             share = f": mean share of {grid.names[1]} {grid.share(values.values):.1%}" if grid.dimension == 4 else ""
             axis.set_title(words + share, parse_math=False)
         for axis in axes[len(panels) :]:

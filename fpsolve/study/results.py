@@ -162,7 +162,7 @@ class Solved:
         eigenpairs: those whose eigenfunctions are wanted.
         stationary: the eigenpair at p = 0; None where no density is wanted, or it is not to be trusted.
         is_passing: whether it failed for a reason that may be gone when it is tried again.
-        directions: of more than two variables, in place of these, what is wanted over directions, p = 0 with the density.
+        directions: of more than two variables, in their place, all that is wanted; p = 0 with the density.
     """
 
     result: CurveResult | None
