@@ -114,7 +114,7 @@ class DirectionDensity(Result):
         return replace(DENSITY, words=self.name, unit=self.grid.unit, dims=dims)
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-        self.grid.draw(axes, self.values, replace(self._density, words="density").attributes, **kwargs)
+        self.grid.draw(axes, self.values, replace(self._density, words="density").attributes, **{"vmin": 0.0, **kwargs})
 
     def _said(self) -> str:
         share = f", mean share of {self.grid.names[1]} {self.grid.share(self.values):.2%}"

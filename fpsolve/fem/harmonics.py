@@ -55,6 +55,11 @@ class HarmonicCells:
         """Two degrees more."""
         return replace(self, waves=self.waves + 2)
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a table says of it."""
+        return {"harmonics": self.waves}
+
 
 @dataclass(frozen=True, eq=False)
 class Harmonics:

@@ -101,6 +101,11 @@ class SphereCells:
         lines = np.sort(np.append(self.lines, 0.5 * (self.lines[1:] + self.lines[:-1])))
         return replace(self, lines=lines, degree=MOST_DEGREE // 2 + 2)
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a table says of it."""
+        return {"eta_cells": self.lines.size - 1, "eta_degree": self.degree, "waves": self.waves}
+
 
 @dataclass(frozen=True, eq=False)
 class Waves:

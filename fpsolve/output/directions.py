@@ -114,7 +114,7 @@ def _draw(case: Case, curve: Curve, found: xarray.Dataset, paths: list[Path], ti
         for place, (axis, (words, values)) in enumerate(zip(axes, panels, strict=False)):
             is_right = place % columns == columns - 1 or place == len(panels) - 1
             about = {"long_name": "density", "units": grid.unit} if is_right else {"long_name": "", "units": "1"}
-            grid.draw(axis, values.values, about)
+            grid.draw(axis, values.values, about, vmin=0.0)
             if place % columns:
                 axis.set_ylabel("")
             if place + columns < len(panels):

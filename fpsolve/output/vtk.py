@@ -142,7 +142,7 @@ def write_directions(found: Sequence[SettledDirections], curve: Curve, folder: P
     stem, others = f"eigenfunctions{curve.suffix}", [each for each in found if each.pair.p]
     names = {each.pair.p: _name(stem, each.pair.p) for each in others}
     for each in others:
-        data = {name: getattr(each.fields, own) for name, (own, _) in FIELDS.items()}
+        data = {name: getattr(each.fields, own) for name, (own, _) in reversed(FIELDS.items())}
         known = {"p": each.pair.p, "Lambda": each.pair.value}
         _write_plane(folder / names[each.pair.p], grid, {**data, **always}, {**known, **facts})
     if others:

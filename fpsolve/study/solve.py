@@ -355,15 +355,8 @@ def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
     generator = known[p].pair.generator
     phase, noise = generator.chosen.phase, generator.chosen.noise
     interval = {"xi_min": float(noise.lines[0]), "xi_max": float(noise.lines[-1])} if noise.lines.size else {}
-    if generator.problem.dimension == 2:
-        directions = {
-            "phi_cells": phase.lines.size - 1,
-            "phi_degrees": [int(degree) for degree in phase.degrees],
-        }
-    else:
-        directions = {"eta_cells": phase.lines.size - 1, "eta_degree": phase.degree, "waves": phase.waves}
     return {
-        **directions,
+        **phase.facts,
         "xi": noise.kind,
         "xi_size": noise.size,
         **interval,
