@@ -36,11 +36,13 @@ class SettledDirections:
     """T, T* and T T* over directions on the finest functions that were looked at.
 
     Attributes:
+        value: Λ(p) as it was found before.
         pair: the eigenpair on these.
         fields: what it has over directions.
         error: the larger total variation of T* and of T T* from those of the functions before; NaN if there are none.
     """
 
+    value: float
     pair: PrincipalPair
     fields: DirectionFields
     error: float
@@ -54,7 +56,7 @@ class SettledDirections:
 
 def settled_directions(pair: PrincipalPair) -> SettledDirections:
     """Those of a pair of three or four variables, on as fine functions as its T* needs."""
-    found = SettledDirections(pair, Directions(pair).fields, math.nan)
+    found = SettledDirections(pair.value, pair, Directions(pair).fields, math.nan)
     while not found.error <= SETTLED:
         generator = found.pair.generator
         finer = replace(generator.chosen, phase=generator.chosen.phase.enriched())
@@ -67,7 +69,7 @@ def settled_directions(pair: PrincipalPair) -> SettledDirections:
         fields = Directions(new).fields
         before = found.on(fields.grid).fields
         error = max(_variation(fields, before, name) for name in ("adjoint", "product"))
-        found = SettledDirections(new, fields, error)
+        found = SettledDirections(pair.value, new, fields, error)
     return found
 
 

@@ -68,7 +68,7 @@ def write_densities(found: Sequence[SettledDirections], curve: Curve, folder: Pa
         about = replace(quantity, dims=("p", *plane), **({} if own == "right" else unit))
         numbers[replace(about, name=name)] = np.stack([getattr(each.fields, own) for each in shown])
     numbers[ERROR] = np.array([each.error for each in shown])
-    numbers[MOMENT] = np.array([each.pair.value for each in shown])
+    numbers[MOMENT] = np.array([each.value for each in shown])
     if grid.dimension == 4:
         share = replace(mean_share(grid), dims=("p",))
         numbers[share] = np.array([grid.share(each.fields.product) for each in shown])

@@ -143,7 +143,7 @@ def write_directions(found: Sequence[SettledDirections], curve: Curve, folder: P
     names = {each.pair.p: _name(stem, each.pair.p) for each in others}
     for each in others:
         data = {name: getattr(each.fields, own) for name, (own, _) in reversed(FIELDS.items())}
-        known = {"p": each.pair.p, "Lambda": each.pair.value}
+        known = {"p": each.pair.p, "Lambda": each.value}
         _write_plane(folder / names[each.pair.p], grid, {**data, **always}, {**known, **facts})
     if others:
         write_text(folder / f"{stem}.pvd", _collection((p, name, "") for p, name in names.items()))

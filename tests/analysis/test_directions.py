@@ -205,8 +205,10 @@ def test_noise_is_integrated_over():
     assert fields.total == pytest.approx(1, abs=1e-3)
 
 
-def test_what_densities_say(white):
-    density = tilted_density(white.pair(1.0))
+def test_what_densities_say():
+    solver = ExponentSolver(turning(4, np.eye(4)))
+    pair = solver.pair(1.0)
+    density = tilted_density(pair)
     assert repr(density).startswith("DirectionDensity(tilted density at p = 1, ± ")
     found = density.to_xarray()
     assert found.density.dims == ("eta", "phase_difference")
@@ -214,14 +216,14 @@ def test_what_densities_say(white):
     assert density.error < 0.02
     assert float(found.eta_weights @ found.density @ found.phase_difference_weights) == pytest.approx(1, abs=1e-12)
     axes = density.plot()
-    assert axes.get_xlabel() == r"share of x₃ in the energy, $\sin^2\eta$ (%)"
-    assert axes.get_ylabel().startswith("phase of x₁ less that of x₃")
-    assert white.pair(1.0).plot("T_adjoint").png.startswith(b"\x89PNG")
+    assert axes.get_xlabel().startswith("share of (x₃, x₄) in the sum of squares")
+    assert axes.get_ylabel().startswith("phase of (x₁, x₂) less that")
+    assert pair.plot("T_adjoint").png.startswith(b"\x89PNG")
     with pytest.raises(ValueError, match="cylinder"):
-        white.pair(1.0).plot(cylinder=True)
+        pair.plot(cylinder=True)
     with pytest.raises(ValueError, match="field"):
-        white.pair(1.0).plot("U")
+        pair.plot("U")
     with pytest.raises(ValueError, match="p = 0, but the pair has p = 1"):
-        stationary_density(white.pair(1.0))
+        stationary_density(pair)
     with pytest.raises(ValueError, match="two variables"):
-        furstenberg_khasminskii(white.pair(0.0))
+        furstenberg_khasminskii(solver.pair(0.0))
