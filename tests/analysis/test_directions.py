@@ -73,8 +73,7 @@ def test_isotropic_systems_in_any_coordinates(n, p):
 
 def test_uniform_densities_of_the_pictures():
     """1/(4π) per unit of the sphere, and sin 2η/(2π) over η and θ₁ − θ₂."""
-    pairs = [ExponentSolver(turning(n, np.eye(n))).pair(0.0) for n in (3, 4)]
-    three, four = map(stationary_density, pairs)
+    three, four = (stationary_density(ExponentSolver(turning(n, np.eye(n))).pair(0.0)) for n in (3, 4))
     np.testing.assert_allclose(three.values, 1 / (4 * math.pi), atol=1e-4)
     np.testing.assert_allclose(
         four.values, np.sin(2 * four.grid.first)[:, None] / (2 * math.pi) + 0 * four.values, atol=1e-4
@@ -123,9 +122,9 @@ def test_coordinates_of_a_user():
     assert pair_names(turning(4, np.eye(4))) == ("(x₁, x₂)", "(x₃, x₄)")
     shares = []
     for each in (problem(White(s=1.0)), Problem(modes, White(s=1.0)), TURNED):
-        fields = Directions(ExponentSolver(each, rtol=1e-4).pair(1.0)).on(DirectionGrid.of(each, 24))
+        fields = Directions(ExponentSolver(each, rtol=1e-3).pair(1.0)).on(DirectionGrid.of(each, 24))
         shares.append(fields.grid.share(fields.product))
-    np.testing.assert_allclose(shares, shares[0], rtol=1e-3)
+    np.testing.assert_allclose(shares, shares[0], rtol=1e-2)
 
 
 @pytest.mark.slow
@@ -187,6 +186,7 @@ def test_stationary_density_of_two_modes_against_paths(white):
         assert abs(np.mean(by_path) - expected) < 4 * error + 0.5 * density.error
 
 
+@pytest.mark.slow
 def test_noise_is_integrated_over():
     """At p = 2 ∫ T* eeᵀ dσ dξ of OU noise has the second moments of its Hermite hierarchy."""
     pair = ExponentSolver(problem(OrnsteinUhlenbeck(alpha=1.0, sigma=0.5 * math.sqrt(2))), rtol=1e-6).pair(2.0)
