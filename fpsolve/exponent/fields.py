@@ -219,7 +219,8 @@ def _refuse_more(pair: PrincipalPair) -> None:
     """Raises `OutputError` where T depends on more than φ and ξ."""
     problem = pair.generator.problem
     if problem.dimension > 2:
-        raise OutputError(f"T of {problem.dimension} variables is no function of phase and noise; use its `Directions`")
+        why = f"T of {problem.dimension} variables is no function of phase and noise"
+        raise OutputError(f"{why}; use `plot`, `tilted_density`, or a case, whose run writes files for ParaView")
     if why := problem.no_picture:
         raise OutputError(why)
 
