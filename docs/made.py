@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[1]
 CASES = [*sorted(ROOT.glob("cases/*.toml")), *sorted(ROOT.glob("cases/systems/*.toml"))]
 CHARTS = {path.name for path in (ROOT / "docs/charts").glob("*")}
 """Cases whose chart takes long; theirs is drawn from what `fpsolve chart` wrote once."""
-TWO_AXES = "filtered", "two_noises", "coupled"
+TWO_AXES = "filtered", "two_noises", "coupled", "coupled_ou"
 """Cases with a dimension more, which are drawn at fewer p, to four digits."""
 OWN_P = "stochastic_mathieu", "flutter"
 """Cases of which their own p are drawn."""

@@ -193,6 +193,14 @@ class Code(Enum):
         "warning: {name} at p = {p:g} is not resolved: {size:.0%} of it has the wrong sign; this hardly affects Λ, but "
         "do not rely on a picture of it"
     )
+    ROUGH_DENSITY = (
+        "warning: the densities of directions at p = {p:g} are rough: {size:?finer functions move {size:.0%} of "
+        "them¦none of finer functions were compared}; this hardly affects Λ, but do not rely on their details"
+    )
+    FINE_DENSITY = (
+        "warning: the densities of directions at p = {p:g} are finer than the nodes of their pictures, which miss "
+        "{size:.1%} of them; this hardly affects Λ, but do not rely on their heights"
+    )
     NOTHING_DRAWN = "warning: neither the stationary density nor eigenfunctions are written: {reason}"
 
     INDEX_FAILED = "failure: no {symbols}: {reason}"

@@ -3,6 +3,7 @@ from .density import adjoint_density as adjoint_density
 from .density import furstenberg_khasminskii as furstenberg_khasminskii
 from .density import stationary_density as stationary_density
 from .density import tilted_density as tilted_density
+from .directions import DirectionDensity as DirectionDensity
 from .inverse import Design as Design
 from .inverse import design as design
 from .sensitivity import Sensitivities as Sensitivities

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fpsolve.analysis.directions import DirectionDensity, settled_directions
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import QUARTERS, add_legend, coloured, draw_plane, label_axes
@@ -100,8 +101,8 @@ class Density(Result):
         return self.phi_weights @ self.values
 
 
-def stationary_density(pair: PrincipalPair) -> Density:
-    """ρ(φ, ξ), solution of the Fokker-Planck equation L*(0)ρ = 0.
+def stationary_density(pair: PrincipalPair) -> Density | DirectionDensity:
+    """ρ(φ, ξ), solution of the Fokker-Planck equation L*(0)ρ = 0; of more than two variables that of directions.
 
     Raises:
         NotConverged: too much of it is negative; `partial` is what was found.
@@ -110,13 +111,13 @@ def stationary_density(pair: PrincipalPair) -> Density:
     return _checked(pair, _density(_of_zero(pair), "adjoint"), "stationary density")
 
 
-def adjoint_density(pair: PrincipalPair) -> Density:
-    """T*(φ, ξ; p) normalised to 1. Raises `NotConverged` where too much of it is negative."""
+def adjoint_density(pair: PrincipalPair) -> Density | DirectionDensity:
+    """T*(φ, ξ; p) normalised to 1, or that of directions. Raises `NotConverged` where too much of it is negative."""
     return _checked(pair, _density(pair, "adjoint"), "adjoint density")
 
 
-def tilted_density(pair: PrincipalPair) -> Density:
-    """T T*: how phase and noise are distributed along the paths that carry the p-th moment.
+def tilted_density(pair: PrincipalPair) -> Density | DirectionDensity:
+    """T T*: how phase and noise, or directions, are distributed along the paths that carry the p-th moment.
 
     Raises:
         NotConverged: too much of it is negative; `partial` is what was found.
@@ -136,8 +137,10 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     log-amplitude jumps by ln R; it is taken on the side from where the impact is met.
 
     Raises:
-        ValueError: the pair is not the one at p = 0, or several noises have values.
+        ValueError: the pair is not the one at p = 0, several noises have values, or there are more than two variables.
     """
+    if pair.generator.problem.dimension > 2:
+        raise ValueError("the formula is for two variables, but there are more; use lyapunov_exponent")
     if len(pair.generator.problem.coloured.parts) > 1:
         raise ValueError("the formula is for one noise that is not white, but there are several; use lyapunov_exponent")
     space, problem, at = _of_zero(pair).space, pair.generator.problem, pair.space.xi.samples()
@@ -169,7 +172,7 @@ def _of_zero(pair: PrincipalPair) -> PrincipalPair:
     raise ValueError(f"the stationary density is the adjoint eigenfunction at p = 0, but the pair has p = {pair.p:g}")
 
 
-def _checked(pair: PrincipalPair, density: Density, name: str) -> Density:
+def _checked(pair: PrincipalPair, density: Density | DirectionDensity, name: str) -> Density | DirectionDensity:
     """The density, if it is one. Raises `NotConverged`."""
     share = density.negative_share()
     if share > MOST_NEGATIVE:
@@ -177,8 +180,14 @@ def _checked(pair: PrincipalPair, density: Density, name: str) -> Density:
     return density
 
 
-def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Density:
-    """One of the `Fields`, normalised, repeated from a half circle to the full one."""
+def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Density | DirectionDensity:
+    """One of the `Fields`, normalised, repeated from a half circle to the full one; or that of directions."""
+    words = "tilted" if name == "product" else "adjoint" if pair.p else "stationary"
+    title = f"{words} density at p = {pair.p:g}"
+    if pair.generator.problem.dimension > 2:
+        found = settled_directions(pair)
+        values = getattr(found.fields, name)
+        return DirectionDensity(found.fields.grid, values, found.error, title, pair.generator.problem.values)
     space, at, turns, frame = pair.space, pair.space.xi.samples(), pair.space.turns, pair.generator.problem.frame
     points, weights = space.phi.points, space.phi.weights
     if frame is not None:
@@ -189,6 +198,5 @@ def _density(pair: PrincipalPair, name: Literal["adjoint", "product"]) -> Densit
     order = np.argsort(phi)
     phi, values, phi_weights = phi[order], values[order], np.tile(weights, turns)[order]
     total, problem = phi_weights @ values @ at.measure, pair.generator.problem
-    words = "tilted" if name == "product" else "adjoint" if pair.p else "stationary"
-    about = f"{words} density at p = {pair.p:g}", problem.noise_quantity, problem.values, problem.noise.has_states
+    about = title, problem.noise_quantity, problem.values, problem.noise.has_states
     return Density(phi, at.xi, phi_weights, at.measure, values / total, *about)

@@ -132,7 +132,7 @@ def changed_value(pair: PrincipalPair, by: ParameterDerivative) -> Estimate:
     x, y, turns = pair.right, pair.left, pair.space.turns
     factors = list(pair.generator.changed(by, pair.p).terms)
     if (mass := pair.generator.changed_mass(by, pair.p)) is not None:
-        factors += [(-pair.value * phase, *noises) for phase, *noises in mass.terms]
+        factors += [(-pair.eigenvalue * phase, *noises) for phase, *noises in mass.terms]
     terms = [KroneckerSum([each]) for each in factors]
     parts = turns * np.array([y @ (term @ x) for term in terms])
     sizes = turns * np.array([abs(y) @ (abs(term) @ abs(x)) for term in terms])
@@ -166,7 +166,7 @@ def _operator(
     pair: PrincipalPair, by: ParameterDerivative, k: int, change: float, own: float | None = None
 ) -> Callable[[FloatArray], FloatArray]:
     """∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M − ∂Λ⁽ᵏ⁾/∂θ M."""
-    value = own if own is not None else (pair.value, pair.derivative)[k]
+    value = own if own is not None else (pair.eigenvalue, pair.derivative)[k]
     operator, mass = pair.generator.changed(by, pair.p, derivative=k), pair.generator.changed_mass(by, pair.p)
 
     def image(v: FloatArray) -> FloatArray:

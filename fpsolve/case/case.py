@@ -59,6 +59,8 @@ COMPUTED = ("oscillator", "system", "noise", "vary", "mesh")
 """The sections that say of what the numbers are."""
 MOST_DRAWN = 10
 """Of so many curves at most eigenfunctions are written unasked."""
+MOST_DENSITIES = 3
+"""p of which densities of more than two variables are written unasked, which take seconds each."""
 USUAL_P = 2.0
 _NO_FOLDER = re.compile(r".*[. ]|(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE | re.DOTALL)
 """Names that are ".", "..", or what Windows changes or has for devices."""
@@ -211,15 +213,16 @@ class Case(Section):
 
     @property
     def shown(self) -> FloatArray:
-        """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread, or none."""
+        """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread, or none.
+
+        Of more than two variables at most three.
+        """
         wanted = self.output.eigenfunctions
-        if (
-            EIGENFUNCTIONS not in self.output.quantities
-            or self.leaves_out_eigenfunctions
-            or not self.problem.is_on_cylinder
-        ):
+        if EIGENFUNCTIONS not in self.output.quantities or self.leaves_out_eigenfunctions or self.problem.no_picture:
             wanted = ()
-        return _spread(self.p) if wanted is None else np.array([self.p[np.argmin(np.abs(self.p - p))] for p in wanted])
+        if wanted is None:
+            return _spread(self.p, 9 if self.problem.dimension == 2 else MOST_DENSITIES)
+        return np.array([self.p[np.argmin(np.abs(self.p - p))] for p in wanted])
 
     @property
     def usual_p(self) -> float:
@@ -353,5 +356,5 @@ def _faults_of_name(name: str) -> Iterator[Fault]:
         yield Fault("", None, f"{text}{remedy}; rename the file")
 
 
-def _spread(p: FloatArray) -> FloatArray:
-    return np.sort(p)[np.unique(np.linspace(0, p.size - 1, min(p.size, 9)).round().astype(int))]
+def _spread(p: FloatArray, most: int = 9) -> FloatArray:
+    return np.sort(p)[np.unique(np.linspace(0, p.size - 1, min(p.size, most)).round().astype(int))]

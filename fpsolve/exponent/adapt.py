@@ -258,7 +258,7 @@ class NearPlace:
         if elsewhere is None:
             return found
         other = search.run(first(self.problem, search.p, self.rtol, elsewhere))
-        return max(found, other, key=lambda each: each.value)
+        return max(found, other, key=lambda each: each.pair.value)
 
     @cached_property
     def given(self) -> tuple[Generator, Generator]:
@@ -270,7 +270,7 @@ class NearPlace:
     def meets(self, solution: Solution, tolerance: Tolerance) -> bool:
         """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
         pair = solution.pair
-        return abs(pair.p) < self.small_p or solution.error <= tolerance(pair.p, solution.value)
+        return abs(pair.p) < self.small_p or solution.error <= tolerance(pair.p, pair.value)
 
     def trimmed(self, solution: Solution, tolerance: Tolerance) -> Discretisation:
         """The discretisation of a solution, or a much smaller one that would do."""
@@ -314,7 +314,7 @@ class FarPlaces(NearPlace):
         if start is not None and len(wanted) == 1:
             return search.run(start)
         found = (search.run(first_far(self.problem, place, self.rtol)) for place in wanted)
-        return max(found, key=lambda each: each.value)
+        return max(found, key=lambda each: each.pair.value)
 
     def fits(self, generator: Generator, q: float, p: float) -> bool:
         if generator.chosen.is_killed:
@@ -344,7 +344,7 @@ class AllPlaces:
         far = self.far.solution(p, tolerance, countdown) if other_places(near.pair) else None
         if far is None or far.pair.value - far.error < near.pair.value + 10 * near.error:
             near = self.near.solution(p, tolerance, countdown)
-        found = max((each for each in (near, far) if each), key=lambda each: each.value)
+        found = max((each for each in (near, far) if each), key=lambda each: each.pair.value)
         if found.pair.value + found.error < 0 and grows_far_out(self.near.problem):
             raise NotConverged(Message(Code.HELD_TOO_FAR, p=p, z=FURTHEST, value=found.pair.value))
         return found
@@ -489,7 +489,7 @@ class _Search:
     def stop(self, reason: Message) -> NoReturn:
         """Raise `NotConverged` with the best solution."""
         if best := self.best:
-            reached = {"value": best.value, "error": self.error, "size": self.share}
+            reached = {"value": best.pair.value, "error": self.error, "size": self.share}
             told = Message(Code.BUDGET_SPENT, p=self.p, reason=reason, **reached)
         else:
             last, is_thin = self.failure, isinstance(self.failure, NotConverged)

@@ -60,18 +60,19 @@ class PrincipalPair(EigenfunctionPlot):
 
     Attributes:
         p: the moment.
-        value: Λ(p), per unit time.
+        eigenvalue: of the matrix of L(p), per unit time.
         right: coefficients of T, shape (size,); its mean over the weight of the space, P_s without a tilt, is 1.
         left: coefficients of T*/P_s, shape (size,); ∫T T* dφ dξ over the full circle is 1.
         derivative: Λ′(p) = ⟨T*, L′(p) T⟩ (Hellmann-Feynman).
         residual: the larger of the two backward errors ‖(L − Λ)T‖/(‖L‖‖T‖), also for T*.
-        rounding: bound on the effect of rounding on `value`.
+        rounding: bound on the effect of rounding on `eigenvalue`.
         sign_defects: shares of T and of T* that are not positive, by their own size or by |T T*|.
         generator: what was solved.
+        correction: what functions beyond those of the mesh change in Λ(p), to first order.
     """
 
     p: float
-    value: float
+    eigenvalue: float
     right: FloatArray
     left: FloatArray
     derivative: float
@@ -79,6 +80,12 @@ class PrincipalPair(EigenfunctionPlot):
     rounding: float
     sign_defects: tuple[float, float]
     generator: Generator
+    correction: float = 0.0
+
+    @property
+    def value(self) -> float:
+        """Λ(p), per unit time."""
+        return self.eigenvalue + self.correction
 
     def __repr__(self) -> str:
         of_p = f"({self.p:g}) = "
@@ -335,7 +342,7 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
         rounding = max(rounding, abs(value))
     return PrincipalPair(
         p=p,
-        value=value,
+        eigenvalue=value,
         right=x,
         left=y,
         derivative=float(y @ (generator.matrix(p, derivative=1) @ x) / norm),
@@ -417,11 +424,11 @@ class Bordered:
         self.pair, self._weighed = pair, (pair.space.weighed(pair.right), pair.space.weighed(pair.left))
         self.norm = float(pair.left @ self._weighed[0])
         self._pencil = pair.generator.at(pair.p)
-        self._operator = self._pencil.matrix.shifted(pair.value)
+        self._operator = self._pencil.matrix.shifted(pair.eigenvalue)
 
     @cached_property
     def _factor(self) -> Factors:
-        return self._pencil.factorised(self.pair.value + 1e-6 * self.pair.generator.unit_rate)
+        return self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self.pair.generator.unit_rate)
 
     def solve(self, source: FloatArray, *, adjoint: bool = False) -> FloatArray:
         """v from the load f."""

@@ -141,19 +141,12 @@ class Solution:
     Attributes:
         pair: the principal pair.
         finer: that on a finer mesh, which measures the error of a given mesh: it may have few modes.
-        search: the error of the place among several problems where the value is the least, or of the correction.
-        correction: what functions beyond those of the pair change in Λ(p), to first order.
+        search: the error of the place among several problems where the value is the least, or of the correction of `pair`.
     """
 
     pair: PrincipalPair
     finer: PrincipalPair | None = None
     search: float = 0.0
-    correction: float = 0.0
-
-    @property
-    def value(self) -> float:
-        """Λ(p)."""
-        return self.pair.value + self.correction
 
     @cached_property
     def effects(self) -> tuple[ModeEffects | None, ...]:
@@ -174,7 +167,7 @@ class Solution:
 
     @cached_property
     def error(self) -> float:
-        """Estimate of the error of `value`: discretisation, truncation and rounding."""
+        """Estimate of the error of `pair.value`: discretisation, truncation and rounding."""
         if self.finer is not None:
             return self._beside(self.finer) + self._other
         if not self.corners:
@@ -209,7 +202,7 @@ class Solution:
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     """The effects along every direction of every axis; None along one that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
-    operator = pair.generator.at(pair.p).matrix.shifted(pair.value)
+    operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
     tables, found = (space.table(pair.right), space.table(pair.left)), list[ModeEffects | None]()
     directions = [(at, axis, *ladder) for at, axis in enumerate(space.axes) for ladder in axis.ladders]
     for at, axis, cells, modes, own in directions:

@@ -12,12 +12,15 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, replace
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
+from fpsolve.drawing import SIZE, STYLE
 from fpsolve.errors import OutputError
+from fpsolve.exponent.directions import Directions
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.model.problem import parameter_lines
 from fpsolve.model.quantity import PHASE, Quantity, density_unit
@@ -214,7 +217,11 @@ class Strips(Nodes):
 
 def _refuse_more(pair: PrincipalPair) -> None:
     """Raises `OutputError` where T depends on more than φ and ξ."""
-    if why := pair.generator.problem.no_picture:
+    problem = pair.generator.problem
+    if problem.dimension > 2:
+        why = f"T of {problem.dimension} variables is no function of phase and noise"
+        raise OutputError(f"{why}; use `plot`, `tilted_density`, or a case, whose run writes files for ParaView")
+    if why := problem.no_picture:
         raise OutputError(why)
 
 
@@ -253,6 +260,9 @@ class EigenfunctionPlot:
     def plot(self, field: Field = "T", *, cylinder: bool = False, cmap: str = "viridis") -> Picture:
         """Draw an eigenfunction, or the tilted density, over phase and noise; for noise with states a line for each.
 
+        Of more than two variables over directions, see `analysis.DirectionDensity`, as the functions of this pair have
+        it: T as its mean, T* and T T* as densities.
+
         In space by pyvista where this machine can render, which takes some seconds to find out the first time; else in
         the plane by matplotlib.
 
@@ -262,10 +272,15 @@ class EigenfunctionPlot:
             cmap: the colours, by matplotlib's names.
 
         Raises:
-            ValueError: there is no such field.
+            ValueError: there is no such field, or a cylinder is wanted of more than two variables.
             OutputError: T depends on more than φ and ξ.
         """
-        surface = surface_of(self, field)  # type: ignore[arg-type]
+        pair: PrincipalPair = self  # type: ignore[assignment]
+        if pair.generator.problem.dimension > 2:
+            if cylinder:
+                raise ValueError("got cylinder = True, which is for functions of phase and noise; leave it out")
+            return _picture_of_directions(pair, _known(field), cmap)
+        surface = surface_of(pair, field)
         if surface.is_lines:
             return flat_picture(surface, cmap)
         if can_render():
@@ -279,11 +294,38 @@ class EigenfunctionPlot:
         return flat_picture(surface, cmap)
 
 
-def surface_of(pair: PrincipalPair, field: str) -> Surface:
-    """A function of a pair where it is not negligible, with its words. Raises `ValueError`."""
+def _known(field: str) -> str:
+    """The name of a field. Raises `ValueError`."""
     if field not in FIELDS:
         raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
-    (name, quantity), problem = FIELDS[field], pair.generator.problem
+    return field
+
+
+def title_of(pair: PrincipalPair) -> str:
+    """p and Λ(p) in words."""
+    return f"p = {pair.p:g}, Λ(p) = {round(pair.value, 14) + 0.0:.6g} (1/time)"
+
+
+def _picture_of_directions(pair: PrincipalPair, field: str, cmap: str) -> Picture:
+    """A function of directions in colours."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    found, (name, quantity), content = Directions(pair).fields, FIELDS[field], BytesIO()
+    unit = quantity.unit if name == "right" else found.grid.unit
+    with rc_context(STYLE):
+        figure = Figure(figsize=SIZE, layout="constrained")
+        axes = figure.add_subplot()
+        found.grid.draw(axes, getattr(found, name), {**quantity.attributes, "units": unit}, cmap=cmap)
+        figure.suptitle(title_of(pair), parse_math=False)
+        axes.set_title("\n".join(parameter_lines(pair.generator.problem.parameters)), fontsize=9, parse_math=False)
+    figure.savefig(content, format="png", dpi=150)
+    return Picture(content.getvalue())
+
+
+def surface_of(pair: PrincipalPair, field: str) -> Surface:
+    """A function of a pair where it is not negligible, with its words. Raises `ValueError`."""
+    (name, quantity), problem = FIELDS[_known(field)], pair.generator.problem
     nodes, noise, is_lines = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity, problem.noise.has_states
     unit = quantity.unit if name == "right" else "1/rad" if is_lines else density_unit(noise)
     xi = pair.space.xi.support if is_lines else nodes.unit * nodes.z
@@ -296,7 +338,7 @@ def surface_of(pair: PrincipalPair, field: str) -> Surface:
         values=values[:, :: nodes.order + 1] if is_lines else values,
         about=about,
         name=quantity.symbol,
-        title=f"p = {pair.p:g}, Λ(p) = {round(pair.value, 14) + 0.0:.6g} (1/time)",
+        title=title_of(pair),
         lines=parameter_lines(problem.parameters),
         impacts=sorted(rays),
         is_lines=is_lines,

@@ -193,9 +193,10 @@ class SpherePlace(NearPlace):
                 continue
             level += 1
             change = self._change(pair, level)
-            values.append(pair.value + change)
+            pair = replace(pair, correction=change)
+            values.append(pair.value)
             left = max(abs(change), LEFT * abs(values[-1] - values[-2])) if len(values) > 1 else ALONE * abs(change)
-            solution = Solution(pair, search=left, correction=change)
+            solution = Solution(pair, search=left)
             if solution.error <= allowed:
                 return solution
             search.note(solution, solution.error, allowed)
@@ -204,10 +205,10 @@ class SpherePlace(NearPlace):
         """What the waves of the next level change in Λ(p), to first order."""
         generator = self._generator(level)
         pencil, space, old = generator.at(pair.p), generator.space(pair.p), pair.space
-        operator, new = pencil.matrix.shifted(pair.value), space.phi.degrees > pair.generator.chosen.phase.waves
+        operator, new = pencil.matrix.shifted(pair.eigenvalue), space.phi.degrees > pair.generator.chosen.phase.waves
         right = space.table(operator @ space.carry(pair.right, old))[new].ravel()
         left = space.table(operator.T @ space.carry(pair.left, old))[new].ravel()
-        factors = pencil.on(new).factorised(pair.value)
+        factors = pencil.on(new).factorised(pair.eigenvalue)
         return float(-left @ factors.solve(right) / (pair.left @ old.weighed(pair.right)))
 
     def _begin(self, chosen: Discretisation) -> None:

@@ -232,7 +232,7 @@ class ExponentSolver:
             found = [each.solution(point, tolerance) for each in self.classes]
             if point < 0 and len(found) > 1:
                 return self._least(point, tolerance, *found)
-            return max(found, key=lambda each: each.value)
+            return max(found, key=lambda each: each.pair.value)
         return self.place.solution(point, tolerance)
 
     def _least(self, p: float, tolerance: Tolerance | None, *ends: Solution) -> Solution:
@@ -249,17 +249,17 @@ class ExponentSolver:
 
         along, across = ends
         for end, share in ((along, 1 - NEAR_END), (across, NEAR_END)):
-            if at(share).value >= end.value:
+            if at(share).pair.value >= end.pair.value:
                 return end
         tried = list(ends)
 
         def value(share: float) -> float:
             tried.append(at(share))
-            return tried[-1].value
+            return tried[-1].pair.value
 
         minimize_scalar(value, bounds=(0.0, 1.0), method="bounded", options={"xatol": CLOSE})
-        best, second = sorted(tried, key=lambda each: each.value)[:2]
-        return replace(best, search=second.value - best.value)
+        best, second = sorted(tried, key=lambda each: each.pair.value)[:2]
+        return replace(best, search=second.pair.value - best.pair.value)
 
     def by_class(self, p: ArrayLike) -> tuple[InvariantClass, ...]:
         """λ and Λ(p) of the `classes`; nothing where the phase leaves every ray. Raises `NotConverged`."""
@@ -269,7 +269,7 @@ class ExponentSolver:
             solutions = [each.solution(float(point)) for point in points]
             value, error = (
                 np.array(column, dtype=float)
-                for column in ([one.value for one in solutions], [one.error for one in solutions])
+                for column in ([one.pair.value for one in solutions], [one.error for one in solutions])
             )
             is_along = number < len(phases)
             phase = phases[number] if is_along else phases[0]
@@ -309,8 +309,7 @@ class ExponentSolver:
         pairs = tuple(solutions[i].pair for i in sorted(solutions))
         found = np.array([pair.p for pair in pairs])
         errors = np.array([solutions[i].error for i in sorted(solutions)])
-        value = np.array([solutions[i].value for i in sorted(solutions)])
-        slope = np.array([pair.derivative for pair in pairs])
+        value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("value", "derivative"))
         value[found == 0], errors[found == 0] = 0.0, 0.0  # but for rounding, in every space
         if grows_far_out(self.problem):
             slope[found == 0] = np.minimum(slope[found == 0], 0.0)  # from the left, where Λ is finite
@@ -330,7 +329,7 @@ class ExponentSolver:
     def estimate(self, solution: Solution) -> Estimate:
         """Λ(p) on the scale of the terms of Eq. (37) before they cancel."""
         p = solution.pair.p
-        return Estimate(solution.value, solution.error, self.scale(p), quantity=quantity.moment_at(p))
+        return Estimate(solution.pair.value, solution.error, self.scale(p), quantity=quantity.moment_at(p))
 
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
@@ -388,12 +387,12 @@ class ExponentSolver:
         """
         if abs(p) >= TINY_P:
             solution = self._nearest(p, tolerance)
-            return solution.value / p, solution.error / abs(p)
+            return solution.pair.value / p, solution.error / abs(p)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.near.solution(point, tolerance).pair for point in points]
         near = self.near.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
-        return float(np.mean([pair.derivative for pair in pairs])) + near.correction / near.pair.p, error
+        return float(np.mean([pair.derivative for pair in pairs])) + near.pair.correction / near.pair.p, error
 
 
 def tolerated(rtol: float, scales: Scale, p: float, value: float) -> float:

@@ -99,6 +99,11 @@ class PhaseCells:
         """Number of unknowns."""
         return int(np.sum(self.degrees + 1))
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a table says of it."""
+        return {"phi_cells": self.lines.size - 1, "phi_degrees": [int(degree) for degree in self.degrees]}
+
     def axis(self) -> PhaseAxis:
         """The functions."""
         return PhaseAxis(self.lines, self.degrees)

@@ -16,6 +16,7 @@ Polynomials in e know no coordinates: rotations change nothing. They fail where 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations, combinations_with_replacement
@@ -23,10 +24,10 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity
-from scipy.special import eval_jacobi, roots_jacobi
+from scipy.special import betaln, eval_jacobi, gammaln, roots_jacobi
 
 from fpsolve.arrays import FloatArray, one
-from fpsolve.fem.sphere import Coordinates, DirectionAxis, group, group_dimensions
+from fpsolve.fem.sphere import Coordinates, DirectionAxis, group, group_dimensions, waves_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +56,11 @@ class HarmonicCells:
     def enriched(self) -> HarmonicCells:
         """Two degrees more."""
         return replace(self, waves=self.waves + 2)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a table says of it."""
+        return {"harmonics": self.waves}
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,3 +210,36 @@ class HarmonicAxis(DirectionAxis):
 
     def _form(self, left: Any, right: Any) -> FloatArray:
         return np.asarray((left.T @ right).toarray())
+
+    @property
+    def area(self) -> float:
+        """That of the sphere, as harmonics are orthonormal in the mean."""
+        return 2 * math.pi ** (self.n / 2) / math.gamma(self.n / 2)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        dimensions, most = group_dimensions(self.n), self.chosen.waves + 2
+        sides = np.linalg.norm(points[: dimensions[0]], axis=0), np.linalg.norm(points[dimensions[0] :], axis=0)
+        x = (sides[0] - sides[1]) * (sides[0] + sides[1])
+        degrees = [group(k, most).degrees for k in dimensions]
+        of_waves = waves_at(dimensions, most, points).reshape(x.size, *map(len, degrees))
+        columns, own_degrees = list[FloatArray](), list[Any]()
+        for m, k in ((m, k) for m in np.unique(degrees[0]) for k in np.unique(degrees[1])):
+            if (m + k) % 2 or m + k > most:
+                continue
+            rows = np.arange((most - m - k) // 2 + 1)
+            alpha, beta = k + dimensions[1] / 2 - 1, m + dimensions[0] / 2 - 1
+            own = (sides[0] ** m * sides[1] ** k)[:, None] * eval_jacobi(rows, alpha, beta, x[:, None])
+            own = own / np.sqrt(_mean_squares(rows, alpha, beta, dimensions))
+            of_pair = of_waves[:, degrees[0] == m][:, :, degrees[1] == k].reshape(x.size, -1)
+            columns.append((of_pair[:, :, None] * own[:, None, :]).reshape(x.size, -1))
+            own_degrees.append(np.tile(m + k + 2 * rows, of_pair.shape[1]))
+        by_degree = np.argsort(np.concatenate(own_degrees), kind="stable")
+        return np.concatenate(columns, axis=1)[:, by_degree[self._harmonics.own]]
+
+
+def _mean_squares(degrees: Any, alpha: float, beta: float, dimensions: tuple[int, int]) -> FloatArray:
+    """The means of cos^2m η sin^2k η P² over the sphere, of Jacobi polynomials P of some degrees."""
+    low, high = (0.5 * each for each in dimensions)
+    logs = gammaln(degrees + alpha + 1) + gammaln(degrees + beta + 1) - gammaln(degrees + 1)
+    logs -= gammaln(degrees + alpha + beta + 1) + betaln(low, high)
+    return np.asarray(np.exp(logs) / (2 * degrees + alpha + beta + 1))

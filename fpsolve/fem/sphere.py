@@ -106,6 +106,11 @@ class SphereCells:
         lines = np.sort(np.append(self.lines, 0.5 * (self.lines[1:] + self.lines[:-1])))
         return replace(self, lines=lines, degree=MOST_DEGREE // 2 + 2)
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a table says of it."""
+        return {"eta_cells": self.lines.size - 1, "eta_degree": self.degree, "waves": self.waves}
+
 
 @dataclass(frozen=True, eq=False)
 class Waves:
@@ -257,6 +262,15 @@ class DirectionAxis(Axis):
         """What is added against pairs that no path has."""
         return 0.0 * self.identity
 
+    @property
+    def area(self) -> float:
+        """dσ/dμ of the surface of the sphere and the measure of the inner products."""
+        raise NotImplementedError
+
+    def at(self, points: FloatArray) -> Any:
+        """Values at any directions y, shape (n, m), as rows of E with u(y) = E @ coefficients, shape (m, size)."""
+        raise NotImplementedError
+
 
 class SphereAxis(DirectionAxis):
     """Continuous elements in η times waves of the other angles, see the module.
@@ -383,6 +397,47 @@ class SphereAxis(DirectionAxis):
         weights = weights * np.cos(inner) ** (first + 1) * np.sin(inner) ** (second + 1)
         jump = self.line.jumps_of_slope().toarray()
         return self._assembled([-(jump.T @ (weights[:, None] * jump))], [np.eye(self.waves.own.size)])
+
+    @property
+    def area(self) -> float:
+        """|S^(n₁ − 1)| |S^(n₂ − 1)|, as waves are orthonormal in the mean over both groups."""
+        return math.prod(2 * math.pi ** (k / 2) / math.gamma(k / 2) for k in self.chosen.dimensions)
+
+    def at(self, points: FloatArray) -> csr_matrix:
+        first, second = (points[each] for each in self._slices)
+        on_line = self.line.at(np.arctan2(np.linalg.norm(second, axis=0), np.linalg.norm(first, axis=0)))
+        of_waves = waves_at(self.chosen.dimensions, self.chosen.waves + 2, points)[:, self._of_product]
+        shape = len(of_waves), self.chosen.degree + 1
+        nodes, values = (each.reshape(shape) for each in (on_line.indices, on_line.data))
+        place = np.full(self.line.size * self.waves.own.size, -1)
+        place[self._kept] = np.arange(self.size)
+        columns = place[nodes[:, :, None] * self.waves.own.size + np.arange(self.waves.own.size)]
+        entries = np.where(columns >= 0, values[:, :, None] * of_waves[:, None, :], 0.0)
+        starts = np.arange(len(entries) + 1) * math.prod(entries.shape[1:])
+        return csr_matrix((entries.ravel(), np.maximum(columns, 0).ravel(), starts), shape=(len(entries), self.size))
+
+    @cached_property
+    def _of_product(self) -> Any:
+        """Where the waves that functions have are among all products of `waves_at`."""
+        reach = self.chosen.waves + 2
+        first, second = (group(k, reach).degrees for k in self.chosen.dimensions)
+        sums = np.add.outer(first, second).ravel()
+        return np.flatnonzero((sums % 2 == 0) & (sums <= reach))[self.waves.own]
+
+
+def waves_at(dimensions: tuple[int, int], most: int, points: FloatArray) -> FloatArray:
+    """The products of the waves of both groups up to a degree, at directions; shape (m, products)."""
+    tables, start = list[FloatArray](), 0
+    for dimension in dimensions:
+        own, start = points[start : start + dimension], start + dimension
+        if dimension == 1:
+            tables.append(np.stack([np.ones(own.shape[1]), np.where(own[0] < 0, -1.0, 1.0)], axis=1))
+            continue
+        turns = np.outer(np.arctan2(own[1], own[0]), np.arange(1, most + 1))
+        waves = math.sqrt(2) * np.stack([np.cos(turns), np.sin(turns)], axis=2)
+        tables.append(np.column_stack([np.ones(len(turns)), waves.reshape(len(turns), -1)]))
+    first, second = tables
+    return (first[:, :, None] * second[:, None, :]).reshape(len(first), -1)
 
 
 class SphereTerms(NoiseTerms):

@@ -134,16 +134,13 @@ class Problem:
     @property
     def is_on_cylinder(self) -> bool:
         """Whether functions of it are of φ and of one ξ, so that they make a surface, or a line for each state."""
-        return not self.no_picture
+        return self.dimension == 2 and not self.no_picture
 
     @property
     def no_picture(self) -> str:
-        """Why functions of it are neither; empty where they are."""
+        """Why functions of it cannot be drawn; empty where they can, of more than two variables over directions."""
         if self.dimension > 2:
-            return (
-                f"an eigenfunction of {self.dimension} variables is not a function of phase and noise, which could be "
-                "drawn; look at Λ(p)"
-            )
+            return ""
         if len(self.coloured.parts) > 1:
             several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
             return f"{several}; make all of these noises white but one"

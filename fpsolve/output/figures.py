@@ -151,7 +151,7 @@ def draw(
     if not case.output.figure or setting.needed not in case.output.quantities or not results:
         return
     held = held_in_words(results[0].curve, case.vary.keys, setting.time_unit)
-    with figure_for(*_headed(folder, "figure", into, case.caption), held, FORMATS[setting.width]) as figure:
+    with figure_for(*headed(folder, "figure", into, case.caption), held, FORMATS[setting.width]) as figure:
         axes = figure.add_subplot()
         if other := map_key(setting, case.vary):
             _draw_map(axes, case, results, (setting.x, other), folder)
@@ -179,7 +179,7 @@ def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path,
             bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
         held = held_in_words(result.curve, (), case.figure.time_unit)
         name = f"sensitivities{result.curve.suffix}"
-        with figure_for(*_headed(folder, name, into, case.headline), held) as figure:
+        with figure_for(*headed(folder, name, into, case.headline), held) as figure:
             words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
             draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).shown for key in found.theta])
 
@@ -190,14 +190,14 @@ def draw_response(case: Case, simulated: SimulatedCurve, folder: Path, *, into: 
         return
     name = f"response{simulated.curve.suffix}"
     held = held_in_words(simulated.curve, (), "time")
-    with figure_for(*_headed(folder, name, into, case.headline), held, Format(width=10.5)) as figure:
+    with figure_for(*headed(folder, name, into, case.headline), held, Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
         simulated.response.plot(plane)
         figure.get_layout_engine().set(wspace=0.1)
         simulated.response.plot_amplitude(radial)
 
 
-def _headed(folder: Path, name: str, into: Path | None, heading: str) -> tuple[list[Path], str]:
+def headed(folder: Path, name: str, into: Path | None, heading: str) -> tuple[list[Path], str]:
     """Where a figure goes, and its heading; one drawn into a page has none, as the page has it."""
     return ([into], "") if into else ([folder / f"{name}.{ending}" for ending in ("png", "pdf")], heading)
 

@@ -26,6 +26,7 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STAB
 from fpsolve.files import parsed_json, plain_text, write_text
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.output.charts import draw_chart
+from fpsolve.output.directions import directions_file, draw_densities
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, region_meaning, simulated_meanings
 from fpsolve.output.proofs import PROOF, between, proof_grid, proofs_grid
@@ -212,6 +213,12 @@ def _figures(case: Case, found: Found, folder: Path) -> Iterator[Figure]:
     for result in found.results[:MOST_PICTURES]:
         title = f"Effect of the parameters{_of(result.curve)}"
         jobs.append((f"sensitivities{result.curve.suffix}", title, partial(draw_sensitivities, case, [result], folder)))
+        if directions_file(result.curve, folder).is_file():
+            title = (
+                f"Densities of {'energy share and phase difference' if case.problem.dimension == 4 else 'directions'}"
+            )
+            draw_it = partial(draw_densities, case, [result], folder)
+            jobs.append((f"densities{result.curve.suffix}", f"{title}{_of(result.curve)}", draw_it))
     for each in found.simulated[:MOST_PICTURES]:
         title = f"Simulated stationary response{_of(each.curve)}"
         jobs.append((f"response{each.curve.suffix}", title, partial(draw_response, case, each, folder)))
@@ -227,7 +234,7 @@ def _figures(case: Case, found: Found, folder: Path) -> Iterator[Figure]:
                     yield Figure(title, svg=_inlined(path.read_text(encoding="utf-8"), name))
             except Exception as failure:
                 yield Figure(title, missing=_no_picture(f"{type(failure).__name__}: {failure}"))
-        if found.results and case.shown.size:
+        if found.results and case.shown.size and case.problem.dimension == 2:
             yield from _eigenfunctions(case, found.results[:MOST_PICTURES], folder, Path(place))
 
 

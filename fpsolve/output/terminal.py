@@ -80,14 +80,15 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
     Of more than `MOST_ROWS` curves the extreme and the failed ones have one.
     """
     quantities = _quantities(case)
+    theories = [each for each in quantities if each.value is None and any(map(each.text, results))]
+    quantities = [each for each in quantities if each.value is not None or each in theories]
     is_digest = len(results) > MOST_ROWS
     chosen = _chosen(results, quantities) if is_digest else [("", result) for result in results]
     has_status = len(results) > MOST_TABLES or any(result.status for _, result in chosen)
     columns = [*varied_columns(case), *quantities]
     is_whole = all(result.status == Status.CONVERGED for _, result in chosen)
     columns += [Column("status", 1 if is_whole else 0)] * has_status + [Column("which", is_text=True)] * is_digest
-    theory = [each.heading for each in quantities if each.heading.startswith("Eq.")]
-    told = [THEORY] * bool(theory) + [STAR] * any("*" in each for each in theory)
+    told = [THEORY] * bool(theories) + [STAR] * any("*" in each.heading for each in theories)
     grid = Grid(case.headline, columns, remark="; ".join(told))
     for which, result in chosen:
         varied, numbers = map(written, result.curve.varied.values()), (each.text(result) for each in quantities)

@@ -16,19 +16,24 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from fpsolve.analysis.directions import SettledDirections
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import plain_unit
+from fpsolve.exponent.directions import DirectionGrid
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.fields import Nodes, xi_marginal
+from fpsolve.exponent.fields import FIELDS, Nodes, xi_marginal
 from fpsolve.files import write_text
 from fpsolve.model.problem import Problem, parameter_lines, parameter_words
+from fpsolve.model.quantity import Quantity
+from fpsolve.output.directions import on_one_grid, write_densities
 from fpsolve.signals import signals_held
 from fpsolve.study.results import SimulatedCurve, Solved
 
 CURVES = "curves.pvd"
 MOST_STATES = 8
 """States of the noise that a picture names."""
+_DIGITS = str.maketrans("₁₂₃₄²", "12342")
 Facts = Mapping[str, float | str]
 
 
@@ -103,6 +108,8 @@ def write_density(
 
 def write_functions(solved: Solved, curve: Curve, folder: Path) -> None:
     """Write the eigenfunctions of a curve; with the first curve the stationary density too."""
+    if solved.directions:
+        write_directions(solved.directions, curve, folder)
     if solved.stationary is None:
         return
     about = ({**curve.parameters, "curve": float(curve.number), **_frame(curve.problem)}, curve.varied)
@@ -111,6 +118,58 @@ def write_functions(solved: Solved, curve: Curve, folder: Path) -> None:
     if solved.eigenpairs:
         copy_show_script(folder)
         write_eigenfunctions(folder, solved.eigenpairs, solved.stationary, f"eigenfunctions{curve.suffix}", *about)
+
+
+def write_directions(found: Sequence[SettledDirections], curve: Curve, folder: Path) -> None:
+    """Write densities.nc and, as `write_eigenfunctions`, a series over p; with the first curve the stationary density.
+
+    The files for ParaView show x = η and y = θ₁ − θ₂ of four variables, of three variables the unit sphere. At p = 0
+    T = 1 and T* is the stationary density, so that the series leaves it out.
+    """
+    found = on_one_grid(found)
+    write_densities(found, curve, folder)
+    grid, problem = found[0].fields.grid, curve.problem
+    stationary = next((each for each in found if not each.pair.p), None)
+    facts = {"curve": float(curve.number), **_facts(curve.parameters, curve.varied, problem)}
+    facts |= {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
+    always: dict[str, FloatArray] = {}
+    if stationary is not None:
+        always["stationary_density"] = stationary.fields.adjoint
+    first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
+    always |= {"share": np.sin(first) ** 2} if grid.dimension == 4 else {"longitude": first, "latitude": second}
+    if stationary is not None and curve.number == 1:
+        _write_plane(folder / "density.vtu", grid, always, {"p": 0.0, "Lambda": 0.0, **facts})
+    stem, others = f"eigenfunctions{curve.suffix}", [each for each in found if each.pair.p]
+    names = {each.pair.p: _name(stem, each.pair.p) for each in others}
+    for each in others:
+        data = {name: getattr(each.fields, own) for name, (own, _) in reversed(FIELDS.items())}
+        known = {"p": each.pair.p, "Lambda": each.value}
+        _write_plane(folder / names[each.pair.p], grid, {**data, **always}, {**known, **facts})
+    if others:
+        write_text(folder / f"{stem}.pvd", _collection((p, name, "") for p, name in names.items()))
+
+
+def _plain(axis: Quantity) -> str:
+    """The words of a coordinate and its unit, in ASCII."""
+    return f"{axis.words} ({axis.unit})".translate(_DIGITS).encode("ascii", "replace").decode()
+
+
+def _write_plane(path: Path, grid: DirectionGrid, data: Mapping[str, FloatArray], facts: Facts) -> None:
+    """Write a .vtu file of quadrilaterals between the nodes; the first array of point data is shown first."""
+    pyvista, (a, b) = _pyvista(), (grid.first.size, grid.second.size)
+    first, second = (each.ravel() for each in np.meshgrid(grid.first, grid.second, indexing="ij"))
+    points = np.stack([first, second, 0 * first], axis=1)
+    if grid.dimension == 3:
+        flat = np.cos(second)
+        points = np.stack([flat * np.cos(first), flat * np.sin(first), np.sin(second)], axis=1)
+    corner = (np.arange(a - 1)[:, None] * b + np.arange(b - 1)).ravel()
+    cells = np.stack([np.full_like(corner, 4), corner, corner + b, corner + b + 1, corner + 1], axis=1)
+    kinds = np.full(corner.size, pyvista.CellType.QUAD, dtype=np.uint8)
+    output = pyvista.UnstructuredGrid(cells.ravel(), kinds, points)
+    for name, values in data.items():
+        output.point_data[name] = values.ravel()
+    output.GetPointData().SetActiveScalars(next(iter(data)))
+    _write(path, output, facts)
 
 
 def write_curves(case: Case, folder: Path) -> Path | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
+from fpsolve.analysis.directions import SettledDirections
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Curve
@@ -161,12 +162,14 @@ class Solved:
         eigenpairs: those whose eigenfunctions are wanted.
         stationary: the eigenpair at p = 0; None where no density is wanted, or it is not to be trusted.
         is_passing: whether it failed for a reason that may be gone when it is tried again.
+        directions: of more than two variables, in their place, all that is wanted; p = 0 with the density.
     """
 
     result: CurveResult | None
     eigenpairs: tuple[PrincipalPair, ...]
     stationary: PrincipalPair | None
     is_passing: bool = False
+    directions: tuple[SettledDirections, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

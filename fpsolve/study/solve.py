@@ -6,6 +6,7 @@ from a neighbour's mesh saves half of the time of one p in strong noise, and not
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -19,6 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fpsolve.analysis.density import negative_share, stationary_density
+from fpsolve.analysis.directions import SettledDirections, negative_part, settled_directions
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
@@ -40,6 +42,10 @@ from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 Kept = TypeVar("Kept")
 BATCHES, MOST_SETS = 256, 64
 """About so many batches has a case, unless these are larger than that."""
+
+
+ROUGH = 0.05
+"""Total variation by which finer functions may move a density that a picture shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +96,7 @@ class Numerics:
 def everything(case: Case, number: int = 1) -> Wanted:
     """What [output] names as `quantities`, of the curve with a number; the density goes with what is drawn of it."""
     names = set(case.output.quantities)
-    draws, has_moments = EIGENFUNCTIONS in names and case.problem.is_on_cylinder, MOMENT.name in names
+    draws, has_moments = EIGENFUNCTIONS in names and not case.problem.no_picture, MOMENT.name in names
     slopes = tuple(case.differentiated) if has_moments else ()
     return Wanted(
         case.p if has_moments else np.zeros(0),
@@ -149,6 +155,7 @@ def solve_curve(
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
     pairs, stationary, undrawn = _functions(solver, without_failed(wanted, found.failures))
+    directions = _directions(solver, without_failed(wanted, found.failures))
     slopes, refused = None, list[Message]()
     if wanted.differentiated is not None:
         try:
@@ -182,6 +189,7 @@ def solve_curve(
         )
         if defect > most
     ]
+    unresolved += [message for each in directions for message in _unclear(each)]
     imprecise = [
         Message(
             Code.INDEX_RTOL_MISSED,
@@ -212,7 +220,8 @@ def solve_curve(
         seconds=thread_time() - started,
     )
     told = (*(failure.reason for failure in result.failures), *result.warnings, *result.notes)
-    return Solved(result, pairs, stationary, is_passing=any(each.tells_of(Code.NO_MEMORY) for each in told))
+    is_passing = any(each.tells_of(Code.NO_MEMORY) for each in told)
+    return Solved(result, pairs, stationary, is_passing, directions)
 
 
 def without_failed(wanted: Wanted, failures: Sequence[Failure]) -> Wanted:
@@ -224,7 +233,12 @@ def without_failed(wanted: Wanted, failures: Sequence[Failure]) -> Wanted:
 def _functions(
     solver: ExponentSolver, wanted: Wanted
 ) -> tuple[tuple[PrincipalPair, ...], PrincipalPair | None, list[Message]]:
-    """The eigenpairs to be drawn that converge, that at p = 0 if it is to be trusted, and else why it is not."""
+    """The eigenpairs to be drawn that converge, that at p = 0 if it is to be trusted, and else why it is not.
+
+    Of more than two variables there are none, but `_directions`.
+    """
+    if solver.problem.dimension > 2:
+        return (), None, []
 
     def pair(p: float) -> PrincipalPair | None:
         try:
@@ -240,6 +254,29 @@ def _functions(
         remedy = solver.near.refinement
         return pairs, None, [Message(Code.NOTHING_DRAWN, reason=failure.reason, remedy=remedy)]
     return pairs, stationary, []
+
+
+def _directions(solver: ExponentSolver, wanted: Wanted) -> tuple[SettledDirections, ...]:
+    """Of more than two variables what is wanted over directions, of the p that converge."""
+    if solver.problem.dimension == 2:
+        return ()
+    found = list[SettledDirections]()
+    for p in sorted({*wanted.shown, 0.0} if wanted.density else wanted.shown):
+        with suppress(NotConverged):
+            found.append(settled_directions(solver.pair(p)))
+    return tuple(found)
+
+
+def _unclear(found: SettledDirections) -> Iterator[Message]:
+    """Which densities of directions mislead."""
+    p, fields = found.pair.p, found.fields
+    for name, values in {"T_adjoint": fields.adjoint, "tilted_density": fields.product}.items():
+        if (defect := negative_part(fields.grid, values)) > MOST_NEGATIVE:
+            yield Message(Code.UNREADABLE, name=name, p=p, size=defect)
+    if not fields.is_resolved:
+        yield Message(Code.FINE_DENSITY, p=p, size=abs(fields.total - 1))
+    if not found.error <= ROUGH:
+        yield Message(Code.ROUGH_DENSITY, p=p, size=None if math.isnan(found.error) else found.error)
 
 
 def _solve_indices(
@@ -318,15 +355,8 @@ def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
     generator = known[p].pair.generator
     phase, noise = generator.chosen.phase, generator.chosen.noise
     interval = {"xi_min": float(noise.lines[0]), "xi_max": float(noise.lines[-1])} if noise.lines.size else {}
-    if generator.problem.dimension == 2:
-        directions = {
-            "phi_cells": phase.lines.size - 1,
-            "phi_degrees": [int(degree) for degree in phase.degrees],
-        }
-    else:
-        directions = {"eta_cells": phase.lines.size - 1, "eta_degree": phase.degree, "waves": phase.waves}
     return {
-        **directions,
+        **phase.facts,
         "xi": noise.kind,
         "xi_size": noise.size,
         **interval,
@@ -388,8 +418,9 @@ def solved(order: Order, numerics: Numerics, progress: Callable[[], None] = lamb
     curve, wanted = order.curve, order.wanted
     if order.is_known:
         try:
-            pairs, stationary, _ = _functions(numerics.solver(curve), wanted)
-            return Solved(None, pairs, stationary)
+            solver = numerics.solver(curve)
+            pairs, stationary, _ = _functions(solver, wanted)
+            return Solved(None, pairs, stationary, directions=_directions(solver, wanted))
         except OSError:
             raise
         except Exception:  # its numbers stay as they are

@@ -18,6 +18,7 @@ from fpsolve.model.checks import check_noise
 from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
 from fpsolve.output.designs import write_design
+from fpsolve.output.directions import draw_densities
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_samples, write_simulation
 from fpsolve.output.vtk import write_response
@@ -160,6 +161,7 @@ def run_case(
             with watch.bar(Phase(case.name, "figures")), writable(folder):
                 draw(case, sweep.results, simulated, folder)
                 draw_sensitivities(case, sweep.results, folder)
+                draw_densities(case, sweep.results, folder)
             if reporter is not None:
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo
                 write_report(

@@ -14,6 +14,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.output.letters import spelt
 from fpsolve.output.screen import Column, Grid, Screen
 from fpsolve.output.terminal import (
+    curve_grid,
     duration,
     print_comparisons,
     print_remark,
@@ -23,6 +24,7 @@ from fpsolve.output.terminal import (
 )
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
+from fpsolve.study.solve import failed
 from tests.conftest import sampled
 from tests.solving import case_in, solve_case
 from tests.test_workflow import TEXT
@@ -377,3 +379,29 @@ def test_greek_is_spelt_where_there_is_none():
     assert spelt("λ = 1 ± 2, Λ″(0), δ_p ≤ ε²", "ascii") == "lambda = 1 +- 2, Lambda''(0), delta_p <= epsilon^2"
     assert spelt("λ ± é", "latin-1") == "lambda ± é"
     assert spelt("Λ ± …", "utf-8") == "Λ ± …"
+
+
+def test_columns_of_theories_that_there_are_not_are_left_out(tmp_path):
+    """Perturbation theory is for two variables: of more, a table over a parameter has finite elements alone."""
+    text = """
+title = "Three variables"
+[system]
+variables = ["x", "v", "u"]
+drift = ["v", "-x - 2*s*v - xi*x + 0.5*u", "-u - 0.5*v"]
+parameters = { s = 0.1 }
+[noise]
+kind = "white"
+s = 0.5
+[moments]
+p = [2.0]
+[vary]
+"system.s" = [0.1, 0.2]
+[figure]
+x = "system.s"
+y = "stability_index"
+"""
+    case = case_in(tmp_path, text)
+    results = [failed(curve, "nothing was solved") for curve in case.curves()]
+    found = curve_grid(case, results)
+    assert not [column.heading for column in found.columns if column.heading.startswith("Eq.")]
+    assert not found.remark

@@ -1,0 +1,72 @@
+"""Values of the functions on the sphere of directions at any points, and the measure that they are integrated by."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fpsolve.fem.harmonics import HarmonicCells
+from fpsolve.fem.sphere import SphereCells
+
+LINES = np.array([0.0, 0.5, math.pi / 2])
+TURNS = 2 * math.pi * np.arange(12) / 12
+
+
+def axis_of(kind, n):
+    unit = tuple(map(tuple, np.eye(n).tolist()))
+    return HarmonicCells(unit, 4).axis() if kind == "harmonics" else SphereCells(unit, LINES, 4, 4).axis()
+
+
+def rule(n, lines=LINES):
+    """Directions and weights of dσ in the angles of the axes, exact for products of waves, by Gauss in each element."""
+    x, w = np.polynomial.legendre.leggauss(12)
+    eta = np.concatenate([a + (b - a) * (1 + x) / 2 for a, b in pairwise(lines)])
+    weights = np.concatenate([(b - a) / 2 * w for a, b in pairwise(lines)])
+    firsts = np.array([[1.0, -1.0]]) if n == 3 else np.stack([np.cos(TURNS), np.sin(TURNS)])
+    seconds = np.stack([np.cos(TURNS), np.sin(TURNS)])
+    c, s = np.cos(eta)[:, None, None], np.sin(eta)[:, None, None]
+    shape = eta.size, firsts.shape[1], TURNS.size
+    rows = [c * each[None, :, None] for each in firsts] + [s * each[None, None] for each in seconds]
+    points = np.stack([np.broadcast_to(row, shape).ravel() for row in rows])
+    own = weights * np.cos(eta) ** (n - 3) * np.sin(eta) * 2 * math.pi / 12 * (1 if n == 3 else 2 * math.pi / 12)
+    return points, np.repeat(own, shape[1] * shape[2])
+
+
+@pytest.mark.parametrize("n", [3, 4])
+@pytest.mark.parametrize("kind", ["elements", "harmonics"])
+def test_integrals_by_points_are_the_matrices(kind, n):
+    """∫ u v, and ∫ v q u of a matrix, whose q is eᵀXe: the first fixes the order of the functions, too."""
+    axis, (points, weights) = axis_of(kind, n), rule(n)
+    values = axis.at(points)
+    values = values.toarray() if kind == "elements" else values
+    mass = values.T @ (weights[:, None] * values) / axis.area
+    np.testing.assert_allclose(mass, axis.identity, atol=1e-8)
+    matrix = np.random.default_rng(1).standard_normal((n, n))
+    _, growth = axis.driven(matrix)
+    q = np.einsum("im,ij,jm->m", points, matrix, points)
+    np.testing.assert_allclose(values.T @ ((weights * q)[:, None] * values) / axis.area, growth, atol=1e-8)
+    np.testing.assert_allclose(values @ axis.constant, 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("n", [3, 4])
+@pytest.mark.parametrize("kind", ["elements", "harmonics"])
+def test_opposite_directions_are_one(kind, n):
+    axis = axis_of(kind, n)
+    points = np.random.default_rng(2).standard_normal((n, 50))
+    points /= np.linalg.norm(points, axis=0)
+    own = np.random.default_rng(3).standard_normal(axis.size)
+    np.testing.assert_allclose(axis.at(points) @ own, axis.at(-points) @ own, atol=1e-9)
+
+
+def test_elements_and_harmonics_meet_the_same_polynomial():
+    """A harmonic of the degree 4, smooth in η, by its projection on many elements, at points that no rule has."""
+    unit, lines = tuple(map(tuple, np.eye(4).tolist())), np.linspace(0, math.pi / 2, 7)
+    elements, harmonics = SphereCells(unit, lines, 9, 4).axis(), axis_of("harmonics", 4)
+    points, weights = rule(4, lines)
+    own = np.random.default_rng(4).standard_normal(harmonics.size)
+    by_points = elements.at(points).T @ (weights * (harmonics.at(points) @ own)) / elements.area
+    found = np.linalg.solve(elements.identity, by_points)
+    others = np.random.default_rng(5).standard_normal((4, 100))
+    others /= np.linalg.norm(others, axis=0)
+    np.testing.assert_allclose(elements.at(others) @ found, harmonics.at(others) @ own, atol=1e-9)
