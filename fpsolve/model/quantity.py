@@ -28,6 +28,17 @@ SECOND_DERIVATIVE = replace(
     words="curvature of the moment Lyapunov exponent",
     latex=r"$\Lambda''(p)$",
 )
+ORDER = Quantity("order", "n", "order of ε", "$n$", dims=("order",))
+COEFFICIENT = Quantity(
+    "coefficient",
+    "Λₙ(p)",
+    "coefficient of the perturbation series",
+    r"$\Lambda_n(p)$",
+    "1/time",
+    ("order", "p"),
+    "(20)-(23)",
+    error_source="the difference from the adjoint recursion with more functions of the noise, rounding",
+)
 RESIDUAL = Quantity("residual", "residual", "backward error of the eigenpair", dims=("p",))
 EFFECTIVE_PATHS = Quantity(
     "effective_paths", "effective paths", "effective number of paths that carry the mean", dims=("p",)
