@@ -22,13 +22,14 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, dense, is_whole, one, real_number, real_numbers, shown
@@ -192,11 +193,11 @@ def perturbation_series(problem: Problem, p: ArrayLike, *, order: int = 6, rtol:
             for solve in (found.right, finer.left)
         )
         size = np.max(np.abs(left), axis=1, keepdims=True)
-        error = np.abs(left - right) + rounding
-        if found.is_complete or np.all(error <= rtol * size) or 2 * finer.size > MOST_FUNCTIONS:
+        change = np.abs(left - right)
+        if found.is_complete or np.all(change <= np.maximum(rtol * size, rounding)) or 2 * finer.size > MOST_FUNCTIONS:
             break
         found = finer
-    return PerturbationSeries(points, left, error, problem.system.epsilon, problem.values)
+    return PerturbationSeries(points, left, change + rounding, problem.system.epsilon, problem.values)
 
 
 def _refuse(problem: Problem) -> None:
@@ -246,6 +247,7 @@ class _Recursion:
         generator = sum(self._product({k: None}) for k in range(len(self._axes)))
         free = np.linalg.inv(frame) @ steady @ frame
         self._growth, speed = float(stretching(free).mean), float(turning(free).mean)
+        self._size = float(np.abs(free).sum())
         self._slopes = math.copysign(1.0, speed) / math.pi * problem.system.log_factors_by_order(order)
         self._factors = [
             scipy.linalg.lu_factor(self._bordered(generator) if wave == 0 else generator + speed * wave * self._mass)
@@ -257,79 +259,84 @@ class _Recursion:
             return turning(matrix), stretching(matrix)
 
         self._free = Harmonics(speed, 0.0, 0.0)
-        self._driven = [
-            (term.order, *turned(term), self._product({self._at(term.noise): term.g}))
-            for term in system.terms
-            if 0 < term.order <= order
-        ]
+        terms = [term for term in system.terms if 0 < term.order <= order]
+        self._noises = [self._mass, *(self._product({self._at(term.noise): term.g}) for term in terms)]
+        self._driven = [(term.order, *turned(term), 1 + k) for k, term in enumerate(terms)]
         self._diffused = [(each.order, *turned(each)) for each in problem.diffusions if 2 * each.order <= order]
 
     def right(self, p: float) -> FloatArray:
         """Λₙ from the recursion for T, and the rounding of their last sum, shape (2, order + 1)."""
-        return self._solve(self._terms(p), p, 0)
+        return self._solve(self._terms(p), self._noises, p, 0)
 
     def left(self, p: float) -> FloatArray:
         """The same from that for T*."""
-        adjoint = {n: [(phase.T, noise.T) for phase, noise in each] for n, each in self._terms(p).items()}
-        return self._solve(adjoint, p, 1)
+        adjoint = [(order, k, phase.T.tocsr()) for order, k, phase in self._terms(p)]
+        return self._solve(adjoint, [noise.T for noise in self._noises], p, 1)
 
-    def _solve(self, terms: Mapping[int, Any], p: float, transposed: int) -> FloatArray:
+    def _solve(self, terms: Sequence[tuple[int, int, Any]], noises: Sequence[Any], p: float, transposed: int) -> FloatArray:
         """Functions are tables of waves × functions of ξ."""
         middle = self._waves.size // 2
         start = np.zeros((self._waves.size, self.size), dtype=complex)
         start[middle] = self._start
-        weight = self._mass @ self._start
-        norm = float(weight @ self._start)
-        functions, values, sizes = [start], np.zeros(self.order + 1), np.zeros(self.order + 1)
-        values[0] = sizes[0] = p * self._growth
+        norm = float(self._start @ self._mass @ self._start)
+        seen = [np.abs(noise.T) @ np.abs(self._start) / norm for noise in noises]
+        rows = [np.abs(phase.toarray()[middle]) for *_, phase in terms]
+        functions, images = [start], [[start @ noise.T for noise in noises]]
+        values, sizes = np.zeros(self.order + 1), np.zeros(self.order + 1)
+        values[0], sizes[0] = p * self._growth, p * self._size
         for n in range(1, self.order + 1):
-            image = np.zeros_like(start)
-            for j in range(1, n + 1):
-                for phase, noise in terms.get(j, ()):
-                    image += phase @ functions[n - j] @ noise.T
-                    around = np.abs(phase[middle]) @ np.abs(functions[n - j])
-                    sizes[n] += around @ (np.abs(noise.T) @ np.abs(self._start)) / norm
+            load = np.zeros_like(start)
+            for (j, k, phase), row in zip(terms, rows, strict=True):
+                if j <= n:
+                    load -= phase @ images[n - j][k]
+                    sizes[n] += row @ (np.abs(functions[n - j]) @ seen[k])
             # of Λⱼ Tₙ₋ⱼ those with j < n have no mean
-            values[n] = float((image[middle] @ self._start).real) / norm
-            load = -image
+            values[n] = -float((load[middle] @ self._start).real) / norm
             for j in range(1, n + 1):
-                load += values[j] * (functions[n - j] @ self._mass.T)
+                load += values[j] * images[n - j][0]
             new = np.empty_like(start)
             for k, (factor, row) in enumerate(zip(self._factors, load, strict=True)):
                 row = np.append(row, 0.0) if k == middle else row
                 new[k] = scipy.linalg.lu_solve(factor, row, trans=transposed)[: self.size]
             functions.append(new)
-        return np.array([values, 4 * _EPS * np.abs(sizes)])
+            images.append([new @ noise.T for noise in noises])
+        return np.array([values, 16 * _EPS * np.abs(sizes)])
 
-    def _terms(self, p: float) -> dict[int, list[tuple[Any, Any]]]:
-        """By the order of ε pairs of a matrix of waves and one of the noises, without L₀."""
-        found: dict[int, list[tuple[Any, Any]]] = {}
+    def _terms(self, p: float) -> list[tuple[int, int, Any]]:
+        """L less L₀: the order of ε, the place of the matrix of the noises, and that of the waves."""
+        found: dict[tuple[int, int], Any] = {}
 
-        def add(order: int, phase: Any, noise: Any) -> None:
+        def add(order: int, phase: Any, noise: int) -> None:
             if order <= self.order:
-                found.setdefault(order, []).append((phase, noise))
+                found[order, noise] = phase + found[order, noise] if (order, noise) in found else phase
 
         slopes = [(m, slope) for m, slope in enumerate(self._slopes.tolist()) if slope]
         for m, slope in slopes:
-            add(m, p * slope * self._wave_matrix(self._free), self._mass)
+            add(m, p * slope * self._wave_matrix(self._free), 0)
         for order, h, q, noise in self._driven:
             along, stretch = self._wave_matrix(h), self._wave_matrix(q)
-            add(order, along * self._waves + p * stretch, noise)
+            add(order, along @ self._along + p * stretch, noise)
             for m, slope in slopes:
                 add(order + m, p * slope * along, noise)
         for order, h, q in self._diffused:
             along, stretch = self._wave_matrix(h), self._wave_matrix(q)
-            parts = [(0, along * self._waves + p * stretch), *((m, p * slope * along) for m, slope in slopes)]
+            parts = [(0, along @ self._along + p * stretch), *((m, p * slope * along) for m, slope in slopes)]
             for i, first in parts:
                 for j, last in parts:
-                    add(2 * order + i + j, 0.5 * first @ last, self._mass)
-        return found
+                    add(2 * order + i + j, 0.5 * first @ last, 0)
+        return [(*key, phase.tocsr()) for key, phase in found.items()]
+
+    @property
+    def _along(self) -> Any:
+        """∂φ."""
+        return scipy.sparse.diags_array(self._waves)
 
     def _wave_matrix(self, f: Harmonics) -> Any:
         """f(φ) times waves e^{2ikφ}."""
         count = self._waves.size
         up = 0.5 * (f.cosine - 1j * f.sine)
-        return f.mean * np.eye(count) + up * np.eye(count, k=-1) + np.conj(up) * np.eye(count, k=1)
+        diagonals = [np.full(count - 1, up), np.full(count, f.mean), np.full(count - 1, np.conj(up))]
+        return scipy.sparse.diags_array(diagonals, offsets=[-1, 0, 1])
 
     def _bordered(self, generator: Any) -> Any:
         """L_ξ with the condition that the mean is 0."""
@@ -352,7 +359,7 @@ def _best(sizes: FloatArray) -> tuple[int, float]:
     own = sizes[orders]
     for k in (1, 2):  # a term is small by chance where the terms change their sign
         own[k:-k] = np.maximum(own[k:-k], np.sqrt(own[2 * k :] * own[: -2 * k]))
-    ratio = max(own[-1] / own[-2], math.sqrt(own[-1] / own[-3]))
+    ratio = max(own[-1] / own[-2], own[-2] / own[-3])
     beyond = own[-1] * ratio / (1 - ratio) if ratio < 1 else math.inf  # as of a geometric series
     left = [beyond]
     for j in range(own.size - 2, 0, -1):
