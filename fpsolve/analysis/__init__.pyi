@@ -3,6 +3,10 @@ from .density import adjoint_density as adjoint_density
 from .density import furstenberg_khasminskii as furstenberg_khasminskii
 from .density import stationary_density as stationary_density
 from .density import tilted_density as tilted_density
+from .growth import GrowthLaw as GrowthLaw
+from .growth import RateFunction as RateFunction
+from .growth import growth_law as growth_law
+from .growth import rate_function as rate_function
 from .sensitivity import Sensitivities as Sensitivities
 from .sensitivity import sensitivities as sensitivities
 from .stability import Boundary as Boundary

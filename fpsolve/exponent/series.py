@@ -136,7 +136,9 @@ class PerturbationSeries(Result):
         for p, column in zip(self.p, sizes.T, strict=True):
             seen = np.isfinite(column)
             axes.semilogy(np.flatnonzero(seen), column[seen], "o-", **{"label": f"p = {p:g}", **kwargs})
-        axes.set(xlabel="order $n$ of the term", ylabel=rf"$|\varepsilon^n\Lambda_n|$ at $\varepsilon$ = {self.epsilon:g}")
+        axes.set(
+            xlabel="order $n$ of the term", ylabel=rf"$|\varepsilon^n\Lambda_n|$ at $\varepsilon$ = {self.epsilon:g}"
+        )
         if 1 < self.p.size <= 8:
             axes.legend(frameon=False)
 
@@ -273,7 +275,9 @@ class _Recursion:
         adjoint = [(order, k, phase.T.tocsr()) for order, k, phase in self._terms(p)]
         return self._solve(adjoint, [noise.T for noise in self._noises], p, 1)
 
-    def _solve(self, terms: Sequence[tuple[int, int, Any]], noises: Sequence[Any], p: float, transposed: int) -> FloatArray:
+    def _solve(
+        self, terms: Sequence[tuple[int, int, Any]], noises: Sequence[Any], p: float, transposed: int
+    ) -> FloatArray:
         """Functions are tables of waves × functions of ξ."""
         middle = self._waves.size // 2
         start = np.zeros((self._waves.size, self.size), dtype=complex)
