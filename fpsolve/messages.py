@@ -174,12 +174,12 @@ class Code(Enum):
         "choose s on this side of {slope:.6g}, or a wider interval"
     )
     GROWTH_UNSOLVED = (
-        "failure: the growth rate s = {s:.6g} is not reached: Λ′ is {slope:.6g} at p = {p:g}, and beyond it Λ(p) is not "
-        "solved: {reason}; choose s on this side of {slope:.6g}"
+        "failure: the growth rate s = {s:.6g} is not reached: Λ′ is {slope:.6g} at p = {p:g}, and beyond it Λ(p) is "
+        "not solved: {reason}; choose s on this side of {slope:.6g}"
     )
     NO_RATE_FUNCTION = (
-        "failure: there is no rate function to compute: Λ(p) has a kink, as the noise has algebraic tails, or the phase "
-        "never leaves a ray; take Λ(p) itself"
+        "failure: there is no rate function to compute: Λ(p) has a kink, as the noise has algebraic tails, or the "
+        "phase never leaves a ray; take Λ(p) itself"
     )
     NO_PREFACTOR = (
         "failure: the law of growth in finite time is for two variables, and not for filtered noise; take rate_function"

@@ -142,7 +142,7 @@ class GrowthLaw(Result):
     start: float
 
     def to_xarray(self) -> xarray.Dataset:
-        """P(s_t ≥ s), P(s_t ≤ s) and the density over t and s, with their errors; C, p and I over s, the width over t."""
+        """P(s_t ≥ s), P(s_t ≤ s) and the density over t and s, with errors; C, p and I over s, the width over t."""
         of_law = replace(
             PROBABILITY.error(), comment="from the next order in 1/t, those of C and I, and other eigenvalues"
         )
@@ -379,8 +379,8 @@ def _found(slopes: Slopes, s: FloatArray) -> RateFunction:
         value = here.p**2 * here.ratio_slope + gap * here.p + gap**2 / (2 * here.curvature)
         error = here.error + gap**2 / (2 * here.curvature)
         rows[i] = (float(s[i]), here.p + gap / here.curvature, max(value, 0.0), error, here.curvature)
-    columns = np.array([rows[i] for i in sorted(rows)]).reshape(-1, 5).T
-    result = RateFunction(*columns, slopes.solver)
+    growth, p, values, errors, curvature = np.array([rows[i] for i in sorted(rows)]).reshape(-1, 5).T
+    result = RateFunction(growth, p, values, errors, curvature, slopes.solver)
     if failures:
         raise NotConverged(Message(Code.SEVERAL, reasons=failures), result)
     return result
@@ -497,7 +497,7 @@ def _ends(pair: PrincipalPair, start: float) -> tuple[FloatArray, FloatArray]:
         weights = weights * frame.length(frame.own_phase(points)) ** -pair.p
     table = phi.values if weights is None else phi.at(points)
     last = table.T @ (phi.weights if weights is None else weights)
-    first = own * np.ravel((phi.at(phi.lines[0] + np.mod(at - phi.lines[0], phi.span)).T @ np.ones(1)))
+    first = own * np.ravel(phi.at(phi.lines[0] + np.mod(at - phi.lines[0], phi.span)).T @ np.ones(1))
     noise, total = _of_noises(space)
     return space.product([first / total, *noise]), space.product([np.ravel(last), *noise])
 

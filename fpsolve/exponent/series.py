@@ -89,7 +89,8 @@ class PerturbationSeries(Result):
         """The order up to which the sum has the smallest error, shape (n,).
 
         The terms first fall, and then they grow, as the series is asymptotic. What a sum leaves out is about what the
-        terms after it add until they grow; where they still fall at the highest order, the rest as of a geometric series.
+        terms after it add until they grow. Where they still fall at the highest order, the rest is that of a geometric
+        series.
         """
         return np.array([_best(column)[0] for column in self._sizes(epsilon).T])
 
@@ -352,7 +353,8 @@ class _Recursion:
 
     def _product(self, of: Mapping[int, Any]) -> Any:
         """The matrix of the noises with functions of some of them, None for the generator."""
-        return reduce(np.kron, [dense(axis.matrix(of.get(k, one))) for k, axis in enumerate(self._axes)])
+        matrices: list[Any] = [dense(axis.matrix(of.get(k, one))) for k, axis in enumerate(self._axes)]
+        return reduce(np.kron, matrices)
 
 
 def _best(sizes: FloatArray) -> tuple[int, float]:

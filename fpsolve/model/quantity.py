@@ -149,6 +149,8 @@ STORED_MOMENTS = {
     "perturbation": MOMENT.perturbation,
 }
 """Those of them that results.nc holds, by the same names, as they are called there."""
+OF_RATE = {RATE_FUNCTION.name: replace(RATE_FUNCTION, dims=("p",), comment="at s = Λ′(p), the moment_derivative")}
+"""What it holds where the rate function is asked for; the error is that of the moment."""
 
 
 def moment_at(p: float) -> Quantity:

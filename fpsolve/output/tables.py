@@ -27,7 +27,7 @@ from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
-from fpsolve.model.quantity import MOMENT, MOMENTS
+from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 MOST_INDENTED = 100
@@ -62,21 +62,21 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
     state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
     start = json.dumps({**head(case), **state, **facts}, indent=1, ensure_ascii=False).removesuffix("\n}")
     indent = 1 if case.planned <= MOST_INDENTED else None
-    has_moments = MOMENT.name in case.output.quantities
+    has_moments, names = MOMENT.name in case.output.quantities, columns_of(case)
     indices = [column.name for each in asked(case) for column in (each, each.error())]
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
         )
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
-        by_moment.writerow([*case.vary.keys, *MOMENTS])
+        by_moment.writerow([*case.vary.keys, *names])
         by_curve.writerow([*case.vary.keys, *indices, "p_solved", "p_failed", "status", "seconds"])
         summary.write(f'{start},\n "curves": [')
         for number, result in enumerate(results):
             varied, done = result.curve.varied.values(), result.moments
-            columns = [getattr(done, name).tolist() for name in MOMENTS]
+            columns = [getattr(done, name).tolist() for name in names]
             finite = [[None if math.isnan(each) else each for each in row] for row in zip(*columns, strict=True)]
-            rows = [dict(zip(MOMENTS, row, strict=True)) for row in finite]
+            rows = [dict(zip(names, row, strict=True)) for row in finite]
             content = _summary(case, result, rows)
             text = json.dumps(content, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
             summary.write((",\n  " if number else "\n  ") + text)
@@ -86,6 +86,11 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
             counts = [done.p.size, (case.p.size if has_moments else 0) - done.p.size]
             by_curve.writerow([*varied, *numbers, *counts, result.status.word, round(result.seconds, 6)])
         summary.write("\n ]\n}\n")
+
+
+def columns_of(case: Case) -> list[str]:
+    """The names of what a case asks for at every p."""
+    return [*MOMENTS, *[RATE_FUNCTION.name] * (RATE_FUNCTION.name in case.output.quantities)]
 
 
 def asked(case: Case) -> list[Index]:

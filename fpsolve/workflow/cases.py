@@ -17,7 +17,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.checks import check_noise
 from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
-from fpsolve.output.figures import draw, draw_response, draw_sensitivities
+from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_simulation
 from fpsolve.output.vtk import write_response
 from fpsolve.pool import Pool, cluster, parallel, serial
@@ -152,6 +152,7 @@ def run_case(
         def show() -> None:
             with watch.bar(Phase(case.name, "figures")), writable(folder):
                 draw(case, sweep.results, simulated, folder)
+                draw_rates(case, sweep.results, folder)
                 draw_sensitivities(case, sweep.results, folder)
             if reporter is not None:
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo

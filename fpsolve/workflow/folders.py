@@ -13,7 +13,7 @@ from fpsolve.files import TEMPORARY, alone, parsed_json, plain_text, writable
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
 SOLVED = (
-    r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc|(figure|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu"
+    r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc|(figure|rate_function|sensitivities(-\d+)?)\.(png|pdf)|density\.vtu"
     r"|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
 )
 SIMULATED = r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)"
