@@ -39,7 +39,7 @@ COEFFICIENT = Quantity(
     "(20)-(23)",
     error_source="the difference from the adjoint recursion with more functions of the noise, rounding",
 )
-GROWTH = Quantity("growth_rate", "s", "growth rate (1/t) ln ‖x(t)‖", "$s$", "1/time", ("growth_rate",))
+GROWTH = Quantity("growth_rate", "s", "growth rate of a path", r"$s = \ln\|x(t)\|/t$", "1/time", ("growth_rate",))
 TIME = Quantity("time", "t", "time", "$t$", "time", ("time",))
 RATE_FUNCTION = Quantity(
     "rate_function",
