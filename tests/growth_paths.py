@@ -71,8 +71,9 @@ def draw(file, count=1_000_000):
             )
             axes.semilogy(RATES[seen], dots[seen], ".", color=colour)
         seen = np.minimum(found, 1 - found) * count >= 10
-        off, apart = (np.max((np.abs(share - found) / each)[seen]) for each in (deviation, error))
-        print(f"t = {time:g}: at most {off:.1f} standard deviations, and {apart:.2f} of the estimated error")
+        apart = np.abs(share - found)[seen]
+        sampled, rest = apart / deviation[seen], np.maximum(apart - 4 * deviation[seen], 0) / error[seen]
+        print(f"t = {time:g}: {sampled.max():.1f} standard deviations; beyond 4 of them {rest.max():.2f} of the error")
     axes.set(
         xlabel=r"growth rate $s = \ln\|x(t)\|/t$ (1/time)",
         ylabel=r"$P(s_t\leq s)$ left, $P(s_t\geq s)$ right of $\lambda$",

@@ -13,7 +13,8 @@ beside the exponential N. Bleistein, Comm. Pure Appl. Math. 19, 1966):
     √(t/2πΛ″) C e^{−tI} [1 + a(C)/t],    Φ̄(√t w) + φ(√t w)/√t [C/u − 1/w + ((C/u) a(C/p) + 1/w³)/t],
     a(G) = Λ⁗/8Λ″² − 5Λ‴²/24Λ″³ + (G′/G) Λ‴/2Λ″² − (G″/G)/2Λ″.
 
-The error is estimated by the terms with a(G), of one order more, the errors of C and I, and the aₖ nearest to Λ.
+The error is estimated by the terms with a(G), of one order more; as these change their sign, also by (A/t)², A being
+a(C) with absolute values for its parts; by the errors of C and I; and by the aₖ nearest to Λ.
 """
 
 from __future__ import annotations
@@ -247,7 +248,7 @@ def growth_law(
         exponent, wave = float(rate.value[i]), math.copysign(math.sqrt(2 * rate.value[i]), saddle.p)
         first, further = [float(fit(saddle.p)) for fit in fits] if abs(saddle.p) < CENTRE[2] else saddle.terms
         root = np.sqrt(times)
-        relative = saddle.error + times * rate.error_estimate[i] + saddle.remainder(times)
+        relative = saddle.error + times * rate.error_estimate[i] + saddle.remainder(times) + (saddle.size / times) ** 2
         height = np.sqrt(times / (2 * math.pi * saddle.curvature)) * saddle.prefactor * np.exp(-times * exponent)
         density[:, i] = np.maximum(height * (1 + saddle.next_density / times), 0.0)
         density_error[:, i] = height * (np.abs(saddle.next_density) / times + relative)
@@ -410,7 +411,12 @@ class _Saddle:
     @property
     def next_density(self) -> float:
         """a(C)."""
-        return self._next(self._first, self._second)
+        return sum(self._next(self._first, self._second))
+
+    @property
+    def size(self) -> float:
+        """A."""
+        return sum(map(abs, self._next(self._first, self._second)))
 
     @cached_property
     def terms(self) -> tuple[float, float]:
@@ -418,12 +424,12 @@ class _Saddle:
         p, own = self.p, self._own
         u, w = p * math.sqrt(self.curvature), math.copysign(math.sqrt(2 * p**2 * own.ratio_slope), p)
         of_quotient = self._next(self._first - 1 / p, self._second - 2 * self._first / p + 2 / p**2)
-        return self.prefactor / u - 1 / w, self.prefactor / u * of_quotient + 1 / w**3
+        return self.prefactor / u - 1 / w, self.prefactor / u * sum(of_quotient) + 1 / w**3
 
-    def _next(self, first: float, second: float) -> float:
-        """a(G) from G′/G and G″/G."""
-        own = self._excess / 8 - 5 * self._skew**2 / 24
-        return own + first / math.sqrt(self.curvature) * self._skew / 2 - second / (2 * self.curvature)
+    def _next(self, first: float, second: float) -> tuple[float, ...]:
+        """The parts of a(G) from G′/G and G″/G."""
+        mixed = first / math.sqrt(self.curvature) * self._skew / 2
+        return self._excess / 8, -5 * self._skew**2 / 24, mixed, -second / (2 * self.curvature)
 
     @cached_property
     def error(self) -> float:

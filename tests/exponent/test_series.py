@@ -199,7 +199,7 @@ def test_second_order_serves_up_to_a_stated_size():
     assert f"at order {series.best_order()[0]}" in str(series)
 
 
-def test_a_result_is_labelled_and_drawn(pictures):
+def test_a_result_is_labelled_and_drawn():
     series = perturbation_series(Problem(oscillator(), UNIT), [2.0, 1.0], order=6)
     found = series.to_xarray()
     assert found.coefficient.sel(order=4, p=2.0).item() == series.coefficients[4, 0]
