@@ -173,6 +173,21 @@ class Code(Enum):
         "moment_lyapunov, which solves each p by itself"
     )
     NOT_INCREASING = "failure: Λ(p)/p does not increase at p = {p:g}, while it must, as Λ is convex"
+    GROWTH_BEYOND = (
+        "failure: the growth rate s = {s:.6g} is not reached: Λ′ is {slope:.6g} at p = {p:g}, the end of the interval; "
+        "choose s on this side of {slope:.6g}, or a wider interval"
+    )
+    GROWTH_UNSOLVED = (
+        "failure: the growth rate s = {s:.6g} is not reached: Λ′ is {slope:.6g} at p = {p:g}, and beyond it Λ(p) is "
+        "not solved: {reason}; choose s on this side of {slope:.6g}"
+    )
+    NO_RATE_FUNCTION = (
+        "failure: there is no rate function to compute: Λ(p) has a kink, as the noise has algebraic tails, or the "
+        "phase never leaves a ray; take Λ(p) itself"
+    )
+    NO_PREFACTOR = (
+        "failure: the law of growth in finite time is for two variables, and not for filtered noise; take rate_function"
+    )
     INDEX_UNSETTLED = "failure: the search for the stability index did not converge; it ended near p = {p:g}"
     NEGATIVE_DENSITY = "failure: the {name} at p = {p:g} is not resolved: {size:.0%} of it is negative"
     SIMULATION_OVERFLOWED = "failure: the simulation overflowed: some ξ is too large for this step; use a smaller step"

@@ -4,6 +4,10 @@ from .density import furstenberg_khasminskii as furstenberg_khasminskii
 from .density import stationary_density as stationary_density
 from .density import tilted_density as tilted_density
 from .directions import DirectionDensity as DirectionDensity
+from .growth import GrowthLaw as GrowthLaw
+from .growth import RateFunction as RateFunction
+from .growth import growth_law as growth_law
+from .growth import rate_function as rate_function
 from .inverse import Design as Design
 from .inverse import design as design
 from .sensitivity import Sensitivities as Sensitivities

@@ -38,7 +38,7 @@ from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, Problem
-from fpsolve.model.quantity import Quantity, moment_at
+from fpsolve.model.quantity import RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
@@ -47,8 +47,10 @@ _DIGITS = 12
 _SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
 SENSITIVITIES, EIGENFUNCTIONS = "sensitivities", "eigenfunctions"
-QUANTITY_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS)
-"""What may be asked for; eigenfunctions with the stationary density."""
+USUAL_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS)
+"""What is computed where nothing is asked for; eigenfunctions with the stationary density."""
+QUANTITY_NAMES = (*USUAL_NAMES, RATE_FUNCTION.name)
+"""What may be asked for."""
 _LARGEST = 1e30
 WANTED = f"wanted relative error; if omitted {RTOL_BEYOND_PLANE:g} for more than two variables"
 _APART = 1e-9
@@ -387,7 +389,7 @@ class OutputSection(Section):
             f"{{guess}} known names: {quoted(QUANTITY_NAMES)};",
         ),
         parameter("what is computed", 'quantities = ["lyapunov_exponent", "stability_index"]'),
-    ] = QUANTITY_NAMES
+    ] = USUAL_NAMES
     eigenfunctions: Annotated[
         Values | None,
         parameter(
@@ -425,6 +427,10 @@ class OutputSection(Section):
             if value and name not in self.quantities:
                 text = f'got {shown(value)}, but output.quantities has no "{name}"; add it there, or write {instead}'
                 wrong.append(((name,), value, text))
+        if RATE_FUNCTION.name in self.quantities and MOMENT.name not in self.quantities:
+            at = "quantities", self.quantities.index(RATE_FUNCTION.name)
+            text = f"got {shown(RATE_FUNCTION.name)}, which follows from Λ(p); add {shown(MOMENT.name)}, or remove it"
+            wrong.append((at, RATE_FUNCTION.name, text))
         refuse(wrong)
         return self
 

@@ -141,7 +141,7 @@ class Solution:
     Attributes:
         pair: the principal pair.
         finer: that on a finer mesh, which measures the error of a given mesh: it may have few modes.
-        search: the error of the place among several problems where the value is the least, or of the correction of `pair`.
+        search: the error of the place among several problems where the value is the least, or of a correction.
     """
 
     pair: PrincipalPair

@@ -28,6 +28,57 @@ SECOND_DERIVATIVE = replace(
     words="curvature of the moment Lyapunov exponent",
     latex=r"$\Lambda''(p)$",
 )
+ORDER = Quantity("order", "n", "order of ε", "$n$", dims=("order",))
+COEFFICIENT = Quantity(
+    "coefficient",
+    "Λₙ(p)",
+    "coefficient of the perturbation series",
+    r"$\Lambda_n(p)$",
+    "1/time",
+    ("order", "p"),
+    "(20)-(23)",
+    error_source="the difference from the adjoint recursion with more functions of the noise, rounding",
+)
+GROWTH = Quantity("growth_rate", "s", "growth rate of a path", r"$s = \ln\|x(t)\|/t$", "1/time", ("growth_rate",))
+TIME = Quantity("time", "t", "time", "$t$", "time", ("time",))
+RATE_FUNCTION = Quantity(
+    "rate_function",
+    "I(s)",
+    "rate function of the growth rate",
+    "$I(s)$",
+    "1/time",
+    ("growth_rate",),
+    "I(s) = p s − Λ(p), s = Λ′(p)",
+    error_source="that of Λ(p)",
+)
+SADDLE = Quantity("p", "p(s)", "order of the moment with this growth rate", "$p(s)$", dims=("growth_rate",))
+PREFACTOR = Quantity(
+    "prefactor",
+    "C",
+    "prefactor of the moment of order p(s)",
+    "$C$",
+    dims=("growth_rate",),
+    equation="E‖x(t)‖^p ~ C e^(Λ(p)t)",
+    error_source="the difference from a finer discretisation",
+)
+PROBABILITY = Quantity(
+    "probability",
+    "P(s_t ≥ s)",
+    "probability to grow as fast or faster",
+    r"$P(s_t \geq s)$",
+    dims=("time", "growth_rate"),
+)
+BELOW = replace(
+    PROBABILITY,
+    name="probability_below",
+    symbol="P(s_t ≤ s)",
+    words="probability to grow as fast or slower",
+    latex=r"$P(s_t \leq s)$",
+)
+GROWTH_DENSITY = Quantity(
+    "density", "f(s)", "density of the growth rate", "$f(s)$", "time", dims=("time", "growth_rate")
+)
+WIDTH = Quantity("width", "√(Λ″(0)/t)", "standard deviation of the growth rate", "", "1/time", ("time",))
 RESIDUAL = Quantity("residual", "residual", "backward error of the eigenpair", dims=("p",))
 EFFECTIVE_PATHS = Quantity(
     "effective_paths", "effective paths", "effective number of paths that carry the mean", dims=("p",)
@@ -98,6 +149,8 @@ STORED_MOMENTS = {
     "perturbation": MOMENT.perturbation,
 }
 """Those of them that results.nc holds, by the same names, as they are called there."""
+OF_RATE = {RATE_FUNCTION.name: replace(RATE_FUNCTION, dims=("p",), comment="at s = Λ′(p), the moment_derivative")}
+"""What it holds where the rate function is asked for; the error is that of the moment."""
 
 
 def moment_at(p: float) -> Quantity:

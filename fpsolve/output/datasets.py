@@ -18,7 +18,7 @@ from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
-from fpsolve.model.quantity import SECONDS, STATUS, STORED_MOMENTS, P, Quantity
+from fpsolve.model.quantity import OF_RATE, RATE_FUNCTION, SECONDS, STATUS, STORED_MOMENTS, P, Quantity
 from fpsolve.output.tables import asked
 from fpsolve.study.results import CurveResult, Status
 
@@ -55,7 +55,8 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
     over: tuple[str, ...] = (SET,) if is_list else vary.keys
     shape = (planned,) if is_list else tuple(len(vary.values(key)) for key in over)
     places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.output.quantities else {}
-    moments = {name: np.full((planned, len(places)), math.nan) for name in STORED_MOMENTS if places}
+    stored = STORED_MOMENTS | (OF_RATE if RATE_FUNCTION.name in case.output.quantities else {})
+    moments = {name: np.full((planned, len(places)), math.nan) for name in stored if places}
     indices = {index: np.full((3, planned), math.nan) for index in asked(case)}
     status, seconds = np.full(planned, Status.MISSING, dtype=np.int8), np.full(planned, math.nan)
     for result in results:
@@ -66,7 +67,7 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
             if numbers := result.index(index):
                 values[:, row] = [*numbers.values()]
         status[row], seconds[row] = result.status, result.seconds
-    columns: list[tuple[Quantity, Any]] = [(STORED_MOMENTS[name], values) for name, values in moments.items()]
+    columns: list[tuple[Quantity, Any]] = [(stored[name], values) for name, values in moments.items()]
     for index, three in indices.items():
         columns += zip((index, index.error(), index.perturbation), three, strict=True)
     columns += [(STATUS, status), (SECONDS, seconds)]

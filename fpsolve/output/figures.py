@@ -38,7 +38,7 @@ from fpsolve.drawing import (
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import P
+from fpsolve.model.quantity import GROWTH, MOMENT, RATE_FUNCTION, P
 from fpsolve.output.charts import held_in_words, read_line
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory import perturbation
@@ -167,6 +167,24 @@ def draw(
         draw_series(axes, case, series, setting.quantity.closed_form + ", reduced noise" * is_exact)
 
 
+def draw_rates(case: Case, results: Sequence[CurveResult], folder: Path, *, into: Path | None = None) -> None:
+    """Draw rate_function.png and .pdf, if the case asks for it: I(s) at s = Λ′(p) of every p, 0 at s = λ."""
+    if RATE_FUNCTION.name not in case.output.quantities or not case.output.figure or not results:
+        return
+    held, is_few = held_in_words(results[0].curve, case.vary.keys, case.figure.time_unit), len(results) <= MOST_NAMED
+    shown = _some(len(results))
+    series = [_rates(result, with_theory=i in shown) for i, result in enumerate(results)]
+    form = FORMATS[case.figure.width]
+    with figure_for(*headed(folder, "rate_function", into, case.headline), held, form) as figure:
+        axes = figure.add_subplot()
+        label_axes(axes, *(each.timed(case.figure.time_unit).attributes for each in (GROWTH, RATE_FUNCTION)))
+        mark_zero(axes)
+        is_exact = any(result.curve.is_exact for result in results)
+        (_draw_few if is_few else _draw_many)(axes, case, series, MOMENT.closed_form + ", reduced noise" * is_exact)
+        axes.margins(x=0.03)
+        axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
+
+
 def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path, *, into: Path | None = None) -> None:
     """Draw sensitivities.png and .pdf of every curve, if the case says so: θ ∂/∂θ of λ and of some Λ(p), scaled."""
     for result in results if case.output.sensitivities else ():
@@ -228,6 +246,17 @@ def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | Non
         root=root if root is not None and first <= root <= last else None,
         slope=slope if first <= 0 <= last else None,
     )
+
+
+def _rates(result: CurveResult, *, with_theory: bool) -> Series:
+    """I over s, beside the parabola (s − λ)²/2Λ″(0) of perturbation theory."""
+    found, theory = result.moments, perturbation.second_order_or_none(result.curve.problem)
+    known = np.isfinite(found.derivative)
+    s, line, values = found.derivative[known], _NOTHING, _NOTHING
+    if with_theory and theory and s.size:
+        line = np.linspace(s.min(), s.max(), 200)
+        values = (line - theory.lyapunov_exponent) ** 2 / (2 * theory.variance_rate)
+    return Series(dict(result.curve.varied), s, found.rate_function[known], line, values)
 
 
 def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:

@@ -25,9 +25,10 @@ from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.files import parsed_json, plain_text, write_text
 from fpsolve.messages import Code, Message, Severity, message_of
+from fpsolve.model.quantity import RATE_FUNCTION
 from fpsolve.output.charts import draw_chart
 from fpsolve.output.directions import directions_file, draw_densities
-from fpsolve.output.figures import draw, draw_response, draw_sensitivities
+from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities
 from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, region_meaning, simulated_meanings
 from fpsolve.output.proofs import PROOF, between, proof_grid, proofs_grid
 from fpsolve.output.screen import Column, Grid
@@ -210,6 +211,8 @@ def _figures(case: Case, found: Found, folder: Path) -> Iterator[Figure]:
         over = "p" if case.figure.x == "p" else case.about(case.figure.x).words
         title = f"The {case.figure.quantity.words}, {case.figure.quantity.symbol}, over {over}"
         jobs.append(("figure", title, partial(draw, case, found.results, found.simulated, folder)))
+        title = f"The {RATE_FUNCTION.words}, {RATE_FUNCTION.symbol}"
+        jobs.append(("rate_function", title, partial(draw_rates, case, found.results, folder)))
     for result in found.results[:MOST_PICTURES]:
         title = f"Effect of the parameters{_of(result.curve)}"
         jobs.append((f"sensitivities{result.curve.suffix}", title, partial(draw_sensitivities, case, [result], folder)))

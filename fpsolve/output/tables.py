@@ -28,7 +28,7 @@ from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
-from fpsolve.model.quantity import MOMENT, MOMENTS
+from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.uncertain import SAMPLE, Samples, spreads_of
 
@@ -66,7 +66,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
     state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
     start = json.dumps({**head(case), **state, **facts}, indent=1, ensure_ascii=False).removesuffix("\n}")
     indent = 1 if case.planned <= MOST_INDENTED else None
-    has_moments = MOMENT.name in case.output.quantities
+    has_moments, names = MOMENT.name in case.output.quantities, columns_of(case)
     indices = [column.name for each in asked(case) for column in (each, each.error())]
     ends = [f"{each.name}_{part}" for each in _uncertain(case) for part in ENDS]
     more = ENDS if case.uncertain else ()
@@ -75,14 +75,14 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
         )
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
-        by_moment.writerow([*case.vary.keys, *MOMENTS, *more])
+        by_moment.writerow([*case.vary.keys, *names, *more])
         by_curve.writerow([*case.vary.keys, *indices, *ends, "p_solved", "p_failed", "status", "seconds"])
         summary.write(f'{start},\n "curves": [')
         for number, result in enumerate(results):
             varied, done = result.curve.varied.values(), result.moments
-            columns = [getattr(done, name).tolist() for name in MOMENTS]
+            columns = [getattr(done, name).tolist() for name in names]
             finite = [[None if math.isnan(each) else each for each in row] for row in zip(*columns, strict=True)]
-            rows = [dict(zip(MOMENTS, row, strict=True)) for row in finite]
+            rows = [dict(zip(names, row, strict=True)) for row in finite]
             content = _summary(case, result, rows)
             text = json.dumps(content, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
             summary.write((",\n  " if number else "\n  ") + text)
@@ -145,6 +145,11 @@ def write_samples(case: Case, samples: Samples, folder: Path) -> None:
         "warnings": in_case_words(samples.remarks),
     }
     write_json(folder / f"{SAMPLE}.json", content)
+
+
+def columns_of(case: Case) -> list[str]:
+    """The names of what a case asks for at every p."""
+    return [*MOMENTS, *[RATE_FUNCTION.name] * (RATE_FUNCTION.name in case.output.quantities)]
 
 
 def asked(case: Case) -> list[Index]:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fpsolve.analysis.directions import SettledDirections
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray
@@ -45,6 +47,11 @@ class MomentColumns:
     residual: FloatArray
     perturbation: FloatArray
     rare: FloatArray
+
+    @property
+    def rate_function(self) -> FloatArray:
+        """I(s) = ps − Λ(p) at s = Λ′(p), shape (n,); its error is, to first order, that of Λ(p)."""
+        return np.asarray(self.p * self.derivative - self.value) + 0.0
 
 
 class Status(IntEnum):

@@ -19,7 +19,7 @@ from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
 from fpsolve.output.designs import write_design
 from fpsolve.output.directions import draw_densities
-from fpsolve.output.figures import draw, draw_response, draw_sensitivities
+from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities
 from fpsolve.output.tables import write_samples, write_simulation
 from fpsolve.output.vtk import write_response
 from fpsolve.pool import Pool, cluster, parallel, serial
@@ -160,6 +160,7 @@ def run_case(
         def show() -> None:
             with watch.bar(Phase(case.name, "figures")), writable(folder):
                 draw(case, sweep.results, simulated, folder)
+                draw_rates(case, sweep.results, folder)
                 draw_sensitivities(case, sweep.results, folder)
                 draw_densities(case, sweep.results, folder)
             if reporter is not None:

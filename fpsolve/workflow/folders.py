@@ -13,7 +13,8 @@ from fpsolve.files import TEMPORARY, alone, parsed_json, plain_text, writable
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
 SOLVED = (
-    r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc|(figure|(sensitivities|densities)(-\d+)?)\.(png|pdf)"
+    r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc"
+    r"|(figure|rate_function|(sensitivities|densities)(-\d+)?)\.(png|pdf)"
     r"|density\.vtu|densities(-\d+)?\.nc|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
     r"|sample\.json|sample/(summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc)"
 )
