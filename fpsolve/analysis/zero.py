@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from pydantic.dataclasses import dataclass as checked_dataclass
 
 from fpsolve.analysis.scan import Sample
-from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
+from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value, held_by
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, Countdown
@@ -288,12 +288,13 @@ class ZeroField:
                 is not near
             ):
                 raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
-        along = [problem.derivative(axis.key) for axis in self._axes]
+        held, by_key = held_by(solver, p, {axis.key: problem.derivative(axis.key) for axis in self._axes})
+        along = [by_key[axis.key] for axis in self._axes]
         if abs(p) >= SMALL_P:
-            pair = solver.near.solution(p).pair
+            pair = held.near.solution(p).pair
             slopes = np.array([changed_value(pair, by).value / p for by in along])
         else:
-            around = Bordered(solver.near.solution(0.0).pair)
+            around = Bordered(held.near.solution(0.0).pair)
             more = [0.5 * p * changed_curvature(around, by).value if p else 0.0 for by in along]
             slopes = np.array([changed_slope(around, by).value for by in along]) + more
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])

@@ -321,7 +321,7 @@ def _is_finite(each: InvariantClass, shape: tuple[int, ...]) -> bool:
     is_whole = all(
         column.shape == shape and bool(np.isfinite(column).all()) for column in (each.value, each.error_estimate)
     )
-    return is_whole and all(map(math.isfinite, (each.phase, exponent.value, exponent.error_estimate)))
+    return is_whole and all(map(math.isfinite, (each.phase or 0.0, exponent.value, exponent.error_estimate)))
 
 
 def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:

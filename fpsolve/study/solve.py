@@ -294,8 +294,8 @@ def _solve_jumps(
 
 
 def _solve_classes(solver: ExponentSolver, p: FloatArray) -> tuple[InvariantClass, ...]:
-    """λ and Λ(p) on a ray that the phase never leaves, and across it, where they converge."""
-    with suppress(NotConverged):
+    """λ and Λ(p) of the classes of the problem, where they converge."""
+    with suppress(NotConverged, NoSuchExponent):
         return solver.by_class(p)
     return ()
 
@@ -304,9 +304,11 @@ def _told_of(classes: Sequence[InvariantClass]) -> Message | None:
     """That there are such classes, and their λ."""
     if len(classes) < 2:
         return None
-    along, across = classes
-    rates = {"along": along.lyapunov_exponent.value, "across": across.lyapunov_exponent.value}
-    return Message(Code.INVARIANT_CLASSES, phase=along.phase, **rates)
+    values = [each.lyapunov_exponent.value for each in classes]
+    if classes[0].phase is None:
+        return Message(Code.BLOCKS, blocks=[f"({each.name})" for each in classes], rates=values)
+    along, across = values
+    return Message(Code.INVARIANT_CLASSES, phase=classes[0].phase, along=along, across=across)
 
 
 def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:

@@ -1,0 +1,132 @@
+"""What some coordinates of a linear system obey by themselves.
+
+Where all matrices of a system are block triangular in coordinates x = Σ V_k y_k, y_k = W_k x, each y_k obeys ẏ_k =
+Σ εⁿ g(ξ) W_k A V_k y_k but for what other blocks drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.plane import CoefficientMatrix, Jump, System
+from fpsolve.model.quantity import Quantity
+
+ROUNDED = 1e-12
+"""Share of a matrix that is rounding."""
+TURN = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))
+"""A uniform rotation, which leaves ‖x‖ alone."""
+
+
+@dataclass(frozen=True)
+class Subsystem(System):
+    """One block of a system, with its parameters. One coordinate is given as ẋ = (a + J)x, J a uniform rotation.
+
+    Attributes:
+        whole: the system.
+        columns, rows: V_k and W_k, of n rows, and of n columns.
+        names: what its coordinates are called.
+    """
+
+    whole: System
+    columns: tuple[tuple[float, ...], ...]
+    rows: tuple[tuple[float, ...], ...]
+    names: tuple[str, ...]
+
+    @property
+    def is_scalar(self) -> bool:
+        """Whether it is one coordinate."""
+        return len(self.rows) == 1
+
+    @property
+    def epsilon(self) -> float:  # type: ignore[override]
+        return self.whole.epsilon
+
+    @cached_property
+    def terms(self) -> Sequence[CoefficientMatrix]:  # type: ignore[override]
+        return (*[TURN] * self.is_scalar, *self.part(self.whole.terms))
+
+    @property
+    def jumps(self) -> Sequence[Jump]:  # type: ignore[override]
+        return ()
+
+    def part(self, terms: Sequence[CoefficientMatrix]) -> tuple[CoefficientMatrix, ...]:
+        """W_k A V_k of some terms of the whole, without those of which nothing is left."""
+        found = list[CoefficientMatrix]()
+        for term in terms:
+            matrix = np.array(self.rows) @ np.array(term.matrix) @ np.array(self.columns)
+            if np.any(matrix):
+                found.append(replace(term, matrix=(matrix[0, 0] * np.eye(2) if self.is_scalar else matrix).tolist()))
+        return tuple(found)
+
+    @property
+    def section(self) -> str:  # type: ignore[override]
+        return self.whole.section
+
+    @property
+    def noise_unit(self) -> str:  # type: ignore[override]
+        return self.whole.noise_unit
+
+    @property
+    def noise_sections(self) -> Sequence[str]:
+        """Of the noises that drive it; the first one of the whole where none does."""
+        known = self.whole.noise_sections
+        if len(known) == 1:
+            return known
+        return [each for each in known if each.removeprefix("noise.") in self.driven_by] or known[:1]
+
+    @property
+    def values(self) -> Mapping[str, float | str]:
+        return self.whole.values
+
+    @property
+    def differentiable(self) -> Sequence[str]:
+        return self.whole.differentiable
+
+    def quantity_of(self, name: str) -> Quantity:
+        return self.whole.quantity_of(name)
+
+    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
+        """That of the whole, in the same coordinates."""
+        terms, _ = self.whole.derivative(name)
+        return self.part(terms), ()
+
+
+def subsystems(whole: System, groups: Sequence[FloatArray], names: Sequence[Sequence[str]]) -> tuple[Subsystem, ...]:
+    """The blocks of a system in coordinates x = Σ V_k y_k, from V_k, which make up a basis, and names of y_k."""
+    inverse = np.linalg.inv(np.column_stack(groups))
+    found, start = list[Subsystem](), 0
+    for columns, own in zip(groups, names, strict=True):
+        stop = start + columns.shape[1]
+        found.append(
+            Subsystem(
+                whole, tuple(map(tuple, columns.tolist())), tuple(map(tuple, inverse[start:stop].tolist())), (*own,)
+            )
+        )
+        start = stop
+    return tuple(found)
+
+
+def couplings(blocks: Sequence[Subsystem], matrices: Sequence[FloatArray]) -> NDArray[np.bool_]:
+    """Whether a block, the row, is driven by another one, the column, in some of the matrices, beyond rounding."""
+    found = np.zeros((len(blocks), len(blocks)), dtype=bool)
+    for matrix in matrices:
+        least = ROUNDED * float(np.linalg.norm(matrix))
+        for i, own in enumerate(blocks):
+            for j, other in enumerate(blocks):
+                part = np.array(own.rows) @ matrix @ np.array(other.columns)
+                found[i, j] |= i != j and bool(np.any(np.abs(part) > least))
+    return found
+
+
+def reached(pattern: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which variable, the row, feels which, the column, through any number of others; every one feels itself."""
+    count = len(pattern)
+    steps = np.linalg.matrix_power((np.asarray(pattern) != 0) | np.eye(count, dtype=bool), count)
+    return np.asarray(steps, dtype=bool)
