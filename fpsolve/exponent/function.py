@@ -266,11 +266,14 @@ def nonzero_root(
     """
     if grows_far_out(solver.problem):
         return Absent(Message(Code.NO_INDEX))
+    if solver.classes and solver.lyapunov_exponent().value < 0:  # that of the largest of their Λ(p), p > 0
+        roots = [nonzero_root(each, interval) for each in solver.classes]
+        return min((each for each in roots if each), key=lambda each: each.value, default=roots[0])
     noise = solver.problem.noise
     ends = low, high = tuple(float(end) for end in np.clip(interval, *solver.problem.moments))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)
-        guess = -ratio / slope
+        guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
     p, tried, steps, tolerance = min(max(guess, low), high), set(), [high - low] * 2, None
     for _ in range(MOST_STEPS):
         tried.add(p)

@@ -255,7 +255,8 @@ class ExponentSolver:
             return self.place.solution(point, tolerance)
         if point < 0 and len(self.classes) > 1:
             return self._joint(point, tolerance)[0]
-        return max((each.solution(point, tolerance) for each in self.classes), key=lambda each: each.pair.value)
+        found = [each.solution(point, tolerance) for each in self.classes]
+        return max(found, key=lambda each: each.pair.value if point else each.pair.derivative)
 
     def leading(self, p: float) -> ExponentSolver:
         """The one of the classes whose Λ(p), or for p = 0 whose λ, that of the problem is; itself without classes.

@@ -291,7 +291,7 @@ class Problem:
             groups = {tuple(np.flatnonzero(feels[k] & feels[:, k]).tolist()) for k in range(n)}
             if len(groups) == 1:
                 return ()
-            ordered = sorted(groups, key=lambda group: (np.count_nonzero(feels[group[0]]), group))
+            ordered = sorted(groups, key=lambda group: (np.count_nonzero(feels[group[0]]) - len(group), group))
             columns = [np.eye(n)[:, group] for group in ordered]
             return subsystems(self.system, columns, [[names[k] for k in group] for group in ordered])
         if not (rays := self.invariant_rays):
