@@ -266,11 +266,13 @@ def nonzero_root(
     """
     if grows_far_out(solver.problem):
         return Absent(Message(Code.NO_INDEX))
-    if solver.classes and solver.lyapunov_exponent().value < 0:  # that of the largest of their Λ(p), p > 0
-        roots = [nonzero_root(each, interval) for each in solver.classes]
-        return min((each for each in roots if each), key=lambda each: each.value, default=roots[0])
     noise = solver.problem.noise
     ends = low, high = tuple(float(end) for end in np.clip(interval, *solver.problem.moments))
+    if solver.classes and solver.lyapunov_exponent().value < 0:  # p > 0, where Λ(p) is the largest of theirs
+        roots = [nonzero_root(each, interval) for each in solver.classes if each.problem.system.driven_by]
+        if known := [each for each in roots if each]:
+            return min(known, key=lambda each: each.value)
+        return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)
         guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)

@@ -42,7 +42,7 @@ from fpsolve.model.kinds import source_of, version_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Numerics, Wanted, everything
 
-RESULT_VERSION = 3
+RESULT_VERSION = 4
 """Of what is computed from the same parameters; records of another one are computed anew."""
 SHARED_SECONDS = 60.0
 """After which a file that another machine has written is there, if it ever is."""

@@ -21,6 +21,7 @@ from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, LinearSystem, Telegraph, White
 from tests.oracles import kronecker
+from tests.random_modes import by_simulation
 
 PAIRS = (
     np.array([[0, 1, 0, 0], [-1, -0.1, 0, 0], [0, 0, 0, 1], [0, 0, -2.56, -0.16]]),
@@ -59,7 +60,7 @@ def by_moments(noise, steady, driven, p):
     if noise is NOISES["white"]:
         return kronecker.white(steady, driven, p)
     if noise is OU:
-        return kronecker.ornstein_uhlenbeck(steady, driven, 1.0, 0.5, p, 2 + 6 * (6 - p))
+        return kronecker.ornstein_uhlenbeck(steady, driven, 1.0, 0.5, p, 44 // len(steady))
     return kronecker.chain(steady, driven, (-0.7, 0.7), ((0, 0.6), (0.6, 0)), p)
 
 
@@ -93,15 +94,26 @@ def test_uncoupled_pairs_by_blocks_and_as_two_systems():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "kind", "p"),
-    [("pairs", "white", 1.0), ("oscillator drives", "white", 1.0), ("oscillator drives", "white", 3.0)],
-)
-def test_blocks_that_other_coordinates_hide(name, kind, p):
+@pytest.mark.parametrize(("name", "p", "rtol"), [("pairs", 1.0, 1e-3), ("oscillator drives", [1.0, 3.0], 3e-4)])
+def test_blocks_that_other_coordinates_hide(name, p, rtol):
     """As one system by the sphere of directions: a second method."""
-    found = moment_lyapunov(hidden(NOISES[kind], *SYSTEMS[name]), p, rtol=3e-4)
-    by_blocks = moment_lyapunov(problem(NOISES[kind], *SYSTEMS[name]), p)
+    found = moment_lyapunov(hidden(White(s=1.0), *SYSTEMS[name]), p, rtol=rtol)
+    by_blocks = moment_lyapunov(problem(White(s=1.0), *SYSTEMS[name]), p)
     assert np.all(np.abs(found.value - by_blocks.value) <= found.error_estimate)
+    assert np.all(found.error_estimate < 1e-3)
+
+
+@pytest.mark.slow
+def test_blocks_against_a_simulation():
+    """λ, Λ(1) and Λ(−0.5) where one block decays much sooner than the other, so that paths forget it."""
+    steady, driven = (matrix.copy() for matrix in CASCADE)
+    steady[3, 3] = -1.2
+    whole = problem(White(s=1.0), steady, driven)
+    solver, made = ExponentSolver(whole), by_simulation(whole, path_steps=1e7)
+    rate = solver.lyapunov_exponent().value
+    assert abs(made.lyapunov_exponent - rate) < 4 * made.lyapunov_exponent_error
+    for each in made.estimates:
+        assert abs(each.value - solver.solution(each.p).pair.value) < 4 * each.standard_error
 
 
 def test_the_largest_class_changes_with_p():
