@@ -38,7 +38,7 @@ from fpsolve.model.plane import (
     turning,
 )
 from fpsolve.model.quantity import NOISE, Quantity
-from fpsolve.model.subsystem import ROUNDED, TURN, Subsystem, couplings, reached, subsystems
+from fpsolve.model.subsystem import ROUNDED, TURN, Subsystem, components, couplings, hidden_blocks, reached, subsystems
 
 P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
@@ -282,23 +282,26 @@ class Problem:
         """What can be solved by itself, as the matrices of the system are block triangular; nothing where they are not.
 
         Of three and four variables groups of these, of which each drives later ones alone: the strongly connected
-        components of the union of the patterns of all matrices. Of two variables ‖x‖ on the first of the
-        `invariant_rays`, and on the second one, or else the distance from the first.
+        components of the union of the patterns of all matrices. Where there is one group, those of coordinates y that
+        show more, if there are any. Of two variables ‖x‖ on the first of the `invariant_rays`, and on the second one,
+        or else the distance from the first.
         """
-        n, names = self.dimension, self.system.states
-        if n > 2:
-            feels = reached(np.sum(np.abs(self._by_noise(self.system.terms)), axis=0))
-            groups = {tuple(np.flatnonzero(feels[k] & feels[:, k]).tolist()) for k in range(n)}
-            if len(groups) == 1:
-                return ()
-            ordered = sorted(groups, key=lambda group: (np.count_nonzero(feels[group[0]]) - len(group), group))
-            columns = [np.eye(n)[:, group] for group in ordered]
-            return subsystems(self.system, columns, [[names[k] for k in group] for group in ordered])
+        if self.dimension > 2:
+            matrices, names = self._by_noise(self.system.terms), self.system.states
+            groups = components(np.sum(np.abs(matrices), axis=0))
+            if len(groups) > 1:
+                unit = np.eye(self.dimension)
+                own = [[names[k] for k in group] for group in groups]
+                return subsystems(self.system, [unit[:, group] for group in groups], own)
+            columns, rounded = hidden_blocks(matrices)
+            signs = iter(f"y{'₁₂₃₄'[k]}" for k in range(self.dimension))
+            own = [[next(signs) for _ in each.T] for each in columns]
+            return subsystems(self.system, columns, own, rounded) if columns else ()
         if not (rays := self.invariant_rays):
             return ()
         phases = rays if len(rays) == 2 else (rays[0], rays[0] + math.pi / 2)
         columns = [np.array([[math.cos(phi)], [-math.sin(phi)]]) for phi in phases]
-        found = subsystems(self.system, columns, [()] * 2)
+        found = subsystems(self.system, columns, [()] * 2, ROUNDED)
         is_one = all(not term.h.mean and not term.h.amplitude for term in self.system.terms)
         return found[:1] if is_one else found
 

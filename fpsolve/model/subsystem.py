@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
@@ -19,7 +20,9 @@ from fpsolve.model.plane import CoefficientMatrix, Jump, System
 from fpsolve.model.quantity import Quantity
 
 ROUNDED = 1e-12
-"""Share of a matrix that is rounding."""
+"""Share of a matrix that is rounding, in the coordinates of rays, and for eigenvectors times their condition."""
+WORST_CONDITION = 100.0
+"""Of eigenvectors in which blocks are looked for."""
 TURN = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))
 """A uniform rotation, which leaves ‖x‖ alone."""
 
@@ -32,12 +35,14 @@ class Subsystem(System):
         whole: the system.
         columns, rows: V_k and W_k, of n rows, and of n columns.
         names: what its coordinates are called.
+        rounded: share of a matrix W A V, of all blocks, that is rounding: 0 where they are variables of the system.
     """
 
     whole: System
     columns: tuple[tuple[float, ...], ...]
     rows: tuple[tuple[float, ...], ...]
     names: tuple[str, ...]
+    rounded: float = 0.0
 
     @property
     def is_scalar(self) -> bool:
@@ -61,7 +66,7 @@ class Subsystem(System):
         found = list[CoefficientMatrix]()
         for term in terms:
             matrix = np.array(self.rows) @ np.array(term.matrix) @ np.array(self.columns)
-            if np.any(matrix):
+            if np.any(np.abs(matrix) > self.rounded * np.linalg.norm(term.matrix)):
                 found.append(replace(term, matrix=(matrix[0, 0] * np.eye(2) if self.is_scalar else matrix).tolist()))
         return tuple(found)
 
@@ -98,30 +103,31 @@ class Subsystem(System):
         return self.part(terms), ()
 
 
-def subsystems(whole: System, groups: Sequence[FloatArray], names: Sequence[Sequence[str]]) -> tuple[Subsystem, ...]:
+def subsystems(
+    whole: System, groups: Sequence[FloatArray], names: Sequence[Sequence[str]], rounded: float = 0.0
+) -> tuple[Subsystem, ...]:
     """The blocks of a system in coordinates x = Σ V_k y_k, from V_k, which make up a basis, and names of y_k."""
     inverse = np.linalg.inv(np.column_stack(groups))
     found, start = list[Subsystem](), 0
     for columns, own in zip(groups, names, strict=True):
-        stop = start + columns.shape[1]
-        found.append(
-            Subsystem(
-                whole, tuple(map(tuple, columns.tolist())), tuple(map(tuple, inverse[start:stop].tolist())), (*own,)
-            )
-        )
-        start = stop
+        rows = inverse[start : start + columns.shape[1]]
+        found.append(Subsystem(whole, _rows(columns), _rows(rows), tuple(own), rounded))
+        start += columns.shape[1]
     return tuple(found)
+
+
+def _rows(matrix: FloatArray) -> tuple[tuple[float, ...], ...]:
+    return tuple(map(tuple, matrix.tolist()))
 
 
 def couplings(blocks: Sequence[Subsystem], matrices: Sequence[FloatArray]) -> NDArray[np.bool_]:
     """Whether a block, the row, is driven by another one, the column, in some of the matrices, beyond rounding."""
     found = np.zeros((len(blocks), len(blocks)), dtype=bool)
     for matrix in matrices:
-        least = ROUNDED * float(np.linalg.norm(matrix))
         for i, own in enumerate(blocks):
             for j, other in enumerate(blocks):
                 part = np.array(own.rows) @ matrix @ np.array(other.columns)
-                found[i, j] |= i != j and bool(np.any(np.abs(part) > least))
+                found[i, j] |= i != j and bool(np.any(np.abs(part) > own.rounded * np.linalg.norm(matrix)))
     return found
 
 
@@ -130,3 +136,39 @@ def reached(pattern: NDArray[Any]) -> NDArray[np.bool_]:
     count = len(pattern)
     steps = np.linalg.matrix_power((np.asarray(pattern) != 0) | np.eye(count, dtype=bool), count)
     return np.asarray(steps, dtype=bool)
+
+
+def components(pattern: NDArray[Any]) -> list[tuple[int, ...]]:
+    """The variables in groups that feel each other, of which each feels earlier ones alone."""
+    feels = reached(pattern)
+    groups = {tuple(np.flatnonzero(row & feels[:, k]).tolist()) for k, row in enumerate(feels)}
+    return sorted(groups, key=lambda group: (np.count_nonzero(feels[group[0]]) - len(group), group))
+
+
+def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[list[FloatArray], float]:
+    """V_k of blocks in other coordinates than the variables, or nothing, and what share of a matrix is rounding there.
+
+    What is invariant for all matrices is so for sums of their products. Such a sum with coefficients at random has
+    different eigenvalues unless two blocks are alike, and then what is invariant is spanned by its eigenvectors.
+    """
+    size = np.sum(np.abs(matrices), axis=0)
+    _, (scales, _) = scipy.linalg.matrix_balance(size, permute=False, separate=True)
+    scaled = [a * scales / scales[:, None] for a in matrices]
+    scaled = [a / norm for a in scaled if (norm := np.linalg.norm(a))]
+    words = [*scaled, *(a @ b for a in scaled for b in scaled)]
+    mixed = np.tensordot(np.random.default_rng(0).standard_normal(len(words)), words, 1)
+    values, vectors = np.linalg.eig(mixed)
+    upper = values.imag >= 0
+    parts = [
+        [each.real, each.imag] if value.imag else [each.real]
+        for value, each in zip(values[upper], vectors.T[upper], strict=True)
+    ]
+    basis, sizes = np.column_stack([column for each in parts for column in each]), [len(each) for each in parts]
+    if not (condition := float(np.linalg.cond(basis))) < WORST_CONDITION:
+        return [], 0.0
+    least = ROUNDED * condition
+    inside = [np.linalg.solve(basis, a @ basis) for a in scaled]
+    pattern = np.any([np.abs(a) > least * np.linalg.norm(a) for a in inside], axis=0)
+    of_mode = np.repeat(np.eye(len(sizes), dtype=bool), sizes, axis=1)
+    groups = components(pattern | of_mode.T @ of_mode)
+    return [scales[:, None] * basis[:, group] for group in groups] if len(groups) > 1 else [], least

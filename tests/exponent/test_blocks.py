@@ -1,6 +1,7 @@
-"""Systems of three and four variables that are solved by blocks: moment equations, the plane, and hidden blocks."""
+"""Systems of three and four variables that are solved by blocks: moment equations, the plane, and other coordinates."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,8 +19,11 @@ from fpsolve import (
 from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import CoefficientMatrix, LinearSystem, Telegraph, White
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.modes import SpherePlace
+from fpsolve.exponent.solver import ExponentSolver, tolerated
+from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, Telegraph, White
+from fpsolve.theory.perturbation import scale_of
 from tests.oracles import kronecker
 from tests.random_modes import by_simulation
 
@@ -48,12 +52,17 @@ def problem(noise, steady, driven):
     return Problem(LinearSystem(terms), noise)
 
 
-def hidden(noise, steady, driven):
-    """The same in rotated coordinates, as one system."""
+def turned(noise, steady, driven):
+    """The same in other coordinates, for variables of unlike units."""
     turn, _ = np.linalg.qr(np.random.default_rng(3).standard_normal(steady.shape))
-    found = problem(noise, turn @ steady @ turn.T, turn @ driven @ turn.T)
-    assert not found.blocks
-    return found
+    turn *= np.array([1.0, 1e3, 1.0, 1e-2])[: len(turn), None]
+    return problem(noise, *(turn @ matrix @ np.linalg.inv(turn) for matrix in (steady, driven)))
+
+
+def as_one(own, p, rtol):
+    """The solution without looking for blocks."""
+    tolerance = partial(tolerated, rtol, scale_of(own))
+    return SpherePlace(own, rtol=rtol, budget=Budget(), tolerance=tolerance).solution(p)
 
 
 def by_moments(noise, steady, driven, p):
@@ -93,14 +102,34 @@ def test_uncoupled_pairs_by_blocks_and_as_two_systems():
     assert again.value[0] == pytest.approx(found.pair.value, abs=1e-12)
 
 
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_blocks_that_other_coordinates_hide(name):
+    for noise in (White(s=1.0), OU):
+        found, expected = (
+            ExponentSolver(make(noise, *SYSTEMS[name])).moments([1.0, 3.0]).value for make in (turned, problem)
+        )
+        np.testing.assert_allclose(found, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_where_there_are_none(seed):
+    steady, driven = np.random.default_rng([7, seed]).standard_normal((2, 3 + seed % 2, 3 + seed % 2))
+    assert not problem(OU, steady, driven).blocks
+    steady[1:, 0] = driven[1:, 0] = 0.0
+    assert len(turned(OU, steady, driven).blocks) == 2
+    steady[1:, 0] = 1e-6
+    assert not turned(OU, steady, driven).blocks
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "p", "rtol"), [("pairs", 1.0, 1e-3), ("oscillator drives", [1.0, 3.0], 3e-4)])
-def test_blocks_that_other_coordinates_hide(name, p, rtol):
-    """As one system by the sphere of directions: a second method."""
-    found = moment_lyapunov(hidden(White(s=1.0), *SYSTEMS[name]), p, rtol=rtol)
-    by_blocks = moment_lyapunov(problem(White(s=1.0), *SYSTEMS[name]), p)
-    assert np.all(np.abs(found.value - by_blocks.value) <= found.error_estimate)
-    assert np.all(found.error_estimate < 1e-3)
+@pytest.mark.parametrize(
+    ("name", "p", "rtol"), [("pairs", 1.0, 1e-3), ("oscillator drives", 1.0, 1e-4), ("oscillator drives", 3.0, 1e-4)]
+)
+def test_blocks_as_one_system(name, p, rtol):
+    """By the sphere of directions: a second method."""
+    own = problem(White(s=1.0), *SYSTEMS[name])
+    found = as_one(own, p, rtol)
+    assert abs(found.pair.value - ExponentSolver(own).solution(p).pair.value) <= found.error < 1e-3
 
 
 @pytest.mark.slow
@@ -214,6 +243,17 @@ def test_sensitivities_are_those_of_the_largest_block():
             assert slopes[key].value == pytest.approx((high - low) / (2 * step), abs=1e-6)
         low, high = (each.lyapunov_exponent().value for each in sides)
         assert found.indices["lyapunov_exponent"][key].value == pytest.approx((high - low) / (2 * step), abs=1e-6)
+
+
+def test_sensitivities_to_what_turns_the_modes():
+    """Modes of K = ((1, k), (k, 2)) with noise in all stiffness alike do not couple, but change with k."""
+    unit, matrix = [[1.0, 0.0], [0.0, 1.0]], [[1.0, "k"], ["k", 2.0]]
+    system = ModalSystem.of(unit, matrix, [[0.2, 0.0], [0.0, 0.2]], stiffness_noise=matrix, parameters={"k": 0.4})
+    whole, step = Problem(system, White(s=0.6)), 1e-4
+    found = sensitivities(whole, 1.0, rtol=1e-9)
+    sides = [moment_lyapunov(whole.at({"system.k": 0.4 + side}), 1.0, rtol=1e-10).value[0] for side in (-step, step)]
+    assert found.moments[0]["system.k"].value == pytest.approx((sides[1] - sides[0]) / (2 * step), abs=1e-6)
+    assert abs(found.moments[0]["system.k"].value) > 0.01
 
 
 def test_two_blocks_that_are_alike_have_no_derivatives():

@@ -63,13 +63,19 @@ def test_noise_couples_too(entries, sizes, noise):
     assert [len(names) for names in named(Problem(system, noise))] == sizes
 
 
+def modes(k, noise):
+    unit, stiffness = [[1.0, 0.0], [0.0, 1.0]], [[1.0, "k"], ["k", 2.0]]
+    return Problem(ModalSystem.of(unit, stiffness, unit, stiffness_noise=noise, parameters={"k": k}), OU)
+
+
 def test_modes_without_a_coupling():
-    one, stiffness = [[1.0, 0.0], [0.0, 1.0]], [[1.0, "k"], ["k", 2.0]]
-    for k, expected in ((0.0, [("q1", "q1_dot"), ("q2", "q2_dot")]), (0.1, [])):
-        system = ModalSystem.of(one, stiffness, one, stiffness_noise=one, parameters={"k": k})
-        problem = Problem(system, OU)
-        assert named(problem) == expected
-        assert not problem.closes("system.k")  # Λ is even in what couples blocks that nothing couples
+    """Noise that is like the damping and the mass leaves the modes of the stiffness apart."""
+    unlike, alike = [[1.0, 0.0], [0.0, 0.5]], [[1.0, 0.0], [0.0, 1.0]]
+    names = [("q1", "q1_dot"), ("q2", "q2_dot")]
+    assert named(modes(0.0, unlike)) == names
+    assert not modes(0.0, unlike).closes("system.k")  # Λ is even in what couples blocks that nothing couples
+    assert named(modes(0.1, unlike)) == []
+    assert named(modes(0.1, alike)) == [("y₁", "y₂"), ("y₃", "y₄")]
 
 
 def test_a_block_has_the_derivatives_of_the_whole():
