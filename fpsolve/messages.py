@@ -120,8 +120,8 @@ class Code(Enum):
     )
     BLOCKS = (
         "note: the blocks of variables {blocks}{is_hidden:?, of coordinates y for which all matrices have blocks,¦} "
-        "are solved one by one, as none is driven by a later one; in this order their λ are {rates:.6g}; Λ(p) is given for "
-        "starts in none of them alone"
+        "are solved one by one, as none is driven by a later one: in this order their λ are {rates:.6g}; Λ(p) is given "
+        "for starts in none of them alone"
     )
     INFINITE_VARIANCE = (
         "failure: the noise has infinite variance, and its standard deviation is the unit of the mesh; choose r0 < 5/3"
