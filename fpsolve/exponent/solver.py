@@ -38,7 +38,6 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
 from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
-from fpsolve.model.subsystem import Subsystem
 from fpsolve.theory.far import far_places, grows_far_out, log_tail, variance_tail
 from fpsolve.theory.perturbation import Scale, scale_of
 
@@ -290,7 +289,7 @@ class ExponentSolver:
         """λ and Λ(p) of the `classes`; nothing where there are none. Raises `NotConverged`."""
         points, found = real_numbers(p, "p", may_be_empty=True), []
         phases = self.problem.invariant_rays
-        for number, each in enumerate(self.classes):
+        for number, (block, each) in enumerate(zip(self.problem.blocks, self.classes, strict=True)):
             solutions = [each.solution(float(point)) for point in points]
             value, error = (
                 np.array(column, dtype=float)
@@ -298,8 +297,8 @@ class ExponentSolver:
             )
             is_along = number < len(phases)
             phase = (phases[number] if is_along else phases[0]) if phases else None
-            rate, names = each.lyapunov_exponent(), _block(each).names
-            found.append(InvariantClass(phase, is_along, rate, points, value, error, names))
+            names = () if phases else block.names
+            found.append(InvariantClass(phase, is_along, each.lyapunov_exponent(), points, value, error, names))
         return tuple(found)
 
     @cached_property
@@ -421,12 +420,6 @@ class ExponentSolver:
         near = self.near.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
         return float(np.mean([pair.derivative for pair in pairs])), error
-
-
-def _block(solver: ExponentSolver) -> Subsystem:
-    """What the solver of a class solves."""
-    assert isinstance(solver.problem.system, Subsystem)
-    return solver.problem.system
 
 
 def tolerated(rtol: float, scales: Scale, p: float, value: float) -> float:

@@ -287,21 +287,21 @@ class Problem:
         or else the distance from the first.
         """
         if self.dimension > 2:
-            matrices, names = self._by_noise(self.system.terms), self.system.states
-            groups = components(np.sum(np.abs(matrices), axis=0))
-            if len(groups) > 1:
-                unit = np.eye(self.dimension)
-                own = [[names[k] for k in group] for group in groups]
-                return subsystems(self.system, [unit[:, group] for group in groups], own)
-            columns, rounded = hidden_blocks(matrices)
-            signs = iter(f"y{'₁₂₃₄'[k]}" for k in range(self.dimension))
-            own = [[next(signs) for _ in each.T] for each in columns]
-            return subsystems(self.system, columns, own, rounded) if columns else ()
+            matrices, n = self._by_noise(self.system.terms), self.dimension
+            basis, groups, rounded, names = (
+                np.eye(n),
+                components(np.sum(np.abs(matrices), axis=0)),
+                0.0,
+                self.system.states,
+            )
+            if len(groups) == 1:
+                basis, groups, rounded = hidden_blocks(matrices)
+                names = [f"y{'₁₂₃₄'[k]}" for k in range(n)]
+            return subsystems(self.system, basis, groups, names, rounded) if len(groups) > 1 else ()
         if not (rays := self.invariant_rays):
             return ()
-        phases = rays if len(rays) == 2 else (rays[0], rays[0] + math.pi / 2)
-        columns = [np.array([[math.cos(phi)], [-math.sin(phi)]]) for phi in phases]
-        found = subsystems(self.system, columns, [()] * 2, ROUNDED)
+        phases = np.array(rays if len(rays) == 2 else (rays[0], rays[0] + math.pi / 2))
+        found = subsystems(self.system, np.stack([np.cos(phases), -np.sin(phases)]), [(0,), (1,)], ("", ""), ROUNDED)
         is_one = all(not term.h.mean and not term.h.amplitude for term in self.system.terms)
         return found[:1] if is_one else found
 

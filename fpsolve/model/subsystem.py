@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import CoefficientMatrix, Jump, System
@@ -33,21 +33,22 @@ class Subsystem(System):
 
     Attributes:
         whole: the system.
-        columns, rows: V_k and W_k, of n rows, and of n columns.
+        basis: all V_k beside each other, of n rows and columns.
+        own: the columns that are V_k.
         names: what its coordinates are called.
-        rounded: share of a matrix W A V, of all blocks, that is rounding: 0 where they are variables of the system.
+        rounded: share of a matrix in these coordinates that is rounding: 0 where they are variables of the system.
     """
 
     whole: System
-    columns: tuple[tuple[float, ...], ...]
-    rows: tuple[tuple[float, ...], ...]
+    basis: tuple[tuple[float, ...], ...]
+    own: tuple[int, ...]
     names: tuple[str, ...]
     rounded: float = 0.0
 
     @property
     def is_scalar(self) -> bool:
         """Whether it is one coordinate."""
-        return len(self.rows) == 1
+        return len(self.own) == 1
 
     @property
     def epsilon(self) -> float:  # type: ignore[override]
@@ -61,12 +62,24 @@ class Subsystem(System):
     def jumps(self) -> Sequence[Jump]:  # type: ignore[override]
         return ()
 
+    @cached_property
+    def _sides(self) -> tuple[FloatArray, FloatArray]:
+        """All W_k below each other, and all V_k beside each other."""
+        basis = np.array(self.basis)
+        return np.linalg.inv(basis), basis
+
+    def inside(self, matrix: ArrayLike) -> FloatArray:
+        """A matrix in the coordinates of all blocks, without what is rounding."""
+        rows, columns = self._sides
+        found = rows @ np.asarray(matrix) @ columns
+        return np.where(np.abs(found) > self.rounded * np.linalg.norm(found), found, 0.0)
+
     def part(self, terms: Sequence[CoefficientMatrix]) -> tuple[CoefficientMatrix, ...]:
         """W_k A V_k of some terms of the whole, without those of which nothing is left."""
         found = list[CoefficientMatrix]()
         for term in terms:
-            matrix = np.array(self.rows) @ np.array(term.matrix) @ np.array(self.columns)
-            if np.any(np.abs(matrix) > self.rounded * np.linalg.norm(term.matrix)):
+            matrix = self.inside(term.matrix)[np.ix_(self.own, self.own)]
+            if np.any(matrix):
                 found.append(replace(term, matrix=(matrix[0, 0] * np.eye(2) if self.is_scalar else matrix).tolist()))
         return tuple(found)
 
@@ -104,30 +117,20 @@ class Subsystem(System):
 
 
 def subsystems(
-    whole: System, groups: Sequence[FloatArray], names: Sequence[Sequence[str]], rounded: float = 0.0
+    whole: System, basis: FloatArray, groups: Sequence[tuple[int, ...]], names: Sequence[str], rounded: float = 0.0
 ) -> tuple[Subsystem, ...]:
-    """The blocks of a system in coordinates x = Σ V_k y_k, from V_k, which make up a basis, and names of y_k."""
-    inverse = np.linalg.inv(np.column_stack(groups))
-    found, start = list[Subsystem](), 0
-    for columns, own in zip(groups, names, strict=True):
-        rows = inverse[start : start + columns.shape[1]]
-        found.append(Subsystem(whole, _rows(columns), _rows(rows), tuple(own), rounded))
-        start += columns.shape[1]
-    return tuple(found)
-
-
-def _rows(matrix: FloatArray) -> tuple[tuple[float, ...], ...]:
-    return tuple(map(tuple, matrix.tolist()))
+    """The blocks of a system in coordinates x = Σ V_k y_k, from groups of columns of a basis, and the names of all."""
+    sides = tuple(map(tuple, basis.tolist()))
+    return tuple(Subsystem(whole, sides, own, tuple(names[k] for k in own), rounded) for own in groups)
 
 
 def couplings(blocks: Sequence[Subsystem], matrices: Sequence[FloatArray]) -> NDArray[np.bool_]:
     """Whether a block, the row, is driven by another one, the column, in some of the matrices, beyond rounding."""
     found = np.zeros((len(blocks), len(blocks)), dtype=bool)
-    for matrix in matrices:
-        for i, own in enumerate(blocks):
+    for matrix in (blocks[0].inside(each) for each in matrices):
+        for i, one in enumerate(blocks):
             for j, other in enumerate(blocks):
-                part = np.array(own.rows) @ matrix @ np.array(other.columns)
-                found[i, j] |= i != j and bool(np.any(np.abs(part) > own.rounded * np.linalg.norm(matrix)))
+                found[i, j] |= i != j and bool(np.any(matrix[np.ix_(one.own, other.own)]))
     return found
 
 
@@ -145,8 +148,10 @@ def components(pattern: NDArray[Any]) -> list[tuple[int, ...]]:
     return sorted(groups, key=lambda group: (np.count_nonzero(feels[group[0]]) - len(group), group))
 
 
-def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[list[FloatArray], float]:
-    """V_k of blocks in other coordinates than the variables, or nothing, and what share of a matrix is rounding there.
+def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[FloatArray, list[tuple[int, ...]], float]:
+    """A basis in which matrices have blocks, the columns of each, and what share of a matrix is rounding there.
+
+    There is one block where none are found.
 
     What is invariant for all matrices is so for sums of their products. Such a sum with coefficients at random has
     different eigenvalues unless two blocks are alike, and then what is invariant is spanned by its eigenvectors.
@@ -165,10 +170,12 @@ def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[list[FloatArray], flo
     ]
     basis, sizes = np.column_stack([column for each in parts for column in each]), [len(each) for each in parts]
     if not (condition := float(np.linalg.cond(basis))) < WORST_CONDITION:
-        return [], 0.0
+        return np.eye(len(size)), [(*range(len(size)),)], 0.0
     least = ROUNDED * condition
     inside = [np.linalg.solve(basis, a @ basis) for a in scaled]
     pattern = np.any([np.abs(a) > least * np.linalg.norm(a) for a in inside], axis=0)
     of_mode = np.repeat(np.eye(len(sizes), dtype=bool), sizes, axis=1)
     groups = components(pattern | of_mode.T @ of_mode)
-    return [scales[:, None] * basis[:, group] for group in groups] if len(groups) > 1 else [], least
+    order = [k for group in groups for k in group]
+    places = [tuple(order.index(k) for k in group) for group in groups]
+    return scales[:, None] * basis[:, order], places, least
