@@ -82,9 +82,33 @@ class Code(Enum):
         "phi = {phase:.6g}, whatever the noise does; for p > 0 Λ(p) is the larger of the growth rates on the ray and "
         "across it"
     )
+    NO_EIGENFUNCTION_OF_BLOCKS = (
+        "failure: there is no positive eigenfunction at p = {p:g}: the blocks of variables {blocks} do not all drive "
+        "each other; for p > 0 Λ(p) is the largest of theirs"
+    )
     NO_COMMON_RATE = (
-        "failure: Λ″(0) does not exist: λ is {value:.6g} both on the ray that the phase never leaves and across it, so "
-        "that Λ″(p) jumps at p = 0"
+        "failure: Λ″(0) does not exist: λ is {value:.6g} of two parts of the motion that do not mix, so that Λ″(p) "
+        "jumps at p = 0"
+    )
+    KINK = (
+        "failure: {p:?Λ({p:g})¦λ} has no derivatives: within the errors it is that of two parts of the motion that do "
+        "not mix, and either may be the larger one for other parameters"
+    )
+    BETWEEN_CLASSES = (
+        "failure: the derivatives of Λ({p:g}) are not computed: it is that of paths on which two parts of the motion "
+        "grow alike; choose p > 0"
+    )
+    GROWING_TOGETHER = (
+        "failure: Λ({p:g}) is not known: for p < 0 it depends on how the blocks of variables {blocks} grow together "
+        "under the noise that they share, not on each alone; choose p >= 0"
+    )
+    CANCELLATIONS = (
+        "failure: Λ({p:g}) is not known: one of the blocks of variables {blocks} drives another one, so that for "
+        "p < -1 rare cancellations count, which are not computed; choose p >= -1"
+    )
+    CLOSES_BLOCKS = (
+        "note: no sensitivities to {key} at {value:g}: for any other value blocks of variables that are solved one by "
+        "one drive each other; choose a value close by"
     )
     START_MATTERS = (
         "note: Λ(p) for p < -1 depends on the start: there is a set of phases around the slower mode into which the "
@@ -93,6 +117,11 @@ class Code(Enum):
     INVARIANT_CLASSES = (
         "note: the phase never leaves the ray at phi = {phase:.6g}: λ is {along:.6g} on the ray and {across:.6g} "
         "across it; Λ(p) is given for starts outside such rays"
+    )
+    BLOCKS = (
+        "note: the blocks of variables {blocks}{is_hidden:?, of coordinates y for which all matrices have blocks,¦} "
+        "are solved one by one, as none is driven by a later one: in this order their λ are {rates:.6g}; Λ(p) is given "
+        "for starts in none of them alone"
     )
     INFINITE_VARIANCE = (
         "failure: the noise has infinite variance, and its standard deviation is the unit of the mesh; choose r0 < 5/3"

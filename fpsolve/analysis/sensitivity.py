@@ -227,9 +227,12 @@ def solve_sensitivities(
         root: near δ_p, if it is known.
         progress: called once for each p and each index, also where it fails.
     """
-    found, parameters = Gradient(solver, along), solver.problem.parameters
-    left = solver.problem.undifferentiable
-    notes = [Message(Code.NO_DERIVATIVE, key=key, value=value) for key, value in left.items()]
+    problem, parameters = solver.problem, solver.problem.parameters
+    notes = [Message(Code.NO_DERIVATIVE, key=key, value=value) for key, value in problem.undifferentiable.items()]
+    closing = {key: by.theta for key, by in along.items() if problem.closes(key)}
+    notes += [Message(Code.CLOSES_BLOCKS, key=key, value=theta) for key, theta in closing.items()]
+    along = {key: by for key, by in along.items() if key not in closing}
+    found = Gradient(solver, along)
 
     def tried(record: Quantity, solve: Callable[[], Slopes], p: float | None = None) -> Slopes:
         try:
@@ -253,7 +256,7 @@ def solve_sensitivities(
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
     solves = dict(zip(RECORDS, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
-    problem, values = solver.problem, solver.problem.values
+    values = problem.values
     noises = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)
     keys = [f"{section}.{name}" for section, noise in noises for name in noise.one_sided]
     one_sided = [Message(Code.ONE_SIDED, key=key, value=values[key]) for key in keys if key in along]
@@ -265,6 +268,28 @@ def solve_sensitivities(
         indices={name: each for name, each in slopes.items() if each},
         notes=(*notes, *one_sided),
     )
+
+
+def held_by(
+    solver: ExponentSolver, p: float, along: Mapping[str, ParameterDerivative]
+) -> tuple[ExponentSolver, Mapping[str, ParameterDerivative]]:
+    """The solver of the block of a system whose Λ(p) is that of the system, and the directions for it.
+
+    Raises:
+        NoSuchExponent: Λ(p) is that of two blocks.
+        NotConverged: it is that of no block alone, or that of the block is not what a direction changes.
+    """
+    while solver.classes:
+        for key, by in along.items():
+            if solver.problem.closes(key):
+                raise NotConverged(Message(Code.CLOSES_BLOCKS, key=key, value=by.theta))
+        solver = solver.leading(p)
+        own = solver.problem
+        along = {
+            key: own.derivative(key) if key in own.differentiable else ParameterDerivative(by.theta)
+            for key, by in along.items()
+        }
+    return solver, along
 
 
 class Gradient:
@@ -283,12 +308,13 @@ class Gradient:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
-        pair = self._solver.pair(p)
-        finer = self._solver.near.finer_pair(pair, widened(pair.generator).enriched())
-        return _compared(*({key: changed_value(each, by) for key, by in self._along.items()} for each in (pair, finer)))
+        solver, along = held_by(self._solver, p, self._along)
+        pair = solver.pair(p)
+        finer = solver.near.finer_pair(pair, widened(pair.generator).enriched())
+        return _compared(*({key: changed_value(each, by) for key, by in along.items()} for each in (pair, finer)))
 
     def lyapunov_exponent(self) -> dict[str, Estimate]:
-        """∂λ/∂θ. Raises `NotConverged`."""
+        """∂λ/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         return self._at_zero(changed_slope)
 
     def variance_rate(self) -> Slopes:
@@ -309,12 +335,14 @@ class Gradient:
         return {key: _times(factor, each) for key, each in slopes.items()}
 
     def _at_zero(self, changed: Callable[[Bordered, ParameterDerivative], Estimate]) -> dict[str, Estimate]:
-        return _compared(*({key: changed(each, by) for key, by in self._along.items()} for each in self._pairs_at_zero))
+        pairs, along = self._pairs_at_zero
+        return _compared(*({key: changed(each, by) for key, by in along.items()} for each in pairs))
 
     @cached_property
-    def _pairs_at_zero(self) -> tuple[Bordered, Bordered]:
-        coarse, fine = self._solver.at_zero
-        return Bordered(coarse), Bordered(fine)
+    def _pairs_at_zero(self) -> tuple[tuple[Bordered, Bordered], Mapping[str, ParameterDerivative]]:
+        solver, along = held_by(self._solver, 0.0, self._along)
+        coarse, fine = solver.at_zero
+        return (Bordered(coarse), Bordered(fine)), along
 
 
 def _compared(coarse: Slopes, fine: Slopes) -> dict[str, Estimate]:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from fpsolve.analysis.scan import Sample
 from fpsolve.analysis.zero import Axis, line_rtol, ratio_with_slopes, said, zero_of
 from fpsolve.arrays import FloatArray, shown
-from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve.errors import FpsolveError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate, Solution
 from fpsolve.exponent.solver import ExponentSolver
@@ -116,9 +116,7 @@ class Distance:
         try:
             refuse_infinite(problem, p)
             solver = self._solver(problem, is_alone=True)
-            if solver.classes:
-                raise NotConverged(Message(Code.NO_EIGENFUNCTION, p=p, phase=problem.invariant_ray))
-            value, error, slopes = ratio_with_slopes(solver, p, [problem.derivative(key) for key in self.keys])
+            value, error, slopes = ratio_with_slopes(solver, p, self.keys)
             self._starts = solver.near.known
         finally:
             self._progress()

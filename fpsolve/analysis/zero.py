@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from pydantic.dataclasses import dataclass as checked_dataclass
 
 from fpsolve.analysis.scan import Sample
-from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value
+from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value, held_by
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, Countdown
@@ -25,7 +25,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT
-from fpsolve.model.problem import ParameterDerivative, Problem, refuse_infinite
+from fpsolve.model.problem import Problem, refuse_infinite
 
 RTOL, RTOL_BEYOND_PLANE = 1e-10, 1e-4
 """Of F, relative to its scale."""
@@ -187,24 +187,25 @@ def line_rtol(problem: Problem, zero: Zero) -> float:
     return RTOL if problem.dimension == 2 or zero.p in EVEN else RTOL_BEYOND_PLANE
 
 
-def ratio_with_slopes(
-    solver: ExponentSolver, p: float, along: Sequence[ParameterDerivative]
-) -> tuple[float, float, FloatArray]:
-    """Λ(p)/p, at p = 0 λ, with its error, and its derivatives along some directions.
+def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> tuple[float, float, FloatArray]:
+    """Λ(p)/p, at p = 0 λ, with its error, and its derivatives by some parameters.
 
     Raises:
-        NotConverged: it is not resolved, or the phase never leaves a ray, so that there is no eigenfunction.
-        NoSuchExponent: Λ(p) < 0 is not the largest eigenvalue, as rare paths far out in algebraic tails grow.
+        NotConverged: it is not resolved, or see `held_by`.
+        NoSuchExponent: Λ(p) < 0 is not the largest eigenvalue, as rare paths far out in algebraic tails grow, or see
+            `held_by`.
     """
     value, error = solver.ratio_alone(p)
     if value > 0 > p and solver.problem.noise.has_algebraic_tails:
         near = solver.near.solution(p).pair
         if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
             raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
+    held, by_key = held_by(solver, p, {key: solver.problem.derivative(key) for key in keys})
+    along = [by_key[key] for key in keys]
     if abs(p) >= SMALL_P:
-        pair = solver.near.solution(p).pair
+        pair = held.near.solution(p).pair
         return value, error, np.array([changed_value(pair, by).value / p for by in along])
-    around = Bordered(solver.near.solution(0.0).pair)
+    around = Bordered(held.near.solution(0.0).pair)
     more = [0.5 * p * changed_curvature(around, by).value if p else 0.0 for by in along]
     return value, error, np.array([changed_slope(around, by).value for by in along]) + more
 
@@ -298,7 +299,7 @@ class ZeroField:
         refuse_infinite(problem, p)
         own: Any = {"rtol": self._rtol, "budget": self._budget, "countdown": countdown, "is_alone": True}
         solver = ExponentSolver(problem, starts=self._starts, **own)
-        value, error, slopes = ratio_with_slopes(solver, p, [problem.derivative(axis.key) for axis in self._axes])
+        value, error, slopes = ratio_with_slopes(solver, p, [axis.key for axis in self._axes])
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
         self._starts = solver.near.known
         return Sample(at, value, gradient, error, solver.scale(p) / abs(p) if p else solver.scales.linear)

@@ -199,6 +199,22 @@ class Solution:
         return abs(finer.value - self.pair.value) * left_on_mesh(self.corners, *degrees)
 
 
+@dataclass(frozen=True, eq=False)
+class SumOfSolutions(Solution):
+    """The sum of the values of two problems, whose eigenfunctions are apart; `pair` has the sum.
+
+    Attributes:
+        parts: of which it is the sum.
+    """
+
+    parts: tuple[Solution, ...] = ()
+
+    @cached_property
+    def error(self) -> float:
+        """That of the parts, and of the place."""
+        return sum(each.error for each in self.parts) + self.search
+
+
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     """The effects along every direction of every axis; None along one that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)

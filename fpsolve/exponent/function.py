@@ -268,9 +268,14 @@ def nonzero_root(
         return Absent(Message(Code.NO_INDEX))
     noise = solver.problem.noise
     ends = low, high = tuple(float(end) for end in np.clip(interval, *solver.problem.moments))
+    if solver.classes and solver.lyapunov_exponent().value < 0:  # p > 0, where Λ(p) is the largest of theirs
+        roots = [nonzero_root(each, interval) for each in solver.classes if each.problem.system.driven_by]
+        if known := [each for each in roots if each]:
+            return min(known, key=lambda each: each.value)
+        return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
     if guess is None:
         ratio, slope, _ = solver.ratio(0.0)
-        guess = -ratio / slope
+        guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
     p, tried, steps, tolerance = min(max(guess, low), high), set(), [high - low] * 2, None
     for _ in range(MOST_STEPS):
         tried.add(p)

@@ -6,14 +6,13 @@ import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property, partial
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize_scalar
 
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
 from fpsolve.data import Result, dataset
@@ -33,6 +32,7 @@ from fpsolve.exponent.adapt import (
 from fpsolve.exponent.eigen import PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
+from fpsolve.exponent.joint import joint_solution
 from fpsolve.exponent.modes import SpherePlace
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     import xarray
 
 HARDLY_FINITE = 1e-6
-NEAR_END, CLOSE = 1e-3, 1e-5
-"""Of a share between two classes: where the slope at its ends is looked at, and to what it is sought."""
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 
@@ -60,22 +58,31 @@ _KINDS: Sequence[tuple[str, Any, str]] = (
 
 @dataclass(frozen=True, eq=False)
 class InvariantClass:
-    """The growth on a ray that the phase never leaves, or of the distance from it.
+    """The growth on a ray that the phase never leaves, or of the distance from it; or that of a block of variables.
 
     Attributes:
-        phase: φ of the ray.
+        phase: φ of the ray; None for a block of variables.
         is_along: whether it is ‖x‖ on the ray, and not the distance from it.
         lyapunov_exponent: its λ.
         p: the moments, shape (n,).
         value, error_estimate: its Λ(p), shape (n,).
+        variables: the names of those of the block; none for a ray.
     """
 
-    phase: float
+    phase: float | None
     is_along: bool
     lyapunov_exponent: Estimate
     p: FloatArray
     value: FloatArray
     error_estimate: FloatArray
+    variables: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """What it is called in tables: "along the ray at phi = 1.5708", "x, v"."""
+        if self.phase is None:
+            return ", ".join(self.variables)
+        return f"{'along' if self.is_along else 'across'} the ray at phi = {self.phase:.6g}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,7 +127,7 @@ class MomentLyapunov(Result):
 
     @property
     def classes(self) -> tuple[InvariantClass, ...]:
-        """For a system whose phase never leaves a ray Λ(p) of each class, else nothing. Raises `NotConverged`."""
+        """Λ(p) of each of the `classes` of the problem, nothing where there are none. Raises `NotConverged`."""
         return self.solver.by_class(self.p)
 
     def to_xarray(self) -> xarray.Dataset:
@@ -210,70 +217,88 @@ class ExponentSolver:
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
         if self.classes:
-            raise NotConverged(Message(Code.NO_EIGENFUNCTION, p=p, phase=self.problem.invariant_ray))
+            if (phase := self.problem.invariant_ray) is None:
+                raise NotConverged(Message(Code.NO_EIGENFUNCTION_OF_BLOCKS, p=p, blocks=self.problem.block_names))
+            raise NotConverged(Message(Code.NO_EIGENFUNCTION, p=p, phase=phase))
         return self.solution(p).pair
 
     @cached_property
     def classes(self) -> tuple[ExponentSolver, ...]:
-        """Those of the `classes` of a problem whose phase never leaves a ray; nothing for others."""
-        own: Any = {"rtol": self.rtol, "budget": self.budget, "countdown": self.countdown}
-        return tuple(ExponentSolver(each, self.mesh, **own) for each in self.problem.classes)
+        """Those of the `classes` of the problem, which has no positive eigenfunction where there are several."""
+        return tuple(
+            ExponentSolver(each, self.mesh, is_alone=self.is_alone, **self._usual) for each in self.problem.classes
+        )
+
+    @property
+    def _usual(self) -> dict[str, Any]:
+        return {"rtol": self.rtol, "budget": self.budget, "countdown": self.countdown}
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, that of rtol if none is given.
 
+        Of several classes it is that of the largest Λ(p) for p ≥ 0. Over a unit of time a block has x_i⁺ = Φ_i x_i +
+        Σ R_ij x_j, with finite moments of all of these. So x_i is a sum of what others drove at each time and Φ_i has
+        carried on since, E‖Φ_i R_ij x_j‖^p ~ exp(Λ_i(p)(t − s) + Λ_j(p) s) at most, and by Minkowski's inequality for
+        p ≥ 1, or |a + b|^p ≤ |a|^p + |b|^p for p < 1, E‖x_i‖^p grows as the largest of these, but for powers of t. It
+        grows no slower: two starts that differ in x_i alone differ by Φ_i of that for ever, so that E‖x‖^p of one of
+        them grows as Λ_i(p). For p < 0 see `joint`.
+
         Raises:
             NoSuchExponent: Λ(p) is infinite.
-            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
+            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one; or for
+                p < 0 more of several classes counts than their Λ(p).
         """
         point = real_number(p, "p")
         refuse_infinite(self.problem, point)
-        if self.classes:
-            found = [each.solution(point, tolerance) for each in self.classes]
-            if point < 0 and len(found) > 1:
-                return self._least(point, tolerance, *found)
-            return max(found, key=lambda each: each.pair.value)
-        return self.place.solution(point, tolerance)
+        if not self.classes:
+            return self.place.solution(point, tolerance)
+        if point < 0 and len(self.classes) > 1:
+            return self._joint(point, tolerance)[0]
+        found = [each.solution(point, tolerance) for each in self.classes]
+        return max(found, key=lambda each: each.pair.value if point else each.pair.derivative)
 
-    def _least(self, p: float, tolerance: Tolerance | None, *ends: Solution) -> Solution:
-        """Λ(p) = min G(pθ, p(1 − θ)) over 0 ≤ θ ≤ 1 for p < 0, from its values at θ = 1 and θ = 0.
+    def leading(self, p: float) -> ExponentSolver:
+        """The one of the classes whose Λ(p), or for p = 0 whose λ, that of the problem is; itself without classes.
 
-        With a and b the growth of ln ‖x‖ on the ray and across it, E exp(αa + βb) ~ exp(G(α, β) t), ‖x‖ grows as the
-        larger of e^a and e^b, so that Λ(p) = sup(min(pa, pb) − I(a, b)), I the rate function of large deviations;
-        min(pa, pb) is the least of p(θa + (1 − θ)b). G is convex in θ.
+        Raises:
+            NoSuchExponent: it is that of two classes, so that Λ(p) has no derivatives by parameters.
+            NotConverged: it is that of none of them; or as `solution`.
         """
+        if len(self.classes) < 2:
+            return self.classes[0] if self.classes else self
+        if p < 0:
+            _, number = self._joint(p, None)
+            if number is None:
+                raise NotConverged(Message(Code.BETWEEN_CLASSES, p=p))
+            return self.classes[number]
+        rates = [each.ratio_alone(p) for each in self.classes]
+        best, second = sorted(range(len(rates)), key=lambda k: -rates[k][0])[:2]
+        if rates[best][0] - rates[second][0] <= rates[best][1] + rates[second][1]:
+            raise NoSuchExponent(Message(Code.KINK, p=p or None))
+        return self.classes[best]
 
-        def at(share: float) -> Solution:
-            own: Any = {"rtol": self.rtol, "budget": self.budget, "countdown": self.countdown}
-            return ExponentSolver(self.problem.mixed(share), self.mesh, **own).solution(p, tolerance)
+    def _joint(self, p: float, tolerance: Tolerance | None) -> tuple[Solution, int | None]:
+        """Λ(p) of several classes for p < 0, and the number of the class that has it, if one has."""
 
-        along, across = ends
-        for end, share in ((along, 1 - NEAR_END), (across, NEAR_END)):
-            if at(share).pair.value >= end.pair.value:
-                return end
-        tried = list(ends)
+        def solve(problem: Problem) -> Solution:
+            return ExponentSolver(problem, self.mesh, **self._usual).solution(p, tolerance)
 
-        def value(share: float) -> float:
-            tried.append(at(share))
-            return tried[-1].pair.value
-
-        minimize_scalar(value, bounds=(0.0, 1.0), method="bounded", options={"xatol": CLOSE})
-        best, second = sorted(tried, key=lambda each: each.pair.value)[:2]
-        return replace(best, search=second.pair.value - best.pair.value)
+        return joint_solution(self.problem, self.classes, solve, p, tolerance)
 
     def by_class(self, p: ArrayLike) -> tuple[InvariantClass, ...]:
-        """λ and Λ(p) of the `classes`; nothing where the phase leaves every ray. Raises `NotConverged`."""
+        """λ and Λ(p) of the `classes`; nothing where there are none. Raises `NotConverged`."""
         points, found = real_numbers(p, "p", may_be_empty=True), []
         phases = self.problem.invariant_rays
-        for number, each in enumerate(self.classes):
+        for number, (block, each) in enumerate(zip(self.problem.blocks, self.classes, strict=True)):
             solutions = [each.solution(float(point)) for point in points]
             value, error = (
                 np.array(column, dtype=float)
                 for column in ([one.pair.value for one in solutions], [one.error for one in solutions])
             )
             is_along = number < len(phases)
-            phase = phases[number] if is_along else phases[0]
-            found.append(InvariantClass(phase, is_along, each.lyapunov_exponent(), points, value, error))
+            phase = (phases[number] if is_along else phases[0]) if phases else None
+            names = () if phases else block.names
+            found.append(InvariantClass(phase, is_along, each.lyapunov_exponent(), points, value, error, names))
         return tuple(found)
 
     @cached_property
@@ -349,9 +374,9 @@ class ExponentSolver:
             NotConverged: it is not resolved.
         """
         if len(self.classes) > 1:
-            on, off = (each.lyapunov_exponent() for each in self.classes)
-            if abs(on.value - off.value) <= on.error_estimate + off.error_estimate:
-                raise NoSuchExponent(Message(Code.NO_COMMON_RATE, value=on.value))
+            rates = sorted((each.lyapunov_exponent() for each in self.classes), key=lambda each: -each.value)
+            if rates[0].value - rates[1].value <= rates[0].error_estimate + rates[1].error_estimate:
+                raise NoSuchExponent(Message(Code.NO_COMMON_RATE, value=rates[0].value))
         tail = variance_tail(self.problem)
         if tail < HARDLY_FINITE:
             raise NoSuchExponent(Message(Code.NO_VARIANCE_RATE))
@@ -388,6 +413,8 @@ class ExponentSolver:
         if abs(p) >= TINY_P:
             solution = self._nearest(p, tolerance)
             return solution.pair.value / p, solution.error / abs(p)
+        if self.classes:
+            return max(each.ratio_alone(p, tolerance) for each in self.classes)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.near.solution(point, tolerance).pair for point in points]
         near = self.near.near_zero(p, tolerance)

@@ -336,6 +336,11 @@ class System(Parametrised):
         return tuple(f"x{'₁₂₃₄'[k]}" for k in range(self.dimension))
 
     @property
+    def driven_by(self) -> frozenset[str]:
+        """The names that its terms give the noises that drive it."""
+        return frozenset(term.noise for term in self.terms if is_driven(term.g))
+
+    @property
     def drives(self) -> Sequence[CoefficientMatrix]:
         """Deprecated: `terms`."""
         warnings.warn("drives are called terms now", DeprecationWarning, stacklevel=2)

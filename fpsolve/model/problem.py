@@ -13,7 +13,7 @@ from textwrap import wrap
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import FloatArray, real_numbers, shown
 from fpsolve.data import plain_unit, written
@@ -34,11 +34,11 @@ from fpsolve.model.plane import (
     affine,
     combined,
     crosses_both_ways,
-    is_driven,
     phase_speed,
     turning,
 )
 from fpsolve.model.quantity import NOISE, Quantity
+from fpsolve.model.subsystem import ROUNDED, TURN, Subsystem, components, couplings, hidden_blocks, reached, subsystems
 
 P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
@@ -101,7 +101,7 @@ class Problem:
                 raise TypeError(f"got {shown(half)} as a {kind}; the first arguments must be a system and a noise")
         wanted, given = self.system.noise_sections, self.noise.parts
         if len(wanted) > 1 or len(given) > 1:
-            names = {term.noise for term in self.system.terms if is_driven(term.g)}
+            names = self.system.driven_by
             if names != set(given):
                 told = f"the terms name the noises {', '.join(map(shown, sorted(names)))}"
                 stated = ", ".join(map(shown, given)) if len(given) > 1 else "one without a name"
@@ -236,14 +236,7 @@ class Problem:
             if abs(b - c) > math.hypot(a - d, b + c) * (1 + 1e-12):
                 return ()
         matrices = [np.array(each.matrix) for each in diffusions] + [each.matrix for each in self._struck]
-        if None in lines:
-            matrices += [np.array(term.matrix) for term in drift.terms]
-        else:
-            parts = dict[str | None, Any]()  # what is steady, and what each noise drives
-            for line, term in zip(lines, drift.terms, strict=True):
-                for name, c in zip((None, term.noise), line or (), strict=True):
-                    parts[name] = parts.get(name, 0.0) + c * drift.epsilon**term.order * np.array(term.matrix)
-            matrices += parts.values()
+        matrices += self._by_noise(drift.terms)
         speeds = [speed for speed in map(turning, matrices) if abs(speed.mean) + speed.amplitude > 0]
         if not speeds:
             return (0.0,)
@@ -282,47 +275,108 @@ class Problem:
         return bool(np.any(np.all(turns > 0, axis=1)) and np.any(np.all(turns < 0, axis=1)))
 
     @cached_property
-    def classes(self) -> tuple[Problem, ...]:
-        """For a system with an `invariant_ray` those of ‖x‖ on it, and of the distance from it; else nothing."""
-        if not self.invariant_rays:
-            return ()
-        is_one = all(not term.h.mean and not term.h.amplitude for term in self.system.terms)
-        return tuple(map(self.mixed, (1.0,) if is_one else (1.0, 0.0)))
+    def blocks(self) -> tuple[Subsystem, ...]:
+        """What can be solved by itself, as the matrices of the system are block triangular; nothing where they are not.
 
-    def mixed(self, share: float) -> Problem:
-        """d ln a/dt = θ q + (1 − θ)(tr A − q), of the two `classes`, θ the share of the first.
-
-        Both obey ȧ = q(ξ) a alone: with e on the ray q = eᵀAe, and tr A − q. They are given as x′ = (q(ξ) + J) x, as a
-        uniform rotation leaves ‖x‖ alone.
+        Of three and four variables groups of these, of which each drives later ones alone: the strongly connected
+        components of the union of the patterns of all matrices. Where there is one group, those of coordinates y that
+        show more, if there are any. Of two variables ‖x‖ on the first of the `invariant_rays`, and on the second one,
+        or else the distance from the first.
         """
-        phi = self.invariant_rays[0]
-
-        def rates(terms: Sequence[CoefficientMatrix]) -> list[CoefficientMatrix]:
-            found = []
-            for term in terms:
-                on_ray = float(term.q(phi))
-                rate = share * on_ray + (1 - share) * (float(np.trace(np.array(term.matrix))) - on_ray)
-                found.append(CoefficientMatrix(term.order, ((rate, 0.0), (0.0, rate)), term.g, term.noise))
-            return found
-
-        def motion(terms: Sequence[CoefficientMatrix]) -> LinearMotion:
-            turn = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))
-            return LinearMotion(self.system.epsilon, (turn, *terms))
-
-        terms = rates(self.system.terms)
-        if self._moved[1] and 0 < share < 1:  # what Itô's sense takes from the drift is not linear in the rates
-            drifts = rates(self._moved[0].terms), self.noise.motion(motion(terms))[0].terms
-            wanted, made = (
-                sum(self.system.epsilon**each.order * each.matrix[0][0] for each in part) for part in drifts
+        if self.dimension > 2:
+            matrices, n = self._by_noise(self.system.terms), self.dimension
+            basis, groups, rounded, names = (
+                np.eye(n),
+                components(np.sum(np.abs(matrices), axis=0)),
+                0.0,
+                self.system.states,
             )
-            terms.append(CoefficientMatrix(0, ((wanted - made, 0.0), (0.0, wanted - made))))
-        return Problem(motion(terms), self.noise)
+            if len(groups) == 1:
+                basis, groups, rounded = hidden_blocks(matrices)
+                names = [f"y{'₁₂₃₄'[k]}" for k in range(n)]
+            return subsystems(self.system, basis, groups, names, rounded) if len(groups) > 1 else ()
+        if not (rays := self.invariant_rays):
+            return ()
+        phases = np.array(rays if len(rays) == 2 else (rays[0], rays[0] + math.pi / 2))
+        found = subsystems(self.system, np.stack([np.cos(phases), -np.sin(phases)]), [(0,), (1,)], ("", ""), ROUNDED)
+        is_one = all(not term.h.mean and not term.h.amplitude for term in self.system.terms)
+        return found[:1] if is_one else found
+
+    @cached_property
+    def classes(self) -> tuple[Problem, ...]:
+        """Those of the `blocks`, each with the noises that drive it."""
+        return tuple(Problem(block, self._noise_of(block)) for block in self.blocks)
+
+    @property
+    def block_names(self) -> tuple[str, ...]:
+        """The blocks of variables as sentences have them: "(x, v)"."""
+        return tuple(f"({', '.join(block.names)})" for block in self.blocks)
+
+    def _noise_of(self, system: System) -> Noise:
+        """The noises that drive a part of the system; the first one where none does."""
+        if len(parts := self.noise.parts) == 1:
+            return self.noise
+        first = self.system.noise_sections[0].removeprefix("noise.")
+        known = {name: noise for name, noise in parts.items() if name in system.driven_by}
+        return noises_of(known or {first: parts[first]})
+
+    @cached_property
+    def is_driven_by(self) -> NDArray[np.bool_]:
+        """Which of the `blocks`, the row, is driven by which, the column, through any number of others; or is it."""
+        if len(self.invariant_rays) == 2:
+            return np.eye(2, dtype=bool)
+        return reached(couplings(self.blocks, self._by_noise(self.system.terms)))
+
+    def closes(self, key: str) -> bool:
+        """Whether another value of a parameter lets one of the `blocks` drive one that it is driven by.
+
+        Then the derivative of Λ(p) by it is not that of one block. By one that lets uncoupled blocks drive each other
+        it is, as −V_k in place of V_k gives the opposite derivative of the couplings: Λ(p) is even in them.
+        """
+        section, _, name = key.rpartition(".")
+        if not self.blocks or section != self.system.section:
+            return False
+        changes = self._by_noise(self.system.derivative(name)[0])
+        if len(self.blocks) == 1:  # all rays are invariant
+            return any(np.any(np.abs(a - a[0, 0] * np.eye(2)) > ROUNDED * np.linalg.norm(a)) for a in changes)
+        return bool(np.any(self.is_driven_by.T[couplings(self.blocks, changes)]))
+
+    def _by_noise(self, terms: Sequence[CoefficientMatrix]) -> list[FloatArray]:
+        """What is steady in some terms, and what each noise drives, each as one matrix; of other g all matrices."""
+        lines = [affine(term.g) for term in terms]
+        if None in lines:
+            return [np.array(term.matrix) for term in terms]
+        parts = dict[str | None, Any]()
+        for line, term in zip(lines, terms, strict=True):
+            for name, c in zip((None, term.noise), line or (), strict=True):
+                parts[name] = parts.get(name, 0.0) + c * self.system.epsilon**term.order * np.array(term.matrix)
+        return [*parts.values()]
+
+    def mixed(self, first: Problem, second: Problem, share: float) -> Problem:
+        """d ln a/dt = θ a₁ + (1 − θ) a₂ of two `classes` of one coordinate each, θ the share of the first.
+
+        As for these the system is ẋ = (θ a₁ + (1 − θ) a₂ + J) x, J a uniform rotation.
+        """
+        terms, pairs = [TURN], ((share, first), (1 - share, second))
+        for size, each in pairs:
+            terms += [replace(term, matrix=(size * np.array(term.matrix)).tolist()) for term in each.system.terms[1:]]
+        system = LinearMotion(self.system.epsilon, tuple(terms))
+        made = Problem(system, self._noise_of(system))
+        if first.diffusions or second.diffusions:  # what Itô's sense takes from the drift is not linear in the rates
+            rest = sum(size * each.drift_rate for size, each in pairs) - made.drift_rate
+            terms.append(CoefficientMatrix(0, ((rest, 0.0), (0.0, rest))))
+        return Problem(LinearMotion(self.system.epsilon, tuple(terms)), made.noise)
+
+    @property
+    def drift_rate(self) -> float:
+        """The sum of the first entries of the terms of the drift."""
+        return sum(self.drift.epsilon**each.order * each.matrix[0][0] for each in self.drift.terms)
 
     @property
     def moments(self) -> tuple[float, float]:
         """The p for which Λ(p) is finite and known, as a closed interval."""
         low, high = self.noise.moments
-        return (max(low, -1.0), high) if len(self.classes) > len(self.invariant_rays) else (low, high)
+        return (max(low, -1.0), high) if len(self.blocks) > len(self.invariant_rays) > 0 else (low, high)
 
     @property
     def halves(self) -> tuple[Parametrised, ...]:
@@ -515,7 +569,7 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     """
     noise, system = problem.noise, problem.motion
     noise.check_existence(p)
-    if problem.classes:
+    if problem.invariant_rays:
         has_jumps = any(jump.log_factor for jump in system.jumps)
         if has_jumps or p < problem.moments[0]:
             raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_ray, has_jumps=has_jumps))

@@ -42,7 +42,7 @@ from fpsolve.model.kinds import source_of, version_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Numerics, Wanted, everything
 
-RESULT_VERSION = 3
+RESULT_VERSION = 4
 """Of what is computed from the same parameters; records of another one are computed anew."""
 SHARED_SECONDS = 60.0
 """After which a file that another machine has written is there, if it ever is."""
@@ -321,7 +321,7 @@ def _is_finite(each: InvariantClass, shape: tuple[int, ...]) -> bool:
     is_whole = all(
         column.shape == shape and bool(np.isfinite(column).all()) for column in (each.value, each.error_estimate)
     )
-    return is_whole and all(map(math.isfinite, (each.phase, exponent.value, exponent.error_estimate)))
+    return is_whole and all(map(math.isfinite, (each.phase or 0.0, exponent.value, exponent.error_estimate)))
 
 
 def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:

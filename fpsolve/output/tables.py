@@ -215,7 +215,7 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
     if result.classes:
         found["classes"] = [
             {
-                "name": f"{'along' if each.is_along else 'across'} the ray at phi = {each.phase:.6g}",
+                "name": each.name,
                 "lyapunov_exponent": {
                     "value": each.lyapunov_exponent.value,
                     "error_estimate": each.lyapunov_exponent.error_estimate,

@@ -87,7 +87,7 @@ class CurveResult(Result):
         notes: where the theories compared with are not valid.
         failures: why some p are missing, or with all p some indices.
         jumps: where a system has several, the `BY_JUMP` of each by their names, as `estimates`.
-        classes: where the phase never leaves a ray, λ and Λ(p) on it and across it.
+        classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
         sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
         seconds: how long the processor took.
     """

@@ -35,6 +35,7 @@ from fpsolve.exponent.quantities import BY_JUMP, INDICES, LYAPUNOV_EXPONENT, MOM
 from fpsolve.exponent.solver import ExponentSolver, InvariantClass, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity, message_of
+from fpsolve.model.problem import Problem
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns, Solved
 from fpsolve.theory.far import heavy_tail_note
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
@@ -174,7 +175,7 @@ def solve_curve(
         heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
         *found.notes,
         *curve.problem.remarks,
-        _told_of(classes),
+        _told_of(curve.problem, classes),
         weak_noise_note(curve.problem, found.p, found.value),
         *of[Severity.NOTE],
         *(slopes.notes if slopes else ()),
@@ -331,19 +332,22 @@ def _solve_jumps(
 
 
 def _solve_classes(solver: ExponentSolver, p: FloatArray) -> tuple[InvariantClass, ...]:
-    """λ and Λ(p) on a ray that the phase never leaves, and across it, where they converge."""
-    with suppress(NotConverged):
+    """λ and Λ(p) of the classes of the problem, where they converge."""
+    with suppress(NotConverged, NoSuchExponent):
         return solver.by_class(p)
     return ()
 
 
-def _told_of(classes: Sequence[InvariantClass]) -> Message | None:
+def _told_of(problem: Problem, classes: Sequence[InvariantClass]) -> Message | None:
     """That there are such classes, and their λ."""
     if len(classes) < 2:
         return None
-    along, across = classes
-    rates = {"along": along.lyapunov_exponent.value, "across": across.lyapunov_exponent.value}
-    return Message(Code.INVARIANT_CLASSES, phase=along.phase, **rates)
+    values = [each.lyapunov_exponent.value for each in classes]
+    if classes[0].phase is None:
+        is_hidden = not set(classes[0].variables) <= set(problem.system.states)
+        return Message(Code.BLOCKS, blocks=problem.block_names, is_hidden=is_hidden, rates=values)
+    along, across = values
+    return Message(Code.INVARIANT_CLASSES, phase=classes[0].phase, along=along, across=across)
 
 
 def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:

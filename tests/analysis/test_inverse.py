@@ -9,7 +9,6 @@ from scipy.optimize import minimize, minimize_scalar
 from fpsolve import (
     ExponentSolver,
     NonGaussianNoise,
-    NotConverged,
     OrnsteinUhlenbeck,
     PlaneSystem,
     Problem,
@@ -221,11 +220,12 @@ def test_more_than_two_variables():
     assert found.values["system.a"].value == pytest.approx(-(0.5**2) / 0.8**2, abs=1e-8)
 
 
-def test_a_phase_that_stays_on_a_ray_has_no_design():
+def test_a_phase_that_stays_on_a_ray():
+    """Λ(2) = 2a + 2S(0) is that of x, as y has −2 + 2S(0)."""
     system = PlaneSystem.of_equations(("x", "y"), ("a*x + xi*x", "0.3*x - y + xi*y"), {"a": 0.1})
     problem = Problem(system, OrnsteinUhlenbeck(alpha=1.0, sigma=1.0))
-    with pytest.raises(NotConverged, match="never leaves the ray"):
-        design(problem, "moment(2) = 1", Axis("system.a", -1.0, 1.0))
+    found = design(problem, "moment(2) = 1", Axis("system.a", -1.0, 1.0))
+    assert found.values["system.a"].value == pytest.approx(-0.5, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, moment_lyapunov
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, moment_lyapunov, sensitivities
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.function import nonzero_root
@@ -160,6 +160,21 @@ def test_one_rate_has_no_variance():
         solver.variance_rate()
     assert solver.solution(-2.0).pair.value == pytest.approx(-0.2, abs=1e-9)
     assert not nonzero_root(solver)
+
+
+def test_derivatives_are_those_of_the_larger_rate():
+    """Λ(p) = max(−ap + ½p²s²0.16, −bp + ½p²s²), which changes at p = 2(b − a)/0.84s² from the first to the second."""
+    rates = "-a*x + 0.4*xi*x + c*y", "0.5*x - b*y - xi*y"
+    system = PlaneSystem.of_equations(("x", "y"), rates, {"a": 0.3, "b": 1.0, "c": 0.0})
+    found = sensitivities(Problem(system, White(s=0.7)), [1.0, 4.0])
+    assert [str(note) for note in found.notes if "system.c" in note]  # both drive each other for any other c
+    expected = [
+        {"system.a": -1.0, "system.b": 0.0, "noise.s": 0.16 * 0.7},
+        {"system.a": 0.0, "system.b": -4.0, "noise.s": 16 * 0.7},
+        {"system.a": -1.0, "system.b": 0.0, "noise.s": 0.0},
+    ]
+    for slopes, numbers in zip((*found.moments, found.indices["lyapunov_exponent"]), expected, strict=True):
+        assert {key: each.value for key, each in slopes.items()} == pytest.approx(numbers, abs=1e-9)
 
 
 def test_refused():

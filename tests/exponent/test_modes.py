@@ -195,18 +195,6 @@ def test_the_lyapunov_exponent_of_two_modes(noise, driven, expected, unit):
     assert abs(found.value - expected) <= found.error_estimate + unit
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("noise", [White(s=0.8), OrnsteinUhlenbeck(alpha=1.0, sigma=0.6)], ids=["white", "ou"])
-def test_an_oscillator_with_what_it_drives(noise):
-    """z of ż = −z + x grows as x does: Λ(p) is that of the plane."""
-    steady, driven = [[0, 1], [-1, -0.3]], [[0, 0], [-1, 0]]
-    more = [[0, 1, 0], [-1, -0.3, 0], [1, 0, -1]], [[0, 0, 0], [-1, 0, 0], [0, 0, 0]]
-    terms = CoefficientMatrix(0, steady), CoefficientMatrix(1, driven, identity)
-    plane = moment_lyapunov(PlaneSystem(terms), noise, [1.0, 3.0])
-    found = moment_lyapunov(problem(noise, *more), [1.0, 3.0], rtol=1e-4)
-    assert np.all(np.abs(found.value - plane.value) <= found.error_estimate)
-
-
 def test_other_coordinates_change_nothing():
     steady, driven = random_system(5, 3)
     turn, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))

@@ -3,8 +3,10 @@
 import json
 
 import numpy as np
+import pytest
 
 from fpsolve.case.case import load_case
+from fpsolve.messages import Code
 from fpsolve.output.records import record_of, result_of
 from fpsolve.output.tables import write_results
 from fpsolve.study.solve import Numerics, everything, solve_curve
@@ -53,3 +55,39 @@ def test_both_classes_are_told_by_name_from_records_too(tmp_path):
         assert [row["p"] for row in found["moments"]] == p.tolist()
         assert np.all((total >= expected - 1e-9) | (p < 0))
         assert np.all((total <= expected + 1e-9) | (p > 0))
+
+
+BLOCKS = """
+title = "Blocks"
+[system]
+variables = ["y", "x", "v"]
+drift = ["-0.4*y", "v", "-x - 0.3*v - load*x + y"]
+noises = { load = "noise.axial" }
+[noise.axial]
+kind = "white"
+s = 0.8
+[moments]
+p = [-2.0, 1.0, 2.0]
+[output]
+quantities = ["moment", "lyapunov_exponent", "stability_index", "sensitivities"]
+"""
+
+
+def test_blocks_are_told_by_their_variables(tmp_path):
+    """Λ(1) and Λ(2) are those of x and v alone; Λ(−2) is not known, as y drives them."""
+    path = tmp_path / "blocks.toml"
+    path.write_text(BLOCKS, encoding="utf-8")
+    case = load_case(path)
+    [curve] = case.curves()
+    result = solve_curve(curve, everything(case), Numerics.of(case)).result
+    assert [note for note in result.notes if "the blocks of variables (y), (x, v) are solved one by one" in note]
+    assert [(each.p, each.reason.code) for each in result.failures] == [(-2.0, Code.CANCELLATIONS)]
+    assert result_of(json.loads(json.dumps(record_of(result))), curve).classes[1].variables == ("x", "v")
+    write_results(case, [result], tmp_path, {})
+    [summary] = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["curves"]
+    slow, own = summary["classes"]
+    assert [each["name"] for each in (slow, own)] == ["y", "x, v"]
+    assert slow["lyapunov_exponent"]["value"] == pytest.approx(-0.4, abs=1e-9)
+    for total, part in zip(summary["moments"], own["moments"], strict=True):
+        assert total["value"] == part["value"]
+    assert summary["stability_index"]["value"] > 0

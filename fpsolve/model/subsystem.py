@@ -1,0 +1,181 @@
+"""What some coordinates of a linear system obey by themselves.
+
+Where all matrices of a system are block triangular in coordinates x = Σ V_k y_k, y_k = W_k x, each y_k obeys ẏ_k =
+Σ εⁿ g(ξ) W_k A V_k y_k but for what other blocks drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.plane import CoefficientMatrix, Jump, System
+from fpsolve.model.quantity import Quantity
+
+ROUNDED = 1e-12
+"""Share of a matrix that is rounding, in the coordinates of rays, and for eigenvectors times their condition."""
+WORST_CONDITION = 100.0
+"""Of eigenvectors in which blocks are looked for."""
+TURN = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))
+"""A uniform rotation, which leaves ‖x‖ alone."""
+
+
+@dataclass(frozen=True)
+class Subsystem(System):
+    """One block of a system, with its parameters. One coordinate is given as ẋ = (a + J)x, J a uniform rotation.
+
+    Attributes:
+        whole: the system.
+        basis: all V_k beside each other, of n rows and columns.
+        own: the columns that are V_k.
+        names: what its coordinates are called.
+        rounded: share of a matrix in these coordinates that is rounding: 0 where they are variables of the system.
+    """
+
+    whole: System
+    basis: tuple[tuple[float, ...], ...]
+    own: tuple[int, ...]
+    names: tuple[str, ...]
+    rounded: float = 0.0
+
+    @property
+    def is_scalar(self) -> bool:
+        """Whether it is one coordinate."""
+        return len(self.own) == 1
+
+    @property
+    def epsilon(self) -> float:  # type: ignore[override]
+        return self.whole.epsilon
+
+    @cached_property
+    def terms(self) -> Sequence[CoefficientMatrix]:  # type: ignore[override]
+        return (*[TURN] * self.is_scalar, *self.part(self.whole.terms))
+
+    @property
+    def jumps(self) -> Sequence[Jump]:  # type: ignore[override]
+        return ()
+
+    @cached_property
+    def _sides(self) -> tuple[FloatArray, FloatArray]:
+        """All W_k below each other, and all V_k beside each other."""
+        basis = np.array(self.basis)
+        return np.linalg.inv(basis), basis
+
+    def inside(self, matrix: ArrayLike) -> FloatArray:
+        """A matrix in the coordinates of all blocks, without what is rounding."""
+        rows, columns = self._sides
+        found = rows @ np.asarray(matrix) @ columns
+        return np.where(np.abs(found) > self.rounded * np.linalg.norm(found), found, 0.0)
+
+    def part(self, terms: Sequence[CoefficientMatrix]) -> tuple[CoefficientMatrix, ...]:
+        """W_k A V_k of some terms of the whole, without those of which nothing is left."""
+        found = list[CoefficientMatrix]()
+        for term in terms:
+            matrix = self.inside(term.matrix)[np.ix_(self.own, self.own)]
+            if np.any(matrix):
+                found.append(replace(term, matrix=(matrix[0, 0] * np.eye(2) if self.is_scalar else matrix).tolist()))
+        return tuple(found)
+
+    @property
+    def section(self) -> str:  # type: ignore[override]
+        return self.whole.section
+
+    @property
+    def noise_unit(self) -> str:  # type: ignore[override]
+        return self.whole.noise_unit
+
+    @property
+    def noise_sections(self) -> Sequence[str]:
+        """Of the noises that drive it; the first one of the whole where none does."""
+        known = self.whole.noise_sections
+        if len(known) == 1:
+            return known
+        return [each for each in known if each.removeprefix("noise.") in self.driven_by] or known[:1]
+
+    @property
+    def values(self) -> Mapping[str, float | str]:
+        return self.whole.values
+
+    @property
+    def differentiable(self) -> Sequence[str]:
+        return self.whole.differentiable
+
+    def quantity_of(self, name: str) -> Quantity:
+        return self.whole.quantity_of(name)
+
+    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
+        """That of the whole, in the same coordinates."""
+        terms, _ = self.whole.derivative(name)
+        return self.part(terms), ()
+
+
+def subsystems(
+    whole: System, basis: FloatArray, groups: Sequence[tuple[int, ...]], names: Sequence[str], rounded: float = 0.0
+) -> tuple[Subsystem, ...]:
+    """The blocks of a system in coordinates x = Σ V_k y_k, from groups of columns of a basis, and the names of all."""
+    sides = tuple(map(tuple, basis.tolist()))
+    return tuple(Subsystem(whole, sides, own, tuple(names[k] for k in own), rounded) for own in groups)
+
+
+def couplings(blocks: Sequence[Subsystem], matrices: Sequence[FloatArray]) -> NDArray[np.bool_]:
+    """Whether a block, the row, is driven by another one, the column, in some of the matrices, beyond rounding."""
+    found = np.zeros((len(blocks), len(blocks)), dtype=bool)
+    for matrix in (blocks[0].inside(each) for each in matrices):
+        for i, one in enumerate(blocks):
+            for j, other in enumerate(blocks):
+                found[i, j] |= i != j and bool(np.any(matrix[np.ix_(one.own, other.own)]))
+    return found
+
+
+def reached(pattern: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which variable, the row, feels which, the column, through any number of others; every one feels itself."""
+    count = len(pattern)
+    steps = np.linalg.matrix_power((np.asarray(pattern) != 0) | np.eye(count, dtype=bool), count)
+    return np.asarray(steps, dtype=bool)
+
+
+def components(pattern: NDArray[Any]) -> list[tuple[int, ...]]:
+    """The variables in groups that feel each other, of which each feels earlier ones alone."""
+    feels = reached(pattern)
+    groups = {tuple(np.flatnonzero(row & feels[:, k]).tolist()) for k, row in enumerate(feels)}
+    return sorted(groups, key=lambda group: (np.count_nonzero(feels[group[0]]) - len(group), group))
+
+
+def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[FloatArray, list[tuple[int, ...]], float]:
+    """A basis in which matrices have blocks, the columns of each, and what share of a matrix is rounding there.
+
+    There is one block where none are found.
+
+    What is invariant for all matrices is so for sums of their products. Such a sum with coefficients at random has
+    different eigenvalues unless two blocks are alike, and then what is invariant is spanned by its eigenvectors.
+    """
+    size = np.sum(np.abs(matrices), axis=0)
+    _, (scales, _) = scipy.linalg.matrix_balance(size, permute=False, separate=True)
+    scaled = [a * scales / scales[:, None] for a in matrices]
+    scaled = [a / norm for a in scaled if (norm := np.linalg.norm(a))]
+    words = [*scaled, *(a @ b for a in scaled for b in scaled)]
+    mixed = np.tensordot(np.random.default_rng(0).standard_normal(len(words)), words, 1)
+    values, vectors = np.linalg.eig(mixed)
+    upper = values.imag >= 0
+    parts = [
+        [each.real, each.imag] if value.imag else [each.real]
+        for value, each in zip(values[upper], vectors.T[upper], strict=True)
+    ]
+    basis, sizes = np.column_stack([column for each in parts for column in each]), [len(each) for each in parts]
+    if not (condition := float(np.linalg.cond(basis))) < WORST_CONDITION:
+        return np.eye(len(size)), [(*range(len(size)),)], 0.0
+    least = ROUNDED * condition
+    inside = [np.linalg.solve(basis, a @ basis) for a in scaled]
+    pattern = np.any([np.abs(a) > least * np.linalg.norm(a) for a in inside], axis=0)
+    of_mode = np.repeat(np.eye(len(sizes), dtype=bool), sizes, axis=1)
+    groups = components(pattern | of_mode.T @ of_mode)
+    order = [k for group in groups for k in group]
+    places = [tuple(order.index(k) for k in group) for group in groups]
+    return scales[:, None] * basis[:, order], places, least
