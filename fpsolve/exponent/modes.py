@@ -46,9 +46,9 @@ THINNEST = 1e-3
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 ALONE = 3.0
-"""What is left after the correction by what two degrees change, over this change, where no coarser space tells more."""
+"""What is left after the correction by what two degrees change, over this change; of two spaces half of it, 1 at last."""
 LEFT = 0.5
-"""The same, over what two degrees more changed in the corrected value."""
+"""The same, over what two degrees more changed in the corrected value, or will change in the other, see `left_of`."""
 DIGITS = 10.0
 
 
@@ -134,6 +134,23 @@ def first_cells(problem: Problem) -> SphereCells | HarmonicCells:
     return SphereCells(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
 
 
+def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
+    """What higher degrees may still change, from how values changed over each doubling of the degree.
+
+    With A and B the sums of all changes from half the degree and from a quarter to half of it, A²/(B − A): exact where
+    the changes fall as a power of the degree, as where T, or T*, is not smooth, and hardly anything where they
+    fall exponentially. Of two changes alone the ratio tells.
+    """
+    changes, m = np.abs(np.diff(values)), np.array(degrees[1:])
+    halves = m > m[-1] / 2, (m > m[-1] / 4) & (m <= m[-1] / 2)
+    if not np.any(halves[1]):
+        halves = m == m[-1], m == m[-1] - 2
+    if not np.any(halves[1]):
+        return 0.0
+    last, before = (float(np.sum(changes[each])) for each in halves)
+    return last * last / (before - last) if last < before else math.inf
+
+
 @dataclass(frozen=True, eq=False)
 class SpherePlace(NearPlace):
     """Λ(p) of a system of dimension 3 or 4; arguments as in `NearPlace`.
@@ -172,7 +189,7 @@ class SpherePlace(NearPlace):
         if not self._levels:
             parts = tuple(first_part(noise, -math.log10(self.rtol)) for noise in self.problem.coloured.parts.values())
             self._begin(Discretisation(self.cells or first_cells(self.problem), parts))
-        values: list[float] = []
+        steps = list[PrincipalPair]()
         pair: PrincipalPair | None = None
         level = 0
         while True:
@@ -181,7 +198,7 @@ class SpherePlace(NearPlace):
             try:
                 pair = self._pair(level, search, pair)
             except (NotConverged, SingularMatrix, MeshError) as failure:
-                search.failure, pair, values = failure, None, []
+                search.failure, pair, steps = failure, None, []
                 level += 1
                 continue
             allowed = search.tolerance(search.p, pair.value)
@@ -189,13 +206,18 @@ class SpherePlace(NearPlace):
             rest = sum(each.error for each in effects if each)
             if rest > 0.5 * allowed:
                 self._begin(self._finer(chosen, effects, allowed))
-                level, values = max(0, level - 1), []
+                level, steps = max(0, level - 1), []
                 continue
             level += 1
             change = self._change(pair, level)
             pair = replace(pair, correction=change)
-            values.append(pair.value)
-            left = max(abs(change), LEFT * abs(values[-1] - values[-2])) if len(values) > 1 else ALONE * abs(change)
+            steps.append(pair)
+            left = max(1.0, ALONE / len(steps)) * abs(change)
+            if len(steps) > 1:
+                waves = [each.generator.chosen.phase.waves for each in steps]
+                uncorrected = left_of(waves, [each.eigenvalue for each in steps])
+                step, beyond = abs(pair.value - steps[-2].value), left_of(waves, [each.value for each in steps])
+                left = max(left, beyond, LEFT * step, LEFT * uncorrected)
             solution = Solution(pair, search=left)
             if solution.error <= allowed:
                 return solution

@@ -132,6 +132,18 @@ def test_blocks_as_one_system(name, p, rtol):
     assert abs(found.pair.value - ExponentSolver(own).solution(p).pair.value) <= found.error < 1e-3
 
 
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3])
+def test_a_driven_block_as_one_system_states_a_true_error(rtol):
+    """T* is not smooth where a decaying part drives the fastest block: degrees of waves help as a power only."""
+    own = problem(White(s=1.0), *SYSTEMS["filter drives"])
+    expected = ExponentSolver(own).solution(1.0).pair.value
+    try:
+        found = as_one(own, 1.0, rtol)
+    except NotConverged as failure:
+        found = failure.partial
+    assert abs(found.pair.value - expected) <= found.error
+
+
 @pytest.mark.slow
 def test_blocks_against_a_simulation():
     """λ, Λ(1) and Λ(−0.5) where one block decays much sooner than the other, so that paths forget it."""

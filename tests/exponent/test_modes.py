@@ -26,7 +26,7 @@ from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.adapt import Budget, _Search
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.exponent.modes import SpherePlace, modal_coordinates, second_moments
+from fpsolve.exponent.modes import SpherePlace, left_of, modal_coordinates, second_moments
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.discretisation import Discretisation, Polynomials, first_part
 from fpsolve.fem.sphere import SphereCells
@@ -148,6 +148,16 @@ def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     found = [principal_pair(place._generator(level), 1.0) for level in (1, 2)]
     told = place._change(found[0], 2)
     assert told == pytest.approx(found[1].value - found[0].value, rel=0.1)
+
+
+@pytest.mark.parametrize("power", [1.5, 2.0, 4.0])
+def test_what_is_left_of_an_algebraic_series(power):
+    """Of what is left ~ m^−k, to first order in 1/m; and of one that falls by 10 each time hardly anything."""
+    for count in (16, 32):
+        m = np.arange(2.0, 2 * count + 2, 2)
+        assert left_of(m, -(m**-power)) == pytest.approx(m[-1] ** -power, rel=3 * power / count)
+    assert left_of([4, 6, 8, 10], [1.0, 1.1, 1.11, 1.111]) < 2e-4
+    assert left_of([4, 6, 8], [1.0, 1.1, 1.3]) == math.inf
 
 
 def test_memory_is_foreseen():
