@@ -46,7 +46,7 @@ THINNEST = 1e-3
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 ALONE = 3.0
-"""What is left after the correction by what two degrees change, over this change; of two spaces half of it, 1 at last."""
+"""What is left after the correction by a change, over this change; of two spaces half of it, of more 1."""
 LEFT = 0.5
 """The same, over what two degrees more changed in the corrected value, or will change in the other, see `left_of`."""
 DIGITS = 10.0
