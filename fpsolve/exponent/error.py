@@ -142,11 +142,13 @@ class Solution:
         pair: the principal pair.
         finer: that on a finer mesh, which measures the error of a given mesh: it may have few modes.
         search: the error of the place among several problems where the value is the least, or of a correction.
+        measured: what finer functions change, in the place of the effects of the highest modes; None where these tell.
     """
 
     pair: PrincipalPair
     finer: PrincipalPair | None = None
     search: float = 0.0
+    measured: float | None = None
 
     @cached_property
     def effects(self) -> tuple[ModeEffects | None, ...]:
@@ -182,7 +184,8 @@ class Solution:
     @cached_property
     def error_by_modes(self) -> float:
         """The same from the highest modes alone, which where T is singular may be too small."""
-        return sum(each.error for each in self.effects if each) + self._other
+        own = sum(each.error for each in self.effects if each) if self.measured is None else self.measured
+        return own + self._other
 
     @cached_property
     def _other(self) -> float:

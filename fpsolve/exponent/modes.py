@@ -3,8 +3,8 @@
 The functions are those of directions in coordinates that the second moments choose. E‖x‖² grows with Λ(2), and
 T = xᵀQx is its eigenfunction for p = 2: in the coordinates of the eigenvectors of Q the strong modes are one group and
 the weak ones the other. Where the noise is weak against the difference of their dampings, T has a layer of the width
-√(q_weak/q_strong) beside the weak ones, for which the elements are graded; where both grow alike there is none, and
-harmonics of the sphere take the place of the elements.
+√(q_weak/q_strong) beside the weak ones, and T* one beside the strong ones, for which the elements are graded; where
+both grow alike there is none, and harmonics of the sphere take the place of the elements.
 
 Any search begins at p = 0, where T = 1, and goes from p to p on the coarsest space; on finer ones it begins with what
 the coarser one has found. What two degrees of waves change tells their error, that of all else comes from the highest
@@ -26,9 +26,9 @@ from fpsolve.errors import MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.adapt import GIGABYTES, SHARE, NearPlace, _Search
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair, rightmost_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.fem.discretisation import Discretisation, first_part
+from fpsolve.fem.discretisation import Discretisation, ModeEffects, Polynomials, first_part
 from fpsolve.fem.harmonics import HarmonicCells
-from fpsolve.fem.sphere import Coordinates, SphereCells, SphereGenerator
+from fpsolve.fem.sphere import Coordinates, SphereCells, SphereGenerator, group_dimensions
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 
@@ -40,7 +40,7 @@ LARGEST_STEP = 1.0
 ROUND = 0.6
 """Width of a layer from which on there is none to speak of, and harmonics of the sphere settle the soonest."""
 WEAK, STEP = 0.2, 1.3
-"""Width of a layer for which elements are graded, and their size in ln tan η."""
+"""Width of a layer of T or T* for which elements are graded, and their size in ln tan η."""
 THINNEST = 1e-3
 """The least width: of modes that nothing couples the layer has none."""
 WORST_CONDITION = 100.0
@@ -49,13 +49,16 @@ ALONE = 3.0
 """What is left after the correction by a change, over this change; of two spaces half of it, of more 1."""
 LEFT = 0.5
 """The same, over what two degrees more changed in the corrected value, or will change in the other, see `left_of`."""
+MEASURED = 3.0
+"""What is left after elements or polynomials of the noise, over what two degrees more of them change."""
 DIGITS = 10.0
 
 
-def second_moments(problem: Problem) -> tuple[float, FloatArray]:
-    """Λ(2) and Q of E‖x‖², from the equations of the second moments in polynomials of the noise.
+def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
+    """Λ(2), Q of E‖x‖² and the second moments E xxᵀ, by their equations in polynomials of the noise.
 
-    With T = Σ xᵀQ_k x f_k(ξ) the generator is Σ (Aᵀ ⊕ Aᵀ) ⊗ Ξ_g + 1 ⊗ L_ξ + ½(Bᵀ ⊕ Bᵀ)², and Q the mean over ξ.
+    With T = Σ xᵀQ_k x f_k(ξ) the generator is Σ (Aᵀ ⊕ Aᵀ) ⊗ Ξ_g + 1 ⊗ L_ξ + ½(Bᵀ ⊕ Bᵀ)²; Q is the mean over ξ of the
+    right eigenvector, E xxᵀ that of the left one, both without a scale.
     """
     motion, named = problem.motion, problem.coloured.parts
     axes = [first_part(noise, DIGITS).axis(noise, 0.0) for noise in named.values()]
@@ -82,18 +85,25 @@ def second_moments(problem: Problem) -> tuple[float, FloatArray]:
     for each in problem.diffusions:
         square = both(each.matrix, each.order)
         total = total + product(0.5 * square @ square)
-    values, vectors = scipy.linalg.eig(finite(total), finite(product(np.eye(size))))
+    values, lefts, rights = scipy.linalg.eig(finite(total), finite(product(np.eye(size))), left=True)
     best = int(np.argmax(values.real))
     mean: FloatArray = np.ones(1)
     for axis, weight in zip(axes, ones, strict=True):
         mean = np.asarray(np.kron(mean, weight @ axis.constant))
-    q = (vectors[:, best].real.reshape(size, -1) @ mean).reshape(unit.shape)
-    q = 0.5 * (q + q.T)
-    return float(values[best].real), q * np.sign(np.trace(q))
+
+    def of_state(vectors: Any) -> FloatArray:
+        q = (vectors[:, best].real.reshape(size, -1) @ mean).reshape(unit.shape)
+        return np.asarray(0.5 * (q + q.T) * np.sign(np.trace(q)))
+
+    return float(values[best].real), of_state(rights), of_state(lefts)
 
 
-def modal_coordinates(problem: Problem) -> tuple[Coordinates, float]:
-    """S of y = S⁻¹x whose directions are solved for, and the width of the layer."""
+def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float, float]]:
+    """S of y = S⁻¹x whose directions are solved for, the width of the layer of T, and where T and T* have theirs.
+
+    Between the groups 1 and 2 of y these lie at ln tan η = ½ ln(q₁/q₂) and ½ ln(p₂/p₁), q and p the sizes of Q and of
+    E yyᵀ on each: T is about (yᵀQy)^½p there, and T* a power of yᵀ(E yyᵀ)⁻¹y.
+    """
     free = sum(
         problem.motion.epsilon**term.order * float(term.g(problem.named_noise(term.noise).mean)) * np.array(term.matrix)
         for term in problem.motion.terms
@@ -108,7 +118,7 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float]:
     own = np.column_stack(columns)
     if not np.linalg.cond(own) < WORST_CONDITION:
         _, own = scipy.linalg.matrix_balance(free, permute=False)
-    _, q = second_moments(problem)
+    _, q, p = second_moments(problem)
     sizes, axes = np.linalg.eigh(own.T @ q @ own)
     sizes, axes = np.maximum(sizes[::-1], 1e-300), axes[:, ::-1]
     count = len(sizes) // 2
@@ -117,19 +127,25 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float]:
         width = math.sqrt(sizes[2] / sizes[1])
     else:
         width = math.sqrt(sizes[count] / sizes[count - 1])
-    width = max(width, THINNEST)
-    return tuple(map(tuple, (own @ axes).tolist())), width
+    found = own @ axes
+    inverse, first = np.linalg.inv(found), group_dimensions(len(sizes))[0]
+    places = []
+    for moments, sign in ((found.T @ q @ found, 0.5), (inverse @ p @ inverse.T, -0.5)):
+        one_group, other = (np.mean(each) for each in np.split(np.maximum(np.diagonal(moments), 0.0), [first]))
+        share = one_group / max(other, 1e-300)
+        places.append(sign * math.log(min(max(share, THINNEST**2), THINNEST**-2)))
+    return tuple(map(tuple, found.tolist())), max(width, THINNEST), (places[0], places[1])
 
 
 def first_cells(problem: Problem) -> SphereCells | HarmonicCells:
     """The coarsest functions of directions."""
-    coordinates, width = modal_coordinates(problem)
+    coordinates, width, places = modal_coordinates(problem)
     if width >= ROUND:
         return HarmonicCells(coordinates, FIRST_WAVES)
     lines = np.linspace(0, math.pi / 2, 3)
-    if width < WEAK:
-        reach = math.log(1 / width) + 1
-        inner = np.linspace(-reach, reach, max(2, round(2 * reach / STEP)) + 1)
+    if max(map(abs, places)) > math.log(1 / WEAK):
+        low, high = min(places) - 1, max(places) + 1
+        inner = np.linspace(low, high, max(2, round((high - low) / STEP)) + 1)
         lines = np.concatenate([[0.0], np.arctan(np.exp(inner)), [math.pi / 2]])
     return SphereCells(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
 
@@ -149,6 +165,18 @@ def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
         return 0.0
     last, before = (float(np.sum(changes[each])) for each in halves)
     return last * last / (before - last) if last < before else math.inf
+
+
+def _told(pair: PrincipalPair, finer: SphereGenerator, axis: int, new: Any) -> float:
+    """What the new functions of an axis of a finer space change in Λ(p), to first order."""
+    pencil, space, old = finer.at(pair.p), finer.space(pair.p), pair.space
+    operator = pencil.matrix.shifted(pair.eigenvalue)
+    right, left = (
+        np.compress(new, space.table(image @ space.carry(each, old)), axis=axis).ravel()
+        for image, each in ((operator, pair.right), (operator.T, pair.left))
+    )
+    factors = pencil.on(axis, new).factorised(pair.eigenvalue)
+    return float(-left @ factors.solve(right) / (pair.left @ old.weighed(pair.right)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +199,7 @@ class SpherePlace(NearPlace):
     def _of_even_p(self, p: int) -> SpherePlace:
         """On harmonics up to the degree p, whose products with r^p are all polynomials of that degree."""
         if p not in self._even:
-            coordinates, _ = modal_coordinates(self.problem)
+            coordinates, *_ = modal_coordinates(self.problem)
             self._even[p] = replace(self, is_alone=False, cells=HarmonicCells(coordinates, p))
         return self._even[p]
 
@@ -203,9 +231,9 @@ class SpherePlace(NearPlace):
                 continue
             allowed = search.tolerance(search.p, pair.value)
             effects = mode_effects(pair)
-            rest = sum(each.error for each in effects if each)
-            if rest > 0.5 * allowed:
-                self._begin(self._finer(chosen, effects, allowed))
+            errors = self._errors(pair, effects, allowed)
+            if sum(errors) > 0.5 * allowed:
+                self._begin(self._finer(chosen, effects, errors, allowed))
                 level, steps = max(0, level - 1), []
                 continue
             level += 1
@@ -218,7 +246,7 @@ class SpherePlace(NearPlace):
                 uncorrected = left_of(waves, [each.eigenvalue for each in steps])
                 step, beyond = abs(pair.value - steps[-2].value), left_of(waves, [each.value for each in steps])
                 left = max(left, beyond, LEFT * step, LEFT * uncorrected)
-            solution = Solution(pair, search=left)
+            solution = Solution(pair, search=left, measured=sum(errors))
             if solution.error <= allowed:
                 return solution
             search.note(solution, solution.error, allowed)
@@ -226,12 +254,35 @@ class SpherePlace(NearPlace):
     def _change(self, pair: PrincipalPair, level: int) -> float:
         """What the waves of the next level change in Λ(p), to first order."""
         generator = self._generator(level)
-        pencil, space, old = generator.at(pair.p), generator.space(pair.p), pair.space
-        operator, new = pencil.matrix.shifted(pair.eigenvalue), space.phi.degrees > pair.generator.chosen.phase.waves
-        right = space.table(operator @ space.carry(pair.right, old))[new].ravel()
-        left = space.table(operator.T @ space.carry(pair.left, old))[new].ravel()
-        factors = pencil.on(new).factorised(pair.eigenvalue)
-        return float(-left @ factors.solve(right) / (pair.left @ old.weighed(pair.right)))
+        return _told(pair, generator, 0, generator.phi.degrees > pair.generator.chosen.phase.waves)
+
+    def _errors(self, pair: PrincipalPair, effects: Sequence[ModeEffects | None], allowed: float) -> list[float]:
+        """Of the elements and of each noise: the effects of the highest modes, or `MEASURED` of what finer ones change.
+
+        Effects are too large where T* has layers that T, and so Λ(p), knows nothing of.
+        """
+        errors, chosen = [each.error if each else 0.0 for each in effects], pair.generator.chosen
+        if sum(errors) <= 0.5 * allowed:
+            return errors
+        count = len(effects) - len(chosen.noises)
+        for k, error in enumerate(errors):
+            if error <= SHARE * allowed:
+                continue
+            if k < count:
+                finer = replace(chosen, phase=replace(chosen.phase, degree=chosen.phase.degree + 2))
+                generator = SphereGenerator(self.problem, finer)
+                cells, modes, _ = generator.phi.ladders[0]
+                change = _told(pair, generator, 0, (cells >= 0) & (modes > chosen.phase.degree))
+            elif isinstance(part := chosen.noises[k - count], Polynomials):
+                noises = list(chosen.noises)
+                noises[k - count] = part.enriched()
+                generator = SphereGenerator(self.problem, replace(chosen, noises=tuple(noises)))
+                axis = 1 + k - count
+                change = _told(pair, generator, axis, np.arange(generator.space(pair.p).shape[axis]) >= part.size)
+            else:
+                continue
+            errors[k] = min(error, MEASURED * abs(change))
+        return errors
 
     def _begin(self, chosen: Discretisation) -> None:
         """Other elements and functions of the noise, the waves from the coarsest on."""
@@ -251,16 +302,17 @@ class SpherePlace(NearPlace):
             search.stop(Message(Code.MEMORY_SPENT, size=size, **limits))
         search.check(chosen)
 
-    def _finer(self, chosen: Discretisation, effects: Sequence[Any], allowed: float) -> Discretisation:
+    def _finer(
+        self, chosen: Discretisation, effects: Sequence[Any], errors: Sequence[float], allowed: float
+    ) -> Discretisation:
         count, share = len(effects) - len(chosen.noises), SHARE * allowed
-        of_elements, of_noises = effects[:count], effects[count:]
         noises = tuple(
-            part if each is None or each.error <= share else part.refined(each, share, may_coarsen=False)
-            for part, each in zip(chosen.noises, of_noises, strict=True)
+            part if error <= share else part.enriched() if error < each.error else part.refined(each, share, False)
+            for part, each, error in zip(chosen.noises, effects[count:], errors[count:], strict=True)
         )
         phase = chosen.phase
-        for each in of_elements:
-            if each.error > 0.1 * allowed:
+        for error in errors[:count]:
+            if error > 0.1 * allowed:
                 phase = phase.finer_elements()
         found = Discretisation(phase, noises)
         return found if found.size > chosen.size else chosen.enriched()

@@ -138,11 +138,12 @@ class KroneckerSum:
             unit = identity(phase.shape[0], format="csr") if issparse(phase) else np.eye(phase.shape[0])
         return KroneckerSum([(phase - shift * unit, *noises), *others], self.unit)
 
-    def on(self, kept: Any) -> KroneckerSum:
-        """What it is on some functions of the first axis, where a mask is true."""
+    def on(self, axis: int, kept: Any) -> KroneckerSum:
+        """What it is on some functions of an axis, where a mask is true."""
         at = np.ix_(kept, kept)
-        unit = None if self.unit is None else self.unit[at]
-        return KroneckerSum([(first[at], *others) for first, *others in self.terms], unit)
+        unit = self.unit if axis or self.unit is None else self.unit[at]
+        terms = [tuple(each[at] if k == axis else each for k, each in enumerate(term)) for term in self.terms]
+        return KroneckerSum(terms, unit)
 
     def with_dense_first(self) -> KroneckerSum:
         """The same, the factors of the first axis as arrays."""

@@ -48,29 +48,29 @@ class Pencil:
         p: the moment.
         space: the trial and test functions.
         matrix: that of L(p), its first term with the matrices of noise that `space.mass` has.
-        first_levels: levels of the first axis, see `Axis.levels`.
+        levels: for each axis, see `Axis`.
     """
 
     p: float
     space: TensorSpace
     matrix: KroneckerSum
-    first_levels: Any
+    levels: Sequence[Any]
 
     @staticmethod
     def of(p: float, space: TensorSpace, matrix: KroneckerSum) -> Pencil:
         """That of all functions."""
-        return Pencil(p, space, matrix, space.phi.levels)
+        return Pencil(p, space, matrix, [axis.levels for axis in space.axes])
 
-    def on(self, kept: Any) -> Pencil:
-        """What it is on some functions of the first axis, where a mask is true."""
-        place = np.cumsum(kept) - 1
-        levels = self.first_levels and [place[level[kept[level]]] for level in self.first_levels]
-        return replace(self, matrix=self.matrix.on(kept), first_levels=levels)
+    def on(self, axis: int, kept: Any) -> Pencil:
+        """What it is on some functions of an axis, where a mask is true."""
+        levels, place = list(self.levels), np.cumsum(kept) - 1
+        if levels[axis]:
+            levels[axis] = [place[level[kept[level]]] for level in levels[axis]]
+        return replace(self, matrix=self.matrix.on(axis, kept), levels=levels)
 
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM: dense, by blocks along an axis, or sparse."""
-        levels = [self.first_levels, *(axis.levels for axis in self.space.axes[1:])]
-        return factorised(self.matrix.shifted(shift), levels, is_full=self.space.phi.is_full)
+        return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full)
 
 
 class Generator:

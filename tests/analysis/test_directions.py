@@ -93,7 +93,7 @@ def moments_of(p_matrix):
 
 def test_second_moments_of_both_eigenfunctions():
     """At p = 2 T is zᵀQz, and ∫ T* eeᵀ dσ is proportional to E zzᵀ/‖E zzᵀ‖; both from Kronecker squares."""
-    pair = ExponentSolver(problem(White(s=1.0)), rtol=1e-8).pair(2.0)
+    pair = enriched(ExponentSolver(problem(White(s=1.0)), rtol=1e-8).pair(2.0))
     free, driven = (RATES @ each @ np.linalg.inv(RATES) for each in (FREE, COUPLED))
     both = [np.kron(each, np.eye(4)) + np.kron(np.eye(4), each) for each in (free, driven)]
     whole = both[0] + 0.5 * both[1] @ both[1]

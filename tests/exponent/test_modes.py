@@ -78,9 +78,14 @@ def test_second_moments(seed, n, kind):
             kronecker.ornstein_uhlenbeck(steady, driven, 1.5, 0.5 / math.sqrt(3), 2, 12),
         ),
     }[kind]
-    value, q = second_moments(problem(noise, steady, driven))
+    value, q, moments = second_moments(problem(noise, steady, driven))
     assert value == pytest.approx(expected, abs=1e-9)
     assert np.min(np.linalg.eigvalsh(q)) > 0
+    assert np.min(np.linalg.eigvalsh(moments)) > 0
+    if kind == "white":  # d E xxᵀ/dt = (A + ½B²) E xxᵀ + E xxᵀ (A + ½B²)ᵀ + B E xxᵀ Bᵀ
+        drift = (steady + 0.5 * driven @ driven) @ moments
+        rate = drift + drift.T + driven @ moments @ driven.T
+        np.testing.assert_allclose(rate, expected * moments, atol=1e-9 * np.max(moments))
 
 
 @pytest.mark.parametrize(("seed", "n"), [(0, 3), (3, 3), (2, 4)])
@@ -143,7 +148,7 @@ def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     given = problem(noise, driven=driven)
     place = SpherePlace(given, rtol=1e-6, budget=Budget(), tolerance=lambda p, value: 1e-6)
     parts = tuple(first_part(each, 7) for each in given.coloured.parts.values())
-    coordinates, _ = modal_coordinates(given)
+    coordinates, *_ = modal_coordinates(given)
     place._begin(Discretisation(SphereCells(coordinates, np.linspace(0, math.pi / 2, 3), 8, 2), parts))
     found = [principal_pair(place._generator(level), 1.0) for level in (1, 2)]
     told = place._change(found[0], 2)
@@ -164,7 +169,7 @@ def test_memory_is_foreseen():
     """A block of all functions of directions for each of the noise, and four numbers for each of its entries."""
     given = problem(OU)
     place = SpherePlace(given, rtol=1e-6, budget=Budget(), tolerance=lambda p, value: 1e-6)
-    coordinates, _ = modal_coordinates(given)
+    coordinates, *_ = modal_coordinates(given)
     cells = SphereCells(coordinates, np.linspace(0, math.pi / 2, 3), 8, 14)
     chosen = Discretisation(cells, (Polynomials(9, 0.0),))
     size = 4 * 8e-9 * cells.size * chosen.size
