@@ -45,8 +45,8 @@ THINNEST = 1e-3
 """The least width: of modes that nothing couples the layer has none."""
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
-ALONE = 3.0
-"""What is left after the correction by a change, over this change; of two spaces half of it, of more 1."""
+BEYOND = (10.0, 1.5, 1.0)
+"""What is left after the correction by a change, over this change, by how many spaces agree: one, two, and more."""
 LEFT = 0.5
 """The same, over what two degrees more changed in the corrected value, or will change in the other, see `left_of`."""
 MEASURED = 3.0
@@ -240,7 +240,7 @@ class SpherePlace(NearPlace):
             change = self._change(pair, level)
             pair = replace(pair, correction=change)
             steps.append(pair)
-            left = max(1.0, ALONE / len(steps)) * abs(change)
+            left = BEYOND[min(len(steps), len(BEYOND)) - 1] * abs(change)
             if len(steps) > 1:
                 waves = [each.generator.chosen.phase.waves for each in steps]
                 uncorrected = left_of(waves, [each.eigenvalue for each in steps])
@@ -257,7 +257,8 @@ class SpherePlace(NearPlace):
         return _told(pair, generator, 0, generator.phi.degrees > pair.generator.chosen.phase.waves)
 
     def _errors(self, pair: PrincipalPair, effects: Sequence[ModeEffects | None], allowed: float) -> list[float]:
-        """Of the elements and of each noise: the effects of the highest modes, or `MEASURED` of what finer ones change.
+        """Of the elements and of each noise: the effects of the highest modes, or the geometric mean of these and of
+        what finer functions change, `MEASURED` of it at least.
 
         Effects are too large where T* has layers that T, and so Λ(p), knows nothing of.
         """
@@ -281,7 +282,7 @@ class SpherePlace(NearPlace):
                 change = _told(pair, generator, axis, np.arange(generator.space(pair.p).shape[axis]) >= part.size)
             else:
                 continue
-            errors[k] = min(error, MEASURED * abs(change))
+            errors[k] = min(error, max(MEASURED * abs(change), math.sqrt(error * abs(change))))
         return errors
 
     def _begin(self, chosen: Discretisation) -> None:
