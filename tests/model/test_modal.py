@@ -5,9 +5,12 @@ import pickle
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, Problem, moment_lyapunov, sensitivities
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, sensitivities
+from fpsolve.arrays import identity
+from fpsolve.model import CoefficientMatrix, LinearSystem, White
 from fpsolve.model.faults import TableError
 from fpsolve.model.systems import ModalSystem, ParametricOscillator
+from tests.conftest import sampled
 
 MASS, DAMPING = [[1.3, 0.2], [0.1, "m2"]], [[0.1, 0.02], ["c", 0.16]]
 STIFFNESS = [["1 + 0.3*U**2", "U"], [0.4, "omega**2"]]
@@ -79,6 +82,25 @@ def test_one_mode_is_an_oscillator():
     plain = moment_lyapunov(ParametricOscillator(stiffness=2.0, damping=0.1), noise, 2.0)
     assert moment_lyapunov(ours, 2.0).value[0] == pytest.approx(plain.value[0], rel=1e-12)
     assert abs(sensitivities(ours, 2.0).moments[0]["system.m"].value) < 1e-10
+
+
+@pytest.mark.parametrize("seed", sampled(*range(20), keep=4))
+def test_one_mode_and_its_matrices_are_one_system_of_the_plane(seed):
+    """By mass, damping and stiffness, by matrices of any dimension, and by equations, to 1e-10."""
+    rng = np.random.default_rng([30, seed])
+    m, (k, k_noise), (c, c_noise) = rng.uniform(0.5, 2.0), rng.uniform(0.5, 3.0, 2), rng.uniform(0.0, 0.4, 2)
+    noise = White(s=0.5) if seed % 2 else OrnsteinUhlenbeck(alpha=1.0, sigma=0.6)
+    mode = ModalSystem.of([[m]], [[k]], [[c]], stiffness_noise=[[k_noise]], damping_noise=[[c_noise]])
+    matrices = (
+        CoefficientMatrix(0, ((0.0, 1.0), (-k / m, -c / m))),
+        CoefficientMatrix(1, ((0.0, 0.0), (-k_noise / m, -c_noise / m)), identity),
+    )
+    values = {"m": m, "k": k, "K": k_noise, "c": c, "C": c_noise}
+    written = PlaneSystem.of_equations(("q", "v"), ("v", "-((k + K*xi)*q + (c + C*xi)*v)/m"), values)
+    systems = mode, LinearSystem(matrices), PlaneSystem(matrices), written
+    found = [moment_lyapunov(Problem(each, noise), [-0.5, 1.0, 3.0], rtol=1e-11).value for each in systems]
+    for each in found[1:]:
+        np.testing.assert_allclose(each, found[0], rtol=1e-10, atol=1e-11)
 
 
 FAULTS = {
