@@ -13,13 +13,15 @@ from matplotlib import pyplot
 from matplotlib.colors import to_hex
 
 import fpsolve
-from fpsolve.analysis import Axis
+from fpsolve.analysis import Axis, design, growth_law, rate_function, uncertainty
 from fpsolve.case.case import Curve
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent import INDICES
+from fpsolve.exponent import INDICES, perturbation_series
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate, Failure
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.model import CoefficientMatrix, LinearSystem, White
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -30,6 +32,15 @@ from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 
 matplotlib.use("Agg")
 REDUCED = FIG1_NOISE.ou_reduction()
+TURNING = Problem(
+    LinearSystem(
+        [
+            CoefficientMatrix(0, ((-0.1, 1.0, 0.0), (-1.0, -0.2, 1.0), (0.0, -1.0, -0.1))),
+            CoefficientMatrix(1, ((0.0, 0.3, 0.0), (-0.3, 0.0, 0.1), (0.0, 0.0, 0.2)), lambda xi: xi),
+        ]
+    ),
+    White(s=1.0),
+)
 FRAME = Axis("oscillator.omega", 0.5, 2.0, "log"), Axis("noise.D0", 0.01, 2.0, "log")
 MAIN = {
     "moments": "moment",
@@ -51,6 +62,12 @@ MAIN = {
     "response": "density",
     "curve": "moment",
     "indices of a curve": "moment",
+    "directions": "density",
+    "design": "oscillator.c1",
+    "uncertainty": "moment",
+    "rate function": "rate_function",
+    "growth law": "density",
+    "series": "moment",
 }
 """Results, by their names here, each with its main variable."""
 
@@ -105,6 +122,12 @@ def results(fig1_solver):
         "response": response(),
         "curve": curve([-1.0, 2.0], "lyapunov_exponent"),
         "indices of a curve": curve([], "lyapunov_exponent", "stability_index"),
+        "directions": fpsolve.tilted_density(ExponentSolver(TURNING, rtol=1e-3).pair(1.0)),
+        "design": design(FIG1, REDUCED, "moment(2) = 0.02", Axis("oscillator.c1", -2.0, 2.0)),
+        "uncertainty": uncertainty(FIG1, REDUCED, {"noise.D0": 0.05}, [1.0, 2.0]),
+        "rate function": rate_function(FIG1, REDUCED, [0.01, 0.02]),
+        "growth law": growth_law(FIG1, REDUCED, [50.0, 100.0], [0.01, 0.02]),
+        "series": perturbation_series(FIG1, REDUCED, [1.0, 2.0], order=4),
     }
     assert set(found) == set(MAIN)
     return found
