@@ -151,11 +151,12 @@ def first_cells(problem: Problem) -> SphereCells | HarmonicCells:
 
 
 def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
-    """What higher degrees may still change, from how values changed over each doubling of the degree.
+    """What higher degrees may still change, from how values changed from one even degree to the next.
 
     With A and B the sums of all changes from half the degree and from a quarter to half of it, A²/(B − A): exact where
-    the changes fall as a power of the degree, as where T, or T*, is not smooth, and hardly anything where they
-    fall exponentially. Of two changes alone the ratio tells.
+    the changes fall as a power of the degree, as where T, or T*, is not smooth. Where each of the last three changes
+    is a share of the one before, twice the rest of a geometric series with the largest of these shares, if that is
+    less. Of two changes alone their ratio tells.
     """
     changes, m = np.abs(np.diff(values)), np.array(degrees[1:])
     halves = m > m[-1] / 2, (m > m[-1] / 4) & (m <= m[-1] / 2)
@@ -164,7 +165,10 @@ def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
     if not np.any(halves[1]):
         return 0.0
     last, before = (float(np.sum(changes[each])) for each in halves)
-    return last * last / (before - last) if last < before else math.inf
+    left = last * last / (before - last) if last < before else math.inf
+    if len(changes) > 3 and (share := float(np.max(changes[-3:] / np.maximum(changes[-4:-1], 1e-300)))) < 1:
+        left = min(left, 2 * float(changes[-1]) * share / (1 - share))
+    return left
 
 
 def _told(pair: PrincipalPair, finer: SphereGenerator, axis: int, new: Any) -> float:

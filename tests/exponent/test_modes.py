@@ -162,6 +162,8 @@ def test_what_is_left_of_an_algebraic_series(power):
         m = np.arange(2.0, 2 * count + 2, 2)
         assert left_of(m, -(m**-power)) == pytest.approx(m[-1] ** -power, rel=3 * power / count)
     assert left_of([4, 6, 8, 10], [1.0, 1.1, 1.11, 1.111]) < 2e-4
+    falling = [1 - 10.0**-k for k in range(5)]
+    assert left_of([2, 4, 6, 8, 10], falling) == pytest.approx(2 * (1 - falling[-1]), rel=1e-9)
     assert left_of([4, 6, 8], [1.0, 1.1, 1.3]) == math.inf
 
 
