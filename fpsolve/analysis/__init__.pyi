@@ -3,6 +3,8 @@ from .density import adjoint_density as adjoint_density
 from .density import furstenberg_khasminskii as furstenberg_khasminskii
 from .density import stationary_density as stationary_density
 from .density import tilted_density as tilted_density
+from .excursions import Excursion as Excursion
+from .excursions import excursion as excursion
 from .inverse import Design as Design
 from .inverse import design as design
 from .sensitivity import Sensitivities as Sensitivities
