@@ -223,8 +223,8 @@ def run(
 
     Curves that an earlier run has finished are not solved again, even if that run was killed.
 
-    Without [output] quantities a case computes all of them: moment,
-    lyapunov_exponent, stability_index, variance_rate, impact_rate,
+    Without [output] quantities a case computes all of them but excursions:
+    moment, lyapunov_exponent, stability_index, variance_rate, impact_rate,
     critical_impact_factor, critical_restitution, sensitivities, eigenfunctions.
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0

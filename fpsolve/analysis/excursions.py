@@ -16,7 +16,7 @@ For other noise T has no such bounds. The number of upcrossings of A has the mea
 as under the measure changed by the martingale (φ, ξ) has the density T T*/⟨T*, T⟩, and ln ‖x‖ grows by Λ′(δ) in a unit
 of time: by the renewal theorem it is as often near ln A as near any other value. For A → ∞ it bounds P(sup ‖x‖ ≥ A).
 
-‖x‖ is the length of the vector of the variables of the system. With x = Sy and ρ = |y|/|x| it is T(φ, ξ) = ρ^p T_y(ψ, ξ)
+‖x‖ is the length of the vector of the variables of the system. With x = Sy and ρ = |y|/|x| its T(φ, ξ) is ρ^p T_y(ψ, ξ)
 of what is solved for y, see `model.frame`.
 """
 
@@ -42,20 +42,22 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import LEVEL, MOST_PROBABLE, LEAST_PROBABLE, UPCROSSINGS
+from fpsolve.model.quantity import LEAST_PROBABLE, LEVEL, MOST_PROBABLE, UPCROSSINGS
 
 if TYPE_CHECKING:
     import xarray
 
-STATIONARY, UNIFORM = "stationary", "uniform"
+SYMBOL = "P(sup ‖x‖ ≥ A)"
+STATIONARY: Literal["stationary"] = "stationary"
+UNIFORM: Literal["uniform"] = "uniform"
 Start = float | Literal["uniform"]
 StartOfNoise = float | Literal["stationary"]
 FINE, MOST_POINTS = 8, 4_000_000
 """Points of T for each polynomial degree, either way; fewer where they would be more than so many."""
 CLOSE, MOST_ROUNDS = 1e-5, 4
 """The relative error of T, at its extremes, that finer discretisations are made for, and how many of them."""
-PARTS = 32
-"""Into how many parts a cell of φ is cut for the integral of q⁺, which has kinks."""
+PARTS, POINTS = 32, 2000
+"""Into how many parts a cell of φ is cut for the integral of q⁺, which has kinks, and points of ξ."""
 SHOWN_LEVELS = (2.0, 4.0, 8.0, 16.0, 32.0)
 
 
@@ -176,12 +178,14 @@ def solve_excursion(
     exponent = solver.lyapunov_exponent()
     found = Excursion(exponent, phi=phi, xi=xi, parameters=problem.values)
     if abs(exponent.value) <= exponent.error_estimate:
-        return replace(found, notes=(Message(Code.EXCURSION_OPEN, value=exponent.value, error=exponent.error_estimate),))
+        return replace(
+            found, notes=(Message(Code.EXCURSION_OPEN, value=exponent.value, error=exponent.error_estimate),)
+        )
     if exponent.value > 0:
         return replace(found, is_certain=True)
     index = nonzero_root(solver, guess=root)
     if not index:
-        return replace(found, notes=(Message(Code.EXCURSION_NO_INDEX, reason=index.reason),))
+        return replace(found, notes=(_without_index(index.reason),))
     found = replace(found, stability_index=index)
     if reason := _no_eigenfunction(problem):
         return replace(found, notes=(reason,))
@@ -215,9 +219,18 @@ def check_start(problem: Problem, phi: Any, xi: Any) -> None:
     if noise.has_states:
         states = noise.reached
         if not np.any(np.isclose(states, value, rtol=1e-9, atol=0)):
-            raise ValueError(f"got xi = {value:g}; must be one of the states, {', '.join(f'{each:g}' for each in states)}")
+            raise ValueError(
+                f"got xi = {value:g}; must be one of the states, {', '.join(f'{each:g}' for each in states)}"
+            )
     elif not abs(value) < noise.half_width:
         raise ValueError(f"got xi = {value:g}; must be between -{noise.half_width:g} and {noise.half_width:g}")
+
+
+def _without_index(reason: Message) -> Message:
+    """What it means that Λ(p) has no other root than 0, λ < 0."""
+    if reason.code is Code.NO_ROOT:
+        return Message(Code.EXCURSION_BEYOND, high=reason.data["high"])
+    return Message(Code.EXCURSION_NO_INDEX, reason=reason)
 
 
 def _no_eigenfunction(problem: Problem) -> Message | None:
@@ -330,7 +343,7 @@ def _at_start(pair: PrincipalPair, *, phi: Start, xi: StartOfNoise) -> float:
         psi = place if frame is None else frame.phase(place)
         first, span = space.phi.lines[0], space.phi.span
         psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
-        at_phi = space.phi.at(psi, after) * (1.0 if frame is None else frame.length(place) ** pair.p)[..., None]
+        at_phi = space.phi.at(psi, after) * (1.0 if frame is None else float(frame.length(place)[0]) ** pair.p)
     means = [_mean_functions(axis, xi) for axis in space.axes[1:]]
     return float(space.evaluate(pair.right, at_phi, *(each[None] for each in means)).ravel()[0])
 
@@ -457,9 +470,10 @@ def _flux(pair: PrincipalPair, parts: int) -> float:
     space, problem = pair.space, pair.generator.problem
     psi, weights = space.phi.finer_rule(parts)
     phi, stretch = _own(pair, psi)
-    each = [axis.samples() for axis in space.axes[1:]]
+    most = (MOST_POINTS / psi.size) ** (1 / len(space.axes[1:]))
+    each = [axis.finer_samples(round(min(most, POINTS * parts / PARTS))) for axis in space.axes[1:]]
     left = space.evaluate(pair.left, space.phi.at(psi), *(at.values for at in each))
-    measures = [axis.measure / at.factor for axis, at in zip(space.axes[1:], each, strict=True)]
+    measures = [at.weight * at.measure / at.factor for at in each]
     shape = (-1, *[1] * len(each))
     rate: Harmonics = growth_rate(problem.drift, problem.at_values([at.xi for at in each]))
     density = np.maximum(rate(phi.reshape(shape)), 0) * left * (weights / stretch).reshape(shape)

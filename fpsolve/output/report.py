@@ -30,6 +30,7 @@ from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, region_meaning, simulated_meanings
 from fpsolve.output.proofs import PROOF, between, proof_grid, proofs_grid
 from fpsolve.output.screen import Column, Grid
+from fpsolve.output.sentences import excursions
 from fpsolve.output.terminal import (
     INTERVAL,
     MOST_TABLES,
@@ -186,7 +187,8 @@ def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str
         for result in found.results:
             parameters = frozenset(result.curve.parameters.items())
             sure = [f"{each}, as parameters are uncertain." for each in verdicts(spreads_of(case, result))]
-            if told := [*meanings(result, time_unit), *sure, *proven.get(parameters, [])]:
+            rare = [text] if (text := excursions(case, result)) else []
+            if told := [*meanings(result, time_unit), *rare, *sure, *proven.get(parameters, [])]:
                 yield result.curve.label, told
     if not found.results and len(found.simulated) <= MOST_DRAWN:
         for each in found.simulated:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
+from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Curve
@@ -81,6 +82,7 @@ class CurveResult(Result):
         jumps: where a system has several, the `BY_JUMP` of each by their names, as `estimates`.
         classes: where the phase never leaves a ray, λ and Λ(p) on it and across it.
         sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
+        excursion: the probability that ‖x‖ ever exceeds a level; None where it is not wanted, or did not converge.
         seconds: how long the processor took.
     """
 
@@ -94,6 +96,7 @@ class CurveResult(Result):
     jumps: tuple[Mapping[str, Estimate | None], ...] = ()
     classes: tuple[InvariantClass, ...] = ()
     sensitivities: Sensitivities | None = None
+    excursion: Excursion | None = None
     seconds: float = 0.0
 
     @property
