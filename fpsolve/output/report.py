@@ -28,7 +28,7 @@ from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.output.charts import draw_chart
 from fpsolve.output.figures import draw, draw_response, draw_sensitivities
 from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, region_meaning, simulated_meanings
-from fpsolve.output.proofs import PROOF, between, proof_grid, proofs_grid
+from fpsolve.output.proofs import PROOF, between, excursion_in_words, proof_grid, proofs_grid
 from fpsolve.output.screen import Column, Grid
 from fpsolve.output.sentences import excursions
 from fpsolve.output.terminal import (
@@ -196,6 +196,7 @@ def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str
     for proof in found.proofs[:MOST_DRAWN]:
         bounds = [(LYAPUNOV_EXPONENT.symbol, proof.exponent), (STABILITY_INDEX.symbol, proof.index)]
         told = [f"{symbol} is {between(each)}" for symbol, each in bounds if each is not None and each.is_proven]
+        told += [text] if (text := excursion_in_words(proof)) else []
         if told := [*proof.verdicts, *told]:
             yield proof.curve.label, [f"Proven: {each}." for each in told]
     if found.chart is not None and found.chart.regions is not None:
