@@ -123,8 +123,9 @@ def print_proofs(case: Case, proofs: Sequence[CurveProof]) -> None:
             told = [*path, f"of {len(proof.moments)} moments {_counted(proof)}"]
         if told:
             screen.say(f"Proven: {'; '.join(told)}.")
-        if rare := excursion_in_words(proof):
-            screen.say(f"Proven: {rare}.")
+        if proof.excursion is not None:
+            rare = excursion_in_words(proof)
+            screen.say(f"Proven: {rare}." if rare else f"{SYMBOL} {NOT_PROVEN}")
         screen.lines([""])
 
 

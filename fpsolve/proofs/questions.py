@@ -27,7 +27,7 @@ GUESS_SHARE = 0.25
 """Of the time of a bound, for one of the two guesses of the number."""
 INDEX_WIDTH, WIDENINGS = 1e-6, 4
 """The width sought for δ_p, and how often it is tried again with one ten times as large."""
-NEARBY = (1e-5, 1e-4, 1e-3, 1e-2)
+NEARBY = (1e-4, 1e-3, 1e-2)
 """How far beside δ_p the sign of Λ(p) is proven for excursions, relative; the first that is found."""
 
 LOOSE = 1e-9
@@ -266,7 +266,7 @@ def prove_excursions(
     for sense, share in ((LOWER, 0.5), (UPPER, 1.0)):
         bounds.append(None)
         for away in NEARBY:
-            p = repr(float(f"{found.value * (1 - sense * away):.12g}"))
+            p = repr(float(f"{found.value * (1 - sense * away):.7g}"))
             seconds = share * (countdown.seconds - countdown.elapsed) / len(NEARBY)
             certificate = sign_certificate(stated, p, sense, Countdown(seconds), progress)
             factor = math.nan if certificate is None else excursion_factor(certificate, sense)

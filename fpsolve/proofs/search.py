@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -37,6 +38,8 @@ the bounds are farther apart than this share of the number."""
 WHOLE_BELOW = 6.0
 """End exponents a below which the ends of the support carry too much weight to be cut off."""
 CELLS, REACH, HELD_FROM, CANDIDATES = 480, 10.0, 3.5, 24
+FINE = 512
+"""Cells of φ at least where the extremes of u matter."""
 SLACK = 1e-6
 """Of the mismatch, relative, so that another machine's rounding does not matter."""
 STEEPEST = 1e6
@@ -315,19 +318,19 @@ def sign_certificate(
 
 
 def _flat(stated: Statement, noise: Cylinder, basis: Basis, p: str, pair: Pair, sense: int) -> Certificate | None:
-    """A certificate with one bound of this sign, W = 0; None where there is none."""
+    """A certificate without W that proves this sign; None where it does not."""
     trial = Trial(noise, ball(p), pair.value, basis, pair.cosine, pair.sine)
-    phases, nodes = max(128, 16 * len(pair.cosine)), np.zeros(0)
+    phases, nodes = max(FINE, 16 * len(pair.cosine)), np.zeros(0)
     if (cells := basis.cover(pair.cosine.shape[1])) is None:
         nodes = _nodes(trial)
         cells = nodes[:-1], nodes[1:]
     bounds = Bounder(trial, phases).bounds(*cells)
-    delta = max(float(np.max(bounds.above(sense))), 1e-18) * (1 + SLACK)
-    if not np.all(bounds.is_positive) or not sense * pair.value + delta < 0:
+    upper, lower = (max(float(np.max(bounds.above(q))), 1e-18) * (1 + SLACK) for q in (UPPER, LOWER))
+    if not np.all(bounds.is_positive) or not sense * pair.value + (upper if sense == UPPER else lower) < 0:
         return None
-    side = SideRecord(delta=delta, nodes=nodes.tolist(), values=np.zeros(nodes.size).tolist(), tails=None)
-    sides = {"upper": side if sense == UPPER else None, "lower": side if sense == LOWER else None}
-    return _certificate(stated, basis, p, pair, phases, **sides)
+    flat: dict[str, Any] = {"nodes": nodes.tolist(), "values": np.zeros(nodes.size).tolist(), "tails": None}
+    sides = (SideRecord(delta=delta, **flat) for delta in (upper, lower))
+    return _certificate(stated, basis, p, pair, phases, *sides)
 
 
 def _apart(certificate: Certificate) -> float:

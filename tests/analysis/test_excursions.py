@@ -105,7 +105,7 @@ def rounded(bounds):
     return [round(float(each), places) for each, places in zip(bounds, (3, 3, 3, 3, 4), strict=True)]
 
 
-@pytest.mark.parametrize("smooth", [True, False])
+@pytest.mark.parametrize("smooth", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_bounds_of_the_telegraph_case_by_another_method(telegraph, smooth, monkeypatch):
     """T in the coordinates (x, ẋ), though the solve turns them, with all phases, or those of growth."""
     if not smooth:
@@ -216,7 +216,9 @@ def test_a_border_of_stability_is_left_open():
             ),
             Code.EXCURSION_RAY,
         ),
-        (Problem(LinearSystem(THREE), White(s=0.9)), Code.EXCURSION_PLANE),
+        pytest.param(
+            Problem(LinearSystem(THREE), White(s=0.9)), Code.EXCURSION_PLANE, marks=pytest.mark.slow, id="three"
+        ),
     ],
 )
 def test_what_is_not_known_is_told(problem, code):
@@ -269,7 +271,7 @@ def test_simulated_paths_of_the_telegraph_case(telegraph):
     found = excursion(telegraph)
     delta = found.stability_index.value
     law = [[-K, K], [K, -K]], [0.5, 0.5]
-    tops, mean, error = chain_paths(telegraph_matrices(), *law, delta, LEVELS, paths=15_000)
+    tops, mean, error = chain_paths(telegraph_matrices(), *law, delta, LEVELS, paths=10_000)
     low, high = found.bounds(LEVELS)
     share, doubt = reached(tops, LEVELS)
     assert np.all(low - 4 * doubt <= share)
@@ -311,7 +313,7 @@ def test_simulated_paths_of_random_oscillators_with_walls(seed):
     """P within the bounds for all A that 100 paths should reach."""
     problem, found = random_oscillator(seed)
     system, noise, delta = problem.system, problem.noise, found.stability_index.value
-    factor, paths = system.impact_factor(), 3000
+    factor, paths = system.impact_factor(), 2000
     still, other = (matrix_at(system, np.array(each)) for each in (0.0, 1.0))
     if noise.has_states:
         matrices = [matrix_at(system, np.array(each)) for each in noise.states]
