@@ -256,6 +256,31 @@ class Code(Enum):
         "note: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded "
         "noise P(sup ‖x‖ > A) may fall faster than any power of A}"
     )
+    EXCURSION_OPEN = (
+        "note: λ = {value:.3g} cannot be distinguished from 0 within its error, {error:.1g}, so that nothing is known "
+        "of P(sup ‖x‖ ≥ A)"
+    )
+    EXCURSION_BEYOND = (
+        "note: no δ_p was found up to p = {high:g}: E‖x‖^p decays for all of these p, so that P(sup ‖x‖ ≥ A) falls "
+        "faster than A^-{high:g}"
+    )
+    EXCURSION_NO_INDEX = "note: there is no δ_p, and so no bound of P(sup ‖x‖ ≥ A): {reason}"
+    EXCURSION_PLANE = (
+        "note: P(sup ‖x‖ ≥ A) has bounds for two variables only, and here are {count}; δ_p is its exponent"
+    )
+    EXCURSION_RAY = (
+        "note: P(sup ‖x‖ ≥ A) has no bounds: the phase never leaves the ray at phi = {phase:.6g}, so that no "
+        "eigenfunction is positive everywhere; δ_p is the exponent for starts outside such rays"
+    )
+    EXCURSION_UNBOUNDED = (
+        "note: the noise is unbounded, so that P(sup ‖x‖ ≥ A) has no bounds for every A: δ_p is its exponent, and the "
+        "mean number of upcrossings bounds it for large A"
+    )
+    EXCURSION_NO_UPPER = (
+        "note: P(sup ‖x‖ ≥ A) has no upper bound: the least T is {value:.2g} with the error {error:.1g}, which may be "
+        "0; use a smaller rtol"
+    )
+    EXCURSION_UNRESOLVED = "failure: T at p = δ_p is not resolved, as no finer discretisation could be made"
     NOT_ONE_RAY = "note: the motion has impacts on {count:?{count}¦no} rays, and it is computed for one ray only"
     RARE_IMPACTS = (
         "note: N < {most:.1g} cannot be distinguished from 0, as if the motion did not turn; so R does not change λ"

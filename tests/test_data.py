@@ -13,7 +13,7 @@ from matplotlib import pyplot
 from matplotlib.colors import to_hex
 
 import fpsolve
-from fpsolve.analysis import Axis, design, growth_law, rate_function, uncertainty
+from fpsolve.analysis import Axis, design, excursion, growth_law, rate_function, uncertainty
 from fpsolve.case.case import Curve
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
@@ -21,9 +21,10 @@ from fpsolve.exponent import INDICES, perturbation_series
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate, Failure
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import CoefficientMatrix, LinearSystem, White
+from fpsolve.model import CoefficientMatrix, LinearSystem, Telegraph, White
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT
+from fpsolve.model.systems import ParametricOscillator
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
 from fpsolve.simulation.response import MEANS
@@ -68,6 +69,7 @@ MAIN = {
     "rate function": "rate_function",
     "growth law": "density",
     "series": "moment",
+    "excursion": "level",
 }
 """Results, by their names here, each with its main variable."""
 
@@ -128,6 +130,7 @@ def results(fig1_solver):
         "rate function": rate_function(FIG1, REDUCED, [0.01, 0.02]),
         "growth law": growth_law(FIG1, REDUCED, [50.0, 100.0], [0.01, 0.02]),
         "series": perturbation_series(FIG1, REDUCED, [1.0, 2.0], order=4),
+        "excursion": excursion(ParametricOscillator(stiffness=1.0, damping=0.08), Telegraph(a=0.8, k=1.0)),
     }
     assert set(found) == set(MAIN)
     return found

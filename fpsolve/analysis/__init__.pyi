@@ -4,6 +4,8 @@ from .density import furstenberg_khasminskii as furstenberg_khasminskii
 from .density import stationary_density as stationary_density
 from .density import tilted_density as tilted_density
 from .directions import DirectionDensity as DirectionDensity
+from .excursions import Excursion as Excursion
+from .excursions import excursion as excursion
 from .growth import GrowthLaw as GrowthLaw
 from .growth import RateFunction as RateFunction
 from .growth import growth_law as growth_law

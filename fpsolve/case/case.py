@@ -30,6 +30,7 @@ from fpsolve.case.sections import (
     EIGENFUNCTIONS,
     ChartSection,
     DesignSection,
+    ExcursionSection,
     Expectation,
     FigureSection,
     MeshSection,
@@ -153,6 +154,9 @@ class Case(Section):
     )
     figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
     output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
+    excursions: Annotated[ExcursionSection, parameter("how far ‖x‖ may rise, and its start", "[excursions]")] = (
+        ExcursionSection()
+    )
     chart: Annotated[ChartSection | None, parameter("the lines of a chart, on which stability ends", "[chart]")] = None
     design: Annotated[DesignSection | None, parameter("what parameters shall be changed for", "[design]")] = None
     uncertain: Annotated[

@@ -18,15 +18,18 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
+from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.zero import axis_faults, said
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of, varying
 from fpsolve.case.messages import Refusal, faults_in, nearest, shown
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
+    EXCURSIONS,
     ChartAxis,
     ChartSection,
     DesignSection,
+    ExcursionSection,
     Expectation,
     FigureSection,
     MeshSection,
@@ -234,6 +237,26 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
             yield (i, "where", key), value, text
 
 
+def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    """A section of what is not computed, and a start that the noise of some curve does not have."""
+    output: OutputSection = valid.get("output", OutputSection())
+    if section.model_fields_set and EXCURSIONS not in output.quantities:
+        text = f'stands here, but output.quantities has no "{EXCURSIONS}"; add it there, or remove this section'
+        yield (), None, text
+    problem = problem_of(valid)
+    if problem is None or section.xi == STATIONARY:
+        return
+    at = varying(problem)
+    for varied in valid.get("vary", Vary()).sets():
+        with suppress(ValueError):  # another fault tells why
+            curve = at(varied)
+            try:
+                check_start(curve, section.phi, section.xi)
+            except ValueError as error:
+                yield ("xi",), section.xi, f"{_with(varied)}{error}"
+                return
+
+
 def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
     """Axes that are none of this case, or a frame in which there is no such problem or a moment is infinite."""
     problem, parameters = problem_of(valid), parameters_of(valid, context)
@@ -328,6 +351,7 @@ REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
     "mesh": _of_mesh,
     "monte_carlo": _of_monte_carlo,
     "figure": _of_figure,
+    "excursions": _of_excursions,
     "output": _of_output,
     "chart": _of_chart,
     "design": _of_design,

@@ -26,6 +26,7 @@ from pydantic import (
     model_validator,
 )
 
+from fpsolve.analysis.excursions import STATIONARY, UNIFORM
 from fpsolve.analysis.inverse import MOST_PARAMETERS
 from fpsolve.analysis.target import start_and_stop, target_of
 from fpsolve.analysis.zero import Axis, Zero, zero_of
@@ -43,13 +44,14 @@ from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
 MAX_NODES = 1000
+MOST_LEVELS = 100
 _DIGITS = 12
 _SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
-SENSITIVITIES, EIGENFUNCTIONS = "sensitivities", "eigenfunctions"
+SENSITIVITIES, EIGENFUNCTIONS, EXCURSIONS = "sensitivities", "eigenfunctions", "excursions"
 USUAL_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS)
 """What is computed where nothing is asked for; eigenfunctions with the stationary density."""
-QUANTITY_NAMES = (*USUAL_NAMES, RATE_FUNCTION.name)
+QUANTITY_NAMES = (*USUAL_NAMES, RATE_FUNCTION.name, EXCURSIONS)
 """What may be asked for."""
 _LARGEST = 1e30
 WANTED = f"wanted relative error; if omitted {RTOL_BEYOND_PLANE:g} for more than two variables"
@@ -433,6 +435,51 @@ class OutputSection(Section):
             wrong.append((at, RATE_FUNCTION.name, text))
         refuse(wrong)
         return self
+
+
+def _start(word: str, remedy: str) -> BeforeValidator:
+    """Takes a number or a word."""
+
+    def checked(value: Any) -> Any:
+        if value == word or is_number(value):
+            return value if value == word else float(value)
+        raise ValueError(f"got {shown_with_kind(value)}; must be a finite number or {shown(word)}; write {remedy}")
+
+    return BeforeValidator(checked)
+
+
+def _levels(value: Any) -> Any:
+    if is_list(value) and 0 < len(value) <= MOST_LEVELS and all(map(is_number, value)) and min(value) > 1:
+        return value
+    raise ValueError(
+        f"got {shown_with_kind(value)}; must be a list of 1 to {MOST_LEVELS} numbers above 1, as the start has the "
+        "length 1; write, for example, levels = [2.0, 10.0]"
+    )
+
+
+class ExcursionSection(Section):
+    """[excursions]: how far ‖x‖ may rise above its start, and what that start is."""
+
+    levels: Annotated[
+        Values,
+        BeforeValidator(_levels),
+        parameter("A of P(sup ‖x‖ ≥ A)", "levels = [2.0, 10.0, 100.0]", strict=False),
+    ] = (2.0, 10.0, 100.0)
+    phi: Annotated[
+        float | Literal["uniform"],
+        _start(UNIFORM, 'phi = 0.0, which displaces the first variable, or phi = "uniform"'),
+        parameter("phase of the start x = (cos φ, −sin φ), in radians", "phi = 0.0"),
+    ] = 0.0
+    xi: Annotated[
+        float | Literal["stationary"],
+        _start(STATIONARY, 'xi = "stationary", or the value of the noise at the start'),
+        parameter("the noise at the start", 'xi = "stationary"'),
+    ] = STATIONARY
+
+    @property
+    def sentence_level(self) -> float:
+        """The level that is nearest to 10."""
+        return min(self.levels, key=lambda level: abs(math.log(level / 10)))
 
 
 class ChartAxis(Section):

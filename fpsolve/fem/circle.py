@@ -64,6 +64,11 @@ class CircleAxis(NoiseAxis):
         weight, turn = np.full(self.points.size, 0.5 / np.pi), 2 * np.pi
         return Samples(self._xi, weight, turn * self.measure, self.values, np.ones(self.points.size))
 
+    def everywhere(self, count: int) -> tuple[FloatArray, Any]:
+        """At equidistant θ of the whole circle, the first one twice."""
+        theta = np.linspace(0, 2 * np.pi, 2 * count + 1)
+        return self.noise.of_angle(theta), self.values_at(theta)
+
     def projection(self, other: CircleAxis) -> FloatArray:
         return np.eye(self.size, other.size)
 

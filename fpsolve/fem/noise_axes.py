@@ -25,6 +25,8 @@ from fpsolve.model.noise import Noise, NoiseDerivative
 
 FAR = 50.0
 """Noise units beyond which OU noise does not come."""
+REACH = 9.0
+"""Noise units on either side of its centre, beyond which nothing is left of a weight that falls like a Gaussian."""
 SHARP_ENDS = 50.0
 """Exponents from which on P_s leaves next to nothing at the ends of its support."""
 NEAR_END, VANISHES = 1e-9, 1e-6
@@ -82,6 +84,24 @@ class NoiseAxis(Axis):
         """At the points of the rule, or at the states."""
         raise NotImplementedError
 
+    def finer_samples(self, count: int) -> Samples:
+        """At the points of a rule for functions with kinks, some `count`."""
+        return self.samples()
+
+    def law(self) -> FloatArray:
+        """The stationary law as weights of the `samples`, shape (n,)."""
+        weights = self.measure / self.samples().factor ** 2
+        return np.asarray(weights / weights.sum())
+
+    def everywhere(self, count: int) -> tuple[FloatArray, Any]:
+        """ξ that cover a bounded support, the ends included, some `count`, and the functions there with their factor.
+
+        Returns:
+            ξ, shape (n,), and values, shape (n, size); all states, if there are states.
+        """
+        at = self.samples()
+        return at.xi, at.values
+
 
 class LineAxis(NoiseAxis):
     """What functions on the line of a diffusion share.
@@ -113,6 +133,23 @@ class LineAxis(NoiseAxis):
         """The functions at any z, shape (len(z), size)."""
         raise NotImplementedError
 
+    def everywhere(self, count: int) -> tuple[FloatArray, Any]:
+        """At points that are closer to each other near the ends, as those of Chebyshev."""
+        z = -self.noise.half_width / self.unit * np.cos(np.linspace(0, np.pi, count + 1))
+        return self.unit * z, self.values_at(z) * self._factor(z)[:, None]
+
+    def finer_samples(self, count: int) -> Samples:
+        """At midpoints of intervals, smaller ones near the ends of a bounded support."""
+        end, x = self.noise.half_width / self.unit, (2 * np.arange(count) + 1) / count - 1
+        if math.isfinite(end):
+            z, measure = end * np.sin(0.5 * np.pi * x), end * np.cos(0.5 * np.pi * x) * np.pi / count
+        else:
+            z, measure = self.center + REACH * x, np.full(count, 2 * REACH / count)
+        return self._sampled(z, self.unit * measure, self.values_at(z))
+
+    def _factor(self, z: FloatArray) -> FloatArray:
+        return np.exp(np.clip(self.tilt * (z - self.center), -600, 600))
+
     def weight(self, z: FloatArray) -> FloatArray:
         """P_s exp(2s z) as a density of z: its integral is 1."""
         return np.exp(self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self._log_weight)
@@ -125,8 +162,7 @@ class LineAxis(NoiseAxis):
         return self._sampled(self.points, self.unit * self.measure / self.weight(self.points), self.values)
 
     def _sampled(self, z: FloatArray, measure: FloatArray, values: Any) -> Samples:
-        factor = np.exp(np.clip(self.tilt * (z - self.center), -600, 600))
-        return Samples(self.unit * z, self.weight(z) / self.unit, measure, values, factor)
+        return Samples(self.unit * z, self.weight(z) / self.unit, measure, values, self._factor(z))
 
     def projection(self, other: LineAxis) -> FloatArray:
         exponent = other.tilt * (self.points - other.center) - self.tilt * (self.points - self.center)

@@ -72,6 +72,10 @@ class PairAxis(NoiseAxis):
         factor = np.exp(np.clip(self._right @ self._u, -600, 600))
         return Samples(self._xi, np.ones(factor.size), self.measure, self.values, factor)
 
+    def law(self) -> FloatArray:
+        weights = self.measure * np.exp(-(self._right + self._left) @ self._u)
+        return np.asarray(weights / weights.sum())
+
     def projection(self, other: PairAxis) -> FloatArray:
         return np.eye(self.size, other.size)
 

@@ -121,6 +121,23 @@ CRITICAL_RESTITUTION = Quantity(
     "(39)",
     _RATIO,
 )
+LEVEL = Quantity("level", "A", "level over that of the start", "$A$", dims=("level",))
+LEAST_PROBABLE = Quantity(
+    "least_probable",
+    "P(sup ‖x‖ ≥ A) >=",
+    "lower bound of the probability of an excursion",
+    r"$P(\sup\|x\| \geq A)$",
+    dims=("level",),
+)
+MOST_PROBABLE = replace(
+    LEAST_PROBABLE,
+    name="most_probable",
+    symbol="P(sup ‖x‖ ≥ A) <=",
+    words="upper bound of the probability of an excursion",
+)
+UPCROSSINGS = Quantity(
+    "upcrossings", "C A^−δ_p", "mean number of upcrossings for large A", r"$C A^{-\delta_p}$", dims=("level",)
+)
 THETA = Quantity("theta", "θ", "parameter", r"$\theta$", "theta_unit", ("parameter",))
 """Any parameter; its unit is a variable beside it."""
 POINTS = {

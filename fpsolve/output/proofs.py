@@ -12,6 +12,7 @@ from typing import Any
 from rich.text import Text
 
 from fpsolve import __version__
+from fpsolve.analysis.excursions import SYMBOL
 from fpsolve.case.case import Case
 from fpsolve.data import written
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
@@ -20,7 +21,7 @@ from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.terminal import MOST_ROWS, MOST_TABLES, varied_columns
 from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import plain, verdicts
-from fpsolve.proofs.questions import IndexEnclosure
+from fpsolve.proofs.questions import ExcursionBound, IndexEnclosure
 from fpsolve.proofs.statement import DECIMAL
 from fpsolve.study.prove import CurveProof
 
@@ -50,6 +51,9 @@ def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_wh
             "stability_index": "null" if proof.index is None else _index(proof.index),
             "verdicts": _line(proof.verdicts),
         }
+        if proof.excursions:
+            rare = ", ".join(_excursion(sense, each) for sense, each in proof.excursions.items())
+            parts["excursions"] = f"[{rare}]"
         text = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in parts.items())
         curves.append(f"  {{\n{text}\n  }}")
     write_text(folder / PROOF, "\n".join(["{", f'{lines},\n "curves": [', ",\n".join(curves), " ]", "}", ""]))
@@ -75,6 +79,30 @@ def _index(found: IndexEnclosure) -> str:
     return f'{{"lower": {_line(ends[0])}, "upper": {_line(ends[1])}, "moments": [{moments}]}}'
 
 
+def _excursion(sense: str, found: ExcursionBound) -> str:
+    """A bound of excursions, and the bounds on Λ(p) from which it follows."""
+    return f'{{"sense": "{sense}", "factor": {_line(found.factor)}, "moment": {_moment(found.p, found.moment)}}}'
+
+
+def excursion_in_words(proof: CurveProof) -> str:
+    """What is proven of excursions: "0.757 A^-0.3784 ≤ P(sup ‖x‖ ≥ A) ≤ 1.34 A^-0.3783 for every A > 1"."""
+    found, text = proof.excursions, SYMBOL
+    if not found:
+        return ""
+    if "lower" in found:
+        text = f"{_power(found['lower'], ROUND_FLOOR)} ≤ {text}"
+    if "upper" in found:
+        text = f"{text} ≤ {_power(found['upper'], ROUND_CEILING)}"
+    return f"{text} for every A > 1, a start (1, 0) and any noise at the start"
+
+
+def _power(found: ExcursionBound, rounding: str) -> str:
+    """c A^−p with the digits of c rounded outward."""
+    factor = Decimal(repr(found.factor))
+    step = Decimal(1).scaleb(factor.adjusted() - 3)
+    return f"{factor.quantize(step, rounding)} A^-{found.p}"
+
+
 def _line(data: Any) -> str:
     return json.dumps(data, allow_nan=False, ensure_ascii=False)
 
@@ -95,6 +123,9 @@ def print_proofs(case: Case, proofs: Sequence[CurveProof]) -> None:
             told = [*path, f"of {len(proof.moments)} moments {_counted(proof)}"]
         if told:
             screen.say(f"Proven: {'; '.join(told)}.")
+        if proof.excursion is not None:
+            rare = excursion_in_words(proof)
+            screen.say(f"Proven: {rare}." if rare else f"{SYMBOL} {NOT_PROVEN}")
         screen.lines([""])
 
 

@@ -240,7 +240,7 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
         CurveResult,
         **_of_curve(curve),
         p=wanted.p.tolist(),
-        wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated, wanted.is_stated],
+        wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated, wanted.is_stated, wanted.start],
         numerics=[numerics.rtol, budget.unknowns, budget.seconds, mesh and codec(CylinderMesh).plain(mesh)],
     )
 
@@ -287,6 +287,9 @@ def fits(result: CurveResult, asked: Sequence[float]) -> bool:
     columns = [getattr(found, each.name) for each in fields(found)]
     p, solved = found.p.tolist(), {*found.p.tolist(), *failed}
     indices = [each for some in (result.estimates, *result.jumps) for each in some.values() if each]
+    if (rare := result.excursion) is not None:
+        numbers = rare.lyapunov_exponent, rare.stability_index, rare.lower, rare.upper, rare.upcrossings
+        indices += filter(None, numbers)
     is_whole = (
         all(each.shape == found.p.shape for each in columns[:-1])
         and found.p.ndim == found.rare.ndim == 1

@@ -30,8 +30,9 @@ from fpsolve.output.charts import draw_chart
 from fpsolve.output.directions import directions_file, draw_densities
 from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities
 from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, region_meaning, simulated_meanings
-from fpsolve.output.proofs import PROOF, between, proof_grid, proofs_grid
+from fpsolve.output.proofs import PROOF, between, excursion_in_words, proof_grid, proofs_grid
 from fpsolve.output.screen import Column, Grid
+from fpsolve.output.sentences import excursions
 from fpsolve.output.terminal import (
     INTERVAL,
     MOST_TABLES,
@@ -188,7 +189,8 @@ def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str
         for result in found.results:
             parameters = frozenset(result.curve.parameters.items())
             sure = [f"{each}, as parameters are uncertain." for each in verdicts(spreads_of(case, result))]
-            if told := [*meanings(result, time_unit), *sure, *proven.get(parameters, [])]:
+            rare = [text] if (text := excursions(case, result)) else []
+            if told := [*meanings(result, time_unit), *rare, *sure, *proven.get(parameters, [])]:
                 yield result.curve.label, told
     if not found.results and len(found.simulated) <= MOST_DRAWN:
         for each in found.simulated:
@@ -196,6 +198,7 @@ def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str
     for proof in found.proofs[:MOST_DRAWN]:
         bounds = [(LYAPUNOV_EXPONENT.symbol, proof.exponent), (STABILITY_INDEX.symbol, proof.index)]
         told = [f"{symbol} is {between(each)}" for symbol, each in bounds if each is not None and each.is_proven]
+        told += [text] if (text := excursion_in_words(proof)) else []
         if told := [*proof.verdicts, *told]:
             yield proof.curve.label, [f"Proven: {each}." for each in told]
     if found.chart is not None and found.chart.regions is not None:

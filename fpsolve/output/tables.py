@@ -17,12 +17,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fpsolve import __version__
+from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.sections import SENSITIVITIES
+from fpsolve.case.sections import EXCURSIONS, SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
@@ -231,6 +234,8 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
         ]
     if SENSITIVITIES in case.output.quantities:
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
+    if EXCURSIONS in case.output.quantities:
+        found["excursions"] = None if result.excursion is None else _excursion(case, result.excursion)
     if case.uncertain:
         found["uncertainty"] = _spreads(case, result)
     return {
@@ -241,6 +246,29 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
         "warnings": in_case_words([*result.warnings, *(failure.reason for failure in result.failures)]),
         "notes": in_case_words(result.notes),
         "seconds": round(result.seconds, 6),
+    }
+
+
+def _excursion(case: Case, found: Excursion) -> dict[str, Any]:
+    """The start, the bounds and the asymptotic number of upcrossings at all levels, and what these follow from."""
+
+    def numbers(each: Estimate | None) -> dict[str, float] | None:
+        return each and {"value": each.value, "error_estimate": each.error_estimate}
+
+    levels = np.array(case.excursions.levels)
+    rows = zip(levels.tolist(), *(each.tolist() for each in found.bounds(levels)), strict=True)
+    many = [None if math.isnan(each) else each for each in found.expected_upcrossings(levels).tolist()]
+    return {
+        "start": {"phi": found.phi, "xi": found.xi},
+        "is_certain": found.is_certain,
+        "stability_index": numbers(found.stability_index),
+        "lower": numbers(found.lower),
+        "upper": numbers(found.upper),
+        "upcrossings": numbers(found.upcrossings),
+        "levels": [
+            {"level": level, "least_probable": low, "most_probable": high, "upcrossings": count}
+            for (level, low, high), count in zip(rows, many, strict=True)
+        ],
     }
 
 

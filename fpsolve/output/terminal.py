@@ -17,6 +17,7 @@ from rich.text import Text
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.case.sections import EXCURSIONS
 from fpsolve.case.vary import map_key, short_names
 from fpsolve.data import written
 from fpsolve.exponent.error import digits
@@ -34,6 +35,7 @@ from fpsolve.exponent.quantities import (
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import moment_at
 from fpsolve.output.screen import Cell, Column, Grid, Screen
+from fpsolve.output.sentences import bounds_text, excursions, sentence
 from fpsolve.output.tables import asked, in_case_words
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve, Status
@@ -122,13 +124,15 @@ def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
 def _quantities(case: Case) -> list[_Shown]:
     """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
     ordered = sorted(_told(case), key=lambda index: index not in MAIN)
+    rare = [_excursion(case)] * (EXCURSIONS in case.output.quantities)
     if case.figure.x != "p":
-        return [
+        main = [
             each
             for index in ordered
             if index in MAIN
             for each in (_index(index, 0), *_interval(case, index), _theory(case, index))
         ]
+        return main + rare
     found = [
         column
         for rank, each in enumerate(ordered)
@@ -137,7 +141,7 @@ def _quantities(case: Case) -> list[_Shown]:
     p = [float(each) for each in case.p if each] if MOMENT.name in case.output.quantities else []
     if len(p) > MOST_MOMENTS:
         p = [] if found else [p[0], p[-1]]
-    return found + [_moment(each, 2 if found else 0) for each in p]
+    return found + rare + [_moment(each, 2 if found else 0) for each in p]
 
 
 def _index(index: Index, rank: int) -> _Shown:
@@ -172,6 +176,16 @@ def _theory(case: Case, index: Index) -> _Shown:
         return "" if math.isnan(value) else f"{value:.6g}"
 
     return _Shown(heading, rank=1, text=text)
+
+
+def _excursion(case: Case) -> _Shown:
+    """The bounds of the probability of an excursion to one level."""
+    level = case.excursions.sentence_level
+
+    def text(result: CurveResult) -> str:
+        return "" if result.excursion is None else bounds_text(result.excursion, level)
+
+    return _Shown(f"P(sup ‖x‖ ≥ {level:g})", rank=1, text=text)
 
 
 def _moment(p: float, rank: int) -> _Shown:
@@ -245,6 +259,8 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
                 numbers = [f"{INDICES[name].symbol} = {each}" for name, each in found.items() if each]
                 screen.packed([f"φ = {ray.phase:.6g}:", *numbers])
             screen.packed(list(verdicts(spreads)))
+            for text in filter(None, (excursions(case, result), sentence(case, result))):
+                screen.say(text)
             screen.lines([""])
     print_remarks(case, results)
 

@@ -11,15 +11,19 @@ from functools import cached_property, partial
 from typing import Any, cast
 
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import EXCURSIONS
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.messages import Code, Message
 from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import verdicts
 from fpsolve.proofs.questions import (
+    ExcursionBound,
+    ExcursionEnclosure,
     IndexEnclosure,
     check_width,
     prove_bounds,
+    prove_excursions,
     prove_index,
     refuse_unprovable,
 )
@@ -28,7 +32,8 @@ from fpsolve.proofs.statement import DECIMAL, Statement, linear_values, statemen
 ORDERS = "moments.p"
 Literals = Mapping[float, str]
 """Decimals by their floats."""
-Question = Callable[[], "Enclosure | IndexEnclosure"]
+Answer = Enclosure | IndexEnclosure | ExcursionEnclosure
+Question = Callable[[], Answer]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +45,7 @@ class CurveProof:
         moments: p as a decimal, and bounds on Λ(p) or None where that was not tried.
         exponent: bounds on λ; None where they are not asked for, or were not tried.
         index: bounds on δ_p; the same.
+        excursion: bounds of P(sup ‖x‖ ≥ A); the same.
     """
 
     curve: Curve
@@ -47,6 +53,20 @@ class CurveProof:
     moments: tuple[tuple[str, Enclosure | None], ...]
     exponent: Enclosure | None = None
     index: IndexEnclosure | None = None
+    excursion: ExcursionEnclosure | None = None
+
+    @property
+    def excursions(self) -> Mapping[str, ExcursionBound]:
+        """The bounds of P(sup ‖x‖ ≥ A) that hold: "lower", for which λ < 0 is proven too, and "upper"."""
+        found: dict[str, ExcursionBound] = {}
+        if self.excursion is None:
+            return found
+        decays = self.exponent is not None and self.exponent.sign < 0
+        if self.excursion.lower is not None and decays:
+            found["lower"] = self.excursion.lower
+        if self.excursion.upper is not None:
+            found["upper"] = self.excursion.upper
+        return found
 
     @property
     def is_met(self) -> bool:
@@ -62,7 +82,7 @@ class CurveProof:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be proven of a case, the same of every curve: Λ at all p, and λ and δ_p if [output] asks for them.
+    """What is to be proven of a case, the same of every curve: Λ at all p; λ, δ_p, excursions if [output] names them.
 
     Attributes:
         case: whose curves.
@@ -74,8 +94,9 @@ class Plan:
 
     @property
     def indices(self) -> list[str]:
-        """Those of λ and δ_p that are asked for."""
-        return [each.name for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX) if each.name in self.case.output.quantities]
+        """Those of λ, δ_p and excursions that are asked for."""
+        known = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name, EXCURSIONS)
+        return [name for name in known if name in self.case.output.quantities]
 
     @property
     def each(self) -> int:
@@ -113,15 +134,17 @@ class Plan:
                 yield partial(prove_bounds, problem, stated, None, self.width, budget=budget)
             if STABILITY_INDEX.name in self.indices:
                 yield partial(prove_index, problem, stated, budget=budget)
+            if EXCURSIONS in self.indices:
+                yield partial(prove_excursions, problem, stated, budget=budget)
 
-    def gathered(self, answers: Sequence[Enclosure | IndexEnclosure]) -> list[CurveProof]:
+    def gathered(self, answers: Sequence[Answer]) -> list[CurveProof]:
         """What is proven of each curve, from the first answers, in the order of the questions."""
         found, rest = [], iter(answers)
         for curve in self.case.curves(stop=-(-len(answers) // self.each)):
             moments = tuple((p, cast("Enclosure | None", next(rest, None))) for p in self._orders)
             indices: dict[str, Any] = {name: next(rest, None) for name in self.indices}
-            exponent, index = (indices.get(each.name) for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX))
-            found.append(CurveProof(curve, self.stated(curve), moments, exponent, index))
+            names = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name, EXCURSIONS)
+            found.append(CurveProof(curve, self.stated(curve), moments, *map(indices.get, names)))
         return found
 
 
@@ -146,7 +169,7 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
             raise NoSuchExponent(Message(Code.PLACED, place=place, reason=failure.message)) from None
 
 
-def answer(question: Question) -> Enclosure | IndexEnclosure:
+def answer(question: Question) -> Answer:
     """The task: proves what is asked."""
     return question()
 

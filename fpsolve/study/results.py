@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.analysis.directions import SettledDirections
+from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Curve
@@ -89,6 +90,7 @@ class CurveResult(Result):
         jumps: where a system has several, the `BY_JUMP` of each by their names, as `estimates`.
         classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
         sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
+        excursion: the probability that ‖x‖ ever exceeds a level; None where it is not wanted, or did not converge.
         seconds: how long the processor took.
     """
 
@@ -102,6 +104,7 @@ class CurveResult(Result):
     jumps: tuple[Mapping[str, Estimate | None], ...] = ()
     classes: tuple[InvariantClass, ...] = ()
     sensitivities: Sensitivities | None = None
+    excursion: Excursion | None = None
     seconds: float = 0.0
 
     @property

@@ -21,10 +21,11 @@ import numpy as np
 
 from fpsolve.analysis.density import negative_share, stationary_density
 from fpsolve.analysis.directions import SettledDirections, negative_part, settled_directions
+from fpsolve.analysis.excursions import SYMBOL, Excursion, Start, StartOfNoise, solve_excursion
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import EIGENFUNCTIONS, SENSITIVITIES
+from fpsolve.case.sections import EIGENFUNCTIONS, EXCURSIONS, SENSITIVITIES
 from fpsolve.errors import FpsolveError, NoDerivative, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
@@ -59,6 +60,7 @@ class Wanted:
         shown: the p whose eigenfunctions are kept.
         density: whether the stationary density is.
         differentiated: the p at which Λ is differentiated by the parameters; None where no sensitivities are wanted.
+        start: φ₀ and ξ₀ of excursions; None where these are not wanted.
         is_stated: whether a case names what it wants, so that what there is not is told of.
     """
 
@@ -67,6 +69,7 @@ class Wanted:
     shown: tuple[float, ...] = ()
     density: bool = False
     differentiated: tuple[float, ...] | None = None
+    start: tuple[Start, StartOfNoise] | None = None
     is_stated: bool = True
 
     @property
@@ -105,6 +108,7 @@ def everything(case: Case, number: int = 1) -> Wanted:
         shown=tuple(case.shown),
         density=draws and (number == 1 or case.shown.size > 0),
         differentiated=slopes if SENSITIVITIES in names or case.uncertain else None,
+        start=(case.excursions.phi, case.excursions.xi) if EXCURSIONS in names else None,
         is_stated=case.output.states_quantities,
     )
 
@@ -153,6 +157,8 @@ def solve_curve(
     jumps, more = _solve_jumps(solver, wanted.indices, found)
     classes = _solve_classes(solver, found.p)
     missing = [each for each in missing if wanted.is_stated or not each.tells_of(Code.NOT_ONE_RAY)] + more
+    rare, told_of_it = _solve_excursion(solver, wanted, found, estimates[STABILITY_INDEX.name])
+    missing += told_of_it
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
     pairs, stationary, undrawn = _functions(solver, without_failed(wanted, found.failures))
@@ -179,6 +185,7 @@ def solve_curve(
         weak_noise_note(curve.problem, found.p, found.value),
         *of[Severity.NOTE],
         *(slopes.notes if slopes else ()),
+        *(rare.notes if rare else ()),
     )
     unresolved = [
         Message(Code.UNREADABLE, name=name, p=pair.p, size=defect)
@@ -216,6 +223,7 @@ def solve_curve(
         classes=classes,
         warnings=(*found.warnings, *limits),
         sensitivities=slopes,
+        excursion=rare,
         notes=tuple(note for note in notes if note is not None),
         failures=found.failures or tuple(Failure(None, message) for message in of[Severity.FAILURE]),
         seconds=thread_time() - started,
@@ -314,6 +322,23 @@ def _solve_indices(
                 code, symbol = Code.INDEX_MISSING, "stability index"
         missing.setdefault((code, reason), []).append(symbol)
     return estimates, [Message(code, symbols=symbols, reason=reason) for (code, reason), symbols in missing.items()]
+
+
+def _solve_excursion(
+    solver: ExponentSolver, wanted: Wanted, moments: MomentLyapunov, index: Estimate | None
+) -> tuple[Excursion | None, list[Message]]:
+    """Bounds of excursions, or why they are missing; nothing where they are not wanted."""
+    if wanted.start is None:
+        return None, []
+    phi, xi = wanted.start
+    try:
+        return solve_excursion(solver, phi=phi, xi=xi, root=None if index is None else index.value), []
+    except (NotConverged, NoSuchExponent) as failure:
+        reason = failure.message
+    except MemoryError:
+        reason = Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
+    code = Code.INDEX_MISSING if moments.failures else Code.INDEX_FAILED
+    return None, [Message(code, symbols=[SYMBOL], reason=reason)]
 
 
 def _solve_jumps(

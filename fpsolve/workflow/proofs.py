@@ -14,10 +14,9 @@ from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.files import writable
 from fpsolve.output.proofs import write_proof
 from fpsolve.pool import Pool, serial
-from fpsolve.proofs.certificate import Enclosure, MalformedProof
+from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import Claims, claims_from
-from fpsolve.proofs.questions import IndexEnclosure
-from fpsolve.study.prove import CurveProof, Plan, answer, refuse_unprovable_case
+from fpsolve.study.prove import Answer, CurveProof, Plan, answer, refuse_unprovable_case
 from fpsolve.workflow.folders import ANEW, PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
 from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
@@ -52,7 +51,7 @@ def prove_case(
     reporter: Reporter | None = None,
     watch: Watch = SILENT,
 ) -> list[CurveProof]:
-    """Prove bounds on Λ at every p of every curve of a case, and on λ and δ_p; write proof.json into `out`/<case>/.
+    """Prove bounds on Λ at every p of every curve, and on λ, δ_p and excursions; write proof.json into `out`/<case>/.
 
     Args:
         width: wanted upper − lower; 1e-7 of the scale of each number if None.
@@ -66,7 +65,7 @@ def prove_case(
     """
     refuse_unprovable_case(case, width)
     plan = Plan(case, width)
-    answers, proofs = list[Enclosure | IndexEnclosure](), list[CurveProof]()
+    answers, proofs = list[Answer](), list[CurveProof]()
     started = datetime.now(UTC)
 
     def show() -> None:

@@ -48,6 +48,8 @@ class Model(NamedTuple):
     moment: bool
     p: Fraction
     mu: float
+    jumps: tuple = ()  # of each jump its ray, ln R, and whether it is passed forward (1) or backward (−1)
+    coordinates: tuple = ((1, 0), (0, 1))  # P
 
     @property
     def nu(self):
@@ -132,16 +134,17 @@ def model_of(certificate):
         require(certificate.get(part) is None or names not in told, f"Its labels tell another {section}.")
     noise = _noise(given) if certificate.get("chain") is None else _chain(certificate["chain"])
     require(Fraction(1, 10**80) < noise.nu < 10**80, "The rate of the noise is out of range.")
-    if certificate.get("motion") is not None:
-        still, driven, jumps = _motion(certificate["motion"])
+    if (motion := certificate.get("motion")) is not None:
+        still, driven, jumps = _motion(motion)
     else:
         still, driven, jumps = (_parametric if "system.stiffness" in given else _oscillator)(given)
     if noise.ito:
         still = [[still[i][j] - noise.square * _times(driven, driven)[i][j] / 2 for j in (0, 1)] for i in (0, 1)]
-    kappa = cs.exact(0)
+    kappa, passed = cs.exact(0), []
     for ray, log_factor in jumps:
         speeds = [ray[1] * x - ray[0] * y for x, y in (_moved(a, ray) for a in (still, driven))]
-        kappa = kappa + log_factor * _direction(*speeds, noise)
+        passed.append((ray, log_factor, _direction(*speeds, noise)))
+        kappa = kappa + log_factor * passed[-1][-1]
     unit = cs.IV.sqrt(cs.exact(noise.square))
     return Model(
         still=_polar(still, cs.exact(1)),
@@ -151,6 +154,10 @@ def model_of(certificate):
         moment=quantity == "moment",
         p=decimal(certificate["p"]) if quantity == "moment" else Fraction(0),
         mu=float(binary(certificate["mu"])),
+        jumps=tuple(passed),
+        coordinates=((1, 0), (0, 1))
+        if motion is None
+        else tuple(map(tuple, _fractions(motion["coordinates"], (2, 2)))),
     )
 
 

@@ -1,0 +1,488 @@
+"""Excursions: the probability that ‖x‖ ever exceeds A times its start, from T at p = δ_p.
+
+At p = δ_p, where Λ(p) = 0, ‖x‖^p T(φ, ξ) is a martingale. Let ‖x₀‖ = 1, T₀ be the mean of T over the start, and stop it
+when ‖x‖ first reaches A > 1. Where T lies between positive bounds, as for noise on a bounded set and white noise,
+
+    (T₀/max T) A^−δ ≤ P(sup ‖x‖ ≥ A) ≤ (T₀/min T) A^−δ,    δ = δ_p.
+
+The upper bound needs nothing else. The lower one needs λ < 0, so that paths that never reach A add nothing in the end,
+and A is passed by at most a factor g: it has (gA)^−δ, where g > 1 for jumps upwards only. Where g = 1 and ln ‖x‖ has no
+diffusion of its own, ‖x‖ is differentiable when it reaches A, so that max and min are over q(φ, ξ) = d ln ‖x‖/dt ≥ 0.
+
+For other noise T has no such bounds. The number of upcrossings of A has the mean
+
+    E ∫ δ(ln ‖x‖ − ln A) q⁺ dt  ~  C A^−δ,    C = T₀ ⟨T*, q⁺⟩/(Λ′(δ) ⟨T*, T⟩),
+
+as under the measure changed by the martingale (φ, ξ) has the density T T*/⟨T*, T⟩, and ln ‖x‖ grows by Λ′(δ) in a unit
+of time: by the renewal theorem it is as often near ln A as near any other value. For A → ∞ it bounds P(sup ‖x‖ ≥ A).
+
+‖x‖ is the length of the vector of the variables of the system. With x = Sy and ρ = |y|/|x| its T(φ, ξ) is ρ^p T_y(ψ, ξ)
+of what is solved for y, see `model.frame`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial, reduce
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fpsolve.arrays import FloatArray, real_array, real_number, real_numbers, shown
+from fpsolve.data import Quantity, Result, dataset
+from fpsolve.errors import NotConverged
+from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.plane import Harmonics, growth_rate
+from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.quantity import LEAST_PROBABLE, LEVEL, MOST_PROBABLE, UPCROSSINGS
+
+if TYPE_CHECKING:
+    import xarray
+
+SYMBOL = "P(sup ‖x‖ ≥ A)"
+STATIONARY: Literal["stationary"] = "stationary"
+UNIFORM: Literal["uniform"] = "uniform"
+Start = float | Literal["uniform"]
+StartOfNoise = float | Literal["stationary"]
+FINE, MOST_POINTS = 8, 4_000_000
+"""Points of T for each polynomial degree, either way; fewer where they would be more than so many."""
+CLOSE, MOST_ROUNDS = 1e-5, 4
+"""The relative error of T, at its extremes, that finer discretisations are made for, and how many of them."""
+PARTS, POINTS = 32, 2000
+"""Into how many parts a cell of φ is cut for the integral of q⁺, which has kinks, and points of ξ."""
+SHOWN_LEVELS = (2.0, 4.0, 8.0, 16.0, 32.0)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Excursion(Result):
+    """P(sup ‖x‖ ≥ A) over all times, ‖x₀‖ = 1.
+
+    Attributes:
+        lyapunov_exponent: λ; if it is positive, P = 1 for every A.
+        stability_index: δ_p > 0; None where P = 1, or where there is none.
+        lower, upper: what A^−δ_p is multiplied by in both bounds; None where there is no such bound.
+        upcrossings: C of the mean number of upcrossings C A^−δ_p for A → ∞; None where ‖x‖ jumps upwards or diffuses.
+        is_certain: whether P = 1, as λ > 0.
+        phi, xi: the start: φ₀ in radians, or "uniform"; ξ₀, or "stationary".
+        notes: what there is not, and why.
+        parameters: of the problem, by keys such as "noise.D0".
+    """
+
+    lyapunov_exponent: Estimate
+    stability_index: Estimate | None = None
+    lower: Estimate | None = None
+    upper: Estimate | None = None
+    upcrossings: Estimate | None = None
+    is_certain: bool = False
+    phi: float | str = 0.0
+    xi: float | str = STATIONARY
+    notes: tuple[Message, ...] = ()
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
+
+    def bounds(self, level: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """The bounds of P(sup ‖x‖ ≥ A), each of the shape of A, widened by all errors; 0 and 1 where nothing is known.
+
+        Raises:
+            ValueError: a level is not above 1.
+        """
+        levels = _checked_levels(level)
+        low, high = np.zeros(levels.shape), np.ones(levels.shape)
+        index = self.stability_index
+        if self.is_certain:
+            return high, high
+        if index is not None:
+            if self.lower is not None:
+                factor = max(self.lower.value - self.lower.error_estimate, 0.0)
+                low = factor * levels ** -(index.value + index.error_estimate)
+            if self.upper is not None:
+                factor = self.upper.value + self.upper.error_estimate
+                high = np.minimum(factor * levels ** -(index.value - index.error_estimate), 1.0)
+        return low, high
+
+    def expected_upcrossings(self, level: ArrayLike) -> FloatArray:
+        """C A^−δ_p, the mean number of upcrossings for A → ∞, of the shape of A; NaN where it is not known.
+
+        Raises:
+            ValueError: a level is not above 1.
+        """
+        levels, index = _checked_levels(level), self.stability_index
+        if self.upcrossings is None or index is None:
+            return np.full(levels.shape, math.nan)
+        return np.asarray(self.upcrossings.value * levels**-index.value)
+
+    def to_xarray(self, level: ArrayLike = SHOWN_LEVELS) -> xarray.Dataset:
+        """The bounds, and the asymptotic number of upcrossings, over some A."""
+        levels = real_numbers(level, "level")
+        low, high = self.bounds(levels)
+        numbers: dict[Quantity, Any] = {LEAST_PROBABLE: low, MOST_PROBABLE: high}
+        if self.upcrossings is not None:
+            numbers[UPCROSSINGS] = self.expected_upcrossings(levels)
+        more = {"phi": self.phi, "xi": self.xi}
+        title = "probability of excursions"
+        return dataset(title, "finite elements", numbers, {LEVEL: levels}, self.parameters, notes=self.notes, **more)
+
+    def _said(self) -> str:
+        if self.is_certain:
+            return "P(sup ‖x‖ ≥ A) = 1"
+        if self.stability_index is None:
+            return "not known"
+        if self.lower is None:
+            return f"P(sup ‖x‖ ≥ A) ~ A^-{self.stability_index.value:.6g}"
+        ends = self.lower.value, math.inf if self.upper is None else self.upper.value
+        return "P(sup ‖x‖ ≥ A) A^{:.6g} from {:.4g} to {:.4g}".format(self.stability_index.value, *ends)
+
+
+@of_problem
+def excursion(
+    problem: Problem,
+    *,
+    phi: Start = 0.0,
+    xi: StartOfNoise = STATIONARY,
+    rtol: float = 1e-8,
+    budget: Budget | None = None,
+) -> Excursion:
+    """Bounds of the probability that ‖x‖ ever exceeds A ‖x₀‖, for every A > 1; for unbounded noise its exponent δ_p.
+
+    ‖x‖ is √(x₁² + x₂²) in the variables of the system, `problem.system.states`.
+
+    Args:
+        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        phi: φ₀ of the start x₀ = (cos φ₀, −sin φ₀), just after a jump if there is one on this ray; or "uniform".
+        xi: ξ₀; or "stationary".
+        rtol, budget: as for `moment_lyapunov`.
+
+    Raises:
+        ValueError: there is no such start.
+        NotConverged: λ, δ_p or T is not resolved within the budget.
+    """
+    solver = ExponentSolver(problem, rtol=rtol, budget=budget or Budget())
+    return solve_excursion(solver, phi=phi, xi=xi)
+
+
+def solve_excursion(
+    solver: ExponentSolver, *, phi: Start = 0.0, xi: StartOfNoise = STATIONARY, root: float | None = None
+) -> Excursion:
+    """The same with a solver of the problem; `root` is near δ_p, if that is known."""
+    problem = solver.problem
+    check_start(problem, phi, xi)
+    if solver.mesh is not None:  # whose functions need not reach the ends of the noise
+        solver = replace(solver, mesh=None)
+    exponent = solver.lyapunov_exponent()
+    found = Excursion(exponent, phi=phi, xi=xi, parameters=problem.values)
+    if abs(exponent.value) <= exponent.error_estimate:
+        return replace(
+            found, notes=(Message(Code.EXCURSION_OPEN, value=exponent.value, error=exponent.error_estimate),)
+        )
+    if exponent.value > 0:
+        return replace(found, is_certain=True)
+    index = nonzero_root(solver, guess=root)
+    if not index:
+        return replace(found, notes=(_without_index(index.reason),))
+    found = replace(found, stability_index=index)
+    if reason := _no_eigenfunction(problem):
+        return replace(found, notes=(reason,))
+    crossing, notes = Crossing.of(problem), list[Message]()
+    ladder = Ladder(solver, index.value)
+    is_bounded = problem.noise.is_bounded
+    if is_bounded:
+        low, high, flat = _prefactors(ladder, partial(_at_start, phi=phi, xi=xi), crossing)
+        found = replace(found, lower=low, upper=high)
+        notes += flat
+    else:
+        notes.append(Message(Code.EXCURSION_UNBOUNDED))
+    if crossing.is_smooth:
+        found = replace(found, upcrossings=_upcrossings(ladder, partial(_at_start, phi=phi, xi=xi)))
+    return replace(found, notes=tuple(notes))
+
+
+def check_start(problem: Problem, phi: Any, xi: Any) -> None:
+    """Refuse a start that a problem does not have. Raises `ValueError`."""
+    if phi != UNIFORM:
+        real_number(phi, "phi")
+    if xi == STATIONARY:
+        return
+    value, noise = real_number(xi, "xi"), problem.coloured
+    stay = f'write xi = "{STATIONARY}"'
+    if noise.is_white:
+        raise ValueError(f"got xi = {value:g}, but white noise has no value at a time; {stay}")
+    if len(noise.parts) > 1 or not noise.is_drawn:
+        why = "several noises have values" if len(noise.parts) > 1 else "its value alone does not tell how it goes on"
+        raise ValueError(f"got xi = {value:g}, but {why}; {stay}")
+    if noise.has_states:
+        states = noise.reached
+        if not np.any(np.isclose(states, value, rtol=1e-9, atol=0)):
+            raise ValueError(
+                f"got xi = {value:g}; must be one of the states, {', '.join(f'{each:g}' for each in states)}"
+            )
+    elif not abs(value) < noise.half_width:
+        raise ValueError(f"got xi = {value:g}; must be between -{noise.half_width:g} and {noise.half_width:g}")
+
+
+def _without_index(reason: Message) -> Message:
+    """What it means that Λ(p) has no other root than 0, λ < 0."""
+    if reason.code is Code.NO_ROOT:
+        return Message(Code.EXCURSION_BEYOND, high=reason.data["high"])
+    return Message(Code.EXCURSION_NO_INDEX, reason=reason)
+
+
+def _no_eigenfunction(problem: Problem) -> Message | None:
+    """Why T is not looked at, or None."""
+    if problem.dimension > 2:
+        return Message(Code.EXCURSION_PLANE, count=problem.dimension)
+    return Message(Code.EXCURSION_RAY, phase=problem.invariant_ray) if problem.classes else None
+
+
+class Crossing(NamedTuple):
+    """How ‖x‖ passes a level.
+
+    Attributes:
+        overshoot: g, the largest factor of a jump.
+        is_smooth: whether ‖x‖ is differentiable there, so that it passes with q ≥ 0.
+    """
+
+    overshoot: float
+    is_smooth: bool
+
+    @classmethod
+    def of(cls, problem: Problem) -> Crossing:
+        system, noise = problem.system, problem.noise
+        factors = [math.exp(jump.log_factor) for jump in system.jumps]
+        impulses = noise.impulses(system)
+        factors += [float(np.linalg.norm(each.matrix, 2)) for each in impulses]
+        _, diffusions = noise.motion(system)
+        overshoot = max(1.0, *factors, 1.0)
+        diffuses = any(not each.q.vanishes for each in diffusions)
+        return cls(overshoot, overshoot == 1.0 and not impulses and not diffuses)
+
+
+class Ladder:
+    """The pair at p, and on ever finer discretisations as far as they can be made; each is solved once."""
+
+    def __init__(self, solver: ExponentSolver, p: float) -> None:
+        self._solver, self._pairs = solver, [solver.pair(p)]
+
+    def __iter__(self) -> Iterator[PrincipalPair]:
+        for number in range(1 + MOST_ROUNDS):
+            if number == len(self._pairs):
+                last = self._pairs[-1]
+                try:
+                    self._pairs.append(self._solver.near.finer_pair(last, last.generator.chosen.enriched()))
+                except NotConverged:
+                    return
+            yield self._pairs[number]
+
+
+class Grid(NamedTuple):
+    """Points at which T is looked at, with the ends of all cells of φ, seen from inside, and of the noise.
+
+    Attributes:
+        psi, inside: points of φ in the coordinates of the solve, and the cells they are seen from, shape (cells, n).
+        counts: points of every noise.
+    """
+
+    psi: FloatArray
+    inside: FloatArray
+    counts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, pair: PrincipalPair) -> Grid:
+        space = pair.space
+        counts = [FINE * (int(np.max(axis.modes)) + 1) for axis in space.axes]
+        many = math.prod(counts) * (space.phi.lines.size - 1)
+        share = min(1.0, (MOST_POINTS / many) ** (1 / len(counts)))
+        phases, *noises = (max(16, math.ceil(share * count)) for count in counts)
+        lines = space.phi.lines
+        t = np.linspace(0, 1, phases + 1)
+        psi = lines[:-1, None] * (1 - t) + lines[1:, None] * t
+        return cls(psi, np.broadcast_to(0.5 * (lines[:-1, None] + lines[1:, None]), psi.shape), tuple(noises))
+
+    def values(self, pair: PrincipalPair) -> tuple[FloatArray, FloatArray]:
+        """T in the coordinates of the system, and q, both of shape (cells, n, ...)."""
+        space, problem = pair.space, pair.generator.problem
+        at_phi = space.phi.at(self.psi.ravel(), self.inside.ravel())
+        reached = [axis.everywhere(count) for axis, count in zip(space.axes[1:], self.counts, strict=True)]
+        table = space.evaluate(pair.right, at_phi, *(values for _, values in reached))
+        phi, stretch = _own(pair, self.psi.ravel())
+        columns = (-1, *[1] * len(reached))
+        rate = growth_rate(problem.drift, problem.at_values([xi for xi, _ in reached]))(phi.reshape(columns))
+        shape = (*self.psi.shape, *table.shape[1:])
+        return (table * stretch.reshape(columns)).reshape(shape), np.broadcast_to(rate, table.shape).reshape(shape)
+
+    def continuous(self, pair: PrincipalPair) -> tuple[int, ...]:
+        """The axes of these tables along which T is continuous: φ within a cell, and noise without states."""
+        return (1, *[2 + k for k, axis in enumerate(pair.space.axes[1:]) if axis.cells.max() >= 0])
+
+
+def _own(pair: PrincipalPair, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """φ in the coordinates of the system, and ρ^p there."""
+    frame = pair.generator.problem.frame
+    if frame is None:
+        return psi, np.ones(psi.shape)
+    phi = frame.own_phase(psi)
+    return phi, frame.length(phi) ** pair.p
+
+
+def _at_start(pair: PrincipalPair, *, phi: Start, xi: StartOfNoise) -> float:
+    """T₀, the mean of T over the start."""
+    space, frame = pair.space, pair.generator.problem.frame
+    if phi == UNIFORM:
+        psi, weights = space.phi.finer_rule(1 if frame is None else frame.parts)
+        own, stretch = _own(pair, psi)
+        weights = weights * stretch / (space.phi.span * (1.0 if frame is None else frame.density(own)))
+        at_phi = (weights @ space.phi.at(psi))[None]
+    else:
+        place = np.array([float(phi)])
+        psi = place if frame is None else frame.phase(place)
+        first, span = space.phi.lines[0], space.phi.span
+        psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
+        at_phi = space.phi.at(psi, after) * (1.0 if frame is None else float(frame.length(place)[0]) ** pair.p)
+    means = [_mean_functions(axis, xi) for axis in space.axes[1:]]
+    return float(space.evaluate(pair.right, at_phi, *(each[None] for each in means)).ravel()[0])
+
+
+def _mean_functions(axis: Any, xi: StartOfNoise) -> FloatArray:
+    """The means of the functions of a noise over its start, shape (size,)."""
+    if xi == STATIONARY:
+        at = axis.samples()
+        return np.asarray((axis.law() * at.factor) @ at.values)
+    if axis.cells.max() < 0:
+        chosen = np.isclose(axis.support, xi, rtol=1e-9, atol=0) * axis.measure
+        return np.asarray(chosen / chosen.sum())
+    at = axis.at(np.array([float(xi)]) / axis.unit)
+    return np.asarray(at.values[0] * at.factor[0])
+
+
+def _prefactors(
+    ladder: Ladder, start: Callable[[PrincipalPair], float], crossing: Crossing
+) -> tuple[Estimate | None, Estimate | None, list[Message]]:
+    """T₀/(g^δ max T) and T₀/min T, or why one is not there. Raises `NotConverged`."""
+    coarse, best = None, None
+    for pair in ladder:
+        if coarse is not None:
+            best = _extremes(coarse, pair, start, crossing)
+            if best.relative_error <= CLOSE:
+                break
+        coarse = pair
+    if best is None:
+        raise NotConverged(Message(Code.EXCURSION_UNRESOLVED), remedy=Remedy.BUDGET)
+    size = crossing.overshoot ** (coarse.p if coarse else 0.0)
+    least, most = 1 / best.most.value, 1 / (best.most.value + best.most.error_estimate)
+    low = Estimate(least / size, (least - most) / size, least)
+    if not best.least.value > best.least.error_estimate:
+        return low, None, [Message(Code.EXCURSION_NO_UPPER, value=best.least.value, error=best.least.error_estimate)]
+    smallest, widest = 1 / best.least.value, 1 / (best.least.value - best.least.error_estimate)
+    return low, Estimate(smallest, widest - smallest, smallest), []
+
+
+class Extremes(NamedTuple):
+    """The least and the largest T/T₀ where ‖x‖ passes a level."""
+
+    least: Estimate
+    most: Estimate
+
+    @property
+    def relative_error(self) -> float:
+        return max(each.error_estimate / abs(each.value) for each in self)
+
+
+def _extremes(
+    coarse: PrincipalPair, fine: PrincipalPair, start: Callable[[PrincipalPair], float], crossing: Crossing
+) -> Extremes:
+    """Those of a pair; their errors are its difference from a coarser one in the cell, and what lies between points."""
+    grid = Grid.of(fine)
+    values, rate = grid.values(fine)
+    values = values / start(fine)
+    other = grid.values(coarse)[0] / start(coarse)
+    axes = grid.continuous(fine)
+    error = np.max(np.abs(values - other), axis=1, keepdims=True) + _between(values, axes)
+    if not crossing.is_smooth or rate.max() < 0:
+        rate = np.ones(rate.shape)
+    wider = rate + _between(rate, axes)
+    own = _where_positive(values, rate, axes)
+    most, least = float(own.max()), float(own.min())
+    highest = float(_where_positive(values + error, wider, axes).max())
+    lowest = float(_where_positive(values - error, wider, axes).min())
+    return Extremes(
+        Estimate(least, max(least - lowest, 0.0), abs(least)), Estimate(most, max(highest - most, 0.0), most)
+    )
+
+
+def _where_positive(values: FloatArray, rate: FloatArray, axes: Iterable[int]) -> FloatArray:
+    """The values where a rate is not negative, also where it is 0 between two points, shape (n,)."""
+    found = [values[rate >= 0]]
+    for axis in axes:
+        count = rate.shape[axis]
+        (here, there), (own, other) = (
+            [np.take(table, at, axis=axis) for at in (np.arange(count - 1), np.arange(1, count))]
+            for table in (rate, values)
+        )
+        crosses = (here >= 0) != (there >= 0)
+        share = here[crosses] / (here[crosses] - there[crosses])
+        found.append(own[crosses] + share * (other[crosses] - own[crosses]))
+    return np.concatenate(found)
+
+
+def _between(values: FloatArray, axes: Iterable[int]) -> FloatArray:
+    """By how much a function may exceed its values at two neighbours: an eighth of its second difference there."""
+    total = np.zeros(values.shape)
+    for axis in axes:
+        bent = np.abs(np.diff(values, n=2, axis=axis)) / 8
+        ends = [(0, 0)] * values.ndim
+        ends[axis] = (1, 1)
+        padded = np.pad(bent, ends, mode="edge")
+        total += reduce(np.maximum, (_moved(padded, axis, step) for step in (-1, 0, 1)))
+    return total
+
+
+def _moved(table: Any, axis: int, step: int) -> Any:
+    """A table moved by one point, its ends repeated."""
+    count = table.shape[axis]
+    return np.take(table, np.clip(np.arange(count) + step, 0, count - 1), axis=axis)
+
+
+def _upcrossings(ladder: Ladder, start: Callable[[PrincipalPair], float]) -> Estimate:
+    """C; its error is the difference from a coarser discretisation and a coarser rule. Raises `NotConverged`."""
+    last = None
+    for pair in ladder:
+        value = _flux(pair, PARTS) * start(pair) / pair.derivative
+        if last is not None:
+            coarser = _flux(pair, PARTS // 2) * start(pair) / pair.derivative
+            error = abs(value - last) + abs(value - coarser)
+            if error <= CLOSE * value:
+                break
+        last = value
+    else:
+        if last is None or not error <= value:
+            raise NotConverged(Message(Code.EXCURSION_UNRESOLVED), remedy=Remedy.BUDGET)
+    return Estimate(value, error, value, quantity=UPCROSSINGS)
+
+
+def _flux(pair: PrincipalPair, parts: int) -> float:
+    """⟨T*, q⁺⟩, with ⟨T*, T⟩ = 1 on the full circle."""
+    space, problem = pair.space, pair.generator.problem
+    psi, weights = space.phi.finer_rule(parts)
+    phi, stretch = _own(pair, psi)
+    most = (MOST_POINTS / psi.size) ** (1 / len(space.axes[1:]))
+    each = [axis.finer_samples(round(min(most, POINTS * parts / PARTS))) for axis in space.axes[1:]]
+    left = space.evaluate(pair.left, space.phi.at(psi), *(at.values for at in each))
+    measures = [at.weight * at.measure / at.factor for at in each]
+    shape = (-1, *[1] * len(each))
+    rate: Harmonics = growth_rate(problem.drift, problem.at_values([at.xi for at in each]))
+    density = np.maximum(rate(phi.reshape(shape)), 0) * left * (weights / stretch).reshape(shape)
+    return space.turns * float(np.sum(density * reduce(np.multiply.outer, measures)))
+
+
+def _checked_levels(level: ArrayLike) -> FloatArray:
+    """Levels A. Raises `ValueError`."""
+    levels = real_array(level, "level")
+    if not np.all(levels > 1):
+        raise ValueError(f"got level = {shown(level)}; must be above 1, as ‖x₀‖ = 1 is reached at the start")
+    return levels
