@@ -223,9 +223,9 @@ def run(
 
     Curves that an earlier run has finished are not solved again, even if that run was killed.
 
-    Without [output] quantities a case computes all of them but excursions:
-    moment, lyapunov_exponent, stability_index, variance_rate, impact_rate,
-    critical_impact_factor, critical_restitution, sensitivities, eigenfunctions.
+    Without [output] quantities a case computes moment, lyapunov_exponent,
+    stability_index, variance_rate, impact_rate, critical_impact_factor,
+    critical_restitution, sensitivities, eigenfunctions, but not excursions.
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """

@@ -13,7 +13,7 @@ from matplotlib import pyplot
 from matplotlib.colors import to_hex
 
 import fpsolve
-from fpsolve.analysis import Axis
+from fpsolve.analysis import Axis, excursion
 from fpsolve.case.case import Curve
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
@@ -49,6 +49,7 @@ MAIN = {
     "simulation": "moment",
     "no estimate": "moment",
     "response": "density",
+    "excursion": "least_probable",
     "curve": "moment",
     "indices of a curve": "moment",
 }
@@ -103,6 +104,7 @@ def results(fig1_solver):
         "simulation": simulated(estimates),
         "no estimate": simulated(()),
         "response": response(),
+        "excursion": excursion(replace(FIG1, c1=-2.0), FIG1_NOISE),
         "curve": curve([-1.0, 2.0], "lyapunov_exponent"),
         "indices of a curve": curve([], "lyapunov_exponent", "stability_index"),
     }
