@@ -33,8 +33,9 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_array, real_number, real_numbers, shown
 from fpsolve.data import Quantity, Result, dataset
+from fpsolve.drawing import add_legend, coloured, label_axes
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.adapt import Budget, Countdown
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
@@ -46,6 +47,7 @@ from fpsolve.model.quantity import LEAST_PROBABLE, LEVEL, MOST_PROBABLE, UPCROSS
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
 SYMBOL = "P(sup ‖x‖ ≥ A)"
 STATIONARY: Literal["stationary"] = "stationary"
@@ -54,10 +56,11 @@ Start = float | Literal["uniform"]
 StartOfNoise = float | Literal["stationary"]
 FINE, MOST_POINTS = 8, 4_000_000
 """Points of T for each polynomial degree, either way; fewer where they would be more than so many."""
-CLOSE, MOST_ROUNDS = 1e-5, 4
-"""The relative error of T, at its extremes, that finer discretisations are made for, and how many of them."""
+CLOSE, MOST_ROUNDS, GROWTH = 1e-4, 4, 2.0
+"""The relative error of T, at its extremes, that finer discretisations are made for, how many, how their time grows."""
 PARTS, POINTS = 32, 2000
 """Into how many parts a cell of φ is cut for the integral of q⁺, which has kinks, and points of ξ."""
+LEAST_SHOWN = 1e-12
 SHOWN_LEVELS = (2.0, 4.0, 8.0, 16.0, 32.0)
 
 
@@ -128,6 +131,21 @@ class Excursion(Result):
         more = {"phi": self.phi, "xi": self.xi}
         title = "probability of excursions"
         return dataset(title, "finite elements", numbers, {LEVEL: levels}, self.parameters, notes=self.notes, **more)
+
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+        """Both bounds over A, and what lies between them."""
+        levels = np.geomspace(1.01, 100.0, 101)
+        low, high = self.bounds(levels)
+        style = {"label": "bounds", **coloured(axes, kwargs)}
+        axes.plot(levels, np.maximum(low, LEAST_SHOWN), **style)
+        axes.plot(levels, high, **{**style, "label": None})
+        axes.fill_between(levels, np.maximum(low, LEAST_SHOWN), high, color=style["color"], alpha=0.2, linewidth=0)
+        if self.upcrossings is not None:
+            count = self.expected_upcrossings(levels)
+            axes.plot(levels, count, linestyle="--", color=style["color"], label="upcrossings for large A")
+        axes.set(xscale="log", yscale="log", xlim=(1.0, 100.0))
+        label_axes(axes, found[LEVEL.name].attrs, found[LEAST_PROBABLE.name].attrs | {"long_name": "probability"})
+        add_legend(axes)
 
     def _said(self) -> str:
         if self.is_certain:
@@ -205,9 +223,9 @@ def solve_excursion(
 
 def check_start(problem: Problem, phi: Any, xi: Any) -> None:
     """Refuse a start that a problem does not have. Raises `ValueError`."""
-    if phi != UNIFORM:
+    if not (isinstance(phi, str) and phi == UNIFORM):
         real_number(phi, "phi")
-    if xi == STATIONARY:
+    if isinstance(xi, str) and xi == STATIONARY:
         return
     value, noise = real_number(xi, "xi"), problem.coloured
     stay = f'write xi = "{STATIONARY}"'
@@ -264,19 +282,26 @@ class Crossing(NamedTuple):
 
 
 class Ladder:
-    """The pair at p, and on ever finer discretisations as far as they can be made; each is solved once."""
+    """The pair at p, and on ever finer discretisations as far as the budget allows; each is solved once.
+
+    One of them there is at least, if it has not too many unknowns.
+    """
 
     def __init__(self, solver: ExponentSolver, p: float) -> None:
-        self._solver, self._pairs = solver, [solver.pair(p)]
+        self._solver, self._pairs, self._last = solver, [solver.pair(p)], 0.0
+        self._time = Countdown(solver.budget.seconds)
 
     def __iter__(self) -> Iterator[PrincipalPair]:
         for number in range(1 + MOST_ROUNDS):
             if number == len(self._pairs):
-                last = self._pairs[-1]
+                last, begun = self._pairs[-1], self._time.elapsed
+                if begun + GROWTH * self._last > self._time.seconds:
+                    return
                 try:
                     self._pairs.append(self._solver.near.finer_pair(last, last.generator.chosen.enriched()))
                 except NotConverged:
                     return
+                self._last = self._time.elapsed - begun
             yield self._pairs[number]
 
 

@@ -150,13 +150,13 @@ quantities = ["moment", "lyapunov_exponent", "excursions"]
 """
     )
     assert main(["prove", str(path), "--out", str(tmp_path)]) == 0
-    told = capsys.readouterr().out.replace("\n", " ")
-    bounds = re.search(r"([\d.]+) A\^-([\d.]+) ≤ P\(sup ‖x‖ ≥ A\) ≤ ([\d.]+) A\^-([\d.]+) for every A > 1", told)
-    assert bounds, told
-    low, steep, high, flat = map(float, bounds.groups())
-    assert steep - 1e-3 < flat < 1.302367339 < steep  # δ_p
-    for level, simulated in ((2, 0.3587), (4, 0.1449), (8, 0.0580), (16, 0.0229), (32, 0.0087)):  # by 40,000 paths
-        assert 0.45 * simulated < low * level**-steep < simulated < high * level**-flat < 2.2 * simulated
+    told = " ".join(capsys.readouterr().out.split())
+    found = re.search(r"Proven: (\S+) A\^-(\S+) ≤ P\(sup ‖x‖ ≥ A\) ≤ (\S+) A\^-(\S+) for every A > 1", told)
+    least, more, most, less = map(float, found.groups())
+    assert 1.3020 < less < 1.302367339 < more < 1.3027
+    exact = [excursion(PROBLEMS["telegraph"], xi=xi) for xi in (-0.8, 0.8)]
+    assert 0.99 * min(each.lower.value for each in exact) < least < min(each.lower.value for each in exact) * 1.001
+    assert max(each.upper.value for each in exact) < most
     proof = tmp_path / "mine/proof.json"
     assert main(["prove", "--check", str(proof)]) == 0
     data = json.loads(proof.read_text(encoding="utf-8"))
