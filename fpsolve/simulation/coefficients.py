@@ -132,6 +132,7 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
     every = sum((np.abs(system.epsilon**term.order * np.array(term.matrix)) for term in system.terms), zero)
     even = _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)), every)
     back, intensity, intensities = np.linalg.inv(even), 0.0, list[float]()
+    free = even @ matrix_at(moved, 0.0, slice(0, 1)) @ back
     for name, part in noise.parts.items():
         own = [term for term in system.terms if is_driven(term.g) and term.noise == name]
         total = sum(
@@ -149,8 +150,7 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
             driven.append(total)
             time = min(part.correlation_time, part.period or math.inf)
             intensity += 2 * sizes[-1][0] ** 2 * time
-            intensities.append(2 * part.standard_deviation**2 * time)
-    free = even @ matrix_at(moved, 0.0, slice(0, 1)) @ back
+            intensities.append(2 * part.standard_deviation**2 * time * _exchanged(free, part))
     half_turn = math.pi / _rate(free, intensity)
     return SplitCoefficients(
         noise,
@@ -201,6 +201,7 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         strength *= -1.0 if down > up else 1.0
     time = 1.0 if noise.is_white else 2 * noise.correlation_time
     half_turn = math.pi / _rate(free, fluctuation**2 * time)
+    time *= _exchanged(free, noise)
     if is_switched:
         moves = [(time * share, each) for share, each in zip(noise.probabilities, around, strict=True)]
     else:
@@ -235,11 +236,24 @@ def _fastest(free: FloatArray) -> float:
     return omega**2 if omega > 0 else -(spread**2)
 
 
+def _exchanged(free: FloatArray, noise: Noise) -> float:
+    """A share of the intensity S(0) of a noise that moves energy from mode to mode: 1 in the plane, or of white noise.
+
+    Beyond it is the mean of S at the sums and the differences of their frequencies, over S(0), and 1 at most.
+    """
+    if noise.is_white or len(free) == 2:
+        return 1.0
+    values = np.linalg.eigvals(free)
+    pairs = [(a, b) for i, a in enumerate(values) for b in values[:i] if not (a.imag and np.isclose(a, np.conj(b)))]
+    densities = [noise.spectral_density(abs(a.imag - b.imag)) for a, b in pairs]
+    return min(float(np.mean(densities)) / max(noise.spectral_density(0.0), 1e-300), 1.0)
+
+
 def _settling(free: FloatArray, driven: Sequence[tuple[float, FloatArray]], half_turn: float) -> float:
     """Beyond the plane six times that in which E‖x‖² forgets how the modes shared it; 0 in the plane.
 
     It is that under white noises, Σ ½ I (B ⊗ 1 + 1 ⊗ B)² for pairs (I, B), on symmetric matrices: where the noise has a
-    memory, about. What turns meanwhile is forgotten sooner, as it averages out.
+    memory, about, see `_exchanged`. What turns meanwhile is forgotten sooner, as it averages out.
     """
     n = len(free)
     if n == 2:
