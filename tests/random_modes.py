@@ -17,6 +17,7 @@ from fpsolve import OrnsteinUhlenbeck, Problem, lyapunov_exponent, moment_lyapun
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.adapt import Budget
+from fpsolve.messages import Code
 from fpsolve.model import CoefficientMatrix, Filter, LinearSystem, Telegraph, White
 from fpsolve.model.noise import Noise
 from fpsolve.simulation.coefficients import coefficients
@@ -94,9 +95,16 @@ def by_elements(problem: Problem) -> list[tuple[float, float] | str]:
 
 
 def outcomes(problem: Problem, *, path_steps: float = PATH_STEPS) -> list[Outcome | str]:
-    """λ and Λ(p) by both, or why the elements give none. A number that the simulation does not give is NaN."""
+    """λ and Λ(p) by both, or why the elements give none. A number that the simulation does not give is NaN.
+
+    So is one of which it says that it still drifts, as its standard error then does not tell how far it is.
+    """
     made = by_simulation(problem, path_steps=path_steps)
-    moments = [(each.value or math.nan, each.standard_error or math.nan) for each in made.estimates]
+    drifting = {each.data["p"] for each in made.warnings if each.code is Code.DRIFTING}
+    moments = [
+        (math.nan, math.nan) if each.p in drifting else (each.value or math.nan, each.standard_error or math.nan)
+        for each in made.estimates
+    ]
     simulated = [(made.lyapunov_exponent, made.lyapunov_exponent_error), *moments]
     return [
         each if isinstance(each, str) else Outcome(*each, *pair)
