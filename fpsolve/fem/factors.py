@@ -95,18 +95,18 @@ def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
     if n > 2 and levels and levels[-1] is not None:
         choices.append(_by_levels(operator, along_last(operator, levels[-1] or levels_of(operator))))
     elif 2 * band < n:
-        choices.append(
-            (n * (_dense_cost(m) + 2 * band * (1 + band) * m**3), lambda: BlockFactors(operator.with_dense_first()))
-        )
+        cost = n * (_dense_cost(m) + 2 * band * (1 + band) * m**3)
+        choices.append((cost, lambda: BlockFactors(operator.with_dense_first())))
     if levels and levels[0] is not None:
         choices.append(_by_levels(operator, along_first(operator, levels[0])))
-    *cheapest, (_, last) = sorted(choices, key=lambda choice: -choice[0])
+    cheapest, *others = [factorise for _, factorise in sorted(choices, key=lambda choice: choice[0])]
     with suppress(SingularMatrix):
-        return last()
-    return cheapest[-1][1]()
+        return cheapest()
+    return others[0]()
 
 
 def _by_levels(operator: KroneckerSum, levels: Sequence[Any]) -> tuple[float, Callable[[], Factors]]:
+    """Operations of an elimination by levels, and what does it."""
     sizes = [level.size for level in levels]
     cost = sum(_dense_cost(size) for size in sizes) + sum(2 * a**2 * b for a, b in pairwise(reversed(sizes)))
     return cost, lambda: LevelFactors(operator, levels)

@@ -109,7 +109,7 @@ class SphereCells:
     @property
     def facts(self) -> dict[str, Any]:
         """What a table says of it."""
-        return {"eta_cells": self.lines.size - 1, "eta_degree": self.degree, "waves": self.waves}
+        return {"eta_cells": self.elements, "eta_degree": self.degree, "waves": self.waves}
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +307,7 @@ class SphereAxis(DirectionAxis):
         node = self._kept // waves.own.size
         of_elements = np.where(line.modes[node] == 1, -1, line.cells[node])
         self.ladders = ((of_elements, line.modes[node], self._on_kept(line.nested)),)
-        self.levels = [np.flatnonzero(line.first_cells[node] == k) for k in range(line.lines.size - 1)]
+        self.levels = [np.flatnonzero(line.first_cells[node] == k) for k in range(chosen.elements)]
         constant = np.zeros((line.size, waves.own.size))
         constant[:, 0] = line.constant()
         self.constant = constant.ravel()[self._kept]
