@@ -386,6 +386,28 @@ class Code(Enum):
         "warning: no stationary response: λ = {value:.3g} ± {error:.1e} {most:?is not {most:g} standard errors above "
         "0¦is not positive}, and if λ < 0 almost every path comes to rest"
     )
+    RESPONSE_LINEAR = (
+        "note: no stationary response: it is that of a vibro-impact oscillator with c2 or c3 > 0; in a linear system "
+        "nothing limits the amplitude"
+    )
+    RESPONSE_NOISE = (
+        "note: no stationary density by finite elements: it is for one noise with a density, and no white noise, "
+        "impulses or chains; simulate the response instead"
+    )
+    RESPONSE_TAILS = (
+        "note: no stationary density by finite elements: for r0 > 1 the noise has algebraic tails and there is no δ_p, "
+        "which tells the density near rest; use r0 <= 1, or simulate the response"
+    )
+    RESPONSE_DIES = (
+        "note: no stationary response: λ = {value:.6g} ± {error:.1g} is not positive, so that almost every path comes "
+        "to rest"
+    )
+    RESPONSE_NO_INDEX = "note: no stationary density by finite elements: there is no δ_p: {reason}"
+    RESPONSE_TOO_LARGE = (
+        "failure: the stationary response did not converge: the next discretisation has {unknowns} unknowns, which "
+        "take {gigabytes:.1f} GB, more than {most:g} GB"
+    )
+    RESPONSE_OPEN = "failure: the stationary response did not converge: its means still change by {size:.1e} of them"
     RESPONSE_STOPPED = "warning: the simulation of the response was stopped early, after the time {time:.3g}"
     RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"
 
