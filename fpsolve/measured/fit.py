@@ -287,7 +287,7 @@ def _fitted(data: _Data, families: Sequence[Kind], weights: FloatArray) -> tuple
         return np.asarray(np.sign(bounded) * size * np.sqrt(np.maximum(np.expm1(bounded) - bounded, 0)))
 
     start = _start(data, families, weights)
-    found = least_squares(residuals, start, bounds=(start - 15, start + 15), x_scale=1.0, ftol=1e-12, xtol=1e-10)
+    found = least_squares(residuals, start, bounds=(start - 15, start + 15), ftol=1e-10, xtol=1e-8, max_nfev=60)
     return found.x, 2 * found.cost
 
 
