@@ -9,8 +9,8 @@ has the weights wᵢ: larger near the frequencies that matter, so that a wrong f
 gᵢ = ∂ ln Sᵢ/∂θ the estimate has the covariance A⁻¹BA⁻¹, A = Σ wᵢnᵢ gᵢgᵢᵀ and B = Σ wᵢ²nᵢ gᵢgᵢᵀ for independent values.
 
 Sᵢ(θ) of a record is the mean of its estimate: the transform of w⋆w(t) C(t), C the autocovariance of ξ and w the window.
-So it has neither the bias of aliases nor that of leakage. There B is that of the scores of the segments themselves,
-which neighbouring frequencies, overlaps, and the fourth cumulants of a noise that is not Gaussian change.
+So it has neither the bias of aliases nor that of leakage. There B has the correlation of neighbouring frequencies too.
+Of bounded noise, which is not Gaussian, it is that of the scores of the segments themselves.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from scipy.optimize import least_squares, nnls
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.measured.kinds import KINDS, Kind
-from fpsolve.measured.spectrum import Record, Spectrum, bracketed, gaps
+from fpsolve.measured.spectrum import Record, Spectrum, bracketed, gaps, welch_variance
 from fpsolve.measured.weak import Where, frequencies_that_matter
 from fpsolve.messages import Code, Message
 from fpsolve.model import Noise, Noises
@@ -109,7 +109,9 @@ class NoiseFit:
         sizes = np.array([size(key) for key in self.parameters])
         parameters = {key: value * by for (key, value), by in zip(self.parameters.items(), sizes, strict=True)}
         parts = tuple(
-            noise.at({key.rpartition(".")[2]: v for key, v in parameters.items() if key.rpartition(".")[0] in ("", name)})
+            noise.at(
+                {key.rpartition(".")[2]: v for key, v in parameters.items() if key.rpartition(".")[0] in ("", name)}
+            )
             for name, noise in kinds.items()
         )
         return replace(
@@ -122,14 +124,17 @@ class NoiseFit:
 
 
 class _Data(NamedTuple):
-    """Values with what they are the mean of: `expected` makes Sᵢ(θ) of kinds; `scores` are those of segments."""
+    """Values, of how many each is the mean, and what `expected` makes of kinds: Sᵢ(θ).
+
+    Of a record `segments` are the values of each, and `variance` that of a mean over its square.
+    """
 
     omega: FloatArray
     values: FloatArray
     number: FloatArray
     expected: Callable[[Kind, FloatArray], FloatArray]
     segments: FloatArray | None
-    overlaps: int
+    variance: float
 
 
 def fit_noise(
@@ -214,7 +219,7 @@ def _of_spectrum(data: Spectrum) -> _Data:
         number[positive],
         lambda kind, theta: kind.density(omega[positive], theta),
         None,
-        0,
+        math.nan,
     )
 
 
@@ -240,7 +245,14 @@ def _of_record(record: Record, whole: bool) -> _Data:
         return np.maximum(found, 1e-300)
 
     number = np.full(omega.size, float(len(starts)))
-    return _Data(omega, segments.mean(axis=0), number, expected, None if whole else segments, 1)
+    return _Data(
+        omega,
+        segments.mean(axis=0),
+        number,
+        expected,
+        None if whole else segments,
+        welch_variance(record.values.size, length),
+    )
 
 
 def _sum(data: _Data, families: Sequence[Kind], theta: FloatArray) -> FloatArray:
@@ -318,13 +330,18 @@ def _told(
     bread = np.linalg.pinv(slopes.T @ (slopes * (weights * data.number)[:, None]))
     if data.segments is None:
         meat = dispersion * slopes.T @ (slopes * (weights**2 * data.number)[:, None])
+    elif all(family.is_gaussian for family in families):
+        # Hann's window correlates neighbours: of a Gaussian noise by 4/9, and by 1/36 at two steps
+        rows = slopes * (weights * data.number * math.sqrt(data.variance))[:, None]
+        meat = rows.T @ rows
+        for lag, share in ((1, 4 / 9), (2, 1 / 36)):
+            meat += share * (rows[lag:].T @ rows[:-lag] + rows[:-lag].T @ rows[lag:])
     else:
         scores = (data.segments / fitted - 1) * weights @ slopes
         scores -= scores.mean(axis=0)
         count = len(scores)
         meat = scores.T @ scores
-        for lag in range(1, data.overlaps + 1):
-            meat += scores[lag:].T @ scores[:-lag] + scores[:-lag].T @ scores[lag:]
+        meat += scores[1:].T @ scores[:-1] + scores[:-1].T @ scores[1:]  # neighbours overlap
         meat *= count / max(count - 1.5, 1.0)
     values = np.exp(theta)
     covariance = bread @ meat @ bread * np.outer(values, values)

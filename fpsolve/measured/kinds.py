@@ -24,6 +24,7 @@ class Kind:
         covariance: C(t) by t ≥ 0, shape (n,), and the values.
         amplitude: which of the parameters multiplies ξ.
         start: values from a place ω₀ and a relative width w of a peak, before the amplitude is known.
+        is_gaussian: whether ξ is.
     """
 
     names: tuple[str, ...]
@@ -32,6 +33,7 @@ class Kind:
     covariance: Shape
     amplitude: int
     start: Callable[[float, float], Sequence[float]]
+    is_gaussian: bool = True
 
 
 def _ou_density(omega: FloatArray, theta: FloatArray) -> FloatArray:
@@ -107,6 +109,7 @@ BOUNDED = Kind(
     _bounded_covariance,
     0,
     lambda omega, width: (1.0, omega, (2 * width * omega) ** 0.5),
+    is_gaussian=False,
 )
 KINDS = {
     "ornstein-uhlenbeck": (OU,),

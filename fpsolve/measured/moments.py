@@ -11,7 +11,6 @@ With b = 1 − r₀ > 0 the stationary density (9) is that of (1 − ξ²/h²)^(
 
 from __future__ import annotations
 
-
 import numpy as np
 
 from fpsolve.arrays import FloatArray
@@ -42,9 +41,7 @@ def non_gaussian_from_record(record: Record) -> NoiseFit:
     theta = _parameters(means)
     covariance_of_means = np.cov(blocks.T) / BLOCKS
     steps = 1e-5 * means
-    slopes = np.array(
-        [(_parameters(means + h) - _parameters(means - h)) / (2 * h.max()) for h in np.diag(steps)]
-    ).T
+    slopes = np.array([(_parameters(means + h) - _parameters(means - h)) / (2 * h.max()) for h in np.diag(steps)]).T
     noise = NonGaussianNoise(D0=float(theta[0]), tau0=float(theta[1]), r0=float(theta[2]))
     times = record.duration / noise.correlation_time
     messages = (Message(Code.SHORT_RECORD, times=times, least=LEAST_TIMES),) if times < LEAST_TIMES else ()
