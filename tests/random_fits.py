@@ -5,6 +5,7 @@ Of 100 seeds 95 ± 5 must have a parameter within 1.96 standard errors.
 
 import math
 import sys
+from functools import partial
 
 import numpy as np
 
@@ -28,7 +29,7 @@ def spectrum_of(noise, rng, averages=16, omega=None):
 
 
 def record_of(noise, rng, n=20_000, step=0.1):
-    """Exact transitions of a path; those of Eq. (7) by Euler's method, 50 steps for one."""
+    """Exact transitions of a path; those of Eq. (7) by implicit Euler steps, 20 for one."""
     if isinstance(noise, OrnsteinUhlenbeck):
         matrix, unit, output = np.array([[-noise.alpha]]), np.array([noise.standard_deviation]), np.ones(1)
     elif isinstance(noise, Filter):
@@ -53,16 +54,16 @@ def record_of(noise, rng, n=20_000, step=0.1):
 
 
 def _of_eq_7(noise, rng, n, step, parts=20):
-    """Many short paths side by side would not be one record, so that this takes a loop, compiled."""
+    """A single path in a compiled loop."""
     from numba import njit
 
     @njit
     def path(xi, n, parts, h, b, tau, kick, seed):
-        np.random.seed(seed)
+        np.random.seed(seed)  # noqa: NPY002
         values = np.empty(n)
         for i in range(n):
             for _ in range(parts):
-                xi += kick * np.random.standard_normal()
+                xi += kick * np.random.standard_normal()  # noqa: NPY002
                 # backwards for the drift −ξ/(τ(1 − bξ²)), which holds ξ inside
                 low, high = -1 / math.sqrt(b), 1 / math.sqrt(b)
                 for _ in range(50):
@@ -111,7 +112,7 @@ def main(seeds=100):
             "whittle": (record_of, {"method": "whittle"}),
         }
         for name, (make, options) in rows.items():
-            shares, others, known = coverage(noise, make, lambda data, o=options: fitted(data, noise.kind, **o), seeds)
+            shares, others, known = coverage(noise, make, partial(fitted, kind=noise.kind, **options), seeds)
             print(noise, name, shares, "std", known.std(axis=0).round(2), "others", others, flush=True)
     for r0 in (0.7, 0.95):
         noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=r0)

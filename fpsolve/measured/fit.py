@@ -99,7 +99,7 @@ class NoiseFit:
     def scaled(self, factor: float) -> NoiseFit:
         """The fit of the signal times a factor, such as `of_relative_stiffness`; its misfits and messages stay."""
         powers = {"sigma": 1, "s": 1, "mu": 1, "D0": 2}
-        kinds = {name: noise for name, noise in zip(NAMES, self.parts, strict=False)}
+        kinds = dict(zip(NAMES, self.parts, strict=False))
 
         def size(key: str) -> float:
             part, _, name = key.rpartition(".")
@@ -108,12 +108,11 @@ class NoiseFit:
 
         sizes = np.array([size(key) for key in self.parameters])
         parameters = {key: value * by for (key, value), by in zip(self.parameters.items(), sizes, strict=True)}
-        parts = tuple(
-            noise.at(
-                {key.rpartition(".")[2]: v for key, v in parameters.items() if key.rpartition(".")[0] in ("", name)}
-            )
-            for name, noise in kinds.items()
-        )
+        own = {name: dict[str, float]() for name in kinds}
+        for key, value in parameters.items():
+            part, _, parameter = key.rpartition(".")
+            own[part or NAMES[0]][parameter] = value
+        parts = tuple(noise.at(own[name]) for name, noise in kinds.items())
         return replace(
             self,
             parts=parts,
@@ -227,11 +226,11 @@ def _of_record(record: Record, whole: bool) -> _Data:
     """Periodograms of segments with Hann's window that overlap by half, or of the whole record."""
     length = record.values.size if whole else record.segment_length()
     window = np.ones(length) if whole else np.hanning(length + 1)[:-1]
-    window /= np.linalg.norm(window)
+    window /= math.sqrt(float(window @ window))
     hop = length - length // 2
     starts = range(0, record.values.size - length + 1, hop)
     inside = slice(2, length // 2)
-    segments = np.array(
+    segments: FloatArray = np.array(
         [record.step * abs(np.fft.rfft(window * record.values[i : i + length])[inside]) ** 2 for i in starts]
     )
     omega = 2 * math.pi * np.fft.rfftfreq(length, record.step)[inside]
@@ -242,17 +241,10 @@ def _of_record(record: Record, whole: bool) -> _Data:
 
     def expected(kind: Kind, theta: FloatArray) -> FloatArray:
         found = 2 * record.step * np.fft.rfft(lags * kind.covariance(t, theta)).real[inside]
-        return np.maximum(found, 1e-300)
+        return np.asarray(np.maximum(found, 1e-300))
 
-    number = np.full(omega.size, float(len(starts)))
-    return _Data(
-        omega,
-        segments.mean(axis=0),
-        number,
-        expected,
-        None if whole else segments,
-        welch_variance(record.values.size, length),
-    )
+    number, variance = np.full(omega.size, float(len(starts))), welch_variance(record.values.size, length)
+    return _Data(omega, segments.mean(axis=0), number, expected, None if whole else segments, variance)
 
 
 def _sum(data: _Data, families: Sequence[Kind], theta: FloatArray) -> FloatArray:
@@ -271,7 +263,10 @@ def _start(data: _Data, families: Sequence[Kind], weights: FloatArray) -> FloatA
     widths = (1.0,) if len(family.names) == 2 else (0.02, 0.06, 0.2, 0.7)
     candidates = [np.array(family.start(place, width), dtype=float) for place in places for width in widths]
     blocks = np.array_split(np.arange(data.omega.size), min(data.omega.size, 400))
-    mean = lambda each: np.array([np.average(each[b], weights=weights[b]) for b in blocks])  # noqa: E731
+
+    def mean(each: FloatArray) -> FloatArray:
+        return np.array([np.average(each[block], weights=weights[block]) for block in blocks])
+
     root = np.sqrt([np.sum((weights * data.number)[b]) for b in blocks])
     measured = mean(data.values)
     columns = np.array([mean(data.expected(family, each)) for each in candidates]).T

@@ -81,7 +81,7 @@ def _filter(has_value: bool, has_slope: bool) -> Kind:
 
     def make(*theta: float) -> Noise:
         c0, c1 = output(np.array(theta))
-        return Filter(*theta[:3], c0=c0, c1=c1)
+        return Filter(theta[0], theta[1], theta[2], c0, c1)
 
     both = has_value and has_slope
     return Kind(

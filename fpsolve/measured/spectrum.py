@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import trapezoid
 
 from fpsolve.arrays import FloatArray, is_whole, shown
 
@@ -94,7 +95,7 @@ class Spectrum:
     @property
     def covered_variance(self) -> float:
         """2∫ S(ω) dω/(2π) over the frequencies, by trapezia, in ξ²."""
-        return float(np.trapezoid(self.density, self.frequencies)) / math.pi
+        return float(trapezoid(self.density, self.frequencies)) / math.pi
 
     @classmethod
     def from_columns(

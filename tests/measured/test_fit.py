@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from fpsolve.measured import (
     Record,
@@ -46,7 +47,7 @@ def test_the_kinds_have_the_covariance_and_density_of_the_noises():
             assert c[0] == pytest.approx(noise.standard_deviation**2)
             for omega in (0.3, 2.0):
                 assert family.density(np.array([omega]), theta)[0] == pytest.approx(noise.spectral_density(omega))
-                transform = 2 * np.trapezoid(c * np.cos(omega * t), t)
+                transform = 2 * trapezoid(c * np.cos(omega * t), t)
                 assert transform == pytest.approx(noise.spectral_density(omega), rel=1e-4)
 
 
@@ -149,7 +150,7 @@ def test_a_fit_scales_with_the_signal():
 
 
 def test_verdict_has_the_weak_noise_limit():
-    """With S known up to a share e at 2ω, λ = −ζω + ω²S/8 has the error ω² S e/8; here from the OU noise's covariance."""
+    """With S known up to a share e at 2ω, Λ(2) = −2ζω + ω²S/2 has the error ω²S e/2."""
     omega, zeta = 2.0, 0.01
     noise = OrnsteinUhlenbeck(alpha=1.5, sigma=0.05)
     fit = fitted(Spectrum(OMEGA, exact(noise), np.full(OMEGA.size, 0.25)), noise.kind).scaled(
