@@ -225,7 +225,7 @@ def _of_spectrum(data: Spectrum) -> _Data:
 def _of_record(record: Record, whole: bool) -> _Data:
     """Periodograms of segments with Hann's window that overlap by half, or of the whole record."""
     length = record.values.size if whole else record.segment_length()
-    window = np.ones(length) if whole else np.hanning(length + 1)[:-1]
+    window = np.asarray(np.ones(length) if whole else np.hanning(length + 1)[:-1], dtype=float)
     window /= math.sqrt(float(window @ window))
     hop = length - length // 2
     starts = range(0, record.values.size - length + 1, hop)
@@ -233,7 +233,7 @@ def _of_record(record: Record, whole: bool) -> _Data:
     segments: FloatArray = np.array(
         [record.step * abs(np.fft.rfft(window * record.values[i : i + length])[inside]) ** 2 for i in starts]
     )
-    omega = 2 * math.pi * np.fft.rfftfreq(length, record.step)[inside]
+    omega: FloatArray = np.asarray(2 * math.pi * np.fft.rfftfreq(length, record.step)[inside], dtype=float)
     size = 2 * length
     lags = np.fft.irfft(abs(np.fft.rfft(window, size)) ** 2, size)[:length]
     lags[0] *= 0.5  # as C(0) stands once in 2 Re Σ
