@@ -235,12 +235,12 @@ def _of_record(record: Record, whole: bool) -> _Data:
     )
     omega: FloatArray = np.asarray(2 * math.pi * np.fft.rfftfreq(length, record.step)[inside], dtype=float)
     size = 2 * length
-    lags = np.fft.irfft(abs(np.fft.rfft(window, size)) ** 2, size)[:length]
+    lags = np.asarray(np.fft.irfft(abs(np.fft.rfft(window, size)) ** 2, size)[:length], dtype=float)
     lags[0] *= 0.5  # as C(0) stands once in 2 Re Σ
     t = record.step * np.arange(length)
 
     def expected(kind: Kind, theta: FloatArray) -> FloatArray:
-        found = 2 * record.step * np.fft.rfft(lags * kind.covariance(t, theta)).real[inside]
+        found = 2 * record.step * np.fft.rfft(np.multiply(lags, kind.covariance(t, theta))).real[inside]
         return np.asarray(np.maximum(found, 1e-300))
 
     number, variance = np.full(omega.size, float(len(starts))), welch_variance(record.values.size, length)
@@ -260,7 +260,7 @@ def _start(data: _Data, families: Sequence[Kind], weights: FloatArray) -> FloatA
     """From the sum Σ a² S of candidates with a² ≥ 0 that is nearest, relatively: one candidate more for each part."""
     family = families[0]
     places = np.geomspace(max(data.omega[0], 1e-3 * data.omega[-1]), data.omega[-1], 40)
-    widths = (1.0,) if len(family.names) == 2 else (0.02, 0.06, 0.2, 0.7)
+    widths = (1.0,) if len(family.names) == 2 else (0.02, 0.06, 0.2, 0.7, 2.0)
     candidates = [np.array(family.start(place, width), dtype=float) for place in places for width in widths]
     blocks = np.array_split(np.arange(data.omega.size), min(data.omega.size, 400))
 
@@ -293,9 +293,21 @@ def _fitted(data: _Data, families: Sequence[Kind], weights: FloatArray) -> tuple
         bounded = np.clip(log_ratio, -100, 100)
         return np.asarray(np.sign(bounded) * size * np.sqrt(np.maximum(np.expm1(bounded) - bounded, 0)))
 
-    start = _start(data, families, weights)
-    found = least_squares(residuals, start, bounds=(start - 15, start + 15), ftol=1e-10, xtol=1e-8, max_nfev=60)
-    return found.x, 2 * found.cost
+    starts = [_start(data, families, weights)]
+    if len(families) > 1:  # one part more beside the best sum of fewer, which halves a part of it in two places
+        fewer, _ = _fitted(data, families[1:], weights)
+        first = fewer[: len(families[0].names)]
+        shift = np.zeros_like(first)
+        shift[0 if families[0].amplitude else 1] = 1.0
+        half = np.zeros_like(first)
+        half[families[0].amplitude] = 0.5 * math.log(2)
+        starts.append(np.concatenate([first - half - shift, first - half + shift, fewer[first.size :]]))
+    found = [
+        least_squares(residuals, start, bounds=(start - 15, start + 15), ftol=1e-10, xtol=1e-8, max_nfev=100)
+        for start in starts
+    ]
+    best = min(found, key=lambda each: each.cost)
+    return best.x, 2 * best.cost
 
 
 def _slopes(data: _Data, families: Sequence[Kind], theta: FloatArray) -> FloatArray:
