@@ -237,11 +237,11 @@ def _of_record(record: Record, whole: bool) -> _Data:
     size = 2 * length
     lags = np.asarray(np.fft.irfft(abs(np.fft.rfft(window, size)) ** 2, size)[:length], dtype=float)
     lags[0] *= 0.5  # as C(0) stands once in 2 Re Σ
-    t = record.step * np.arange(length)
+    t = np.asarray(record.step * np.arange(length), dtype=float)
 
     def expected(kind: Kind, theta: FloatArray) -> FloatArray:
-        found = 2 * record.step * np.fft.rfft(np.multiply(lags, kind.covariance(t, theta))).real[inside]
-        return np.asarray(np.maximum(found, 1e-300))
+        found = 2 * record.step * np.fft.rfft(np.multiply(lags, kind.covariance(t, theta), dtype=float)).real[inside]
+        return np.asarray(np.maximum(found, 1e-300), dtype=float)
 
     number, variance = np.full(omega.size, float(len(starts))), welch_variance(record.values.size, length)
     return _Data(omega, segments.mean(axis=0), number, expected, None if whole else segments, variance)

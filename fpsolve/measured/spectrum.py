@@ -15,7 +15,7 @@ from fpsolve.arrays import FloatArray, is_whole, shown
 
 SHORTEST = 256
 """Samples of a record at least."""
-SEGMENTS = 32
+SEGMENTS = 64
 """A record is cut into about so many parts, each twice covered, if nothing else is stated."""
 SIDES = {"one": 0.5, "two": 1.0}
 UNITS = {"Hz": 2 * math.pi, "rad/s": 1.0}
@@ -179,10 +179,10 @@ class Record:
         return replace(self, values=self.values * factor)
 
     def segment_length(self, segment: int | None = None) -> int:
-        """Samples of a segment; n/16, so that 31 segments overlap by half, if none is stated."""
+        """Samples of a segment; n/32 but at least 32, so that 63 segments overlap by half, if none is stated."""
         n = self.values.size
         if segment is None:
-            return 2 * (n // SEGMENTS)
+            return max(2 * (n // SEGMENTS), 32)
         if not is_whole(segment, 16, n):
             raise ValueError(f"got segment = {shown(segment)}; must be a whole number from 16 to {n}, in samples")
         return int(segment)
