@@ -159,8 +159,8 @@ def fit_noise(
         method: of a record "spectrum", Welch's estimate, or "whittle", the periodogram of the whole record. With
             "whittle" values are taken as independent, as of a Gaussian noise.
 
-    Standard errors of bounded noise from a record of 250 correlation times are too small, by up to a quarter, as measured
-    with `python -m tests.random_fits`; with method = "whittle" that of its amplitude is far too large.
+    Standard errors of bounded noise from a record of 250 correlation times are too small, by up to a quarter, as seen
+    in `python -m tests.random_fits`; with method = "whittle" that of its amplitude is far too large.
 
     Raises:
         ValueError: an argument is none of these, or nothing was measured near a frequency that matters.
