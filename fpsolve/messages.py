@@ -302,6 +302,19 @@ class Code(Enum):
     UNSEEN_TAILS = (
         f"note: algebraic tails: {_RARE}; a simulation shows Λ(p) without these paths, and λ is the {ALMOST_EVERY}"
     )
+    NOISE_MISFIT = (
+        "warning: near {name} the measured density is {relative:+.1%} off the fitted one, with a standard error of "
+        "{error:.1%}; take another kind of noise, or more terms"
+    )
+    SPECTRUM_GAP = "note: nothing was measured from {low:.4g} to {high:.4g} rad/time"
+    NO_SPECTRUM_ERROR = (
+        "note: the errors of the measured values are not known, and are taken from how far these are from the fit; "
+        "state how many averages they are of"
+    )
+    SHORT_RECORD = (
+        "warning: the record is {times:.3g} correlation times long, too few for its standard errors; use a record of "
+        "at least {least:g}"
+    )
     FAR_FROM_GAUSSIAN = (
         "note: the Ornstein-Uhlenbeck reduction is meant for r0 near 1, but |r0 - 1| = {departure:.3g} > {most:g}: its "
         "variance is {reduced:.4g}, and that of the noise, Eq. (10), is {variance:.4g}"
