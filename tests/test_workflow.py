@@ -382,7 +382,13 @@ def test_a_run_goes_on_where_it_was_interrupted(whole, tmp_path, monkeypatch):
     assert files(folder) == TABLES
 
 
-SIMULATED = {"monte_carlo.json", "monte_carlo-2.json", "monte_carlo_response.vti", "monte_carlo_response.csv", "monte_carlo_response-2.png"}
+SIMULATED = {
+    "monte_carlo.json",
+    "monte_carlo-2.json",
+    "monte_carlo_response.vti",
+    "monte_carlo_response.csv",
+    "monte_carlo_response-2.png",
+}
 """Files of simulations."""
 
 

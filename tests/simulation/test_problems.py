@@ -40,9 +40,7 @@ def moments(*args, estimator="direct", **kwargs):
 
 
 def response(*args, **kwargs):
-    return simulated_response(
-        *args, exponent=0.05, variance_rate=0.01, paths=32, time=50.0, step=0.1, seed=1, **kwargs
-    )
+    return simulated_response(*args, exponent=0.05, variance_rate=0.01, paths=32, time=50.0, step=0.1, seed=1, **kwargs)
 
 
 @pytest.mark.parametrize("estimator", sampled("direct", "population"))

@@ -139,7 +139,14 @@ def test_each_curve_has_its_file_and_stale_ones_go(case, out):
 def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out, capsys, fails):
     """Nor of a run, whose figure may have its dots."""
     (out / "quick").mkdir(parents=True)
-    earlier = {"monte_carlo.json", "monte_carlo-2.json", "monte_carlo_response.png", "summary.json", "figure.png", "density.vtu"}
+    earlier = {
+        "monte_carlo.json",
+        "monte_carlo-2.json",
+        "monte_carlo_response.png",
+        "summary.json",
+        "figure.png",
+        "density.vtu",
+    }
     for name in (*earlier, "notes.txt"):
         (out / "quick" / name).write_text("{}", encoding="utf-8")
     fails(1)
@@ -155,7 +162,13 @@ def test_the_nonlinear_response_is_written(case, out):
     ]
     assert simulate(case, "--out", out, *nonlinear) == 0
     folder = out / "quick"
-    written = {"monte_carlo.json", "monte_carlo_response.csv", "monte_carlo_response.vti", "monte_carlo_response.png", "monte_carlo_response.pdf"}
+    written = {
+        "monte_carlo.json",
+        "monte_carlo_response.csv",
+        "monte_carlo_response.vti",
+        "monte_carlo_response.png",
+        "monte_carlo_response.pdf",
+    }
     assert names(folder) == written
     response = read(folder / "monte_carlo.json")["response"]
     assert response["means"].keys() == {"x", "x_squared", "v_squared", "amplitude", "energy"}
