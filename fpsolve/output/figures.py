@@ -203,7 +203,7 @@ def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path,
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path, *, into: Path | None = None) -> None:
-    """Draw monte_carlo_response.png and .pdf of a curve, if it has one: the densities of (x, ẋ) and of the amplitude."""
+    """Draw monte_carlo_response.png and .pdf of a curve: the density of (x, ẋ) and of the amplitude."""
     if simulated.response is None:
         return
     name = f"monte_carlo_response{simulated.curve.suffix}"

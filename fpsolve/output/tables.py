@@ -1,4 +1,4 @@
-"""Results as tables: summary.json, moments.csv, curves.csv; monte_carlo.json and monte_carlo_response.csv of a simulation.
+"""Results as tables: summary.json, moments.csv, curves.csv; monte_carlo.json and monte_carlo_response.csv."""
 
 from __future__ import annotations
 
