@@ -203,10 +203,10 @@ def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path,
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path, *, into: Path | None = None) -> None:
-    """Draw response.png and .pdf of a curve, if it has one: the joint density of x and ẋ, and that of the amplitude."""
+    """Draw monte_carlo_response.png and .pdf of a curve: the density of (x, ẋ) and of the amplitude."""
     if simulated.response is None:
         return
-    name = f"response{simulated.curve.suffix}"
+    name = f"monte_carlo_response{simulated.curve.suffix}"
     held = held_in_words(simulated.curve, (), "time")
     with figure_for(*headed(folder, name, into, case.headline), held, Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)

@@ -227,7 +227,7 @@ def _figures(case: Case, found: Found, folder: Path) -> Iterator[Figure]:
             jobs.append((f"densities{result.curve.suffix}", f"{title}{_of(result.curve)}", draw_it))
     for each in found.simulated[:MOST_PICTURES]:
         title = f"Simulated stationary response{_of(each.curve)}"
-        jobs.append((f"response{each.curve.suffix}", title, partial(draw_response, case, each, folder)))
+        jobs.append((f"monte_carlo_response{each.curve.suffix}", title, partial(draw_response, case, each, folder)))
     if found.chart is not None and found.chart.lines:
         title = f"Where stability ends, over {charted(case).x.key} and {charted(case).y.key}"
         jobs.append(("chart", title, partial(draw_chart, case, found.chart, folder)))
