@@ -418,9 +418,12 @@ class Code(Enum):
     RESPONSE_NO_INDEX = "note: no stationary density by finite elements: there is no δ_p: {reason}"
     RESPONSE_TOO_LARGE = (
         "failure: the stationary response did not converge: the next discretisation has {unknowns} unknowns, which "
-        "take {gigabytes:.1f} GB, more than {most:g} GB"
+        "take {gigabytes:.1f} GB, more than {most:g} GB; use a larger rtol"
     )
-    RESPONSE_OPEN = "failure: the stationary response did not converge: its means still change by {size:.1e} of them"
+    RESPONSE_OPEN = (
+        "failure: the stationary response did not converge: its means still change by {size:.1e} of them; use a larger "
+        "rtol"
+    )
     RESPONSE_STOPPED = "warning: the simulation of the response was stopped early, after the time {time:.3g}"
     RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"
 

@@ -19,7 +19,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
 from fpsolve.fem.discretisation import NoisePart, first_part
 from fpsolve.fem.factors import one_thread
-from fpsolve.messages import Code, Message, Remedy
+from fpsolve.messages import Code, Message
 from fpsolve.nonlinear.elimination import Solution, Tail, solved, solved_tail
 from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
 
@@ -143,7 +143,7 @@ class Search:
                 return solution, found, errors
             more = (worst > SHARE) | (worst == worst.max())
             levels = tuple(int(n) for n in np.array(levels) + more + (worst > FAR))
-        raise NotConverged(Message(Code.RESPONSE_OPEN, size=float(np.max(errors[:-1] / scales))), None, Remedy.BUDGET)
+        raise NotConverged(Message(Code.RESPONSE_OPEN, size=float(np.max(errors[:-1] / scales))))
 
     @cached_property
     def base(self) -> Choice:
@@ -176,7 +176,7 @@ class Search:
                 choice = finer(choice)
         if choice.gigabytes > GIGABYTES:
             data = {"unknowns": choice.size, "gigabytes": choice.gigabytes, "most": GIGABYTES}
-            raise NotConverged(Message(Code.RESPONSE_TOO_LARGE, **data), None, Remedy.BUDGET)
+            raise NotConverged(Message(Code.RESPONSE_TOO_LARGE, **data))
         self.unknowns = max(self.unknowns, choice.size)
         with one_thread():
             if levels[:2] not in self._planes:
