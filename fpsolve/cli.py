@@ -162,17 +162,50 @@ def _drop_blocked_output() -> None:
 
 @app.command
 def new(
-    name: Annotated[str, Parameter(help="A case that comes with fpsolve; if omitted, all are listed.")] = "",
+    name: Annotated[
+        str,
+        Parameter(
+            help="A case that comes with fpsolve; if omitted, all are listed. With options the new file; if omitted, "
+            "KIND.toml here."
+        ),
+    ] = "",
     file: Annotated[Path | None, Parameter(help="The new file, or its folder; if omitted, NAME.toml here.")] = None,
+    *,
+    kind: Annotated[
+        str | None,
+        Parameter(
+            help="Write a case of this kind with comments: oscillator, which is meant if only other options are given, "
+            "system for an equation of your own, parametric for noise in the stiffness, modes or plane."
+        ),
+    ] = None,
+    frequency: Annotated[
+        list[float] | None, Parameter(help="Its natural frequency in Hz; of two modes twice.", negative="")
+    ] = None,
+    damping_ratio: Annotated[
+        list[float] | None,
+        Parameter(help="Its damping as a share of critical damping; 0.01 if omitted.", negative=""),
+    ] = None,
+    restitution: Annotated[
+        float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
+    ] = None,
 ) -> int:
-    """Copy a case that comes with fpsolve, or list these cases with their titles.
+    """Copy a case that comes with fpsolve, list these cases with their titles, or write a commented one of a kind.
 
-    Beside the copy is fpsolve.schema.json, with which editors complete and check it.
+    Beside the new case is fpsolve.schema.json, with which editors complete and check it.
 
     Example: fpsolve new fig1 my_case.toml
-    """
-    from fpsolve.workflow.shipped import copy_case, described_cases
 
+    Example: fpsolve new my.toml --frequency 2 --damping-ratio 0.01 --restitution 0.9
+    """
+    from fpsolve.case.templates import modes_of
+    from fpsolve.workflow.shipped import copy_case, described_cases, write_case
+
+    if any(each is not None for each in (kind, frequency, damping_ratio, restitution)):
+        if file is not None:
+            raise FpsolveError(f"got {name} and {file}; with --kind and other options name the new file only")
+        made = modes_of(frequency or [], damping_ratio or [], restitution)
+        print(f"written: {escaped(str(write_case(kind or 'oscillator', made, Path(name) if name else None)))}")
+        return 0
     if name:
         print(f"written: {escaped(str(copy_case(name, file)))}")
         return 0
