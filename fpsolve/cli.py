@@ -1,4 +1,4 @@
-"""The command line, fpsolve run | check | simulate | chart | design | prove | mesh | new | schema, and its messages."""
+"""The command line, fpsolve run | check | simulate | chart | design | prove | noise and others, and its messages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from shlex import quote
 from time import monotonic
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, CycloptsPanel, Parameter, Token
 from rich.console import Console
@@ -607,6 +607,112 @@ def prove(
         if unmet:
             code = NOT_CONVERGED
     return code
+
+
+@app.command
+def noise(
+    spectrum: Annotated[
+        Path | None,
+        Parameter(
+            help="A spectral density: .csv, .txt, .npy, .npz, .mat, .uff or .nc, with a column of frequencies.",
+        ),
+    ] = None,
+    *,
+    record: Annotated[
+        Path | None,
+        Parameter(
+            help="A record of values over time instead, also .wav; beside a spectrum its variance is compared with it."
+        ),
+    ] = None,
+    per: Annotated[
+        Literal["Hz", "rad/s"] | None,
+        Parameter(help="The unit of the frequencies; if omitted that of the file, which must state it."),
+    ] = None,
+    sided: Annotated[
+        Literal["one", "two"] | None,
+        Parameter(help="Whether the integral over f > 0 is the variance, one, or half of it, two."),
+    ] = None,
+    frequency: Annotated[
+        list[float] | None,
+        Parameter(
+            help="Natural frequency in the unit of --per, Hz if that is omitted; of two modes twice.", negative=""
+        ),
+    ] = None,
+    damping_ratio: Annotated[
+        float | None,
+        Parameter(help="Damping as a share of critical damping: states an oscillator, whose verdict is told."),
+    ] = None,
+    restitution: Annotated[
+        float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
+    ] = None,
+    case: Annotated[Path | None, Parameter(help="A case instead, whose noise is replaced.")] = None,
+    modes: Annotated[
+        Path | None, Parameter(help="A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it.")
+    ] = None,
+    mode: Annotated[list[Count] | None, Parameter(help="A row of it; of two modes twice.", negative="")] = None,
+    noise_in: Annotated[
+        Literal["stiffness", "damping"] | None,
+        Parameter(help="Where the noise is; stiffness if neither this nor --of is stated."),
+    ] = None,
+    of: Annotated[
+        Literal["stiffness", "damping", "acceleration", "height"] | None,
+        Parameter(
+            help="What was measured: the relative stiffness, the damping in 1/s, the vertical acceleration of the "
+            "support of a pendulum in m/s^2, or the metacentric height of a ship in m; that of --noise-in if omitted."
+        ),
+    ] = None,
+    length: Annotated[
+        float | None, Parameter(help="Length of the pendulum in m, from which its natural frequency follows.")
+    ] = None,
+    gm: Annotated[float | None, Parameter(help="Mean metacentric height in m, for --of height.")] = None,
+    kind: Annotated[
+        Literal["ornstein-uhlenbeck", "filter", "bounded", "non-gaussian"], Parameter(help="The kind of noise.")
+    ] = "ornstein-uhlenbeck",
+    terms: Annotated[Count, Parameter(help="How many noises of the kind are added, 1 to 3.")] = 1,
+    method: Annotated[
+        Literal["spectrum", "whittle"],
+        Parameter(help="Of a record: its spectrum by Welch's method, or Whittle's likelihood."),
+    ] = "spectrum",
+    column: Annotated[str | None, Parameter(help="The column of values, if the file has several.")] = None,
+    rate: Annotated[
+        float | None, Parameter(help="Values of the record per second, if the file states no times.")
+    ] = None,
+    averages: Annotated[
+        float | None, Parameter(help="How many independent periodograms the spectrum is the mean of: tells its errors.")
+    ] = None,
+    out: Out = Path("results"),
+    json: Annotated[bool, Parameter(help="Print noise.json in one line.", negative="")] = False,
+) -> int:
+    """Fit a noise to what was measured, most of all at twice the natural frequency; say what it means for stability.
+
+    Prints the section [noise] of a case, and writes noise.toml, a case with it, noise.json and a figure into
+    OUT/<file>/. Frequencies of the fit are 2f, of two modes 2f1, 2f2, f1 + f2 and |f1 - f2|, and 0 for noise in the
+    damping.
+
+    Example: fpsolve noise spectrum.csv --per Hz --sided one --frequency 2.0 --damping-ratio 0.01 --averages 64
+
+    Example: fpsolve noise --record shaking.csv --of acceleration --length 0.5 --damping-ratio 0.02 --kind filter
+    """
+    from fpsolve.output.noises import Convention, print_noise
+    from fpsolve.output.terminal import print_written
+    from fpsolve.workflow.noise import Statement, measurement_of, noise_case
+
+    start = monotonic()
+    stated = Statement(
+        spectrum=spectrum, record=record, per=per, sided=sided, frequency=tuple(frequency or ()),
+        damping_ratio=damping_ratio, restitution=restitution, case=load([case], None)[0] if case else None, modes=modes,
+        mode=tuple(mode or ()), noise_in=noise_in, of=of, length=length, gm=gm, kind=kind, terms=terms, method=method,
+        column=column, rate=rate, averages=averages,
+    )  # fmt: skip
+    data, wanted, source = measurement_of(stated)
+    shown = Convention(per or "Hz", sided or "one")
+    outcome, folder, names = noise_case(data, wanted, source, shown, out)
+    if json:
+        print(" ".join(line.strip() for line in (folder / names[0]).read_text(encoding="utf-8").splitlines()))
+    else:
+        print_noise(outcome, source, shown)
+        print_written(folder, ", ".join(names), monotonic() - start)
+    return NOT_CONVERGED if outcome.failure is not None else 0
 
 
 @app.command

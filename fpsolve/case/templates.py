@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from fpsolve.case.messages import nearest, shown
 from fpsolve.errors import FpsolveError
@@ -60,8 +61,20 @@ def modes_of(frequencies: Sequence[float], zeta: Sequence[float], restitution: f
     return Modes(omega, ratios, restitution, in_hertz=bool(frequencies))
 
 
-def case_text(kind: str, modes: Modes) -> str:
+class Parts(NamedTuple):
+    """The text of a case up to its noise, and the noise."""
+
+    head: str
+    noise: str
+
+
+def case_text(kind: str, modes: Modes, noise: str = "") -> str:
     """The text of a case of a kind of system, see `TEMPLATES`.
+
+    Args:
+        kind: its word.
+        modes: its frequencies, damping and wall.
+        noise: its sections of noise; one to be replaced if none are stated.
 
     Raises:
         FpsolveError: there is no such kind, or it has no place for two modes, or for a wall.
@@ -78,11 +91,26 @@ def case_text(kind: str, modes: Modes) -> str:
         raise FpsolveError("got --restitution for --kind modes, which has no walls; leave it out, or take another kind")
     if make is _modes and not modes.in_hertz:
         modes = replace(modes, omega=(1.0, RATIO), zeta=modes.zeta * 2)
-    units = (
-        '\n[units]\ntime = "s"                          # labels tables, figures and files\n' if modes.in_hertz else ""
-    )
-    return f"{make(modes)}{units}{_MOMENTS_OF_FOUR if len(modes.omega) > 1 else _MOMENTS}"
+    head, own = make(modes)
+    moments = _MOMENTS_OF_FOUR if len(modes.omega) > 1 else _MOMENTS
+    return f"{head}{noise or own}{_UNITS if modes.in_hertz else ''}{moments}"
 
+
+def sum_text(modes: Modes, names: Sequence[str], noise_in: str, noise: str) -> str:
+    """The text of a case of one mode under the sum of several noises, by their names, in its stiffness or damping."""
+    drive = " + ".join(names)
+    force = f" + ({drive}) * v" if noise_in == "damping" else f" - ({drive}) * x"
+    drift = f"-omega**2 * x - 2*zeta*omega * v{force}"
+    about = f"# An oscillator with the noise {drive} in its {noise_in}.\n"
+    return (
+        f"{about}{_equation(modes, f'Oscillator with noise in its {noise_in}', drift, names)}{noise}{_UNITS}{_MOMENTS}"
+    )
+
+
+_UNITS = """
+[units]
+time = "s"                          # labels tables, figures and files
+"""
 
 _MOMENTS = """
 [moments]
@@ -135,9 +163,9 @@ def _noise(section: str, what: str, unit: str, rate: float, deviation: float, ti
     )
 
 
-def _oscillator(modes: Modes) -> str:
+def _oscillator(modes: Modes) -> Parts:
     omega, zeta, time, r = modes.omega[0], modes.zeta[0], _unit(modes), modes.restitution or 1.0
-    return (
+    return Parts(
         "# ẍ − (c1 + ξ) ẋ + ω² x = 0, Eq. (3), with a wall at x = 0: the noise ξ is in the damping.\n"
         + _title(modes, "Oscillator with noise in its damping")
         + "\n[oscillator]\n"
@@ -147,43 +175,53 @@ def _oscillator(modes: Modes) -> str:
         + _line(
             "impact", '"restitution"', f'the bounce itself; "delta" would multiply the speed by {math.exp(r - 1):.4g}'
         )
-        + _line("epsilon", 1.0, "1: noise, damping and loss are as stated")
-        + _noise("noise", "Of the damping", f", in 1/{time}", omega, 0.1 * omega, time)
+        + _line("epsilon", 1.0, "1: noise, damping and loss are as stated"),
+        _noise("noise", "Of the damping", f", in 1/{time}", omega, 0.1 * omega, time),
     )
 
 
-def _parametric(modes: Modes) -> str:
+def _parametric(modes: Modes) -> Parts:
     omega, zeta, time, r = modes.omega[0], modes.zeta[0], _unit(modes), modes.restitution or 1.0
-    return (
+    return Parts(
         "# ẍ + 2·damping·ẋ + (stiffness + ξ) x = 0 with a wall at x = 0: the noise ξ is in the stiffness.\n"
         + _title(modes, "Oscillator with noise in its stiffness")
         + '\n[system]\nkind = "parametric"\n'
         + _line("stiffness", omega**2, f"ω², in 1/{time}²; {_of_omega(modes)}")
         + _line("damping", zeta * omega, f"ζω for ζ = {zeta:g}, in 1/{time}")
-        + _line("restitution", r, "speed after a bounce over that before; 1 means no wall")
-        + _noise(
+        + _line("restitution", r, "speed after a bounce over that before; 1 means no wall"),
+        _noise(
             "noise", "Of the stiffness: ω² times its relative change", f", in 1/{time}²", omega, 0.1 * omega**2, time
-        )
+        ),
     )
 
 
-def _system(modes: Modes) -> str:
-    omega, zeta, time, r = modes.omega[0], modes.zeta[0], _unit(modes), modes.restitution
+def _system(modes: Modes) -> Parts:
+    drift = "-omega**2 * (1 + load) * x - 2*zeta*omega * v"
+    return Parts(
+        "# An equation of your own: ẍ + 2ζω ẋ + ω² (1 + load) x = 0. Change it, see the page Your own equation.\n"
+        + _equation(modes, "Own equation", drift, ["load"]),
+        _noise("noise.load", "Of the relative stiffness", ", dimensionless", modes.omega[0], 0.1, _unit(modes)),
+    )
+
+
+def _equation(modes: Modes, title: str, drift: str, names: Sequence[str]) -> str:
+    """Equations in x and v, with the rate of v."""
+    omega, zeta, r = modes.omega[0], modes.zeta[0], modes.restitution
     wall = "" if r is None else f", R = {_number(r)}"
     walls = "" if r is None else 'walls = [{ at = "x = 0", restitution = "R" }]   # v after a bounce is −R v\n'
     return (
-        "# An equation of your own: ẍ + 2ζω ẋ + ω² (1 + load) x = 0. Change it, see the page Your own equation.\n"
-        + _title(modes, "Own equation")
+        _title(modes, title)
         + '\n[system]\nvariables = ["x", "v"]\n'
-        + 'drift = ["v", "-omega**2 * (1 + load) * x - 2*zeta*omega * v"]   # ẋ and v̇\n'
+        + f'drift = ["v", "{drift}"]   # ẋ and v̇\n'
         + f"parameters = {{ omega = {_number(omega)}, zeta = {_number(zeta)}{wall} }}   # {_of_omega(modes)}\n"
-        + 'noises = { load = "noise.load" }\n'
+        + "noises = { "
+        + ", ".join(f'{name} = "noise.{name}"' for name in names)
+        + " }\n"
         + walls
-        + _noise("noise.load", "Of the relative stiffness", ", dimensionless", omega, 0.1, time)
     )
 
 
-def _plane(modes: Modes) -> str:
+def _plane(modes: Modes) -> Parts:
     omega, zeta, time, r = modes.omega[0], modes.zeta[0], _unit(modes), modes.restitution
     square, damping = _number(omega**2), _number(-2 * zeta * omega + 0.0)
     jump = (
@@ -191,18 +229,18 @@ def _plane(modes: Modes) -> str:
         if r is None
         else f"jumps = [{{ phase = {math.pi / 2!r}, log_factor = {_number(math.log(r))} }}]   # ln R at x = 0\n"
     )
-    return (
+    return Parts(
         "# d(x, v)/dt = (A + ξ B)(x, v) by matrices; here ẍ + 2ζω ẋ + ω² (1 + ξ) x = 0.\n"
         + _title(modes, "System of two variables by matrices")
         + '\n[system]\nkind = "plane"\nterms = [\n'
         + f"    {{ matrix = [[0, 1], [-{square}, {damping}]] }},   # A; {_of_omega(modes)}\n"
         + f"    {{ order = 1, matrix = [[0, 0], [-{square}, 0]], noise = true }},   # B\n]\n"
-        + jump
-        + _noise("noise", "Of the relative stiffness", ", dimensionless", omega, 0.1, time)
+        + jump,
+        _noise("noise", "Of the relative stiffness", ", dimensionless", omega, 0.1, time),
     )
 
 
-def _modes(modes: Modes) -> str:
+def _modes(modes: Modes) -> Parts:
     omega, zeta, time, n = modes.omega, modes.zeta, _unit(modes), len(modes.omega)
 
     def diagonal(values: Sequence[float]) -> str:
@@ -212,18 +250,18 @@ def _modes(modes: Modes) -> str:
     own = ", ".join(f"{each / (2 * math.pi):.6g} Hz" if modes.in_hertz else f"ω = {each:g}" for each in omega)
     count = "Two modes" if n == 2 else "One mode"
     coupled = "[[1.0]]" if n == 1 else "[[1.0, 0.5], [0.5, 1.0]]"
-    return (
+    return Parts(
         "# M q̈ + C q̇ + (K + ξ K_ξ) q = 0 in modal coordinates, M = 1.\n"
         + f'title = "{count}: {own}"\n'
         + f'\n[system]\nkind = "modes"\nmass = {diagonal([1.0] * n)}\n'
         + f"damping = {diagonal([2 * z * w for z, w in zip(zeta, omega, strict=True)])}   # 2ζω, in 1/{time}\n"
         + f"stiffness = {diagonal([w * w for w in omega])}   # ω², in 1/{time}²\n"
-        + f"stiffness_noise = {coupled}   # K_ξ: replace it by the geometric stiffness of your load in these modes\n"
-        + _noise("noise", "Of the load", "", omega[0], 0.1 * omega[0] ** 2, time)
+        + f"stiffness_noise = {coupled}   # K_ξ: replace it by the geometric stiffness of your load in these modes\n",
+        _noise("noise", "Of the load", "", omega[0], 0.1 * omega[0] ** 2, time),
     )
 
 
-TEMPLATES: Mapping[str, Callable[[Modes], str]] = {
+TEMPLATES: Mapping[str, Callable[[Modes], Parts]] = {
     "oscillator": _oscillator,
     "system": _system,
     "parametric": _parametric,

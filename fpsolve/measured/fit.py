@@ -108,18 +108,18 @@ class NoiseFit:
 
         sizes = np.array([size(key) for key in self.parameters])
         parameters = {key: value * by for (key, value), by in zip(self.parameters.items(), sizes, strict=True)}
-        own = {name: dict[str, float]() for name in kinds}
+        covariance = self.covariance * np.outer(sizes, sizes)
+        return replace(self.at(parameters), covariance=covariance, spectrum=self.spectrum.scaled(factor))
+
+    def at(self, values: Mapping[str, float]) -> NoiseFit:
+        """The same with other values of some parameters, by their keys."""
+        parameters = {**self.parameters, **values}
+        own = {name: dict[str, float]() for name in NAMES}
         for key, value in parameters.items():
-            part, _, parameter = key.rpartition(".")
-            own[part or NAMES[0]][parameter] = value
-        parts = tuple(noise.at(own[name]) for name, noise in kinds.items())
-        return replace(
-            self,
-            parts=parts,
-            parameters=parameters,
-            covariance=self.covariance * np.outer(sizes, sizes),
-            spectrum=self.spectrum.scaled(factor),
-        )
+            part, _, name = key.rpartition(".")
+            own[part or NAMES[0]][name] = value
+        parts = tuple(noise.at(own[name]) for name, noise in zip(NAMES, self.parts, strict=False))
+        return replace(self, parts=parts, parameters=parameters)
 
 
 class _Data(NamedTuple):
@@ -198,7 +198,7 @@ def _refuse_far(spectrum: Spectrum, matter: Mapping[str, float]) -> None:
             k = int(np.argmin(abs(omega - target)))
             raise ValueError(
                 f"nothing was measured near {name} = {target:.4g} rad/time, which stability depends on; the nearest "
-                f"point is {omega[k]:.4g}; measure there, or see whether frequency is in rad/time"
+                f"point is {omega[k]:.4g}; measure there, or correct the natural frequency or its unit"
             )
 
 

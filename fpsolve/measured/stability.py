@@ -46,12 +46,13 @@ def verdict(problem: Problem, fit: NoiseFit, *, rtol: float | None = None) -> Ve
     solver = ExponentSolver(problem, rtol=rtol)
     exponent, moment = solver.lyapunov_exponent(), solver.solution(2.0)
     found = sensitivities(problem, [2.0], rtol=rtol)
+    section = problem.system.noise_sections[0] if len(fit.parts) == 1 else "noise"
     return Verdict(
-        _spread(exponent.value, exponent.error_estimate, found.indices[LYAPUNOV_EXPONENT.name], fit),
-        _spread(moment.pair.value, 0.0, found.moments[0], fit),
+        _spread(exponent.value, exponent.error_estimate, found.indices[LYAPUNOV_EXPONENT.name], fit, section),
+        _spread(moment.pair.value, 0.0, found.moments[0], fit, section),
     )
 
 
-def _spread(value: float, error: float, slopes: Mapping[str, Estimate], fit: NoiseFit) -> Spread:
-    g = np.array([slopes[f"noise.{key}"].value for key in fit.parameters])
+def _spread(value: float, error: float, slopes: Mapping[str, Estimate], fit: NoiseFit, section: str) -> Spread:
+    g = np.array([slopes[f"{section}.{key}"].value for key in fit.parameters])
     return Spread(value, value, math.hypot(math.sqrt(max(float(g @ fit.covariance @ g), 0.0)), error))
