@@ -156,7 +156,7 @@ def _of_omega(modes: Modes, i: int = 0) -> str:
 def _noise(section: str, what: str, unit: str, rate: float, deviation: float, time: str) -> str:
     """A noise to be replaced."""
     return (
-        f"\n# {what}.\n# A noise to be replaced: `fpsolve noise` fits one to what was measured.\n[{section}]\n"
+        f"\n{f'[{section}]':34}  # {what}, to be replaced: `fpsolve noise` fits one to what was measured\n"
         + _line("kind", '"ornstein-uhlenbeck"', "or another, see the page Noises")
         + _line("alpha", rate, f"1 over the correlation time, in 1/{time}")
         + _line("standard_deviation", deviation, f"of ξ{unit}")
@@ -176,7 +176,7 @@ def _oscillator(modes: Modes) -> Parts:
             "impact", '"restitution"', f'the bounce itself; "delta" would multiply the speed by {math.exp(r - 1):.4g}'
         )
         + _line("epsilon", 1.0, "1: noise, damping and loss are as stated"),
-        _noise("noise", "Of the damping", f", in 1/{time}", omega, 0.1 * omega, time),
+        _noise("noise", "of the damping", f", in 1/{time}", omega, 0.1 * omega, time),
     )
 
 
@@ -189,9 +189,7 @@ def _parametric(modes: Modes) -> Parts:
         + _line("stiffness", omega**2, f"ω², in 1/{time}²; {_of_omega(modes)}")
         + _line("damping", zeta * omega, f"ζω for ζ = {zeta:g}, in 1/{time}")
         + _line("restitution", r, "speed after a bounce over that before; 1 means no wall"),
-        _noise(
-            "noise", "Of the stiffness: ω² times its relative change", f", in 1/{time}²", omega, 0.1 * omega**2, time
-        ),
+        _noise("noise", "of the stiffness", f", in 1/{time}²", omega, 0.1 * omega**2, time),
     )
 
 
@@ -200,7 +198,7 @@ def _system(modes: Modes) -> Parts:
     return Parts(
         "# An equation of your own: ẍ + 2ζω ẋ + ω² (1 + load) x = 0. Change it, see the page Your own equation.\n"
         + _equation(modes, "Own equation", drift, ["load"]),
-        _noise("noise.load", "Of the relative stiffness", ", dimensionless", modes.omega[0], 0.1, _unit(modes)),
+        _noise("noise.load", "of the relative stiffness", ", dimensionless", modes.omega[0], 0.1, _unit(modes)),
     )
 
 
@@ -236,7 +234,7 @@ def _plane(modes: Modes) -> Parts:
         + f"    {{ matrix = [[0, 1], [-{square}, {damping}]] }},   # A; {_of_omega(modes)}\n"
         + f"    {{ order = 1, matrix = [[0, 0], [-{square}, 0]], noise = true }},   # B\n]\n"
         + jump,
-        _noise("noise", "Of the relative stiffness", ", dimensionless", omega, 0.1, time),
+        _noise("noise", "of the relative stiffness", ", dimensionless", omega, 0.1, time),
     )
 
 
@@ -249,15 +247,18 @@ def _modes(modes: Modes) -> Parts:
 
     own = ", ".join(f"{each / (2 * math.pi):.6g} Hz" if modes.in_hertz else f"ω = {each:g}" for each in omega)
     count = "Two modes" if n == 2 else "One mode"
-    coupled = "[[1.0]]" if n == 1 else "[[1.0, 0.5], [0.5, 1.0]]"
+    shares = [
+        ", ".join(_number((1.0 if i == j else 0.5) * a * b) for j, b in enumerate(omega)) for i, a in enumerate(omega)
+    ]
+    coupled = f"[[{'], ['.join(shares)}]]"
     return Parts(
         "# M q̈ + C q̇ + (K + ξ K_ξ) q = 0 in modal coordinates, M = 1.\n"
         + f'title = "{count}: {own}"\n'
         + f'\n[system]\nkind = "modes"\nmass = {diagonal([1.0] * n)}\n'
         + f"damping = {diagonal([2 * z * w for z, w in zip(zeta, omega, strict=True)])}   # 2ζω, in 1/{time}\n"
         + f"stiffness = {diagonal([w * w for w in omega])}   # ω², in 1/{time}²\n"
-        + f"stiffness_noise = {coupled}   # K_ξ: replace it by the geometric stiffness of your load in these modes\n",
-        _noise("noise", "Of the load", "", omega[0], 0.1 * omega[0] ** 2, time),
+        + f"stiffness_noise = {coupled}   # K_ξ: replace it by the geometric stiffness of your load\n",
+        _noise("noise", "of the relative stiffness", ", dimensionless", omega[0], 0.1, time),
     )
 
 

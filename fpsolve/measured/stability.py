@@ -49,7 +49,7 @@ def verdict(problem: Problem, fit: NoiseFit, *, rtol: float | None = None) -> Ve
     section = problem.system.noise_sections[0] if len(fit.parts) == 1 else "noise"
     return Verdict(
         _spread(exponent.value, exponent.error_estimate, found.indices[LYAPUNOV_EXPONENT.name], fit, section),
-        _spread(moment.pair.value, 0.0, found.moments[0], fit, section),
+        _spread(moment.pair.value, moment.error, found.moments[0], fit, section),
     )
 
 

@@ -210,7 +210,16 @@ def _misfit_grid(outcome: NoiseOutcome, source: Path, shown: Convention) -> Grid
     for each, value, error in zip(fit.misfit, values.tolist(), errors.tolist(), strict=True):
         told = "unknown" if math.isnan(each.error) else f"{each.error:.2g}"
         frequency = f"{shown.frequency(each.omega):.4g}"
-        grid.rows.append([each.name, frequency, f"{value:.4g}", f"{error:.2g}", f"{1 + each.relative:.4g}", told])
+        grid.rows.append(
+            [
+                each.name.replace("ω", shown.symbol),
+                frequency,
+                f"{value:.4g}",
+                f"{error:.2g}",
+                f"{1 + each.relative:.4g}",
+                told,
+            ]
+        )
     return grid
 
 

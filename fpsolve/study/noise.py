@@ -38,6 +38,8 @@ from fpsolve.model.systems.vibro_impact import ImpactLaw
 NON_GAUSSIAN = "non-gaussian"
 CLOSE = 0.02
 """By which share of it two statements of a frequency may differ."""
+RTOL = 1e-4
+"""Of λ and Λ(2), whose errors by the fit are some percent."""
 STILL = 1e-6
 """Of a modulus: imaginary parts below are none."""
 
@@ -169,7 +171,8 @@ def measure(data: Spectrum | Record, wanted: Wanted) -> NoiseOutcome:
     system = _system(wanted, len(fit.parts))
     if system is not None and wanted.terms < len(NAMES):
         try:
-            found["verdict"] = verdict(Problem(system, scaled.noise), scaled)
+            problem = Problem(system, scaled.noise)
+            found["verdict"] = verdict(problem, scaled, rtol=max(problem.usual_rtol, RTOL))
         except NotConverged as failure:
             found["failure"] = failure.message
         except ValueError as error:

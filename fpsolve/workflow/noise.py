@@ -13,6 +13,7 @@ import numpy as np
 from fpsolve.case.case import Case
 from fpsolve.case.templates import Modes, modes_of
 from fpsolve.errors import FpsolveError
+from fpsolve.fem.factors import one_thread
 from fpsolve.files import alone, writable
 from fpsolve.measured import Record, Spectrum, read_modes, read_record, read_spectrum
 from fpsolve.measured.reading import Per, Sided
@@ -38,7 +39,8 @@ def noise_case(
     """
     folder = out / source.stem
     try:
-        outcome = measure(data, wanted)
+        with one_thread():  # the arrays are small
+            outcome = measure(data, wanted)
     except FpsolveError as error:
         raise FpsolveError(f"{source}: {error}") from None
     with alone(folder), writable(folder):
