@@ -17,11 +17,12 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import with_noise
 from fpsolve.case.templates import case_text, sum_text
-from fpsolve.drawing import COLOURS, figure_for, label_axes
+from fpsolve.drawing import COLOURS, figure_for, label_axes, plain_numbers
 from fpsolve.files import write_json, write_text
 from fpsolve.measured.fit import NAMES, NoiseFit
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.spectrum import SIDES, UNITS
+from fpsolve.messages import Code
 from fpsolve.model import Noise
 from fpsolve.output.screen import Column, Grid, Screen
 from fpsolve.output.terminal import percent, print_remark, sampled
@@ -226,27 +227,33 @@ def _misfit_grid(outcome: NoiseOutcome, source: Path, shown: Convention) -> Grid
 def sentences(outcome: NoiseOutcome) -> Iterator[str]:
     """What the fit means: critical damping ratios, and λ and Λ(2) of the system with their probabilities."""
     if outcome.exponent and outcome.moment:
-        walls = " Without walls:" if outcome.wanted.modes.restitution not in (None, 1.0) or outcome.wanted.case else ""
-        pairs = [
-            f"{symbol} < 0 for a damping ratio above {_with_error(each)}"
-            for symbol, each in (("λ", outcome.exponent), ("Λ(2)", outcome.moment))
-        ]
-        yield f"In weak noise{walls.lower()} {', and '.join(pairs)}."
+        walls = " without walls" if outcome.wanted.modes.restitution not in (None, 1.0) or outcome.wanted.case else ""
+        exponent, moment = _percent(outcome.exponent), _percent(outcome.moment)
+        yield f"In weak noise{walls} λ < 0 for a damping above {exponent}, and Λ(2) < 0 above {moment} of critical damping."
     if outcome.verdict is None:
         return
+    is_off = any(each.code is Code.NOISE_MISFIT for each in outcome.fit.messages)
     for symbol, each, below, above in (
         ("λ", outcome.verdict.exponent, "almost every path decays", "almost every path grows"),
         ("Λ(2)", outcome.verdict.moment, "the mean square decays", "the mean square grows"),
     ):
         number = f"{symbol} = {sampled(each.value, each.deviation)} ± {each.deviation:.1g} 1/s"
+        if is_off:
+            yield f"{number} with the noise that was fitted."
+            continue
         is_below = each.below >= 0.5
         sure = percent(each.below if is_below else 1 - each.below)
         yield f"{number}: {symbol} {'<' if is_below else '>'} 0 with {sure}, {below if is_below else above}."
-    yield "The probabilities are of the standard errors of the fit alone: another family of noise is not in them."
+    if is_off:
+        yield "There are no probabilities, as the fit is off where stability depends on it."
+    else:
+        yield "The probabilities are of the standard errors of the fit alone: another family of noise is not in them."
 
 
-def _with_error(each: Critical) -> str:
-    return f"{sampled(each.value, each.error)} ± {each.error:.1g}"
+def _percent(each: Critical) -> str:
+    """A damping ratio in percent with two digits of its error."""
+    value, error = 100 * each.value, 100 * each.error
+    return f"({sampled(value, error) if error > 0 else f'{value:.4g}'} ± {error:.1g}) %"
 
 
 def band_of(fit: NoiseFit) -> tuple[FloatArray, FloatArray] | None:
@@ -286,6 +293,9 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
             axes.annotate(name, (place, 1.0), (3, -3), xycoords=("data", "axes fraction"), textcoords="offset points",
                           va="top", color=COLOURS[1], fontsize="small")  # fmt: skip
         axes.plot([], [], color=COLOURS[1], linestyle=(0, (4, 2)), linewidth=1.2, label="what stability depends on")
+        axes.set_xlim(0.9 * x[0], x[-1] / 0.9)
+        for axis in (axes.xaxis, axes.yaxis):
+            plain_numbers(axis)
         low, high = np.nanmin(factor * spectrum.density), np.nanmax(factor * spectrum.density)
         axes.set_ylim(0.3 * low, 3 * high)
         sides = {"one": "one-sided", "two": "two-sided"}[shown.sided]
