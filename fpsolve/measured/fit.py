@@ -36,6 +36,8 @@ FLOOR, WIDTH = 0.02, 0.3
 NAMES = ("first", "second", "third")
 """Of the noises of a sum."""
 MOST_TERMS = len(NAMES)
+UNTOLD = 1e-8
+"""Of the information of scaled parameters: a smaller eigenvalue is of a direction that the values do not tell."""
 MISFIT = 3.0
 """Standard errors by which a fit may be wrong where it matters before that is said."""
 
@@ -81,7 +83,8 @@ class NoiseFit:
 
     @property
     def errors(self) -> Mapping[str, float]:
-        return dict(zip(self.parameters, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        variances = np.maximum(np.diag(self.covariance), 0.0)
+        return dict(zip(self.parameters, np.sqrt(variances).tolist(), strict=True))
 
     @cached_property
     def noise(self) -> Noise:
@@ -98,18 +101,27 @@ class NoiseFit:
 
     def scaled(self, factor: float) -> NoiseFit:
         """The fit of the signal times a factor, such as `of_relative_stiffness`; its misfits and messages stay."""
-        powers = {"sigma": 1, "s": 1, "mu": 1, "D0": 2}
-        kinds = dict(zip(NAMES, self.parts, strict=False))
-
-        def size(key: str) -> float:
-            part, _, name = key.rpartition(".")
-            noise = kinds[part or NAMES[0]]
-            return abs(factor) ** powers[name] if name in noise.of_xi else 1.0
-
-        sizes = np.array([size(key) for key in self.parameters])
+        sizes = abs(factor) ** self.powers
         parameters = {key: value * by for (key, value), by in zip(self.parameters.items(), sizes, strict=True)}
         covariance = self.covariance * np.outer(sizes, sizes)
         return replace(self.at(parameters), covariance=covariance, spectrum=self.spectrum.scaled(factor))
+
+    @property
+    def powers(self) -> FloatArray:
+        """The power of a factor of ξ by which each parameter changes, shape (k,)."""
+        known, kinds = {"sigma": 1.0, "s": 1.0, "mu": 1.0, "D0": 2.0}, dict(zip(NAMES, self.parts, strict=False))
+
+        def power(key: str) -> float:
+            part, _, name = key.rpartition(".")
+            return known[name] if name in kinds[part or NAMES[0]].of_xi else 0.0
+
+        return np.array([power(key) for key in self.parameters])
+
+    @property
+    def off(self) -> float:
+        """The largest share by which the fit is off where it matters, without what its standard error explains."""
+        squares = [each.relative**2 - (0 if math.isnan(each.error) else each.error**2) for each in self.misfit]
+        return math.sqrt(max([0.0, *squares]))
 
     def at(self, values: Mapping[str, float]) -> NoiseFit:
         """The same with other values of some parameters, by their keys."""
@@ -337,7 +349,8 @@ def _told(
     n, k = data.values.size, theta.size
     unknown = method == "spectrum" and spectrum.relative_error is None
     dispersion = float(np.sum(weights * ratio**2) / np.sum(weights)) * n / max(n - k, 1) if unknown else 1.0
-    bread = np.linalg.pinv(slopes.T @ (slopes * (weights * data.number)[:, None]))
+    information = slopes.T @ (slopes * (weights * data.number)[:, None])
+    bread = np.linalg.pinv(information, hermitian=True)
     if data.segments is None:
         meat = dispersion * slopes.T @ (slopes * (weights**2 * data.number)[:, None])
     elif all(family.is_gaussian for family in families):
@@ -370,6 +383,9 @@ def _told(
     messages += [Message(Code.SPECTRUM_GAP, low=low, high=high) for low, high in gaps(spectrum)]
     if unknown:
         messages.append(Message(Code.NO_SPECTRUM_ERROR))
+    size = np.sqrt(np.diag(information))
+    if np.linalg.eigvalsh(information / np.outer(size, size))[0] < UNTOLD:
+        messages.append(Message(Code.UNTOLD_PARAMETERS))
     return NoiseFit(
         parts=tuple(parts),
         parameters=dict(zip(keys, values.tolist(), strict=True)),

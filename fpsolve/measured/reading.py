@@ -181,8 +181,9 @@ def _ordinate(table: Table, over: str, wanted: str | None) -> str:
     if wanted is not None:
         if wanted in table.columns:
             return wanted
-        close = get_close_matches(wanted, others, n=1)
-        guess = f' did you mean "{close[0]}"?' if close else ""
+        lower = {name.lower(): name for name in others}
+        close = get_close_matches(wanted.lower(), lower, n=1)
+        guess = f' did you mean "{lower[close[0]]}"?' if close else ""
         raise ValueError(f'has no column "{wanted}";{guess} {_has(table)}')
     if len(others) != 1:
         raise ValueError(f"has several columns of values; state one by --column; {_has(table)}")

@@ -22,7 +22,6 @@ from fpsolve.files import write_json, write_text
 from fpsolve.measured.fit import NAMES, NoiseFit
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.spectrum import SIDES, UNITS
-from fpsolve.messages import Code
 from fpsolve.model import Noise
 from fpsolve.output.screen import Column, Grid, Screen
 from fpsolve.output.terminal import percent, print_remark, sampled
@@ -229,25 +228,19 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
     if outcome.exponent and outcome.moment:
         walls = " without walls" if outcome.wanted.modes.restitution not in (None, 1.0) or outcome.wanted.case else ""
         exponent, moment = _percent(outcome.exponent), _percent(outcome.moment)
-        yield f"In weak noise{walls} λ < 0 for a damping above {exponent}, and Λ(2) < 0 above {moment} of critical damping."
+        yield f"In weak noise{walls} λ < 0 above {exponent} of critical damping, and Λ(2) < 0 above {moment}."
     if outcome.verdict is None:
         return
-    is_off = any(each.code is Code.NOISE_MISFIT for each in outcome.fit.messages)
     for symbol, each, below, above in (
         ("λ", outcome.verdict.exponent, "almost every path decays", "almost every path grows"),
         ("Λ(2)", outcome.verdict.moment, "the mean square decays", "the mean square grows"),
     ):
         number = f"{symbol} = {sampled(each.value, each.deviation)} ± {each.deviation:.1g} 1/s"
-        if is_off:
-            yield f"{number} with the noise that was fitted."
-            continue
         is_below = each.below >= 0.5
         sure = percent(each.below if is_below else 1 - each.below)
         yield f"{number}: {symbol} {'<' if is_below else '>'} 0 with {sure}, {below if is_below else above}."
-    if is_off:
-        yield "There are no probabilities, as the fit is off where stability depends on it."
-    else:
-        yield "The probabilities are of the standard errors of the fit alone: another family of noise is not in them."
+    off = f", and that it is {outcome.fit.off:.0%} off where stability depends on it" if outcome.fit.off else ""
+    yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."
 
 
 def _percent(each: Critical) -> str:

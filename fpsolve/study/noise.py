@@ -214,7 +214,7 @@ def _system(wanted: Wanted, terms: int) -> System | None:
 
 
 def _critical(fit: NoiseFit, wanted: Wanted) -> dict[str, Any]:
-    """The damping ratios at which λ and Λ(2) vanish in weak noise, to first order in the errors of the fit."""
+    """The damping ratios at which λ and Λ(2) vanish in weak noise, with errors as those of `verdict`."""
     if len(wanted.modes.omega) > 1:
         return {}
     omega = wanted.modes.omega[0]
@@ -226,6 +226,7 @@ def _critical(fit: NoiseFit, wanted: Wanted) -> dict[str, Any]:
 
     values, slopes = ratios(fit), slopes_of(fit, ratios)
     errors = np.sqrt(np.maximum(np.einsum("ki,kl,li->i", slopes, fit.covariance, slopes), 0.0))
+    errors = np.hypot(errors, fit.off * values)
     exponent, moment = (Critical(float(a), float(b)) for a, b in zip(values, errors, strict=True))
     return {"exponent": exponent, "moment": moment}
 

@@ -84,18 +84,18 @@ def measurement_of(stated: Statement) -> tuple[Spectrum | Record, Wanted, Path]:
     place = SIGNALS[of].noise_in
     if stated.noise_in not in (None, place):
         raise FpsolveError(f"got --of {of} and --noise-in {stated.noise_in}; {of} is in the {place}; leave one out")
+    source = stated.spectrum or stated.record
+    if source is None:
+        raise FpsolveError("name a file: that of a spectrum, or of a record by --record")
+    modes = _modes(stated, of)
     if stated.case:
         refuse_wrong_case(stated.case, of, stated.terms)
-    modes = _modes(stated, of)
     if (of == "height") != (stated.gm is not None):
         remedy = "leave it out" if stated.gm is not None else "state the mean metacentric height in m by --gm"
         raise FpsolveError(f"--gm belongs to --of height; {remedy}")
     if stated.gm is not None and not 0 < stated.gm < math.inf:
         raise FpsolveError(f"got --gm {stated.gm}; must be > 0, in m")
     wanted = Wanted(of, stated.kind, stated.terms, stated.method, modes, stated.gm, stated.case)
-    source = stated.spectrum or stated.record
-    if source is None:
-        raise FpsolveError("name a file: that of a spectrum, or of a record by --record")
     record = read_record(stated.record, rate=stated.rate, of=of, column=stated.column) if stated.record else None
     if stated.spectrum is None and record is not None:
         left_out = [name for name in ("per", "sided", "averages") if getattr(stated, name) is not None]
