@@ -312,8 +312,8 @@ class Code(Enum):
         "state how many averages they are of"
     )
     UNTOLD_PARAMETERS = (
-        "warning: the values do not tell all parameters of the fit, whose errors are then not known, though that of the "
-        "density is; use fewer terms, or another kind"
+        "warning: the values do not tell all parameters of the fit, whose errors are then not known, though that of "
+        "the density is; use fewer terms, or another kind"
     )
     SHORT_RECORD = (
         "warning: the record is {times:.3g} correlation times long, too few for its standard errors; use a record of "

@@ -385,7 +385,8 @@ def _such_as(names: list[str]) -> str:
 
 def _reason(error: BaseException) -> str:
     """What a library says, in one line of a readable length."""
-    text = " ".join(str(error).split()) or type(error).__name__
+    said = str(error)
+    text = " ".join(said.split()) or type(error).__name__
     return text if len(text) <= 100 else f"{text[:97]}..."
 
 

@@ -95,7 +95,8 @@ def test_acceleration_of_a_support_and_two_terms():
     noises = OrnsteinUhlenbeck(alpha=4.0, sigma=0.1), OrnsteinUhlenbeck(alpha=60.0, sigma=0.3)
     found = noise(
         spectrum(header="f (Hz),G ((m/s^2)^2/Hz)", factor=9.80665**2, noises=noises), "--sided", "one",
-        "--of", "acceleration", "--length", f"{length!r}", "--damping-ratio", "0.01", "--averages", "64", "--terms", "2",
+        "--of", "acceleration", "--length", f"{length!r}", "--damping-ratio", "0.01", "--averages", "64",
+        "--terms", "2",
     )  # fmt: skip
     assert found["natural_frequencies"] == pytest.approx([OMEGA])
     at_double = sum(each.spectral_density(2 * OMEGA) for each in noises)
