@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import sys
@@ -92,6 +93,12 @@ Interactive = Annotated[
         negative="",
     ),
 ]
+
+
+Modes = Annotated[
+    Path | None, Parameter(help="A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it.")
+]
+Mode = Annotated[list[Count] | None, Parameter(help="A row of this table; of two modes twice.", negative="")]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -185,6 +192,8 @@ def new(
         list[float] | None,
         Parameter(help="Its damping as a share of critical damping; 0.01 if omitted.", negative=""),
     ] = None,
+    modes: Modes = None,
+    mode: Mode = None,
     restitution: Annotated[
         float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
     ] = None,
@@ -198,11 +207,20 @@ def new(
     Example: fpsolve new my.toml --frequency 2 --damping-ratio 0.01 --restitution 0.9
     """
     from fpsolve.case.templates import modes_of
+    from fpsolve.workflow.noise import modes_from
     from fpsolve.workflow.shipped import copy_case, described_cases, write_case
 
-    if any(each is not None for each in (kind, frequency, damping_ratio, restitution)):
+    if any(each is not None for each in (kind, frequency, damping_ratio, restitution, modes, mode)):
         if file is not None:
             raise FpsolveError(f"got {name} and {file}; with --kind and other options name the new file only")
+        if modes is not None and (frequency or damping_ratio):
+            raise FpsolveError("--modes states frequencies and damping; leave out --frequency and --damping-ratio")
+        if modes is None and mode is not None:
+            raise FpsolveError("--mode is for the table that --modes names; name one, or leave it out")
+        if modes is not None:
+            table = modes_from(modes, mode or (), restitution)
+            frequency = [each / (2 * math.pi) for each in table.omega]
+            damping_ratio = [each for each in table.zeta if not math.isnan(each)]
         made = modes_of(frequency or [], damping_ratio or [], restitution)
         print(f"written: {escaped(str(write_case(kind or 'oscillator', made, Path(name) if name else None)))}")
         return 0
@@ -646,10 +664,8 @@ def noise(
         float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
     ] = None,
     case: Annotated[Path | None, Parameter(help="A case instead, whose noise is replaced.")] = None,
-    modes: Annotated[
-        Path | None, Parameter(help="A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it.")
-    ] = None,
-    mode: Annotated[list[Count] | None, Parameter(help="A row of it; of two modes twice.", negative="")] = None,
+    modes: Modes = None,
+    mode: Mode = None,
     noise_in: Annotated[
         Literal["stiffness", "damping"] | None,
         Parameter(help="Where the noise is; stiffness if neither this nor --of is stated."),

@@ -129,6 +129,15 @@ def test_two_modes():
     assert np.sort(-values.real) == pytest.approx([0.01 * expected[0]] * 2 + [0.02 * expected[2]] * 2)
 
 
+def test_modes_of_a_table():
+    Path("modes.csv").write_text("Fn (Hz),Xi\n2.0,0.01\n3.5,0.02\n9.0,0.03\n", encoding="utf-8")
+    case = load_case(made("--modes", "modes.csv", "--mode", "1", "--mode", "2", "--kind", "modes"))
+    values = np.linalg.eigvals(sum(np.array(each.matrix) for each in case.system.terms if each.g == one))
+    expected = [2 * math.pi * f for f in (2, 2, 3.5, 3.5)]
+    assert np.sort(abs(values)) == pytest.approx(expected)
+    assert np.sort(-values.real) == pytest.approx([0.01 * expected[0]] * 2 + [0.02 * expected[2]] * 2)
+
+
 def test_a_kind_alone_needs_no_name(capsys):
     assert main(["new", "--kind", "system"]) == 0
     assert capsys.readouterr().out == "written: system.toml\n"
@@ -147,6 +156,9 @@ def test_a_kind_alone_needs_no_name(capsys):
         (["my.toml", "--frequency", "1", "--damping-ratio", "0.1", "--damping-ratio", "0.2"], "one for each"),
         (["mine", "--frequency", "1"], "must end in .toml"),
         (["fig1", "my.toml", "--frequency", "1"], "the new file only"),
+        (["my.toml", "--mode", "1"], "--mode is for the table"),
+        (["my.toml", "--modes", "none.csv"], "no such file"),
+        (["my.toml", "--modes", "none.csv", "--frequency", "1"], "leave out --frequency"),
     ],
 )
 def test_what_is_no_new_case(options, said, capsys):

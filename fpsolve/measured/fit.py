@@ -49,7 +49,7 @@ class Misfit(NamedTuple):
         name: "2ω", or another.
         omega: in rad/time.
         relative: measured/fitted − 1, the mean over a band.
-        error: its standard error; NaN where those of the values are not known.
+        error: its standard error; where those of the values are not known, by how far all of them are from the fit.
     """
 
     name: str
@@ -120,7 +120,7 @@ class NoiseFit:
     @property
     def off(self) -> float:
         """The largest share by which the fit is off where it matters, without what its standard error explains."""
-        squares = [each.relative**2 - (0 if math.isnan(each.error) else each.error**2) for each in self.misfit]
+        squares = [each.relative**2 - each.error**2 for each in self.misfit]
         return math.sqrt(max([0.0, *squares]))
 
     def at(self, values: Mapping[str, float]) -> NoiseFit:
@@ -374,7 +374,7 @@ def _told(
         parts.append(family.make(*own.tolist()))
         keys += [f"{name}.{each}" if len(families) > 1 else each for each in family.names]
         place += len(family.names)
-    misfit = tuple(_misfit(name, at, data, ratio, unknown) for name, at in matter.items())
+    misfit = tuple(_misfit(name, at, data, ratio, dispersion) for name, at in matter.items())
     messages = [
         Message(Code.NOISE_MISFIT, name=each.name, relative=each.relative, error=each.error)
         for each in misfit
@@ -383,7 +383,7 @@ def _told(
     messages += [Message(Code.SPECTRUM_GAP, low=low, high=high) for low, high in gaps(spectrum)]
     if unknown:
         messages.append(Message(Code.NO_SPECTRUM_ERROR))
-    size = np.sqrt(np.diag(information))
+    size = np.sqrt(np.maximum(np.diag(information), 1e-300))
     if np.linalg.eigvalsh(information / np.outer(size, size))[0] < UNTOLD:
         messages.append(Message(Code.UNTOLD_PARAMETERS))
     return NoiseFit(
@@ -397,12 +397,12 @@ def _told(
     )
 
 
-def _misfit(name: str, at: float, data: _Data, ratio: FloatArray, unknown: bool) -> Misfit:
+def _misfit(name: str, at: float, data: _Data, ratio: FloatArray, dispersion: float) -> Misfit:
     """In the band within 10 % of ω, or among the five nearest values."""
     distance = abs(data.omega - at)
     near = distance <= max(0.1 * at, float(np.sort(distance)[min(4, distance.size - 1)]))
     number = data.number[near]
     # Hann's window correlates neighbours: the variance of a sum over many is 35/18 times as large
     inflation = 35 / 18 if data.segments is not None else 1.0
-    error = math.nan if unknown else math.sqrt(inflation / float(np.sum(number)))
+    error = math.sqrt(dispersion * inflation / float(np.sum(number)))
     return Misfit(name, at, float(np.average(ratio[near], weights=number)), error)

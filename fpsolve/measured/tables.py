@@ -20,6 +20,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
+from fpsolve.measured.matlab import MatError, read_mat
 from fpsolve.reading import Unreadable, Words, read_bytes, read_text
 
 MOST_NUMBERS = 2**26
@@ -97,7 +98,8 @@ def _split(name: str, array: Any, unit: str = "") -> Iterator[tuple[str, Column]
         raise Unreadable(f"{name} has complex numbers; export real ones, such as a power spectral density")
     if found.dtype.kind not in "iufb":
         raise Unreadable(f"{name} has no numbers; export numbers")
-    found = np.squeeze(found).astype(float)
+    with np.errstate(invalid="ignore"):  # what is no number is said of its row later
+        found = np.squeeze(found).astype(float)
     if found.ndim == 0:
         return
     if found.ndim == 1:
@@ -205,7 +207,9 @@ def _npy(content: bytes, name: str) -> Any:
             _looked_at(shape, name, dtype.itemsize, len(content))
         file.seek(0)
         return np.load(file, allow_pickle=False)
-    except (ValueError, EOFError, OSError, TypeError, SyntaxError, KeyError, OverflowError, MemoryError) as error:
+    except Unreadable:
+        raise
+    except Exception as error:  # what reads the header raises many kinds for what is none
         raise Unreadable(f"is no file of NumPy ({_reason(error)}); save it with numpy.save or numpy.savez") from None
 
 
@@ -232,28 +236,17 @@ def _of_npz(path: Path) -> Table:
 
 
 def _of_mat(path: Path) -> Table:
-    from scipy.io import loadmat, whosmat
-
     content = read_bytes(path, WORDS)
     if content[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in content[:128]:
         raise Unreadable('is a MATLAB 7.3 file, which is HDF5; save it by save(..., "-v7")')
     columns = dict[str, Column]()
     try:
-        names = []
-        for name, shape, kind in whosmat(io.BytesIO(content)):
-            if kind in ("struct", "cell", "object", "function", "opaque", "char", "sparse", "unknown"):
-                continue
-            _looked_at(tuple(shape), name)
-            names.append(name)
-        found = loadmat(io.BytesIO(content), variable_names=names) if names else {}
-        for name in names:
-            columns |= _split(name, found[name])
-    except Unreadable:
-        raise
-    except Exception as error:  # scipy raises many kinds for what is no such file
+        for name, array in read_mat(content, MOST_NUMBERS):
+            columns |= _split(name, array)
+    except MatError as error:
         raise Unreadable(f'is no MATLAB file ({_reason(error)}); save it by save(..., "-v7")') from None
     if not columns:
-        raise Unreadable("has no arrays of numbers at its top level; save vectors, not structs or cells")
+        raise Unreadable("has no arrays of real numbers at its top level; save vectors, not structs or cells")
     return Table(path, columns)
 
 

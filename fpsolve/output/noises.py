@@ -168,7 +168,7 @@ def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
                 "density": float(density),
                 "density_error": float(error),
                 "measured_over_fitted": 1 + each.relative,
-                "measured_over_fitted_error": None if math.isnan(each.error) else each.error,
+                "measured_over_fitted_error": each.error,
             }
             for each, density, error in zip(fit.misfit, densities, errors, strict=True)
         ],
@@ -196,30 +196,19 @@ def print_noise(outcome: NoiseOutcome, source: Path, shown: Convention) -> None:
 def _misfit_grid(outcome: NoiseOutcome, source: Path, shown: Convention) -> Grid:
     """A row for each frequency that matters."""
     fit, noise_in = outcome.fit, outcome.wanted.noise_in
-    columns = [
-        Column(""),
-        Column(f"{shown.symbol} ({shown.per})"),
-        Column("S fitted"),
-        Column("± s.e."),
-        Column("measured/fitted"),
-    ]
+    headings = "", f"{shown.symbol} ({shown.per})", "S fitted", "± s.e.", "measured/fitted"
     unit = "s" if noise_in == "stiffness" else "1/s"
     remark = f"S of the {SIGNAL_WORDS[noise_in]}, two-sided, in {unit}; G = {shown.factor:.4g} S as in the figure"
-    grid = Grid(f"{source.name}: where stability depends on the noise", [*columns, Column("± s.e.", 1)], remark=remark)
+    grid = Grid(
+        f"{source.name}: where stability depends on the noise",
+        [*map(Column, headings), Column("± s.e.", 1)],
+        remark=remark,
+    )
     values, errors = density_of(fit, [each.omega for each in fit.misfit])
     for each, value, error in zip(fit.misfit, values.tolist(), errors.tolist(), strict=True):
-        told = "unknown" if math.isnan(each.error) else f"{each.error:.2g}"
-        frequency = f"{shown.frequency(each.omega):.4g}"
-        grid.rows.append(
-            [
-                each.name.replace("ω", shown.symbol),
-                frequency,
-                f"{value:.4g}",
-                f"{error:.2g}",
-                f"{1 + each.relative:.4g}",
-                told,
-            ]
-        )
+        name, frequency = each.name.replace("ω", shown.symbol), f"{shown.frequency(each.omega):.4g}"
+        numbers = f"{value:.4g}", f"{error:.2g}", f"{1 + each.relative:.4g}", f"{each.error:.2g}"
+        grid.rows.append([name, frequency, *numbers])
     return grid
 
 

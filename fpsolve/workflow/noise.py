@@ -153,7 +153,7 @@ def _modes(stated: Statement, of: str) -> Modes:
 
 
 def modes_from(path: Path, numbers: Sequence[int], restitution: float | None) -> Modes:
-    """One or two modes of a table, by their rows from 1 on; all if none are stated.
+    """One or two modes of a table, by their rows from 1 on; all if none are stated. Unknown damping is NaN.
 
     Raises:
         FpsolveError: the file is none, there are more than two modes, or a number is none of a row.

@@ -3,6 +3,7 @@
 import io
 import math
 import struct
+import sys
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.io import savemat, wavfile
 from fpsolve.errors import FpsolveError
 from fpsolve.measured import read_modes, read_record, read_spectrum
 from fpsolve.measured.signals import density_unit
+from fpsolve.measured.tables import read_table
 
 F = np.linspace(0.1, 8, 80)
 G = 0.02 / (1 + F**2)
@@ -240,3 +242,56 @@ def test_the_wrong_option(tmp_path):
 def test_times_are_even(t, said, tmp_path):
     with pytest.raises(FpsolveError, match=said):
         read_record(csv(tmp_path / "a.csv", "t (s),x", t, X))
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_arrays_of_matlab(compressed, tmp_path):
+    """All types of numbers, small ones among them, as scipy writes them; the rest is left out."""
+    arrays = {kind: np.array([[1, 2, 100]], dtype=kind) for kind in ("u1", "i2", "i4", "u8", "f4", "f8")}
+    wide = np.arange(12.0).reshape(6, 2)
+    others = {"text": "a", "cell": np.array([1, "a"], dtype=object), "z": np.array([1j]), "deep": {"x": 1.0}}
+    savemat(
+        tmp_path / "a.mat",
+        {**{f"x_{k}": v for k, v in arrays.items()}, "wide": wide, **others},
+        do_compression=compressed,
+    )
+    found = read_table(tmp_path / "a.mat").columns
+    assert set(found) == {*(f"x_{kind}" for kind in arrays), "wide 1", "wide 2"}
+    for kind in arrays:
+        assert found[f"x_{kind}"].values.tolist() == [1, 2, 100]
+    assert np.column_stack([found["wide 1"].values, found["wide 2"].values]).tolist() == wide.tolist()
+
+
+def test_a_universal_file_without_pyuff(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyuff", None)
+    with pytest.raises(FpsolveError, match=r"needs pyuff: pip install 'fpsolve\[measured\]'"):
+        read_spectrum(uff(tmp_path / "a.uff", 9, F, G), sided="one")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_damaged_files_are_read_or_refused_in_one_sentence(seed, tmp_path):
+    """Cut, with other bytes, with bytes that are gone or added."""
+    rng = np.random.default_rng(seed)
+    good = [(path, None) for path in spectra(tmp_path)]
+    (tmp_path / "records").mkdir()
+    good += list(records(tmp_path / "records"))
+    wavfile.write(tmp_path / "a.wav", 50, X.astype("<f4"))
+    said = []
+    for path, rate in [*good, (tmp_path / "a.wav", None)]:
+        for _ in range(40):
+            damaged = bytearray(path.read_bytes())
+            place = rng.integers(len(damaged))
+            new = bytes(rng.integers(0, 256, rng.integers(0, 40)).astype("u1"))
+            damaged[place : rng.choice([place + 1, place + len(new), len(damaged)])] = new
+            other = tmp_path / f"damaged{path.suffix}"
+            other.write_bytes(damaged)
+            try:
+                if path.parent.name == "records" or path.suffix == ".wav":
+                    read_record(other, rate=rate or 50)
+                else:
+                    read_spectrum(other, per="Hz", sided="one")
+            except FpsolveError as error:
+                said.append(str(error))
+    assert said
+    assert not [each for each in said if "\n" in each]
