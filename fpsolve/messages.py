@@ -311,6 +311,10 @@ class Code(Enum):
         "note: the errors of the measured values are not known, and are taken from how far these are from the fit; "
         "state how many averages they are of"
     )
+    UNTOLD_PARAMETERS = (
+        "warning: the values do not tell all parameters of the fit, whose errors are then not known, though that of "
+        "the density is; use fewer terms, or another kind"
+    )
     SHORT_RECORD = (
         "warning: the record is {times:.3g} correlation times long, too few for its standard errors; use a record of "
         "at least {least:g}"

@@ -92,7 +92,7 @@ def beside_records(folder):
 def test_summary_has_the_promised_form_and_the_computed_values(whole):
     results = whole.results
     summary = json.loads((whole.folder / "summary.json").read_text(encoding="utf-8"))
-    state = ["case", "title", "fpsolve_version", "complete", "planned", "done"]
+    state = ["case", "title", "fpsolve_version", "units", "complete", "planned", "done"]
     facts = ["versions", "command", "host", "started", "wall_seconds", "overrides", "case_text"]
     assert list(summary) == [*state, *facts, "curves"]
     assert (summary["case"], summary["title"]) == ("test", "A test")

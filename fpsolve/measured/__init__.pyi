@@ -1,6 +1,9 @@
 from .fit import NoiseFit as NoiseFit
 from .fit import fit_noise as fit_noise
 from .moments import non_gaussian_from_record as non_gaussian_from_record
+from .reading import read_modes as read_modes
+from .reading import read_record as read_record
+from .reading import read_spectrum as read_spectrum
 from .spectrum import Record as Record
 from .spectrum import Spectrum as Spectrum
 from .stability import Verdict as Verdict

@@ -36,6 +36,8 @@ FLOOR, WIDTH = 0.02, 0.3
 NAMES = ("first", "second", "third")
 """Of the noises of a sum."""
 MOST_TERMS = len(NAMES)
+UNTOLD = 1e-8
+"""Of the information of scaled parameters: a smaller eigenvalue is of a direction that the values do not tell."""
 MISFIT = 3.0
 """Standard errors by which a fit may be wrong where it matters before that is said."""
 
@@ -47,7 +49,7 @@ class Misfit(NamedTuple):
         name: "2ω", or another.
         omega: in rad/time.
         relative: measured/fitted − 1, the mean over a band.
-        error: its standard error; NaN where those of the values are not known.
+        error: its standard error; where those of the values are not known, by how far all of them are from the fit.
     """
 
     name: str
@@ -81,7 +83,8 @@ class NoiseFit:
 
     @property
     def errors(self) -> Mapping[str, float]:
-        return dict(zip(self.parameters, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        variances = np.maximum(np.diag(self.covariance), 0.0)
+        return dict(zip(self.parameters, np.sqrt(variances).tolist(), strict=True))
 
     @cached_property
     def noise(self) -> Noise:
@@ -98,28 +101,37 @@ class NoiseFit:
 
     def scaled(self, factor: float) -> NoiseFit:
         """The fit of the signal times a factor, such as `of_relative_stiffness`; its misfits and messages stay."""
-        powers = {"sigma": 1, "s": 1, "mu": 1, "D0": 2}
-        kinds = dict(zip(NAMES, self.parts, strict=False))
-
-        def size(key: str) -> float:
-            part, _, name = key.rpartition(".")
-            noise = kinds[part or NAMES[0]]
-            return abs(factor) ** powers[name] if name in noise.of_xi else 1.0
-
-        sizes = np.array([size(key) for key in self.parameters])
+        sizes = abs(factor) ** self.powers
         parameters = {key: value * by for (key, value), by in zip(self.parameters.items(), sizes, strict=True)}
-        own = {name: dict[str, float]() for name in kinds}
+        covariance = self.covariance * np.outer(sizes, sizes)
+        return replace(self.at(parameters), covariance=covariance, spectrum=self.spectrum.scaled(factor))
+
+    @property
+    def powers(self) -> FloatArray:
+        """The power of a factor of ξ by which each parameter changes, shape (k,)."""
+        known, kinds = {"sigma": 1.0, "s": 1.0, "mu": 1.0, "D0": 2.0}, dict(zip(NAMES, self.parts, strict=False))
+
+        def power(key: str) -> float:
+            part, _, name = key.rpartition(".")
+            return known[name] if name in kinds[part or NAMES[0]].of_xi else 0.0
+
+        return np.array([power(key) for key in self.parameters])
+
+    @property
+    def off(self) -> float:
+        """The largest share by which the fit is off where it matters, without what its standard error explains."""
+        squares = [each.relative**2 - each.error**2 for each in self.misfit]
+        return math.sqrt(max([0.0, *squares]))
+
+    def at(self, values: Mapping[str, float]) -> NoiseFit:
+        """The same with other values of some parameters, by their keys."""
+        parameters = {**self.parameters, **values}
+        own = {name: dict[str, float]() for name in NAMES}
         for key, value in parameters.items():
-            part, _, parameter = key.rpartition(".")
-            own[part or NAMES[0]][parameter] = value
-        parts = tuple(noise.at(own[name]) for name, noise in kinds.items())
-        return replace(
-            self,
-            parts=parts,
-            parameters=parameters,
-            covariance=self.covariance * np.outer(sizes, sizes),
-            spectrum=self.spectrum.scaled(factor),
-        )
+            part, _, name = key.rpartition(".")
+            own[part or NAMES[0]][name] = value
+        parts = tuple(noise.at(own[name]) for name, noise in zip(NAMES, self.parts, strict=False))
+        return replace(self, parts=parts, parameters=parameters)
 
 
 class _Data(NamedTuple):
@@ -198,7 +210,7 @@ def _refuse_far(spectrum: Spectrum, matter: Mapping[str, float]) -> None:
             k = int(np.argmin(abs(omega - target)))
             raise ValueError(
                 f"nothing was measured near {name} = {target:.4g} rad/time, which stability depends on; the nearest "
-                f"point is {omega[k]:.4g}; measure there, or see whether frequency is in rad/time"
+                f"point is {omega[k]:.4g}; measure there, or correct the natural frequency or its unit"
             )
 
 
@@ -337,7 +349,8 @@ def _told(
     n, k = data.values.size, theta.size
     unknown = method == "spectrum" and spectrum.relative_error is None
     dispersion = float(np.sum(weights * ratio**2) / np.sum(weights)) * n / max(n - k, 1) if unknown else 1.0
-    bread = np.linalg.pinv(slopes.T @ (slopes * (weights * data.number)[:, None]))
+    information = slopes.T @ (slopes * (weights * data.number)[:, None])
+    bread = np.linalg.pinv(information, hermitian=True)
     if data.segments is None:
         meat = dispersion * slopes.T @ (slopes * (weights**2 * data.number)[:, None])
     elif all(family.is_gaussian for family in families):
@@ -361,7 +374,7 @@ def _told(
         parts.append(family.make(*own.tolist()))
         keys += [f"{name}.{each}" if len(families) > 1 else each for each in family.names]
         place += len(family.names)
-    misfit = tuple(_misfit(name, at, data, ratio, unknown) for name, at in matter.items())
+    misfit = tuple(_misfit(name, at, data, ratio, dispersion) for name, at in matter.items())
     messages = [
         Message(Code.NOISE_MISFIT, name=each.name, relative=each.relative, error=each.error)
         for each in misfit
@@ -370,6 +383,9 @@ def _told(
     messages += [Message(Code.SPECTRUM_GAP, low=low, high=high) for low, high in gaps(spectrum)]
     if unknown:
         messages.append(Message(Code.NO_SPECTRUM_ERROR))
+    size = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    if np.linalg.eigvalsh(information / np.outer(size, size))[0] < UNTOLD:
+        messages.append(Message(Code.UNTOLD_PARAMETERS))
     return NoiseFit(
         parts=tuple(parts),
         parameters=dict(zip(keys, values.tolist(), strict=True)),
@@ -381,12 +397,12 @@ def _told(
     )
 
 
-def _misfit(name: str, at: float, data: _Data, ratio: FloatArray, unknown: bool) -> Misfit:
+def _misfit(name: str, at: float, data: _Data, ratio: FloatArray, dispersion: float) -> Misfit:
     """In the band within 10 % of ω, or among the five nearest values."""
     distance = abs(data.omega - at)
     near = distance <= max(0.1 * at, float(np.sort(distance)[min(4, distance.size - 1)]))
     number = data.number[near]
     # Hann's window correlates neighbours: the variance of a sum over many is 35/18 times as large
     inflation = 35 / 18 if data.segments is not None else 1.0
-    error = math.nan if unknown else math.sqrt(inflation / float(np.sum(number)))
+    error = math.sqrt(dispersion * inflation / float(np.sum(number)))
     return Misfit(name, at, float(np.average(ratio[near], weights=number)), error)

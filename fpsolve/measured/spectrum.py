@@ -13,6 +13,8 @@ from scipy.integrate import trapezoid
 
 from fpsolve.arrays import FloatArray, is_whole, shown
 
+LARGEST = 1e100
+"""Of any value, so that squares are numbers."""
 SHORTEST = 256
 """Samples of a record at least."""
 SEGMENTS = 64
@@ -29,6 +31,9 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
     if not np.all(np.isfinite(found)):
         i = int(np.flatnonzero(~np.isfinite(found))[0])
         raise ValueError(f"{name} has the value {found[i]} at row {i + 1}; remove rows that are no numbers")
+    if np.max(np.abs(found)) > LARGEST:
+        i = int(np.argmax(np.abs(found)))
+        raise ValueError(f"{name} has the value {found[i]:g} at row {i + 1}; must be at most {LARGEST:g}; correct it")
     return found
 
 

@@ -21,7 +21,7 @@ from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 class Verdict:
     """λ and Λ(2), in 1/time, each a `Spread` with a standard error; `below` of it is the probability that it is < 0.
 
-    The law is normal, and the error of the fit alone counts: a family of noise that is not the true one is not in it.
+    The law is normal. Its variance is that of the fit, and what the fit is off where it matters beyond standard errors.
     """
 
     exponent: Spread
@@ -29,7 +29,11 @@ class Verdict:
 
 
 def verdict(problem: Problem, fit: NoiseFit, *, rtol: float | None = None) -> Verdict:
-    """λ and Λ(2) with the standard errors √(gᵀCg), g = ∂/∂θ by the parameters of the noise and C their covariance.
+    """λ and Λ(2) with the standard errors √(gᵀCg + (m ∂/∂ ln S)²).
+
+    g = ∂/∂θ by the parameters of the noise, and C is their covariance. ∂/∂ ln S is the derivative by the size of the
+    whole spectrum. m² is the largest of (measured/fitted − 1)² minus its variance at the frequencies that matter: where
+    the family is not the true one, it tells the error that this makes.
 
     Args:
         problem: a system with `fit.noise`, in the unit in which the system takes it, see `NoiseFit.scaled`.
@@ -46,12 +50,16 @@ def verdict(problem: Problem, fit: NoiseFit, *, rtol: float | None = None) -> Ve
     solver = ExponentSolver(problem, rtol=rtol)
     exponent, moment = solver.lyapunov_exponent(), solver.solution(2.0)
     found = sensitivities(problem, [2.0], rtol=rtol)
+    section = problem.system.noise_sections[0] if len(fit.parts) == 1 else "noise"
     return Verdict(
-        _spread(exponent.value, exponent.error_estimate, found.indices[LYAPUNOV_EXPONENT.name], fit),
-        _spread(moment.pair.value, 0.0, found.moments[0], fit),
+        _spread(exponent.value, exponent.error_estimate, found.indices[LYAPUNOV_EXPONENT.name], fit, section),
+        _spread(moment.pair.value, moment.error, found.moments[0], fit, section),
     )
 
 
-def _spread(value: float, error: float, slopes: Mapping[str, Estimate], fit: NoiseFit) -> Spread:
-    g = np.array([slopes[f"noise.{key}"].value for key in fit.parameters])
-    return Spread(value, value, math.hypot(math.sqrt(max(float(g @ fit.covariance @ g), 0.0)), error))
+def _spread(value: float, error: float, slopes: Mapping[str, Estimate], fit: NoiseFit, section: str) -> Spread:
+    g = np.array([slopes[f"{section}.{key}"].value for key in fit.parameters])
+    by_size = 0.5 * float(g @ (fit.powers * np.array([*fit.parameters.values()])))
+    return Spread(
+        value, value, math.hypot(math.sqrt(max(float(g @ fit.covariance @ g), 0.0)), error, fit.off * by_size)
+    )

@@ -10,6 +10,9 @@ import math
 
 from fpsolve.arrays import shown
 
+GRAVITY = 9.80665
+"""In m/s²."""
+
 
 def _positive(name: str, value: float) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
@@ -29,7 +32,7 @@ def of_relative_stiffness(omega: float) -> float:
     return _positive("omega", omega) ** 2
 
 
-def of_support_acceleration(gravity: float = 9.80665) -> float:
+def of_support_acceleration(gravity: float = GRAVITY) -> float:
     """1/g, by which the vertical acceleration of the support of a pendulum becomes a relative stiffness.
 
     A pendulum of length ℓ whose support has the acceleration a upward obeys ϑ̈ + 2ζω ϑ̇ + ((g + a)/ℓ) ϑ = 0, so that

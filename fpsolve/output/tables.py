@@ -191,9 +191,10 @@ def in_case_words(messages: Sequence[str]) -> list[str]:
     return [message_of(each).words(CASE_WORDS) for each in messages]
 
 
-def head(case: Case) -> dict[str, str]:
+def head(case: Case) -> dict[str, Any]:
     """What every table begins with."""
-    return {"case": case.name, "title": case.title, "fpsolve_version": __version__}
+    units = {"units": {"time": case.units.time}}
+    return {"case": case.name, "title": case.title, "fpsolve_version": __version__, **units}
 
 
 def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
