@@ -484,9 +484,9 @@ def test_parameters():
 
 START = """
 import sys
-import fpsolve, fpsolve.cli
+import fpsolve, fpsolve.cli, fpsolve.workflow.cases
 fpsolve.VibroImpactOscillator, fpsolve.ExponentSolver, fpsolve.tilted_density, fpsolve.sensitivities, fpsolve.boundary
-print(sorted({"xarray", "pandas", "matplotlib", "h5netcdf", "h5py", "IPython"} & set(sys.modules)))
+print(sorted({"xarray", "pandas", "matplotlib", "h5netcdf", "h5py", "IPython", "numba"} & set(sys.modules)))
 """
 
 

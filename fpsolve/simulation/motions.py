@@ -31,25 +31,11 @@ from numba.extending import overload
 
 from fpsolve.arrays import FloatArray
 from fpsolve.simulation.compiled import compiled, inlined
+from fpsolve.simulation.rays import Rays
 
 _LIMIT = 0.75**2
 """p² + ½(q² + r²) of Ω above which a step is taken in parts: below, series are exact, and no turn is overlooked."""
 _MOST_PARTS = 10_000
-
-
-class Rays(NamedTuple):
-    """Lines at which the norm grows.
-
-    Attributes:
-        along, across: unit vectors along each line, and the same turned by 90°, shape (rays, 2).
-        logs: ln R.
-        ways: the side to which the line is crossed, 1 or −1; 0 where it is crossed to both sides.
-    """
-
-    along: FloatArray
-    across: FloatArray
-    logs: FloatArray
-    ways: FloatArray
 
 
 def _draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]

@@ -21,7 +21,8 @@ from numba.extending import overload
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.simulation.compiled import compiled
-from fpsolve.simulation.motions import Rays, drawn, exact_factors, factors, flow_on
+from fpsolve.simulation.motions import drawn, exact_factors, factors, flow_on
+from fpsolve.simulation.rays import Rays
 
 
 class Driver(NamedTuple):

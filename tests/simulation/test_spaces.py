@@ -12,7 +12,7 @@ from fpsolve.arrays import identity
 from fpsolve.model import CoefficientMatrix, Filter, LinearSystem, MarkovChain, SineWiener, Telegraph, White
 from fpsolve.simulation.coefficients import Coefficients, coefficients
 from fpsolve.simulation.kernels import advance
-from fpsolve.simulation.motions import Rays
+from fpsolve.simulation.rays import Rays
 from fpsolve.simulation.setup import transient
 from fpsolve.simulation.spaces import step_driven_space
 from tests.conftest import UNIT_NOISE, sampled
