@@ -487,14 +487,14 @@ def test_a_closed_pipe_ends_a_command_quietly(case, arguments, unbuffered):
 
 @pytest.mark.parametrize(
     ("arguments", "code"),
-    sampled((["nonsense"], BAD_INPUT), (["run", "test.toml", *WITH_FIGURE], 0), (["run", "none.toml"], BAD_INPUT)),
+    sampled((["nonsense"], BAD_INPUT), (["run", "test.toml", "--set", LEAN], 0), (["run", "none.toml"], BAD_INPUT)),
 )
 def test_full_errors_keep_the_exit_code(case, tmp_path, arguments, code):
     """A run goes on without them."""
     with Path("/dev/full").open("w", encoding="utf-8") as full:
         done = command_line(arguments, stderr=full, stdout=subprocess.DEVNULL)
     assert done.returncode == code
-    assert (tmp_path / "results/test/figure.png").exists() == (code == 0)
+    assert (tmp_path / "results/test/results.nc").exists() == (code == 0)
 
 
 def test_a_lost_working_folder_exits_2(case, tmp_path):
