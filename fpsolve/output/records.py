@@ -30,6 +30,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.kinds import varying
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
@@ -137,6 +138,7 @@ class Results(Sequence[CurveResult]):
 
     def __init__(self, case: Case, records: Records) -> None:
         self._case, self._records, self._asked = case, records, everything(case).p.tolist()
+        self._problem_of = varying(case.problem)
         self._found: dict[int, Address | CurveResult] = {}
         self._order: list[int] = []
         self._kept: dict[int, CurveResult] = {}
@@ -160,11 +162,9 @@ class Results(Sequence[CurveResult]):
             self.add(curve.number, address)
         return is_whole
 
-    def has(self, curve: Curve) -> bool:
-        return curve.number in self._found
-
-    def of(self, curve: Curve) -> CurveResult | None:
-        return self._result(curve) if self.has(curve) else None
+    def has(self, number: int) -> bool:
+        """Whether that of the curve with a number is known."""
+        return number in self._found
 
     def __len__(self) -> int:
         return len(self._order)
@@ -173,19 +173,20 @@ class Results(Sequence[CurveResult]):
         numbers = self._order[index]
         if isinstance(numbers, list):
             return [self[i] for i in range(*index.indices(len(self)))]
-        if (known := self._kept.get(numbers)) is not None:
-            return known
-        [curve] = self._case.curves(numbers - 1, numbers)
-        return self._result(curve)
+        return self.of(numbers)
 
-    def _result(self, curve: Curve) -> CurveResult:
-        found = self._found[curve.number]
+    def of(self, number: int) -> CurveResult:
+        """That of the curve with a number, if it is known. Raises `KeyError`."""
+        if (known := self._kept.get(number)) is not None:
+            return known
+        found = self._found[number]
         if not isinstance(found, Address):
             return found
-        result = result_of(self._records.read(found), curve)
+        [varied] = self._case.vary.sets(number - 1, number)
+        result = result_of(self._records.read(found), Curve(self._problem_of(varied), varied, number))
         if found.size <= self._room:
             self._room -= found.size
-            self._kept[curve.number] = result
+            self._kept[number] = result
         return result
 
 

@@ -10,7 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fpsolve.case.case import Case, Curve, load_case
+from fpsolve.case.case import Case, load_case
+from fpsolve.case.sections import Varied
 from fpsolve.errors import NotConverged
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
@@ -319,17 +320,18 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
     """
     found: list[CurveResult] = []
 
-    def wanted(curve: Curve) -> Wanted:
-        return Wanted(even_moments(case), ()) if by_hierarchy else expected(case, curve)
+    def order(number: int, varied: Varied) -> Order:
+        return Order(number, varied, Wanted(even_moments(case), ()) if by_hierarchy else expected(case, varied))
 
     with (
         saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
         pool or serial() as workers,
     ):
-        task = partial(solve_batch, numerics=Numerics.of(case), keep=result_alone)
-        for done in workers.run(task, batches(case, lambda curve: Order(curve, wanted(curve)))):
-            results = [lost(order.curve) for order in done.item] if done.result is None else done.result
+        task = partial(solve_batch, problem=case.problem, numerics=Numerics.of(case), keep=result_alone)
+        for done in workers.run(task, batches(case, order)):
+            dead = [each.number for each in done.item] if done.result is None else []
+            results = done.result or [lost(curve) for number in dead for curve in case.curves(number - 1, number)]
             for result in filter(None, results):
                 found.append(result)
                 progress(failed=result.status.fails)
