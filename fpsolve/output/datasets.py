@@ -117,7 +117,7 @@ def _variables(case: Case, results: Iterable[CurveResult]) -> dict[str, Variable
         each.name: Variable(
             (*over, *each.dims),
             values.reshape(shape + values.shape[1:]),
-            each.attributes | (flags if each is STATUS else {}),
+            each.timed(case.units.time).attributes | (flags if each is STATUS else {}),
         )
         for each, values in columns
     }
@@ -131,7 +131,7 @@ def _coordinates(case: Case) -> dict[str, Variable]:
         values = np.array(
             vary.columns[key] if is_list else vary.values(key), dtype=object if vary.is_text(key) else float
         )
-        about = {} if vary.is_text(key) else case.parameters[key].quantity.attributes
+        about = {} if vary.is_text(key) else case.about(key).attributes
         found[key] = Variable((SET if is_list else key,), values, about)
     if MOMENT.name in case.output.quantities:
         found["p"] = Variable(("p",), case.p, P.attributes)
