@@ -140,10 +140,8 @@ def _coordinates(case: Case) -> dict[str, Variable]:
 
 def _origin(case: Case, facts: Mapping[str, Any]) -> dict[str, str | float | int]:
     """The case, the parameters that are not varied, and where the numbers come from."""
-    [first] = case.curves(0, 1)
-    held = {key: value for key, value in first.parameters.items() if key not in case.vary.keys}
     origin = {name: each if isinstance(each, str | float | int) else json.dumps(each) for name, each in facts.items()}
-    return {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **held, **origin}
+    return {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.held, **origin}
 
 
 def open_results(*places: str | Path, errors: Literal["raise", "warn"] = "raise") -> xr.Dataset:

@@ -51,6 +51,8 @@ LONGEST, MOST_NUMBERS = 2**28, 2**24
 """Of a line, in bytes, and of an array."""
 KEPT = 2**24
 """Bytes of the records whose results stay in memory once they are read, as each table and figure asks for all."""
+MOST_LISTED = 8
+"""Numbers of an array that is a list in a record; longer ones take less room and time compressed."""
 _NAMES: dict[int, str] = {}
 """The file of this process."""
 Record = dict[str, Any]
@@ -391,7 +393,7 @@ def codec(kind: Any) -> Codec:
         made = lru_cache(lambda text: row.made(json.loads(text)))
         return Codec(row.form, plain, lambda data: made(_checked(data, str)))
     if origin is get_origin(FloatArray):  # np.ndarray, or NDArray itself since NumPy 2.5
-        return Codec("array", _packed, _unpacked)
+        return Codec("array or list", _packed, _unpacked)
     if origin is Literal:
         return Codec(parts, str, lambda data: parts[parts.index(data)])
     if origin is UnionType and NoneType in parts:
@@ -444,12 +446,16 @@ def _checked(data: Any, kind: Any) -> Any:
     return data
 
 
-def _packed(value: FloatArray) -> Record:
+def _packed(value: FloatArray) -> Record | list[float | str]:
+    if value.ndim == 1 and value.size <= MOST_LISTED:
+        return [each if math.isfinite(each) else str(each) for each in map(float, value)]
     data = np.ascontiguousarray(value, dtype="<f8").tobytes()
     return {"shape": list(value.shape), "data": b64encode(zlib.compress(data)).decode("ascii")}
 
 
-def _unpacked(packed: Mapping[str, Any]) -> FloatArray:
+def _unpacked(packed: Any) -> FloatArray:
+    if isinstance(packed, list):
+        return np.array([each if type(each) is float else _number(each) for each in packed], dtype=float)
     shape = tuple(_checked(size, int) for size in packed["shape"])
     if min(shape, default=1) < 0 or (count := math.prod(shape)) > MOST_NUMBERS:
         raise ValueError(f"there is no array of shape {shape}")
@@ -469,6 +475,8 @@ def _text(data: Any) -> str:
 
 def _strict(data: Any) -> Any:
     """What strict JSON in UTF-8 can hold."""
+    if type(data) is int or (type(data) is float and math.isfinite(data)):
+        return data
     _text(json.dumps(data, allow_nan=False, ensure_ascii=False))
     return data
 

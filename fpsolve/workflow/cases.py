@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fpsolve.case.case import Case, load_case
 from fpsolve.case.sections import Varied
@@ -62,6 +62,7 @@ class Outcome:
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
         comparisons: what the case expects beside what was computed.
         faults: of a noise that is no kind of fpsolve, see `check_noise`.
+        facts: versions, the command and the time of a run that solves, see `facts_of`.
         known: how many of its curves an earlier run had finished.
         outdated: how many records of its curves another version has written; these are not used.
         samples: what the samples of its uncertain parameters say; None where there are none.
@@ -72,6 +73,7 @@ class Outcome:
     interruption: str = ""
     comparisons: tuple[Comparison, ...] = ()
     faults: tuple[Message, ...] = ()
+    facts: Mapping[str, Any] = field(default_factory=dict)
     known: int = 0
     outdated: int = 0
     samples: Samples | None = None
@@ -171,7 +173,7 @@ def run_case(
                     case,
                     folder,
                     watch,
-                    facts=sweep.facts(),
+                    facts=sweep.facts,
                     results=sweep.results,
                     simulated=simulated,
                     samples=samples,
@@ -191,6 +193,7 @@ def run_case(
         sweep.results,
         tuple(simulated),
         interruption,
+        facts=sweep.facts,
         known=sweep.known,
         outdated=sweep.records.outdated,
         samples=samples,

@@ -40,8 +40,8 @@ Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
 Orders = tuple[Order, ...]
 SOLVED_RECORDS, SIMULATED_RECORDS = "records/solved", "records/simulated"
-GROWTH = 2
-"""Tables are rewritten when they have grown by this factor, so that all of it costs as little as the last ones."""
+REST = 50
+"""Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
 
 
 def keep(folder: Path, numerics: Numerics, order: Order, curve: Curve, solved: Solved) -> Found:
@@ -85,8 +85,8 @@ class Sweep(_Kept):
         super().__init__(case, folder.resolve(), is_fresh=is_fresh)
         self.started, self._clock = datetime.now(UTC), monotonic()
         self.numerics, self.first, self.further = Numerics.of(case), everything(case, 1), everything(case, 2)
-        self.results = Results(case, self.records)
-        self._tabled = self._settled = 0
+        self.results, self.facts = Results(case, self.records), dict[str, Any]()
+        self._settled, self._due = 0, 0.0
         self._steps_each = max(self.first.p.size, 1) if case.planned == 1 else 1
         self.find()
         self.known = len(self.results)
@@ -125,21 +125,19 @@ class Sweep(_Kept):
                         self.results.add(number, found)
                     is_reported = is_alone and not self.known  # p by p
                     progress(0 if is_reported else self._steps_each, failed=int(is_failed))
-                if len(self.results) >= GROWTH * self._tabled + 1:
+                if monotonic() >= self._due:
                     self.write_tables()
 
     def write_tables(self) -> None:
-        self._tabled = len(self.results)
-        write_results(self.case, self.results, self.folder, self.facts())
+        started, self.facts = monotonic(), facts_of(self.case, self.started, monotonic() - self._clock)
+        write_results(self.case, self.results, self.folder, self.facts)
+        self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
         """Write the tables, results.nc, and the series over the curves."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        write_dataset(self.case, self.results, self.folder, self.facts())
-
-    def facts(self) -> dict[str, Any]:
-        return facts_of(self.case, self.started, monotonic() - self._clock)
+        write_dataset(self.case, self.results, self.folder, self.facts)
 
     def _wanted(self, number: int) -> Wanted:
         return self.first if number == 1 else self.further
