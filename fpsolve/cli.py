@@ -281,6 +281,7 @@ def run(
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
+    from fpsolve.output.tables import whole_summary
     from fpsolve.output.terminal import done_of, known_of, note_missing, print_written
     from fpsolve.study.uncertain import refuse_wrong_samples
     from fpsolve.workflow.cases import run_case
@@ -300,8 +301,7 @@ def run(
         if not quiet:
             note_missing(case, monte_carlo=monte_carlo)
         if json:
-            lines = (out / case.name / "summary.json").read_text(encoding="utf-8").splitlines()
-            print(" ".join(line.strip() for line in lines))
+            print(whole_summary(case, outcome.results, outcome.facts))
         else:
             what = done_of(case, len(outcome.results), sum(each.status.fails for each in outcome.results))
             print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known, outcome.outdated))

@@ -19,7 +19,7 @@ from fpsolve.case.sections import QUANTITY_NAMES
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
 from fpsolve.files import alone
 from fpsolve.model.problem import Problem
-from fpsolve.output import figures
+from fpsolve.output import figures, tables
 from fpsolve.output.terminal import digits
 from fpsolve.study import solve
 from tests.conftest import FIG1, FIG1_NOISE, heed_signals, sampled, started
@@ -487,14 +487,14 @@ def test_a_closed_pipe_ends_a_command_quietly(case, arguments, unbuffered):
 
 @pytest.mark.parametrize(
     ("arguments", "code"),
-    sampled((["nonsense"], BAD_INPUT), (["run", "test.toml", *WITH_FIGURE], 0), (["run", "none.toml"], BAD_INPUT)),
+    sampled((["nonsense"], BAD_INPUT), (["run", "test.toml", "--set", LEAN], 0), (["run", "none.toml"], BAD_INPUT)),
 )
 def test_full_errors_keep_the_exit_code(case, tmp_path, arguments, code):
     """A run goes on without them."""
     with Path("/dev/full").open("w", encoding="utf-8") as full:
         done = command_line(arguments, stderr=full, stdout=subprocess.DEVNULL)
     assert done.returncode == code
-    assert (tmp_path / "results/test/figure.png").exists() == (code == 0)
+    assert (tmp_path / "results/test/results.nc").exists() == (code == 0)
 
 
 def test_a_lost_working_folder_exits_2(case, tmp_path):
@@ -631,6 +631,36 @@ def test_json_prints_the_summary_and_nothing_else(case, tmp_path, capsys):
     assert out.count("\n") == 1
     assert json.loads(out) == json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))
     assert err == ""
+
+
+def test_many_curves_leave_their_numbers_to_results_nc(case, tmp_path, monkeypatch, capsys):
+    """summary.json has state and messages of each; the next command still knows whose files these are."""
+    sets = ["--set", 'vary={ "noise.treatment" = ["ou-reduction", "exact"], "oscillator.epsilon" = [0.1, 1.0] }']
+    command = [
+        "run",
+        case,
+        "--json",
+        *sets,
+        "--set",
+        "output={ figure = false, quantities = ['moment', 'sensitivities'] }",
+    ]
+    assert main(command) == 0
+    few = json.loads(capsys.readouterr().out)
+    monkeypatch.setattr(tables, "MOST_SUMMARISED", 3)
+    assert main(command) == 0
+    many = json.loads(capsys.readouterr().out)
+    known = {"command", "started", "wall_seconds"}
+    assert {**few, **dict.fromkeys(known)} == {**many, **dict.fromkeys(known)}
+    written = json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))
+    told = {"varied", "status", "sensitivities", "warnings", "notes"}
+    assert written["curves"] == [{key: each[key] for key in told} for each in few["curves"]]
+    assert any(each["notes"] for each in written["curves"])
+    for short, each in zip(written["curves"], few["curves"], strict=True):
+        assert written["parameters"] | short["varied"] == each["parameters"]
+    assert main(["simulate", case, *sets, "--paths", "64", "--time", "20"]) == 0
+    assert "summary.json" in files(tmp_path / "results/test")
+    assert main(["simulate", case, *sets, "--paths", "64", "--time", "20", "--set", "noise.tau0=0.6"]) == 0
+    assert "summary.json" not in files(tmp_path / "results/test")
 
 
 def test_json_of_several_cases_is_a_line_each_and_warnings_are_apart(case, tmp_path, capsys):

@@ -31,6 +31,7 @@ from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
 from fpsolve.simulation.response import MEANS
 from fpsolve.study.solve import Numerics, Wanted, solve_curve
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
+from tests.solving import case_text
 
 matplotlib.use("Agg")
 REDUCED = FIG1_NOISE.ou_reduction()
@@ -488,12 +489,21 @@ def test_parameters():
 
 START = """
 import sys
-import fpsolve, fpsolve.cli
+import fpsolve, fpsolve.cli, fpsolve.workflow.cases
 fpsolve.VibroImpactOscillator, fpsolve.ExponentSolver, fpsolve.tilted_density, fpsolve.sensitivities, fpsolve.boundary
-print(sorted({"xarray", "pandas", "matplotlib", "h5netcdf", "h5py", "IPython"} & set(sys.modules)))
+slow = {"xarray", "pandas", "matplotlib", "IPython", "numba"}
+print(sorted({*slow, "h5netcdf", "h5py"} & set(sys.modules)))
+fpsolve.cli.main(["run", "test.toml", "--quiet"])
+print(sorted({*slow, "pyvista"} & set(sys.modules)))
 """
+QUICK = '[moments]\np = [1.0]\n[output]\nfigure = false\nquantities = ["moment"]\n'
 
 
-def test_nothing_that_takes_long_is_imported_at_the_start():
-    done = subprocess.run([sys.executable, "-c", START], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+def test_nothing_that_takes_long_is_imported_at_the_start(tmp_path):
+    """Nor by a run without figures."""
+    (tmp_path / "test.toml").write_text(case_text(QUICK), encoding="utf-8")
+    done = subprocess.run([sys.executable, "-c", START], capture_output=True, text=True, check=True, cwd=tmp_path)
+    before, written, after = done.stdout.splitlines()
+    assert (before, after) == ("[]", "[]")
+    assert written.startswith("written: ")
+    assert (tmp_path / "results/test/results.nc").is_file()

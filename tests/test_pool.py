@@ -17,30 +17,9 @@ from fpsolve import pool
 from fpsolve.errors import FpsolveError
 from fpsolve.pool import PROCESSORS, Pool, cluster, limit_processors, parallel, processors, serial
 from tests.conftest import heed_signals, sampled
+from tests.pool_tasks import deadly, faulty, in_three_steps, square, whereabouts
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-
-
-def square(number):
-    return number * number
-
-
-def deadly(number):
-    if number == 7:
-        os.kill(os.getpid(), signal.SIGKILL)
-    time.sleep(0.01)
-    return number
-
-
-def faulty(number):
-    if number == 3:
-        raise OSError(28, "No space left on device")
-    return number
-
-
-def whereabouts(_):
-    time.sleep(0.05)
-    return os.getpid(), processors()
 
 
 class KilledWorker(Exception):
@@ -182,10 +161,6 @@ def test_little_work_is_done_here(monkeypatch):
     assert len(set(found)) == 3
 
 
-def in_three_steps(item, told):
-    return [told() for _ in range(3)] + [item]
-
-
 def test_steps_of_tasks_are_told(monkeypatch):
     """In this process at once; a worker counts them; on another machine nobody is told."""
     told, steps = [], pool.Steps(lambda: told.append(1))
@@ -212,7 +187,7 @@ def test_steps_of_workers_are_told_before_their_results():
 
 SCRIPT = """
 from fpsolve.pool import parallel
-from tests.test_pool import square
+from tests.pool_tasks import square
 with parallel(2) as workers:
     print(sum(done.result for done in workers.run(square, range(4))))
 """

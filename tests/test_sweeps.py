@@ -348,9 +348,9 @@ def test_the_first_sets_come_one_by_one(place):
 
     num = "{ start = 0.1, stop = 1.0, num = 40 }"
     case = load_case(place / "sweep.toml", [f'vary={{ "noise.D0" = {num}, "noise.tau0" = {num} }}'])
-    found = list(batches(case, lambda curve: Order(curve, everything(case))))
+    found = list(batches(case, lambda number, varied: Order(number, varied, everything(case))))
     assert [len(batch) for batch in found[:8]] == [1] * 6 + [6] * 2
-    assert [order.curve.number for batch in found for order in batch] == list(range(1, 1601))
+    assert [order.number for batch in found for order in batch] == list(range(1, 1601))
 
 
 def test_records_are_read_once(tmp_path, monkeypatch):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -25,6 +26,8 @@ LONGEST, SHORTEST = 0.02, 1e-5
 MOST_TURN = 0.15
 """Of the tangent in one step, in radians."""
 MOST_CORRECTIONS = 5
+SHARE_LEFT = 0.1
+"""Of F, at most, by each further correction; at a zero without a gradient a quarter is left."""
 FARTHEST = 0.1
 """Way of Newton's method to a first point, in sides of the square."""
 MOST_AWAY = 0.2
@@ -127,9 +130,15 @@ def cubic(
 
 
 def find_branches(
-    field: Field, scan: Scan, longest: float = LONGEST, stepped: Callable[[], None] = lambda: None
+    field: Field,
+    scan: Scan,
+    longest: float = LONGEST,
+    stepped: Callable[[], None] = lambda: None,
+    coarse: Field | None = None,
 ) -> Iterator[Trace]:
     """Every branch that a scan shows, one after the other; each of its points is told as it is found.
+
+    Where a coarse F is given, which costs less, it tells whether a zero of the scan leads to a branch that is known.
 
     A closed one is seen for certain if a circle inside it is wider than the diagonal of a cell of the finer grid, 1/100
     of the square for 13 nodes, and its cell misses no node.
@@ -140,7 +149,13 @@ def find_branches(
         rough = find_zero(scan, seed)
         if rough is not None and any(trace.holds(rough, near) or _shows(scan, trace, rough, near) for trace in known):
             continue
-        start = find_zero(field, seed if rough is None else rough.at)
+        at = seed if rough is None else rough.at
+        if coarse is not None:
+            close = find_zero(coarse, at)
+            if close is None or any(trace.holds(close, SAME - close.width) for trace in known):
+                continue
+            at = close.at
+        start = find_zero(field, at)
         if start is None or any(trace.holds(start) for trace in known):
             continue
         known.append(trace_branch(field, start, longest, stepped))
@@ -162,34 +177,42 @@ def _shows(scan: Scan, trace: Trace, rough: Sample, within: float) -> bool:
 
 def find_zero(field: Field, at: FloatArray) -> Sample | None:
     """A point F = 0 near a point: on the gradient, or where that leads out of the square, beside it or above it."""
-    for along in (None, np.array([1.0, 0.0]), np.array([0.0, 1.0])):
-        try:
-            if (sample := correct(field, at, along)) is not None:
+    first = None
+    with suppress(FpsolveError):
+        first = field(np.clip(at, 0, 1)) if _inside(at) else None
+    for along in () if first is None else (None, np.array([1.0, 0.0]), np.array([0.0, 1.0])):
+        with suppress(FpsolveError):
+            if (sample := correct(field, at, along, first)) is not None:
                 return sample
-        except FpsolveError:
-            continue
     return None
 
 
-def correct(field: Field, at: FloatArray, along: FloatArray | None = None) -> Sample | None:
+def correct(
+    field: Field, at: FloatArray, along: FloatArray | None = None, first: Sample | None = None
+) -> Sample | None:
     """The point F = 0 near a point, on the normal to `along`, or without it on the gradient; None where there is none.
+
+    `first` is F at the point, where that is known.
 
     Raises:
         FpsolveError: F does not exist on the way.
     """
-    start = at
-    for _ in range(MOST_CORRECTIONS):
+    start, number, before = at, 0, math.inf
+    while True:
         if not _inside(at) or np.linalg.norm(at - start) > FARTHEST:
             return None
-        sample = field(np.clip(at, 0, 1))
+        sample = field(np.clip(at, 0, 1)) if first is None or number else first
         if sample.is_zero:
             return sample if np.any(sample.gradient) else None
+        number += 1
+        if number >= MOST_CORRECTIONS and abs(sample.value) > SHARE_LEFT * before:
+            return None
+        before = abs(sample.value)
         direction = sample.gradient if along is None else np.array([-along[1], along[0]])
         slope = float(sample.gradient @ direction)
         if slope == 0:
             return None
         at = sample.at - sample.value / slope * direction
-    return None
 
 
 def correct_on_line(field: Field, axis: int, value: float, guess: FloatArray) -> Sample | None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
-from scipy.optimize import brentq
 
 from fpsolve.analysis.continuation import PIECES, Point, Trace, correct, correct_on_line
 from fpsolve.analysis.scan import Field, Sample
@@ -88,6 +87,7 @@ def _sought(
     field: Field, trace: Trace, span: tuple[int, int], component: Callable[[Sample], float]
 ) -> tuple[float, Sample] | None:
     """The place between two points of a branch where something changes its sign, and F there."""
+    from scipy.optimize import brentq  # which takes long to import
 
     def at(place: float) -> Sample:
         i = min(int(place), span[1] - 1)

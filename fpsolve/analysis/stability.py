@@ -224,7 +224,8 @@ class Boundary(Result):
         now = replace(self, scan=scan, **{**_ANEW, "seconds": scan.seconds})
         yield now
         zero_field = now.zero_field
-        for trace in find_branches(zero_field, scan, self.step, stepped):
+        coarse = partial(zero_field, rtol=self.scan_rtol)
+        for trace in find_branches(zero_field, scan, self.step, stepped, coarse):
             now = replace(now, traces=with_branch(now.traces, self._special(zero_field, trace)))
             yield now
         yield now._ended(zero_field)

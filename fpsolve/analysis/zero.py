@@ -31,6 +31,8 @@ RTOL, RTOL_BEYOND_PLANE = 1e-10, 1e-4
 """Of F, relative to its scale."""
 HALF = 0.5
 """Of the time that is left, for one value."""
+NEAR = 0.1
+"""Distance, in sides of the square, up to which a solve starts from that before; farther away its mesh fits no more."""
 
 
 def axis_faults(
@@ -244,29 +246,33 @@ class ZeroField:
         self._rtol = line_rtol(problem, zero) if rtol is None else rtol
         self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
         self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
-        self._starts: Mapping[float, Solution] = {}
+        self._before: tuple[FloatArray, Mapping[float, Solution]] = np.full(2, math.inf), {}
         keys, system = [axis.key for axis in axes], problem.system
         loss = f"{system.section}.{system.impact_parameter}"
         is_affine = (
             zero.p == 0 and loss in keys and not any(problem.derivative(key).jumps for key in keys if key != loss)
         )  # ln R changes with one of them
         self._bounce = keys.index(loss) if is_affine else None
-        self._solved: dict[float, dict[float, Sample]] = {}
+        self._solved: dict[tuple[float, float], dict[float, Sample]] = {}
 
     @property
     def easy_axis(self) -> int:
         """Along which F of one point says most of the next, 0 for u and 1 for v: along r λ is affine."""
         return 1 if self._bounce is None else self._bounce
 
-    def __call__(self, at: FloatArray) -> Sample:
-        """F at (u, v). Raises `FpsolveError` where there is none, or where the time does not suffice."""
+    def __call__(self, at: FloatArray, rtol: float | None = None) -> Sample:
+        """F at (u, v); with an rtol to that alone, begun anew.
+
+        Raises:
+            FpsolveError: there is none, or the time does not suffice.
+        """
         left, started = self._seconds - self.spent_seconds, time.thread_time()
         if left <= 0:
             raise self._stop()
         share = HALF * left
         is_short = share < self._budget.seconds
         try:
-            return self._at(at, Countdown(share) if is_short else None)
+            return self._at(at, rtol, Countdown(share) if is_short else None)
         except NotConverged as failure:
             if is_short and failure.message.tells_of(Code.SECONDS_SPENT):
                 raise self._stop() from failure
@@ -278,7 +284,7 @@ class ZeroField:
         self.stopped = self._spent
         return NotConverged(self.stopped)
 
-    def _at(self, at: FloatArray, countdown: Countdown | None) -> Sample:
+    def _at(self, at: FloatArray, rtol: float | None, countdown: Countdown | None) -> Sample:
         """F at (u, v); without a countdown each p has its own."""
         values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}
         try:
@@ -286,22 +292,25 @@ class ZeroField:
         except ValueError as failure:
             raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
         if self._bounce is None:
-            return self._sample(at, problem, countdown)
-        known = self._solved.setdefault(float(at[1 - self._bounce]), {})
+            return self._sample(at, problem, rtol, countdown)
+        known = self._solved.setdefault((rtol or self._rtol, float(at[1 - self._bounce])), {})
         log_factor = problem.system.jumps[0].log_factor
         if len(known) < 2 and log_factor not in known:
-            known[log_factor] = self._sample(at, problem, countdown)
+            known[log_factor] = self._sample(at, problem, rtol, countdown)
         return known[log_factor] if log_factor in known else self._between(at, problem, log_factor, known, self._bounce)
 
-    def _sample(self, at: FloatArray, problem: Problem, countdown: Countdown | None) -> Sample:
+    def _sample(self, at: FloatArray, problem: Problem, rtol: float | None, countdown: Countdown | None) -> Sample:
         """F from a solve. Raises as `ratio_with_slopes`."""
         p = self._zero.p
         refuse_infinite(problem, p)
-        own: Any = {"rtol": self._rtol, "budget": self._budget, "countdown": countdown, "is_alone": True}
-        solver = ExponentSolver(problem, starts=self._starts, **own)
+        own: Any = {"rtol": rtol or self._rtol, "budget": self._budget, "countdown": countdown, "is_alone": True}
+        place, known = self._before
+        is_near = rtol is None and bool(np.linalg.norm(at - place) <= NEAR)
+        solver = ExponentSolver(problem, starts=known if is_near else {}, **own)
         value, error, slopes = ratio_with_slopes(solver, p, [axis.key for axis in self._axes])
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
-        self._starts = solver.near.known
+        if rtol is None:
+            self._before = at, solver.near.known
         return Sample(at, value, gradient, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
 
     def _between(

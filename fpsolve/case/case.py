@@ -258,6 +258,12 @@ class Case(Section):
         """How many curves there are, without making them."""
         return len(self.vary)
 
+    @property
+    def held(self) -> Varied:
+        """The values of the parameters that are not varied, by their keys."""
+        [first] = self.curves(0, 1)
+        return {key: value for key, value in first.parameters.items() if key not in self.vary.keys}
+
     def curves(self, start: int = 0, stop: int | None = None) -> Iterator[Curve]:
         """One curve for each set of the varied values, from one place to another; each is made when it is asked for."""
         places, problem = range(self.planned)[start:stop], varying(self.problem)

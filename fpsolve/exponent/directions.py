@@ -21,7 +21,6 @@ from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import roots_jacobi
 
 from fpsolve.arrays import FloatArray, one
 from fpsolve.drawing import QUARTERS, draw_colours, label_axes
@@ -94,6 +93,8 @@ class DirectionGrid:
     @classmethod
     def of(cls, problem: Problem, count: int) -> DirectionGrid:
         """One of `count` nodes between the ends, and twice as many steps around."""
+        from scipy.special import roots_jacobi  # which takes long to import
+
         inner, _ = roots_jacobi(count - 2, 1.0, 1.0)  # of Gauss and Lobatto: with both ends, towards which they crowd
         x = np.concatenate([[-1.0], inner, [1.0]])
         last = np.polynomial.legendre.legval(x, np.eye(count)[-1])

@@ -26,7 +26,6 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Tolerance
@@ -128,6 +127,8 @@ def _between(
             return solve(problem.mixed(first.problem, second.problem, share))
         parts = first.solution(p * share, tolerance), second.solution(p * (1 - share), tolerance)
         return _sum(p, share, *parts)
+
+    from scipy.optimize import minimize_scalar  # which takes long to import, and few need
 
     for number, share in enumerate((1 - NEAR_END, NEAR_END)):
         if at(share).pair.value >= ends[number].pair.value:

@@ -33,7 +33,6 @@ from fpsolve.exponent.eigen import PrincipalPair, second_derivative, slope_round
 from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.joint import joint_solution
-from fpsolve.exponent.modes import SpherePlace
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
@@ -196,6 +195,8 @@ class ExponentSolver:
         if self.classes:  # near p = 0
             return max(self.classes, key=lambda each: each.lyapunov_exponent().value).near
         if self.problem.dimension > 2:
+            from fpsolve.exponent.modes import SpherePlace  # with scikit-fem, which takes long to import
+
             return SpherePlace(self.problem, is_alone=self.is_alone, **self._own)
         return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **self._own)
 

@@ -20,7 +20,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import expm, expm_frechet
-from scipy.optimize import brentq
 
 from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, is_whole, one, real_array, real_number, shown
 from fpsolve.model.exact import ExactMotion
@@ -484,6 +483,7 @@ def is_steady(system: System, jump: Jump) -> bool:
 
 def turning_noise(system: System, jump: Jump, ends: FloatArray) -> FloatArray:
     """The ξ between two ends for which the phase turns at the ray of a jump, from forward to backward or back."""
+    from scipy.optimize import brentq  # which takes long to import, and few need
 
     def speed(xi: ArrayLike) -> FloatArray:
         return phase_speed(system, xi)(jump.phase)

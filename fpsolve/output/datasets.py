@@ -8,11 +8,14 @@ import math
 import os
 import warnings
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from glob import glob
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError
@@ -34,22 +37,57 @@ MOST_COMPRESSED = 1000
 """Bytes of numbers that a byte of a file can hold."""
 
 
+@dataclass(frozen=True)
+class Variable:
+    """What stands in a file under a name.
+
+    Attributes:
+        dims: the names of its dimensions.
+        values: numbers, or texts as objects.
+        attributes: such as its unit.
+    """
+
+    dims: tuple[str, ...]
+    values: NDArray[Any]
+    attributes: Mapping[str, Any]
+
+
 def write_dataset(case: Case, results: Iterable[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
-    """results.nc, for xarray and whatever reads netCDF-4; what is missing or failed is NaN."""
-    content = io.BytesIO()  # HDF5 does not survive a full disk
-    dataset_of(case, results, facts).to_netcdf(content, engine="h5netcdf")
-    with atomic(folder / RESULTS) as draft:
-        draft.write_bytes(content.getvalue())
+    """results.nc, for xarray and whatever reads netCDF-4; what is missing or failed is NaN.
 
+    There is a dimension for each varied key, or `set` for those of a list, and p.
 
-def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, Any]) -> xr.Dataset:
-    """The results of a case: a dimension for each varied key, or `set` for those of a list, and p.
+    xarray would write the same, but takes with pandas and Dask as long to import as small cases take in all.
 
     Args:
         facts: on the run, see `facts_of`; they become attributes, tables as JSON.
     """
-    import xarray as xr
+    import h5netcdf
+    import h5py
 
+    variables, coordinates = _variables(case, results), _coordinates(case)
+    beside = " ".join(name for name, each in coordinates.items() if each.dims != (name,))
+    content = io.BytesIO()  # HDF5 does not survive a full disk
+    with h5netcdf.File(content, "w") as file:
+        whole = variables | coordinates
+        sizes = (zip(each.dims, each.values.shape, strict=True) for each in whole.values())
+        file.dimensions = dict(chain.from_iterable(sizes))
+        for name, each in whole.items():
+            is_text, is_number = each.values.dtype == object, each.values.dtype.kind == "f"
+            kind = h5py.string_dtype() if is_text else each.values.dtype
+            fill = math.nan if is_number else None
+            made = file.create_variable(name, each.dims, kind, data=each.values, fillvalue=fill)
+            made.attrs.update(each.attributes)
+            if beside and SET in each.dims and name in variables:
+                made.attrs["coordinates"] = beside
+        is_whole = not np.any(variables[STATUS.name].values == Status.MISSING)
+        file.attrs.update({**_origin(case, facts), "complete": int(is_whole)})
+    with atomic(folder / RESULTS) as draft:
+        draft.write_bytes(content.getvalue())
+
+
+def _variables(case: Case, results: Iterable[CurveResult]) -> dict[str, Variable]:
+    """The numbers of all sets."""
     vary, planned = case.vary, case.planned
     is_list = bool(vary) and vary.mode != "product"
     over: tuple[str, ...] = (SET,) if is_list else vary.keys
@@ -71,30 +109,39 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
     for index, three in indices.items():
         columns += zip((index, index.error(), index.perturbation), three, strict=True)
     columns += [(STATUS, status), (SECONDS, seconds)]
-    variables = {
-        each.name: (
-            (*over, *each.dims),
-            values.reshape(shape + values.shape[1:]),
-            each.timed(case.units.time).attributes,
-        )
-        for each, values in columns
-    }
-    coordinates: dict[str, Any] = {}
-    for key in vary.keys:
-        about = {} if vary.is_text(key) else case.about(key).attributes
-        coordinates[key] = (SET, list(vary.columns[key]), about) if is_list else (key, list(vary.values(key)), about)
-    if MOMENT.name in case.output.quantities:
-        coordinates["p"] = ("p", case.p, P.attributes)
-    [first] = case.curves(0, 1)
-    held = {key: value for key, value in first.parameters.items() if key not in vary.keys}
-    origin = {name: each if isinstance(each, str | float | int) else json.dumps(each) for name, each in facts.items()}
-    head = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol}
-    dataset = xr.Dataset(variables, coordinates, {**head, **held, **origin})
-    dataset[STATUS.name].attrs |= {
+    flags = {
         "flag_values": np.array([int(each) for each in Status], dtype=np.int8),
         "flag_meanings": " ".join(each.name.lower() for each in Status),
     }
-    return dataset.assign_attrs(complete=int(not np.any(status == Status.MISSING)))
+    return {
+        each.name: Variable(
+            (*over, *each.dims),
+            values.reshape(shape + values.shape[1:]),
+            each.timed(case.units.time).attributes | (flags if each is STATUS else {}),
+        )
+        for each, values in columns
+    }
+
+
+def _coordinates(case: Case) -> dict[str, Variable]:
+    """The varied values and p."""
+    vary, found = case.vary, dict[str, Variable]()
+    is_list = bool(vary) and vary.mode != "product"
+    for key in vary.keys:
+        values = np.array(
+            vary.columns[key] if is_list else vary.values(key), dtype=object if vary.is_text(key) else float
+        )
+        about = {} if vary.is_text(key) else case.about(key).attributes
+        found[key] = Variable((SET if is_list else key,), values, about)
+    if MOMENT.name in case.output.quantities:
+        found["p"] = Variable(("p",), case.p, P.attributes)
+    return found
+
+
+def _origin(case: Case, facts: Mapping[str, Any]) -> dict[str, str | float | int]:
+    """The case, the parameters that are not varied, and where the numbers come from."""
+    origin = {name: each if isinstance(each, str | float | int) else json.dumps(each) for name, each in facts.items()}
+    return {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.held, **origin}
 
 
 def open_results(*places: str | Path, errors: Literal["raise", "warn"] = "raise") -> xr.Dataset:

@@ -85,9 +85,11 @@ def write_densities(found: Sequence[SettledDirections], curve: Curve, folder: Pa
 
 def draw_densities(case: Case, results: Iterable[CurveResult], folder: Path, *, into: Path | None = None) -> None:
     """Draw densities.png and .pdf of every curve with densities: the stationary one, and some tilted ones."""
-    import xarray
+    if not case.output.figure or case.problem.dimension == 2:
+        return
+    import xarray  # with pandas, which takes half a second
 
-    for result in results if case.output.figure and case.problem.dimension > 2 else ():
+    for result in results:
         source = directions_file(result.curve, folder)
         if not source.is_file():
             continue

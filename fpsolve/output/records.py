@@ -30,6 +30,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.kinds import varying
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
@@ -50,6 +51,8 @@ LONGEST, MOST_NUMBERS = 2**28, 2**24
 """Of a line, in bytes, and of an array."""
 KEPT = 2**24
 """Bytes of the records whose results stay in memory once they are read, as each table and figure asks for all."""
+MOST_LISTED = 8
+"""Numbers of an array that is a list in a record; longer ones take less room and time compressed."""
 _NAMES: dict[int, str] = {}
 """The file of this process."""
 Record = dict[str, Any]
@@ -137,6 +140,7 @@ class Results(Sequence[CurveResult]):
 
     def __init__(self, case: Case, records: Records) -> None:
         self._case, self._records, self._asked = case, records, everything(case).p.tolist()
+        self._problem_of = varying(case.problem)
         self._found: dict[int, Address | CurveResult] = {}
         self._order: list[int] = []
         self._kept: dict[int, CurveResult] = {}
@@ -160,11 +164,9 @@ class Results(Sequence[CurveResult]):
             self.add(curve.number, address)
         return is_whole
 
-    def has(self, curve: Curve) -> bool:
-        return curve.number in self._found
-
-    def of(self, curve: Curve) -> CurveResult | None:
-        return self._result(curve) if self.has(curve) else None
+    def has(self, number: int) -> bool:
+        """Whether that of the curve with a number is known."""
+        return number in self._found
 
     def __len__(self) -> int:
         return len(self._order)
@@ -173,19 +175,20 @@ class Results(Sequence[CurveResult]):
         numbers = self._order[index]
         if isinstance(numbers, list):
             return [self[i] for i in range(*index.indices(len(self)))]
-        if (known := self._kept.get(numbers)) is not None:
-            return known
-        [curve] = self._case.curves(numbers - 1, numbers)
-        return self._result(curve)
+        return self.of(numbers)
 
-    def _result(self, curve: Curve) -> CurveResult:
-        found = self._found[curve.number]
+    def of(self, number: int) -> CurveResult:
+        """That of the curve with a number, if it is known. Raises `KeyError`."""
+        if (known := self._kept.get(number)) is not None:
+            return known
+        found = self._found[number]
         if not isinstance(found, Address):
             return found
-        result = result_of(self._records.read(found), curve)
+        [varied] = self._case.vary.sets(number - 1, number)
+        result = result_of(self._records.read(found), Curve(self._problem_of(varied), varied, number))
         if found.size <= self._room:
             self._room -= found.size
-            self._kept[curve.number] = result
+            self._kept[number] = result
         return result
 
 
@@ -390,7 +393,7 @@ def codec(kind: Any) -> Codec:
         made = lru_cache(lambda text: row.made(json.loads(text)))
         return Codec(row.form, plain, lambda data: made(_checked(data, str)))
     if origin is get_origin(FloatArray):  # np.ndarray, or NDArray itself since NumPy 2.5
-        return Codec("array", _packed, _unpacked)
+        return Codec("array or list", _packed, _unpacked)
     if origin is Literal:
         return Codec(parts, str, lambda data: parts[parts.index(data)])
     if origin is UnionType and NoneType in parts:
@@ -443,12 +446,16 @@ def _checked(data: Any, kind: Any) -> Any:
     return data
 
 
-def _packed(value: FloatArray) -> Record:
+def _packed(value: FloatArray) -> Record | list[float | str]:
+    if value.ndim == 1 and value.size <= MOST_LISTED:
+        return [each if math.isfinite(each) else str(each) for each in map(float, value)]
     data = np.ascontiguousarray(value, dtype="<f8").tobytes()
     return {"shape": list(value.shape), "data": b64encode(zlib.compress(data)).decode("ascii")}
 
 
-def _unpacked(packed: Mapping[str, Any]) -> FloatArray:
+def _unpacked(packed: Any) -> FloatArray:
+    if isinstance(packed, list):
+        return np.array([each if type(each) is float else _number(each) for each in packed], dtype=float)
     shape = tuple(_checked(size, int) for size in packed["shape"])
     if min(shape, default=1) < 0 or (count := math.prod(shape)) > MOST_NUMBERS:
         raise ValueError(f"there is no array of shape {shape}")
@@ -468,6 +475,8 @@ def _text(data: Any) -> str:
 
 def _strict(data: Any) -> Any:
     """What strict JSON in UTF-8 can hold."""
+    if type(data) is int or (type(data) is float and math.isfinite(data)):
+        return data
     _text(json.dumps(data, allow_nan=False, ensure_ascii=False))
     return data
 

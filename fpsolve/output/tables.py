@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import datetime
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -39,14 +40,16 @@ ENDS = ("low", "high")
 """Of an interval."""
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
+MOST_SUMMARISED = 1000
+"""Curves of which summary.json has all numbers; of more it leaves them to results.nc and to the CSV files."""
+_END = "\n ]\n}\n"
 
 
 def facts_of(case: Case, started: datetime, seconds: float) -> dict[str, Any]:
     """Of a run: versions, the command, the machine, when it began and how long it takes, and the case as written."""
-    packages = {name: version(name) for name in ("numpy", "scipy", "scikit-fem")}
     name, *rest = sys.argv
     kinds = filter(None, (version_of(type(half)) for half in case.problem.halves))  # type: ignore[arg-type]
-    packages |= dict(each.rsplit(" ", 1) for each in kinds)
+    packages = _packages() | dict(each.rsplit(" ", 1) for each in kinds)
     return {
         "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},
         "command": shlex.join(
@@ -60,19 +63,25 @@ def facts_of(case: Case, started: datetime, seconds: float) -> dict[str, Any]:
     }
 
 
+@cache
+def _packages() -> dict[str, str]:
+    """The versions of those that numbers depend on."""
+    return {name: version(name) for name in ("numpy", "scipy", "scikit-fem")}
+
+
 def write_results(case: Case, results: Sequence[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
     """summary.json, which says whether all curves of the case are there, moments.csv and curves.csv, in one go.
+
+    Of many curves summary.json has the state, the messages and what no other table has; see `MOST_SUMMARISED`.
 
     Args:
         facts: on the run, see `facts_of`.
     """
-    state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
-    start = json.dumps({**head(case), **state, **facts}, indent=1, ensure_ascii=False).removesuffix("\n}")
-    indent = 1 if case.planned <= MOST_INDENTED else None
     has_moments, names = MOMENT.name in case.output.quantities, columns_of(case)
     indices = [column.name for each in asked(case) for column in (each, each.error())]
     ends = [f"{each.name}_{part}" for each in _uncertain(case) for part in ENDS]
     more = ENDS if case.uncertain else ()
+    is_short = case.planned > MOST_SUMMARISED
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
@@ -80,24 +89,51 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
         by_moment.writerow([*case.vary.keys, *names, *more])
         by_curve.writerow([*case.vary.keys, *indices, *ends, "p_solved", "p_failed", "status", "seconds"])
-        summary.write(f'{start},\n "curves": [')
+        summary.write(_beginning(case, results, facts, held=is_short))
         for number, result in enumerate(results):
-            varied, done = result.curve.varied.values(), result.moments
-            columns = [getattr(done, name).tolist() for name in names]
-            finite = [[None if math.isnan(each) else each for each in row] for row in zip(*columns, strict=True)]
-            rows = [dict(zip(names, row, strict=True)) for row in finite]
-            content = _summary(case, result, rows)
-            text = json.dumps(content, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
-            summary.write((",\n  " if number else "\n  ") + text)
+            varied, done, rows = result.curve.varied.values(), result.moments, _rows(result, names)
+            summary.write(_entry(case, number, _short_summary(case, result) if is_short else _summary(case, result)))
             spreads = spreads_of(case, result)
-            for row in finite:
+            for row in rows:
                 by_moment.writerow([*varied, *row, *(_ends(spreads.moments.get(float(row[0] or 0.0))) if more else ())])
             intervals = [end for each in _uncertain(case) for end in _ends(spreads.indices.get(each.name))]
             found = [result.estimates[each.name] for each in asked(case)]
             numbers = [number for each in found for number in ((each.value, each.error_estimate) if each else ("", ""))]
             counts = [done.p.size, (case.p.size if has_moments else 0) - done.p.size]
             by_curve.writerow([*varied, *numbers, *intervals, *counts, result.status.word, round(result.seconds, 6)])
-        summary.write("\n ]\n}\n")
+        summary.write(_END)
+
+
+def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str, Any]) -> str:
+    """All numbers and messages of all curves in one line of JSON, as summary.json has them of few curves.
+
+    Args:
+        facts: on the run, see `facts_of`.
+    """
+    entries = (_entry(case, number, _summary(case, result)) for number, result in enumerate(results))
+    lines = "".join([_beginning(case, results, facts), *entries, _END]).splitlines()
+    return " ".join(line.strip() for line in lines)
+
+
+def _beginning(case: Case, results: Sequence[CurveResult], facts: Mapping[str, Any], *, held: bool = False) -> str:
+    """What summary.json has before its curves; with the parameters that these have in common, if they are held."""
+    state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
+    common = {"parameters": dict(case.held)} if held else {}
+    start = json.dumps({**head(case), **state, **facts, **common}, indent=1, ensure_ascii=False)
+    return start.removesuffix("\n}") + ',\n "curves": ['
+
+
+def _entry(case: Case, number: int, content: Mapping[str, Any]) -> str:
+    """A curve in summary.json after so many others."""
+    indent = 1 if case.planned <= MOST_INDENTED else None
+    text = json.dumps(content, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
+    return (",\n  " if number else "\n  ") + text
+
+
+def _rows(result: CurveResult, names: Sequence[str]) -> list[list[float | None]]:
+    """The moments of a curve, a row for each p; None where there is no number."""
+    columns = [getattr(result.moments, name).tolist() for name in names]
+    return [[None if math.isnan(each) else each for each in row] for row in zip(*columns, strict=True)]
 
 
 def _uncertain(case: Case) -> list[Index]:
@@ -201,12 +237,43 @@ def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
     return {"parameters": dict(curve.parameters), "varied": dict(curve.varied)}
 
 
-def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """What a case asks for of a curve; `rows` are those of its moments."""
-    found: dict[str, Any] = {"moments": rows} if MOMENT.name in case.output.quantities else {}
+def _summary(case: Case, result: CurveResult) -> dict[str, Any]:
+    """What a case asks for of a curve."""
+    names = columns_of(case)
+    found: dict[str, Any] = {}
+    if MOMENT.name in case.output.quantities:
+        found["moments"] = [dict(zip(names, row, strict=True)) for row in _rows(result, names)]
     for index in asked(case):
         numbers = result.index(index)
         found[index.name] = numbers and {key: value if math.isfinite(value) else None for key, value in numbers.items()}
+    return {
+        **_parameters(result.curve),
+        "status": result.status.word,
+        **found,
+        **_beyond_tables(case, result),
+        "discretisation": result.discretisation,
+        **_told(result),
+        "seconds": round(result.seconds, 6),
+    }
+
+
+def _short_summary(case: Case, result: CurveResult) -> dict[str, Any]:
+    """The same without what results.nc has, and without the discretisation."""
+    varied = dict(result.curve.varied)
+    return {"varied": varied, "status": result.status.word, **_beyond_tables(case, result), **_told(result)}
+
+
+def _told(result: CurveResult) -> dict[str, list[str]]:
+    """The messages, with those of failures among the warnings."""
+    return {
+        "warnings": in_case_words([*result.warnings, *(failure.reason for failure in result.failures)]),
+        "notes": in_case_words(result.notes),
+    }
+
+
+def _beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
+    """What neither results.nc nor a CSV file has."""
+    found: dict[str, Any] = {}
     if result.jumps:
         found["jumps"] = [
             {"phase": ray.phase, "log_factor": ray.log_factor}
@@ -239,15 +306,7 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
         found["excursions"] = None if result.excursion is None else _excursion(case, result.excursion)
     if case.uncertain:
         found["uncertainty"] = _spreads(case, result)
-    return {
-        **_parameters(result.curve),
-        "status": result.status.word,
-        **found,
-        "discretisation": result.discretisation,
-        "warnings": in_case_words([*result.warnings, *(failure.reason for failure in result.failures)]),
-        "notes": in_case_words(result.notes),
-        "seconds": round(result.seconds, 6),
-    }
+    return found
 
 
 def _excursion(case: Case, found: Excursion) -> dict[str, Any]:

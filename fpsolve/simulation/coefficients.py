@@ -1,11 +1,14 @@
-"""What the simulation takes from a system and a noise: matrices, in coordinates in which the motion is even."""
+"""What the simulation takes from a system and a noise: matrices, in coordinates in which the motion is even.
+
+What moves paths is imported where they are moved: case files are checked with these numbers, without numba.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import expm
@@ -13,9 +16,12 @@ from scipy.linalg import expm
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System, affine, is_driven, is_steady, matrix_at, squared_frequency
-from fpsolve.simulation.motions import DrivenMotion, Rays, StruckMotion, SwitchedMotion
-from fpsolve.simulation.several import SplitMotion, drivers
-from fpsolve.simulation.spaces import DrivenSpace, SplitSpace, SwitchedSpace
+from fpsolve.simulation.rays import Rays
+
+if TYPE_CHECKING:
+    from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
+    from fpsolve.simulation.several import SplitMotion
+    from fpsolve.simulation.spaces import DrivenSpace, SplitSpace, SwitchedSpace
 
 _FAR = 5.0
 """Standard deviations at which noise held to one side is compared with noise held to the other."""
@@ -73,6 +79,9 @@ class Coefficients:
 
     def motion(self, h: float) -> DrivenMotion | SwitchedMotion | StruckMotion | DrivenSpace | SwitchedSpace:
         """The numbers that move paths by a step of length h."""
+        from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
+        from fpsolve.simulation.spaces import DrivenSpace, SwitchedSpace
+
         if self.impulses is not None:
             return StruckMotion(_rows(self.steady[None]), self.impulses, self.rays)
         if self.steady.ndim == 3 and self.dimension > 2:
@@ -110,11 +119,16 @@ class SplitCoefficients(Coefficients):
         return False
 
     def motion(self, h: float) -> SplitMotion | SplitSpace:  # type: ignore[override]
+        from fpsolve.simulation.several import SplitMotion
+        from fpsolve.simulation.spaces import SplitSpace
+
         if self.dimension > 2:
             return SplitSpace(self.driven, np.linalg.norm(self.driven, 2, axis=(1, 2)), expm(0.5 * h * self.steady))
         return SplitMotion(_rows(np.concatenate([self.steady[None], self.driven])), self.rays)
 
     def noise_step(self, h: float, bias: float = 0.0) -> Any:
+        from fpsolve.simulation.several import drivers
+
         return drivers(self.noise.parts, h)
 
     def spread(self, h: float) -> float:

@@ -15,6 +15,8 @@ stands in A₀: a scheme of strong order 3/2 and weak order 2.
 Under a chain the motion between two jumps of ξ is exp(A t), and these come after exponential times: nothing is left
 out. So it is between impulses, each of which multiplies the state.
 
+Rows of arrays are not taken out of them where a path is moved, which takes numba longer than all else.
+
 State: x, u and that of the noise of each path, ξ or the number of a state, arrays of shape (n,) changed in place; of
 noise with more numbers a row for each, shape (numbers, n), ξ being the first. A matrix is stored as half its trace t
 and the rest ((p, q), (r, −p)), whose square is p² + qr times one.
@@ -29,25 +31,11 @@ from numba.extending import overload
 
 from fpsolve.arrays import FloatArray
 from fpsolve.simulation.compiled import compiled, inlined
+from fpsolve.simulation.rays import Rays
 
 _LIMIT = 0.75**2
 """p² + ½(q² + r²) of Ω above which a step is taken in parts: below, series are exact, and no turn is overlooked."""
 _MOST_PARTS = 10_000
-
-
-class Rays(NamedTuple):
-    """Lines at which the norm grows.
-
-    Attributes:
-        along, across: unit vectors along each line, and the same turned by 90°, shape (rays, 2).
-        logs: ln R.
-        ways: the side to which the line is crossed, 1 or −1; 0 where it is crossed to both sides.
-    """
-
-    along: FloatArray
-    across: FloatArray
-    logs: FloatArray
-    ways: FloatArray
 
 
 def _draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
@@ -322,9 +310,8 @@ def step_switched(m, chain, h, x, u, states, log_norm, rng):  # type: ignore[no-
             crossed += count
             left -= stay
             if left > 0:
-                mark, row = rng.random(), chain.reached[k]
-                k = 0
-                while row[k] < mark:
+                mark, left_behind, k = rng.random(), k, 0
+                while chain.reached[left_behind, k] < mark:
                     k += 1
         states[i] = k
     return crossed
@@ -352,7 +339,7 @@ def step_struck(m, law, h, x, u, log_norm, rng):  # type: ignore[no-untyped-def]
                 mark, k = rng.random(), 0
                 while law.reached[k] < mark:
                     k += 1
-                (a, b), (c, d) = m.impulses[k]
+                a, b, c, d = m.impulses[k, 0, 0], m.impulses[k, 0, 1], m.impulses[k, 1, 0], m.impulses[k, 1, 1]
                 x[i], u[i] = a * x[i] + b * u[i], c * x[i] + d * u[i]
             norm = math.sqrt(x[i] * x[i] + u[i] * u[i])
             log_norm[i] += log + math.log(norm)
@@ -370,7 +357,7 @@ def exact_flow(m, k, t, x, u):  # type: ignore[no-untyped-def]
 @compiled
 def exact_factors(m, k, t):  # type: ignore[no-untyped-def]
     """c, s, the growth of the norm and the half-turns of exp(A t) = ± e^growth (c + s B), B the rest of A."""
-    half_trace, p, q, r = m.matrices[k]
+    half_trace, p, q, r = m.matrices[k, 0], m.matrices[k, 1], m.matrices[k, 2], m.matrices[k, 3]
     square, growth = p * p + q * r, half_trace * t
     if square < 0:  # it turns, and crosses each line once in every half-turn
         omega = math.sqrt(-square)
@@ -387,7 +374,7 @@ def exact_factors(m, k, t):  # type: ignore[no-untyped-def]
 @inlined
 def factors(m, k, t):  # type: ignore[no-untyped-def]
     """The same, by series where it is small."""
-    half_trace, p, q, r = m.matrices[k]
+    half_trace, p, q, r = m.matrices[k, 0], m.matrices[k, 1], m.matrices[k, 2], m.matrices[k, 3]
     square = (p * p + q * r) * t * t
     if abs(square) > _LIMIT:
         return exact_factors(m, k, t)
@@ -397,7 +384,7 @@ def factors(m, k, t):  # type: ignore[no-untyped-def]
 @compiled
 def flow_on(m, k, factors, x, u):  # type: ignore[no-untyped-def]
     """The same of x by its factors."""
-    _, p, q, r = m.matrices[k]
+    p, q, r = m.matrices[k, 1], m.matrices[k, 2], m.matrices[k, 3]
     cosh, sinh, log, turns = factors
     x1, u1 = (cosh + sinh * p) * x + sinh * q * u, sinh * r * x + (cosh - sinh * p) * u
     crossed = 0

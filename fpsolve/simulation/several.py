@@ -21,7 +21,8 @@ from numba.extending import overload
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.simulation.compiled import compiled
-from fpsolve.simulation.motions import Rays, drawn, exact_factors, factors, flow_on
+from fpsolve.simulation.motions import drawn, exact_factors, factors, flow_on
+from fpsolve.simulation.rays import Rays
 
 
 class Driver(NamedTuple):
@@ -143,9 +144,8 @@ def _time_in_states(chain, values, h, states, integral, rng):  # type: ignore[no
             total += values[k] * min(stay, left)
             left -= stay
             if left > 0:
-                mark, row = rng.random(), chain.reached[k]
-                k = 0
-                while row[k] < mark:
+                mark, left_behind, k = rng.random(), k, 0
+                while chain.reached[left_behind, k] < mark:
                     k += 1
         states[i], integral[i] = k, total
 

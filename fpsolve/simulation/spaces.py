@@ -174,14 +174,7 @@ def step_driven_space(m, h, x, u, mean, rise, log_norm):  # type: ignore[no-unty
         for i in range(count):
             if sizes[i] < _LIMIT * _LIMIT:
                 largest = max(largest, sizes[i])
-        for k in range(_terms(math.sqrt(largest)), 0, -1):
-            for r in range(n):
-                row = omega[r]
-                _first(row[0], now[0], row[1], now[1], row[2], now[2], after[r])
-                if n == 4:
-                    _more(row[3], now[3], after[r])
-            for r in range(n):
-                _next(begun[r], after[r], 1 / k, now[r])
+        _summed(omega, _terms(math.sqrt(largest)), begun, now, after)
         for i in range(count):
             if not sizes[i] < _LIMIT * _LIMIT:
                 logs[i] += _in_parts(m, h, begun[:, i], means[i], rises[i], now[:, i])
@@ -189,6 +182,33 @@ def step_driven_space(m, h, x, u, mean, rise, log_norm):  # type: ignore[no-unty
         for k in range(n - 1):
             _copied(now[1 + k], us[k], count)
     return 0
+
+
+@compiled
+def _summed(omega, terms, begun, now, after):  # type: ignore[no-untyped-def]
+    """exp Ω of all paths times what was begun with, by so many terms of its series; now is that in the beginning."""
+    n = begun.shape[0]
+    for k in range(terms, 0, -1):
+        for r in range(n):
+            row = omega[r]
+            _first(row[0], now[0], row[1], now[1], row[2], now[2], after[r])
+            if n == 4:
+                _more(row[3], now[3], after[r])
+        for r in range(n):
+            _next(begun[r], after[r], 1 / k, now[r])
+
+
+@compiled
+def _multiplied_all(matrix, states, products):  # type: ignore[no-untyped-def]
+    """A matrix times the states of all paths."""
+    n = matrix.shape[0]
+    for r in range(n):
+        for i in range(products.shape[1]):
+            products[r, i] = 0.0
+        for c in range(n):
+            entry = matrix[r, c]
+            for i in range(products.shape[1]):
+                products[r, i] += entry * states[c, i]
 
 
 @compiled
@@ -282,9 +302,8 @@ def step_switched_space(m, chain, h, x, u, states, log_norm, rng):  # type: igno
                 log_norm[i] += _flow(m.matrices[k], min(stay, left), m.sizes[k], state, other, begun)
             left -= stay
             if left > 0:
-                mark, row = rng.random(), chain.reached[k]
-                k = 0
-                while row[k] < mark:
+                mark, left_behind, k = rng.random(), k, 0
+                while chain.reached[left_behind, k] < mark:
                     k += 1
         log_norm[i] += _tamed(state)
         _store(x, u, i, state)
@@ -304,15 +323,52 @@ def step_split_space(m, x, u, integrals, log_norm, rng):  # type: ignore[no-unty
         rng: a `numpy.random.Generator`.
     """
     n, count = m.half.shape[0], integrals.shape[0]
-    state, other, begun = np.empty(n), np.empty(n), np.empty(n)
-    for i in range(x.size):
-        _load(x, u, i, state)
-        _multiplied(m.half, state, other)
-        is_forward = rng.random() < 0.5
+    width = min(_BLOCK, x.size)
+    omega, sizes, is_forward = np.zeros((n, n, width)), np.zeros(width), np.zeros(width)
+    begun, now, after = np.zeros((n, width)), np.zeros((n, width)), np.empty((n, width))
+    state, other, room = np.empty(n), np.empty(n), np.empty(n)
+    for first in range(0, x.size, width):
+        part = slice(first, min(first + width, x.size))
+        xs, us, logs, parts = x[part], u[:, part], log_norm[part], integrals[:, part]
+        paths = xs.size
+        _copied(xs, begun[0], paths)
+        for k in range(n - 1):
+            _copied(us[k], begun[1 + k], paths)
+        _multiplied_all(m.half, begun, now)
+        for i in range(paths):
+            is_forward[i] = rng.random() < 0.5
         for j in range(count):
-            k = j if is_forward else count - 1 - j
-            log_norm[i] += _flow(m.matrices[k], integrals[k, i], m.sizes[k], state, other, begun)
-        _multiplied(m.half, state, other)
-        log_norm[i] += _tamed(state)
-        _store(x, u, i, state)
+            k = count - 1 - j
+            largest = 0.0
+            for i in range(paths):
+                one, other_one = parts[j, i] * is_forward[i], parts[k, i] * (1 - is_forward[i])
+                sizes[i] = abs(one) * m.sizes[j] + abs(other_one) * m.sizes[k]
+                if sizes[i] < _LIMIT:
+                    largest = max(largest, sizes[i])
+            for r in range(n):
+                _copied(now[r], begun[r], width)
+                for c in range(n):
+                    _taken(m.matrices[j, r, c], parts[j], m.matrices[k, r, c], parts[k], is_forward, omega[r, c])
+            _summed(omega, _terms(largest), begun, now, after)
+            for i in range(paths):
+                if not sizes[i] < _LIMIT:
+                    of = j if is_forward[i] else k
+                    for r in range(n):
+                        state[r] = begun[r, i]
+                    logs[i] += _flow(m.matrices[of], parts[of, i], m.sizes[of], state, other, room)
+                    for r in range(n):
+                        now[r, i] = state[r]
+        _multiplied_all(m.half, now, after)
+        for i in range(paths):
+            for r in range(n):
+                state[r] = after[r, i]
+            logs[i] += _tamed(state)
+            _store(xs, us, i, state)
     return 0
+
+
+@compiled
+def _taken(first, integrals, other, integrals_of_other, is_first, entry):  # type: ignore[no-untyped-def]
+    """One entry of the Ω of all paths, each by the one noise or by the other."""
+    for i in range(integrals.size):
+        entry[i] = is_first[i] * integrals[i] * first + (1 - is_first[i]) * integrals_of_other[i] * other

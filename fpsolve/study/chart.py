@@ -21,7 +21,7 @@ from fpsolve.model.problem import Problem
 from fpsolve.pool import Steps
 from fpsolve.theory.perturbation import second_order
 
-CLOSED_FORM_NODES = 81
+CLOSED_FORM_NODES = 41
 """Of the grid, each way, on which the closed forms are evaluated."""
 
 

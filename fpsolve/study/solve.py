@@ -25,7 +25,8 @@ from fpsolve.analysis.excursions import SYMBOL, Excursion, Start, StartOfNoise, 
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import EIGENFUNCTIONS, EXCURSIONS, SENSITIVITIES
+from fpsolve.case.kinds import varying
+from fpsolve.case.sections import EIGENFUNCTIONS, EXCURSIONS, SENSITIVITIES, Varied
 from fpsolve.errors import FpsolveError, NoDerivative, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
@@ -113,9 +114,9 @@ def everything(case: Case, number: int = 1) -> Wanted:
     )
 
 
-def expected(case: Case, curve: Curve) -> Wanted:
-    """What the expectations of a case compare."""
-    chosen = [each for each in case.expect if each.selects(curve.varied)]
+def expected(case: Case, varied: Varied) -> Wanted:
+    """What the expectations of a case compare, of the curve with these values."""
+    chosen = [each for each in case.expect if each.selects(varied)]
     p = np.unique([each.p for each in chosen if each.p is not None])
     return Wanted(p, tuple(name for name in INDICES if any(each.quantity == name for each in chosen)))
 
@@ -396,33 +397,41 @@ def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """A parameter set to be solved.
+    """A parameter set to be solved; who solves it makes its curve, so that little is sent.
 
     Attributes:
-        curve, wanted: which, and what of it.
-        key: of its record.
+        number, varied: of the curve.
+        wanted: what of it.
         is_known: whether there is a record, so that only its eigenfunctions are to be drawn.
     """
 
-    curve: Curve
+    number: int
+    varied: Varied
     wanted: Wanted
-    key: str = ""
     is_known: bool = False
 
 
 def solve_batch(
     batch: Sequence[Order],
+    problem: Problem,
     numerics: Numerics,
-    keep: Callable[[Order, Solved], Kept],
+    keep: Callable[[Order, Curve, Solved], Kept],
     progress: Callable[[], None] = lambda: None,
 ) -> list[Kept]:
     """The task: solves some sets, and hands each to `keep` before the next is begun.
 
     Args:
-        keep: takes an order and what was found, and returns what the caller needs to know; it pickles.
+        batch: the sets.
+        problem: that of the case, without what is varied.
+        numerics: how they are solved.
+        keep: takes an order, its curve and what was found, and returns what the caller needs to know; it pickles.
         progress: called after each moment; only where the task stays in this process.
     """
-    return [keep(order, solved(order, numerics, progress)) for order in batch]
+    kept, of_values = list[Kept](), varying(problem)
+    for order in batch:
+        curve = Curve(of_values(order.varied), order.varied, order.number)
+        kept.append(keep(order, curve, solved(curve, order, numerics, progress)))
+    return kept
 
 
 def batch_size(planned: int) -> int:
@@ -430,21 +439,25 @@ def batch_size(planned: int) -> int:
     return min(max(planned // BATCHES, 1), MOST_SETS)
 
 
-def batches(case: Case, order: Callable[[Curve], Order | None]) -> Iterator[tuple[Order, ...]]:
+def batches(case: Case, order: Callable[[int, Varied], Order | None]) -> Iterator[tuple[Order, ...]]:
     """All batches of a case, without the sets of which nothing is wanted; the first sets come one by one.
 
     So whoever begins sees soon how long they take.
+
+    Args:
+        case: whose sets these are.
+        order: gives the order of a set from the number of its curve and what is varied.
     """
     size = batch_size(case.planned)
     starts = [*range(min(size, case.planned)), *range(size, case.planned, size), case.planned]
     for start, stop in pairwise(starts):
-        if found := tuple(filter(None, map(order, case.curves(start, stop)))):
+        if found := tuple(filter(None, map(order, range(start + 1, stop + 1), case.vary.sets(start, stop)))):
             yield found
 
 
-def solved(order: Order, numerics: Numerics, progress: Callable[[], None] = lambda: None) -> Solved:
+def solved(curve: Curve, order: Order, numerics: Numerics, progress: Callable[[], None] = lambda: None) -> Solved:
     """What is wanted of a set; where that cannot be found, a result that says why, unless its numbers are known."""
-    curve, wanted = order.curve, order.wanted
+    wanted = order.wanted
     if order.is_known:
         try:
             solver = numerics.solver(curve)
@@ -480,6 +493,6 @@ def lost(curve: Curve) -> CurveResult:
     return failed(curve, Message(Code.WORKER_DIED, remedy=Remedy.MEMORY))
 
 
-def result_alone(order: Order, solved: Solved) -> CurveResult | None:
+def result_alone(order: Order, curve: Curve, solved: Solved) -> CurveResult | None:
     """For a `solve_batch` that keeps nothing but the numbers."""
     return solved.result

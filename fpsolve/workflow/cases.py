@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from fpsolve.case.case import Case, Curve, load_case
+from fpsolve.case.case import Case, load_case
+from fpsolve.case.sections import Varied
 from fpsolve.errors import NotConverged
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
@@ -61,6 +62,7 @@ class Outcome:
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
         comparisons: what the case expects beside what was computed.
         faults: of a noise that is no kind of fpsolve, see `check_noise`.
+        facts: versions, the command and the time of a run that solves, see `facts_of`.
         known: how many of its curves an earlier run had finished.
         outdated: how many records of its curves another version has written; these are not used.
         samples: what the samples of its uncertain parameters say; None where there are none.
@@ -71,6 +73,7 @@ class Outcome:
     interruption: str = ""
     comparisons: tuple[Comparison, ...] = ()
     faults: tuple[Message, ...] = ()
+    facts: Mapping[str, Any] = field(default_factory=dict)
     known: int = 0
     outdated: int = 0
     samples: Samples | None = None
@@ -170,7 +173,7 @@ def run_case(
                     case,
                     folder,
                     watch,
-                    facts=sweep.facts(),
+                    facts=sweep.facts,
                     results=sweep.results,
                     simulated=simulated,
                     samples=samples,
@@ -190,6 +193,7 @@ def run_case(
         sweep.results,
         tuple(simulated),
         interruption,
+        facts=sweep.facts,
         known=sweep.known,
         outdated=sweep.records.outdated,
         samples=samples,
@@ -319,17 +323,18 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
     """
     found: list[CurveResult] = []
 
-    def wanted(curve: Curve) -> Wanted:
-        return Wanted(even_moments(case), ()) if by_hierarchy else expected(case, curve)
+    def order(number: int, varied: Varied) -> Order:
+        return Order(number, varied, Wanted(even_moments(case), ()) if by_hierarchy else expected(case, varied))
 
     with (
         saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
         pool or serial() as workers,
     ):
-        task = partial(solve_batch, numerics=Numerics.of(case), keep=result_alone)
-        for done in workers.run(task, batches(case, lambda curve: Order(curve, wanted(curve)))):
-            results = [lost(order.curve) for order in done.item] if done.result is None else done.result
+        task = partial(solve_batch, problem=case.problem, numerics=Numerics.of(case), keep=result_alone)
+        for done in workers.run(task, batches(case, order)):
+            dead = [each.number for each in done.item] if done.result is None else []
+            results = done.result or [lost(curve) for number in dead for curve in case.curves(number - 1, number)]
             for result in filter(None, results):
                 found.append(result)
                 progress(failed=result.status.fails)

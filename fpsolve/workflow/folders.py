@@ -91,11 +91,11 @@ def _stale(case: Case, there: Mapping[str, Path]) -> list[str]:
     A kind whose tables state complete parameters that the case has is. One without a table is as the others are, but a
     chart says nothing without its table.
     """
-    curves = [curve.parameters for curve in case.curves()]
-    known = {frozenset(each.items()) for each in curves}
     states = {
         kind: [path for name, path in there.items() if re.fullmatch(table, name)] for kind, table in _TABLES.items()
     }
+    curves = [curve.parameters for curve in case.curves()] if any(states.values()) else []
+    known = {frozenset(each.items()) for each in curves}
 
     def agrees(path: Path) -> bool:
         try:
@@ -104,7 +104,8 @@ def _stale(case: Case, there: Mapping[str, Path]) -> list[str]:
                 stated, axes = content["parameters"], {content["x"]["key"], content["y"]["key"]}
                 is_whole = {*stated, *axes} == set(curves[0]) and axes.isdisjoint(stated)
                 return is_whole and any(stated.items() <= each.items() for each in curves)
-            stated = [each["parameters"] for each in content.get("curves", [content])]
+            held = content.get("parameters", {})  # by many curves, which then state the others alone
+            stated = [each.get("parameters") or {**held, **each["varied"]} for each in content.get("curves", [content])]
             is_empty = path.name == "proof.json" and not stated
             return not is_empty and all(frozenset(each.items()) in known for each in stated)
         except (OSError, ValueError, LookupError, TypeError, AttributeError):  # it is not a table of fpsolve

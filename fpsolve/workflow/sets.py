@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import nullcontext
-from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -16,6 +15,7 @@ from time import monotonic
 from typing import Any, ClassVar
 
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import Varied
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import (
     Address,
@@ -40,18 +40,19 @@ Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
 Orders = tuple[Order, ...]
 SOLVED_RECORDS, SIMULATED_RECORDS = "records/solved", "records/simulated"
-GROWTH = 2
-"""Tables are rewritten when they have grown by this factor, so that all of it costs as little as the last ones."""
+REST = 50
+"""Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
 
 
-def keep(folder: Path, order: Order, solved: Solved) -> Found:
+def keep(folder: Path, numerics: Numerics, order: Order, curve: Curve, solved: Solved) -> Found:
     """Write what was found of a set into the folder of its case, and say where the numbers are."""
-    curve, result = order.curve, solved.result
+    result = solved.result
     write_functions(solved, curve, folder)
     is_failed = result is not None and result.status.fails
     if result is None or solved.is_passing:
         return curve.number, result, is_failed
-    return curve.number, append(folder / SOLVED_RECORDS, order.key, record_of(result)), is_failed
+    key = key_of(curve, order.wanted, numerics)
+    return curve.number, append(folder / SOLVED_RECORDS, key, record_of(result)), is_failed
 
 
 class _Kept:
@@ -84,8 +85,8 @@ class Sweep(_Kept):
         super().__init__(case, folder.resolve(), is_fresh=is_fresh)
         self.started, self._clock = datetime.now(UTC), monotonic()
         self.numerics, self.first, self.further = Numerics.of(case), everything(case, 1), everything(case, 2)
-        self.results = Results(case, self.records)
-        self._tabled = self._settled = 0
+        self.results, self.facts = Results(case, self.records), dict[str, Any]()
+        self._settled, self._due = 0, 0.0
         self._steps_each = max(self.first.p.size, 1) if case.planned == 1 else 1
         self.find()
         self.known = len(self.results)
@@ -100,8 +101,9 @@ class Sweep(_Kept):
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished without reporting them."""
         for curve in self.looked_through():
-            if self.results.find(curve, self._key(curve)):
-                self._settled += not self._wanted(curve).draws
+            wanted = self._wanted(curve.number)
+            if self.results.find(curve, key_of(curve, wanted, self.numerics)):
+                self._settled += not wanted.draws
 
     def solve(self, pool: Pool, progress: Advance) -> None:
         """Solve what is not known yet; tables are written at the beginning, and as they grow."""
@@ -110,7 +112,8 @@ class Sweep(_Kept):
         if self._settled:
             progress(self._settled * self._steps_each, known=True)
         queue = _Queue(batches(self.case, self._order))
-        task = partial(solve_batch, numerics=self.numerics, keep=partial(keep, self.folder))
+        kept = partial(keep, self.folder, self.numerics)
+        task = partial(solve_batch, problem=self.case.problem, numerics=self.numerics, keep=kept)
         if is_alone:
             task = partial(task, progress=progress)
         with serial() if is_alone else pool as workers:
@@ -122,44 +125,45 @@ class Sweep(_Kept):
                         self.results.add(number, found)
                     is_reported = is_alone and not self.known  # p by p
                     progress(0 if is_reported else self._steps_each, failed=int(is_failed))
-                if len(self.results) >= GROWTH * self._tabled + 1:
+                if monotonic() >= self._due:
                     self.write_tables()
 
     def write_tables(self) -> None:
-        self._tabled = len(self.results)
-        write_results(self.case, self.results, self.folder, self.facts())
+        started, self.facts = monotonic(), facts_of(self.case, self.started, monotonic() - self._clock)
+        write_results(self.case, self.results, self.folder, self.facts)
+        self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
         """Write the tables, results.nc, and the series over the curves."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        write_dataset(self.case, self.results, self.folder, self.facts())
+        write_dataset(self.case, self.results, self.folder, self.facts)
 
-    def facts(self) -> dict[str, Any]:
-        return facts_of(self.case, self.started, monotonic() - self._clock)
+    def _wanted(self, number: int) -> Wanted:
+        return self.first if number == 1 else self.further
 
-    def _wanted(self, curve: Curve) -> Wanted:
-        return self.first if curve.number == 1 else self.further
-
-    def _key(self, curve: Curve) -> str:
-        return key_of(curve, self._wanted(curve), self.numerics)
-
-    def _order(self, curve: Curve) -> Order | None:
-        wanted = self._wanted(curve)
-        if self.results.has(curve) and not wanted.draws:
+    def _order(self, number: int, varied: Varied) -> Order | None:
+        wanted = self._wanted(number)
+        if not self.results.has(number):
+            return Order(number, varied, wanted)
+        if not wanted.draws:
             return None
-        order, known = Order(curve, wanted, self._key(curve)), self.results.of(curve)
-        return order if known is None else replace(order, wanted=without_failed(wanted, known.failures), is_known=True)
+        return Order(number, varied, without_failed(wanted, self.results.of(number).failures), is_known=True)
+
+    def _curve(self, order: Order) -> Curve:
+        [curve] = self.case.curves(order.number - 1, order.number)
+        return curve
 
     def _lost(self, batch: Orders, queue: _Queue) -> list[Found]:
         """What is known of a batch whose worker died; the rest is tried again, set by set, which shows the reason."""
         self.records.look()
-        places = {order: self.records.address(order.key) for order in batch}
+        keys = {order: key_of(self._curve(order), order.wanted, self.numerics) for order in batch}
+        places = {order: self.records.address(key) for order, key in keys.items()}
         left = [order for order, place in places.items() if place is None or order.is_known]
         if len(batch) > 1:
             queue.again += [(order,) for order in left]
-            return [(order.curve.number, place, False) for order, place in places.items() if order not in left]
-        return [(order.curve.number, None if order.is_known else lost(order.curve), True) for order in left]
+            return [(order.number, place, False) for order, place in places.items() if order not in left]
+        return [(order.number, None if order.is_known else lost(self._curve(order)), True) for order in left]
 
 
 class _Queue(Iterator[Orders]):

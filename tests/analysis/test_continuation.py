@@ -8,7 +8,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fpsolve.analysis.continuation import FRAME, LONGEST, SHORTEST, find_branches, find_zero, with_branch
+from fpsolve.analysis.continuation import (
+    FRAME,
+    LONGEST,
+    MOST_CORRECTIONS,
+    SHORTEST,
+    correct,
+    find_branches,
+    find_zero,
+    with_branch,
+)
 from fpsolve.analysis.scan import FINE, TOLERANCE, Row, Sample, scan_row, scanned
 from fpsolve.analysis.special_points import crossings, with_folds, with_points, with_values
 from fpsolve.errors import NotConverged
@@ -491,6 +500,44 @@ def test_a_branch_is_not_sought_again_where_the_scan_is_off():
     check(branch, of)
     rough = [find_zero(scan, seed) for seed in scan.seeds()]
     assert sum(each is not None and not branch.holds(each, near) for each in rough) > 50
+
+
+def steep(told=None):
+    """F = e^{40(v − 0.3 − 0.4u)} − 1, from whose upper side Newton's method begins with short steps."""
+
+    def curve(u, v):
+        if told is not None:
+            told.append((u, v))
+        size = math.exp(40 * (v - 0.3 - 0.4 * u))
+        return size - 1, -16 * size, 40 * size
+
+    return field(curve)
+
+
+@pytest.mark.parametrize("height", [0.03, 0.05, 0.055])
+def test_newton_s_method_goes_on_while_it_gains_a_digit_a_step(height):
+    """From 0.055 above F is 8.0, 2.7, 0.8, 0.15, 0.009, 4e-5, 1e-9; from 0.08 above it is 0.8 and 0.16 in the end."""
+    told = []
+    at = np.array([0.5, 0.5 + height])
+    sample = correct(steep(told), at, np.array([1.0, 0.0]))
+    assert sample.at == pytest.approx([0.5, 0.5], abs=1e-10)
+    assert len(told) > MOST_CORRECTIONS
+    assert correct(steep(), np.array([0.5, 0.58]), np.array([1.0, 0.0])) is None
+
+
+def test_zeros_of_a_scan_are_told_apart_by_a_coarse_function():
+    """The scan of a steep F shows zeros off its line, which cost coarse values; a branch costs one way to its start."""
+    fine, coarse = [], []
+    scan = scan_of(steep())
+    exact, off = steep(fine), steep(coarse)
+    [branch] = find_branches(exact, scan, coarse=lambda at: off(at)._replace(error=1e-6))
+    check(branch, exact)
+    in_branch = len(branch.points) * 3
+    assert len(fine) < in_branch
+    [same] = find_branches(steep(alone := []), scan)
+    assert apart(branch, same.at) < 1e-9
+    assert len(fine) < len(alone)
+    assert list(find_branches(exact, scan, coarse=lambda at: Sample(at, 1.0, np.ones(2), 0.0, 1.0))) == []
 
 
 def met(one, other):

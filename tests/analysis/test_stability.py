@@ -615,7 +615,7 @@ class Worked:
         self.now, self.cost = 0.0, cost
         for name in ("zero", "scan"):
             monkeypatch.setattr(f"fpsolve.analysis.{name}.time", SimpleNamespace(thread_time=lambda: self.now))
-        monkeypatch.setattr(ZeroField, "_sample", lambda _, at, problem, most: self.sample(at, most))
+        monkeypatch.setattr(ZeroField, "_sample", lambda _, at, problem, rtol, most: self.sample(at, most))
 
     def sample(self, at, countdown):
         cost, seconds = self.cost(at), countdown.seconds if countdown else 60.0

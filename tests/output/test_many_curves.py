@@ -6,10 +6,11 @@ import time
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from fpsolve.case.vary import map_key
 from fpsolve.drawing import label_of
-from fpsolve.output.datasets import dataset_of
+from fpsolve.output.datasets import write_dataset
 from fpsolve.output.figures import Encoding, draw
 from fpsolve.theory.perturbation import second_order
 from tests.conftest import sampled
@@ -191,9 +192,10 @@ def test_a_parameter_is_called_alike_in_all_figures(drawn, tmp_path):
     along, over_it, bar = (
         drawn[0].axes[0].get_ylabel(), drawn[1].axes[0].get_xlabel(), drawn[2].axes[1].get_ylabel(),
     )  # fmt: skip
-    found = dataset_of(case, results_of(case), {})
-    assert {along, over_it, bar, label_of(found["noise.D0"].attrs)} == {"noise intensity $D_0$ (1/time)"}
-    assert drawn[2].axes[0].get_xlabel() == label_of(found["p"].attrs) == "order of the moment $p$"
+    write_dataset(case, results_of(case), tmp_path, {})
+    with xr.open_dataset(tmp_path / "results.nc") as found:
+        assert {along, over_it, bar, label_of(found["noise.D0"].attrs)} == {"noise intensity $D_0$ (1/time)"}
+        assert drawn[2].axes[0].get_xlabel() == label_of(found["p"].attrs) == "order of the moment $p$"
 
 
 def test_a_map_is_centred_at_zero_and_has_its_line(pictures, drawn, tmp_path):

@@ -199,6 +199,12 @@ def column(i, values):
     return lambda record: record["moments"].__setitem__(i, _packed(np.array(values))) or record
 
 
+def compressed(**change):
+    """The p in the form of long arrays, with something changed."""
+    data = base64.b64encode(zlib.compress(np.array([2.0, 0.0, -1.0]).tobytes())).decode()
+    return lambda record: record["moments"].__setitem__(0, {"shape": [3], "data": data} | change) or record
+
+
 def estimate(value, i):
     return lambda record: record["estimates"]["lyapunov_exponent"].__setitem__(i, value) or record
 
@@ -224,11 +230,11 @@ WRONG = {
     "no value": column(1, [math.nan, 0.0, 0.0]),
     "infinite error": column(3, [math.inf, 0.0, 0.0]),
     "rare of others": column(6, [7.0]),
-    "no shape": lambda record: record["moments"][0].update(shape=[-1]) or record,
-    "a large shape": lambda record: record["moments"][0].update(shape=[3 * 10**9]) or record,
-    "much in little": lambda record: record["moments"][0].update(
-        data=base64.b64encode(zlib.compress(bytes(10**8))).decode()
-    ) or record,
+    "a value in words": lambda record: record["moments"][1].__setitem__(0, "1.0") or record,
+    "a value that is true": lambda record: record["moments"][1].__setitem__(0, True) or record,
+    "no shape": compressed(shape=[-1]),
+    "a large shape": compressed(shape=[3 * 10**9]),
+    "much in little": compressed(data=base64.b64encode(zlib.compress(bytes(10**8))).decode()),
     "seconds are infinite": lambda record: record | {"seconds": "inf"},
     "seconds are true": lambda record: record | {"seconds": True},
     "seconds are a text": lambda record: record | {"seconds": "1.0"},
@@ -253,6 +259,7 @@ WRONG = {
 @pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
 def test_a_record_whose_numbers_do_not_fit_is_none(tmp_path, solved, change):
     assert is_taken(tmp_path, solved, lambda record: record)
+    assert is_taken(tmp_path, solved, compressed())
     assert not is_taken(tmp_path, solved, change)
 
 
