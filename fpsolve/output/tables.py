@@ -25,13 +25,14 @@ from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.sections import EXCURSIONS, SENSITIVITIES
+from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
 from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION
+from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.uncertain import SAMPLE, Samples, spreads_of
 
@@ -237,6 +238,8 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
     if EXCURSIONS in case.output.quantities:
         found["excursions"] = None if result.excursion is None else _excursion(case, result.excursion)
+    if case.has_response:
+        found[RESPONSE] = None if result.response is None else _response(result.response)
     if case.uncertain:
         found["uncertainty"] = _spreads(case, result)
     return {
@@ -250,22 +253,35 @@ def _summary(case: Case, result: CurveResult, rows: Sequence[Mapping[str, Any]])
     }
 
 
+def _number(each: Estimate | None) -> dict[str, float] | None:
+    return each and {"value": each.value, "error_estimate": each.error_estimate}
+
+
+def _response(found: CurveResponse) -> dict[str, Any]:
+    """The means and impacts with their errors, what the density does near rest, and how far these are to be trusted."""
+    return {
+        "means": {name: _number(each) for name, each in found.means.items()},
+        "impact_rate": _number(found.impact_rate),
+        "has_hump": found.has_hump,
+        "has_crater": found.has_crater,
+        "balance": _number(found.balance),
+        "least_over_largest_density": found.least,
+        "unknowns": found.unknowns,
+    }
+
+
 def _excursion(case: Case, found: Excursion) -> dict[str, Any]:
     """The start, the bounds and the asymptotic number of upcrossings at all levels, and what these follow from."""
-
-    def numbers(each: Estimate | None) -> dict[str, float] | None:
-        return each and {"value": each.value, "error_estimate": each.error_estimate}
-
     levels = np.array(case.excursions.levels)
     rows = zip(levels.tolist(), *(each.tolist() for each in found.bounds(levels)), strict=True)
     many = [None if math.isnan(each) else each for each in found.expected_upcrossings(levels).tolist()]
     return {
         "start": {"phi": found.phi, "xi": found.xi},
         "is_certain": found.is_certain,
-        "stability_index": numbers(found.stability_index),
-        "lower": numbers(found.lower),
-        "upper": numbers(found.upper),
-        "upcrossings": numbers(found.upcrossings),
+        "stability_index": _number(found.stability_index),
+        "lower": _number(found.lower),
+        "upper": _number(found.upper),
+        "upcrossings": _number(found.upcrossings),
         "levels": [
             {"level": level, "least_probable": low, "most_probable": high, "upcrossings": count}
             for (level, low, high), count in zip(rows, many, strict=True)
