@@ -156,6 +156,14 @@ STATIONARY_MEANS: Mapping[str, Quantity] = {
     )
 }
 """Of the stationary response of the nonlinear oscillator, by their names in files."""
+RESPONSE_NUMBERS: Mapping[str, Quantity] = {
+    name: replace(
+        each, name=f"response_{name}", words=f"stationary {each.words}", latex="", equation="", closed_form=""
+    )
+    for name, each in {**STATIONARY_MEANS, "impact_rate": IMPACT_RATE}.items()
+    if name != "x"
+}
+"""What finite elements give of it; the names are those beside the numbers of the linear system."""
 THETA = Quantity("theta", "θ", "parameter", r"$\theta$", "theta_unit", ("parameter",))
 """Any parameter; its unit is a variable beside it."""
 POINTS = {

@@ -31,7 +31,7 @@ from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
-from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION
+from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION, RESPONSE_NUMBERS, Quantity
 from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.uncertain import SAMPLE, Samples, spreads_of
@@ -72,6 +72,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
     indent = 1 if case.planned <= MOST_INDENTED else None
     has_moments, names = MOMENT.name in case.output.quantities, columns_of(case)
     indices = [column.name for each in asked(case) for column in (each, each.error())]
+    settled = [column.name for each in response_columns(case).values() for column in (each, each.error())]
     ends = [f"{each.name}_{part}" for each in _uncertain(case) for part in ENDS]
     more = ENDS if case.uncertain else ()
     with ExitStack() as stack:
@@ -80,7 +81,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
         )
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
         by_moment.writerow([*case.vary.keys, *names, *more])
-        by_curve.writerow([*case.vary.keys, *indices, *ends, "p_solved", "p_failed", "status", "seconds"])
+        by_curve.writerow([*case.vary.keys, *indices, *settled, *ends, "p_solved", "p_failed", "status", "seconds"])
         summary.write(f'{start},\n "curves": [')
         for number, result in enumerate(results):
             varied, done = result.curve.varied.values(), result.moments
@@ -95,6 +96,8 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
                 by_moment.writerow([*varied, *row, *(_ends(spreads.moments.get(float(row[0] or 0.0))) if more else ())])
             intervals = [end for each in _uncertain(case) for end in _ends(spreads.indices.get(each.name))]
             found = [result.estimates[each.name] for each in asked(case)]
+            stationary = result.response.numbers if result.response else {}
+            found += [stationary.get(name) for name in response_columns(case)]
             numbers = [number for each in found for number in ((each.value, each.error_estimate) if each else ("", ""))]
             counts = [done.p.size, (case.p.size if has_moments else 0) - done.p.size]
             by_curve.writerow([*varied, *numbers, *intervals, *counts, result.status.word, round(result.seconds, 6)])
@@ -159,6 +162,11 @@ def columns_of(case: Case) -> list[str]:
 def asked(case: Case) -> list[Index]:
     """The indices that a case asks for."""
     return [index for name, index in INDICES.items() if name in case.output.quantities]
+
+
+def response_columns(case: Case) -> Mapping[str, Quantity]:
+    """The numbers of the stationary response by their names, if a case asks for them."""
+    return RESPONSE_NUMBERS if case.has_response else {}
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
