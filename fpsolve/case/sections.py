@@ -72,18 +72,16 @@ NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MO
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
 Scale = Literal["linear", "log"]
-ExpectedName = (
-    QuantityName
-    | Literal[
-        "response.amplitude",
-        "response.amplitude_squared",
-        "response.amplitude_fourth",
-        "response.x_squared",
-        "response.v_squared",
-        "response.energy",
-        "response.impact_rate",
-    ]
-)
+ExpectedName = Literal[
+    QuantityName,
+    "response.amplitude",
+    "response.amplitude_squared",
+    "response.amplitude_fourth",
+    "response.x_squared",
+    "response.v_squared",
+    "response.energy",
+    "response.impact_rate",
+]
 """What an expectation may be of; the numbers of the response have its name before them."""
 MarkedName = Literal["stability_index", "lyapunov_exponent"]
 
