@@ -1,4 +1,4 @@
-"""Results as tables: summary.json, moments.csv, curves.csv; monte_carlo.json and monte_carlo_response.csv."""
+"""Results as tables: summary.json, moments.csv, curves.csv, response.csv; monte_carlo.json and its response."""
 
 from __future__ import annotations
 
@@ -167,6 +167,14 @@ def asked(case: Case) -> list[Index]:
 def response_columns(case: Case) -> Mapping[str, Quantity]:
     """The numbers of the stationary response by their names, if a case asks for them."""
     return RESPONSE_NUMBERS if case.has_response else {}
+
+
+def write_response(result: CurveResult, folder: Path) -> None:
+    """response.csv of a curve, where it has a stationary density: that of the amplitude."""
+    if result.response is None or (density := result.response.density) is None:
+        return
+    rows = zip(density.amplitude.tolist(), density.of_amplitude.tolist(), strict=True)
+    write_csv(folder / f"response{result.curve.suffix}.csv", ["amplitude", "density"], rows)
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
