@@ -249,9 +249,12 @@ def draw_stationary_responses(
             plane, radial = figure.subplots(1, 2)
             figure.get_layout_engine().set(wspace=0.1)
             _draw_joint_density(plane, found, found.density, case, result.curve.oscillator.omega)
-            if sample := samples.get(result.curve.key):
-                sample.plot_amplitude(radial, color=COLOURS[1])
             _draw_amplitudes(radial, found, found.density, case)
+            if sample := samples.get(result.curve.key):
+                x = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
+                look: dict[str, Any] = {"marker": ".", "color": "black", "markersize": points(4), "capsize": points(2)}
+                words = "Monte Carlo ± 2 standard errors"
+                draw_dots(radial, x, sample.amplitude_density, sample.amplitude_error, label=words, **look)
 
 
 def _draw_joint_density(axes: Any, found: CurveResponse, density: ResponseDensity, case: Case, omega: float) -> None:
