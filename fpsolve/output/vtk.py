@@ -25,7 +25,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import FIELDS, Nodes, xi_marginal
 from fpsolve.files import write_text
 from fpsolve.model.problem import Problem, parameter_lines, parameter_words
-from fpsolve.model.quantity import Quantity
+from fpsolve.model.quantity import RESPONSE_NUMBERS, Quantity
 from fpsolve.output.directions import on_one_grid, write_densities
 from fpsolve.signals import signals_held
 from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
@@ -236,8 +236,13 @@ def write_stationary_response(result: CurveResult, folder: Path) -> None:
     if found is None or found.density is None:
         return
     density, omega = found.density, curve.oscillator.omega
-    known = {name: each.value for name, each in found.numbers.items()} | {"stability_index": found.stability_index}
-    facts = {**known, "curve": float(curve.number), **_facts(curve.parameters, curve.varied, curve.problem)}
+    known = {RESPONSE_NUMBERS[name].name: each.value for name, each in found.numbers.items()}
+    facts = {
+        **known,
+        "stability_index": found.stability_index,
+        "curve": float(curve.number),
+        **_facts(curve.parameters, curve.varied, curve.problem),
+    }
     a, phi = np.meshgrid(density.amplitude, density.phi, indexing="ij")
     plane = {"density": density.of_plane, "amplitude": a, "phi": phi}
     places = [a * np.cos(phi), -a * omega * np.sin(phi), 0 * a]
