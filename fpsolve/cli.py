@@ -276,8 +276,8 @@ def run(
 
     Without [output] quantities a case computes all of them: moment,
     lyapunov_exponent, stability_index, variance_rate, impact_rate,
-    critical_impact_factor, critical_restitution, sensitivities, eigenfunctions. Only where
-    they are named it computes rate_function and excursions, too.
+    critical_impact_factor, critical_restitution, sensitivities, eigenfunctions, response.
+    Only where they are named it computes rate_function and excursions, too.
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """

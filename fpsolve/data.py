@@ -76,7 +76,7 @@ class Quantity:
 
     def timed(self, unit: str) -> Self:
         """The same with a unit of time: "1/s" instead of "1/time"."""
-        return replace(self, unit=re.sub(r"\btime\b", unit, self.unit))
+        return replace(self, unit=re.sub(r"\btime(?=\b|²)", unit, self.unit))
 
     def stated(self, value: float | str) -> str:
         r"""A value of it in a figure: "$D_0$ = 0.1/time", "impact = delta"."""

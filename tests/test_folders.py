@@ -64,6 +64,17 @@ def test_what_does_not_agree_goes_alone(case, folder, tmp_path, table, content):
     assert left(case, tmp_path) == EVERYTHING - {table, *TABLES[table]}
 
 
+def test_a_run_removes_the_responses_of_an_earlier_one(case, folder, tmp_path):
+    """Also those that simulations of earlier versions wrote under these names."""
+    stale = {"response.csv", "response-2.vti", "response.png", "response-10.pdf", "response.vtu", "response_3d-2.vtu"}
+    for name in {*stale, "response.txt", "my_response.csv"}:
+        (folder / name).write_text("", encoding="utf-8")
+    assert left(case, tmp_path, SOLVED) == EVERYTHING - {"summary.json", "curves.csv", "figure.png"} | {
+        "response.txt",
+        "my_response.csv",
+    }
+
+
 def test_parameters_of_a_proof_are_complete(case, folder, tmp_path):
     for curves in ([], [{"parameters": {}}], [{"parameters": {"noise.D0": 0.5}}]):
         (folder / "proof.json").write_text(json.dumps({"curves": curves}), encoding="utf-8")

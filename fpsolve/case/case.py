@@ -28,6 +28,7 @@ from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
     EIGENFUNCTIONS,
+    RESPONSE,
     ChartSection,
     DesignSection,
     ExcursionSection,
@@ -37,6 +38,7 @@ from fpsolve.case.sections import (
     Moments,
     MonteCarloSection,
     OutputSection,
+    ResponseSection,
     Section,
     Text,
     UnitsSection,
@@ -159,6 +161,9 @@ class Case(Section):
     excursions: Annotated[ExcursionSection, parameter("how far ‖x‖ may rise, and its start", "[excursions]")] = (
         ExcursionSection()
     )
+    response: Annotated[ResponseSection, parameter("the stationary response for c2 or c3 > 0", "[response]")] = (
+        ResponseSection()
+    )
     chart: Annotated[ChartSection | None, parameter("the lines of a chart, on which stability ends", "[chart]")] = None
     design: Annotated[DesignSection | None, parameter("what parameters shall be changed for", "[design]")] = None
     uncertain: Annotated[
@@ -240,6 +245,19 @@ class Case(Section):
         """Whether no eigenfunctions are written, as there are too many curves and nobody asks for them."""
         is_wanted = EIGENFUNCTIONS in self.output.quantities
         return is_wanted and self.planned > MOST_DRAWN and not self.output.asks_for_eigenfunctions
+
+    @cached_property
+    def has_response(self) -> bool:
+        """Whether the stationary response is computed: it is asked for, or some of at most ten curves are nonlinear."""
+        if RESPONSE not in self.output.quantities or self.response.off:
+            return False
+        return self.output.states_quantities or (self.planned <= MOST_DRAWN and any(map(_is_nonlinear, self.curves())))
+
+    @property
+    def leaves_out_response(self) -> bool:
+        """Whether it is not, as there are too many curves and nobody asks for it."""
+        is_wanted = RESPONSE in self.output.quantities and not (self.response.off or self.has_response)
+        return is_wanted and self.planned > MOST_DRAWN and any(map(_is_nonlinear, self.curves(0, 1)))
 
     @property
     def differentiated(self) -> FloatArray:
@@ -366,6 +384,10 @@ def _faults_of_name(name: str) -> Iterator[Fault]:
         text = f"got {json.dumps(name)} as the file's name without its ending, which names the folder of its results; "
         remedy = "must have no control characters and no backslash, not end in a dot or a space, and be no device"
         yield Fault("", None, f"{text}{remedy}; rename the file")
+
+
+def _is_nonlinear(curve: Curve) -> bool:
+    return curve.problem.system.is_nonlinear
 
 
 def _spread(p: FloatArray, most: int = 9) -> FloatArray:

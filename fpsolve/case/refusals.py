@@ -26,6 +26,7 @@ from fpsolve.case.messages import Refusal, faults_in, nearest, shown
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
     EXCURSIONS,
+    RESPONSE,
     ChartAxis,
     ChartSection,
     DesignSection,
@@ -36,6 +37,7 @@ from fpsolve.case.sections import (
     Moments,
     MonteCarloSection,
     OutputSection,
+    ResponseSection,
     Varied,
     same,
 )
@@ -257,6 +259,18 @@ def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> I
                 return
 
 
+def _of_response(section: ResponseSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    """A section of what is not computed, or that leaves out what is asked for."""
+    output: OutputSection = valid.get("output", OutputSection())
+    is_named = RESPONSE in output.quantities
+    if section.off and output.states_quantities and is_named:
+        text = f'got true, but output.quantities names "{RESPONSE}"; remove one of the two'
+        yield ("off",), True, text
+    elif section.model_fields_set and not section.off and not is_named:
+        text = f'stands here, but output.quantities has no "{RESPONSE}"; add it there, or remove this section'
+        yield (), None, text
+
+
 def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
     """Axes that are none of this case, or a frame in which there is no such problem or a moment is infinite."""
     problem, parameters = problem_of(valid), parameters_of(valid, context)
@@ -353,6 +367,7 @@ REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
     "figure": _of_figure,
     "excursions": _of_excursions,
     "output": _of_output,
+    "response": _of_response,
     "chart": _of_chart,
     "design": _of_design,
     "expect": _of_expect,

@@ -45,12 +45,15 @@ from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 MAX_MOMENTS = 100_000
 MAX_NODES = 1000
 MOST_LEVELS = 100
+MOST_PLACES = 4_000_000
+"""At which a density is written."""
 _DIGITS = 12
 _SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
 SENSITIVITIES, EIGENFUNCTIONS, EXCURSIONS = "sensitivities", "eigenfunctions", "excursions"
-USUAL_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS)
-"""What is computed where nothing is asked for; eigenfunctions with the stationary density."""
+RESPONSE = "response"
+USUAL_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS, RESPONSE)
+"""What is computed where nothing is asked for: eigenfunctions with a density, and the response if there is one."""
 QUANTITY_NAMES = (*USUAL_NAMES, RATE_FUNCTION.name, EXCURSIONS)
 """What may be asked for."""
 _LARGEST = 1e30
@@ -69,6 +72,17 @@ NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MO
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
 Scale = Literal["linear", "log"]
+ExpectedName = Literal[
+    QuantityName,
+    "response.amplitude",
+    "response.amplitude_squared",
+    "response.amplitude_fourth",
+    "response.x_squared",
+    "response.v_squared",
+    "response.energy",
+    "response.impact_rate",
+]
+"""What an expectation may be of; the numbers of the response have its name before them."""
 MarkedName = Literal["stability_index", "lyapunov_exponent"]
 
 
@@ -487,6 +501,31 @@ class ExcursionSection(Section):
         return min(self.levels, key=lambda level: abs(math.log(level / 10)))
 
 
+class ResponseGrid(Section):
+    """{ amplitude, phi, xi }: at how many places along each axis a density is written."""
+
+    amplitude: Annotated[int, parameter("amplitudes", "amplitude = 80", ge=2, le=MAX_NODES)] = 80
+    phi: Annotated[int, parameter("phases from impact to impact", "phi = 49", ge=3, le=MAX_NODES)] = 49
+    xi: Annotated[int, parameter("values of the noise", "xi = 25", ge=2, le=MAX_NODES)] = 25
+
+    @model_validator(mode="after")
+    def _of_moderate_size(self) -> Self:
+        if (size := self.amplitude * self.phi * self.xi) > MOST_PLACES:
+            text = f"makes {size} places; must be at most {MOST_PLACES}; use fewer along some axis"
+            refuse([((), None, text)])
+        return self
+
+
+class ResponseSection(Section):
+    """[response]: the stationary response of the oscillator with c₂ or c₃ > 0, and where its density is written."""
+
+    rtol: Annotated[float, parameter("wanted relative error of its means", "rtol = 1e-6", ge=1e-10, le=0.1)] = 1e-6
+    off: Annotated[bool, parameter("whether it is left out", "off = true")] = False
+    grid: Annotated[
+        ResponseGrid, parameter("places of the written density", "grid = { amplitude = 80, phi = 49, xi = 25 }")
+    ] = ResponseGrid()
+
+
 class ChartAxis(Section):
     """{ key, start, stop, scale, at }: one side of the frame."""
 
@@ -617,7 +656,7 @@ def _where(table: Any) -> Any:
 class Expectation(Section):
     """[[expect]]: a value that the result must have, on the curves that `where` selects."""
 
-    quantity: Annotated[QuantityName, parameter("what is checked", 'quantity = "moment"')]
+    quantity: Annotated[ExpectedName, parameter("what is checked", 'quantity = "moment"')]
     p: Annotated[float | None, parameter("order of the moment", "p = 2.0")] = None
     value: Annotated[float, parameter("the expected value", "value = 0.01416")]
     rtol: Annotated[float | None, parameter("relative tolerance", "rtol = 1e-3", gt=0)] = None
@@ -628,6 +667,12 @@ class Expectation(Section):
         BeforeValidator(_where, json_schema_input_type=dict[str, Value | dict[str, Value]]),
         parameter("which curves: some of the varied keys", 'where = { "noise.D0" = 1.0 }'),
     ] = Field(default_factory=dict)
+
+    @property
+    def of_response(self) -> str:
+        """Which number of the response is checked; empty where it is none of these."""
+        section, _, name = self.quantity.partition(".")
+        return name if section == RESPONSE else ""
 
     def selects(self, varied: Varied) -> bool:
         """Whether this is about the curve with these varied values; without `where`, about all curves."""

@@ -138,6 +138,32 @@ MOST_PROBABLE = replace(
 UPCROSSINGS = Quantity(
     "upcrossings", "C A^−δ_p", "mean number of upcrossings for large A", r"$C A^{-\delta_p}$", dims=("level",)
 )
+DISPLACEMENT = Quantity("x", "x", "displacement", "$x$", "length", ("x",))
+VELOCITY = Quantity("v", "v", "velocity", r"$\dot{x}$", "length/time", ("v",))
+AMPLITUDE = Quantity("amplitude", "A", "amplitude", r"$A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", "length", ("amplitude",))
+JOINT_DENSITY = Quantity("density", "ρ", "density", r"of $(x, \dot{x})$", "time/length²", ("x", "v"))
+AMPLITUDE_DENSITY = Quantity("amplitude_density", "ρ(A)", "density of the amplitude", "$A$", "1/length", ("amplitude",))
+STATIONARY_MEANS: Mapping[str, Quantity] = {
+    name: Quantity(f"mean_{name}", symbol, words, unit=unit)
+    for name, symbol, words, unit in (
+        ("x", "⟨x⟩", "mean of x", "length"),
+        ("amplitude", "⟨A⟩", "mean of the amplitude", "length"),
+        ("amplitude_squared", "⟨A²⟩", "mean of the squared amplitude", "length²"),
+        ("amplitude_fourth", "⟨A⁴⟩", "mean of the fourth power of the amplitude", "length⁴"),
+        ("x_squared", "⟨x²⟩", "mean of x²", "length²"),
+        ("v_squared", "⟨ẋ²⟩", "mean of ẋ²", "length²/time²"),
+        ("energy", "⟨E⟩", "mean of the energy ½ẋ² + ½ω²x²", "length²/time²"),
+    )
+}
+"""Of the stationary response of the nonlinear oscillator, by their names in files."""
+RESPONSE_NUMBERS: Mapping[str, Quantity] = {
+    name: replace(
+        each, name=f"response_{name}", words=f"stationary {each.words}", latex="", equation="", closed_form=""
+    )
+    for name, each in {**STATIONARY_MEANS, "impact_rate": IMPACT_RATE}.items()
+    if name != "x"
+}
+"""What finite elements give of it; the names are those beside the numbers of the linear system."""
 THETA = Quantity("theta", "θ", "parameter", r"$\theta$", "theta_unit", ("parameter",))
 """Any parameter; its unit is a variable beside it."""
 POINTS = {

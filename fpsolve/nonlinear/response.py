@@ -24,7 +24,15 @@ from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import lyapunov_exponent, stability_index
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import IMPACT_RATE
+from fpsolve.model.quantity import (
+    AMPLITUDE,
+    AMPLITUDE_DENSITY,
+    DISPLACEMENT,
+    IMPACT_RATE,
+    JOINT_DENSITY,
+    STATIONARY_MEANS,
+    VELOCITY,
+)
 from fpsolve.nonlinear.adapt import Search
 from fpsolve.nonlinear.elimination import Solution
 from fpsolve.nonlinear.operator import HALF_TURN, Flow
@@ -35,19 +43,7 @@ if TYPE_CHECKING:
 
 SEEN = 1e-8
 """Of the largest density, above which its sign counts."""
-MEANS = {
-    "amplitude": ("⟨A⟩", "mean of the amplitude", "length"),
-    "amplitude_squared": ("⟨A²⟩", "mean of the squared amplitude", "length²"),
-    "amplitude_fourth": ("⟨A⁴⟩", "mean of the fourth power of the amplitude", "length⁴"),
-    "x_squared": ("⟨x²⟩", "mean of x²", "length²"),
-    "v_squared": ("⟨ẋ²⟩", "mean of ẋ²", "length²/time²"),
-    "energy": ("⟨E⟩", "mean of the energy ½ẋ² + ½ω²x²", "length²/time²"),
-}
-X = Quantity("x", "x", "displacement", "$x$", "length", ("x",))
-V = Quantity("v", "v", "velocity", r"$\dot{x}$", "length/time", ("v",))
-AMPLITUDE = Quantity("amplitude", "A", "amplitude", r"$A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", "length", ("amplitude",))
-DENSITY = Quantity("density", "ρ", "density", r"of $(x, \dot{x})$", "time/length²", ("x", "v"))
-AMPLITUDE_DENSITY = Quantity("amplitude_density", "ρ(A)", "density of the amplitude", "$A$", "1/length", ("amplitude",))
+MEANS = ("amplitude", "amplitude_squared", "amplitude_fourth", "x_squared", "v_squared", "energy")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -173,15 +169,15 @@ class StationaryResponse(Result):
         a = (np.arange(points) + 0.5) * self.reach / points
         v = (np.arange(2 * points) + 0.5 - points) * self.reach * omega / points
         numbers: dict[Quantity, Any] = {
-            DENSITY: self.joint_density(a[:, None], v),
+            JOINT_DENSITY: self.joint_density(a[:, None], v),
             AMPLITUDE_DENSITY: self.amplitude_density(a),
         }
-        for name, (symbol, words, unit) in MEANS.items():
-            mean = Quantity(f"mean_{name}", symbol, words, unit=unit)
-            numbers |= {mean: self.means[name].value, mean.error(): self.means[name].error_estimate}
+        for name, found in self.means.items():
+            mean = STATIONARY_MEANS[name]
+            numbers |= {mean: found.value, mean.error(): found.error_estimate}
         rate = replace(IMPACT_RATE, latex="", equation="")
         numbers |= {rate: self.impact_rate.value, rate.error(): self.impact_rate.error_estimate}
-        coordinates = {X: a, V: v, AMPLITUDE: a}
+        coordinates = {DISPLACEMENT: a, VELOCITY: v, AMPLITUDE: a}
         return dataset("stationary response", "finite elements", numbers, coordinates, self.problem.values)
 
     def _table(self) -> xarray.Dataset:

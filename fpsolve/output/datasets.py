@@ -21,8 +21,17 @@ from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
-from fpsolve.model.quantity import OF_RATE, RATE_FUNCTION, SECONDS, STATUS, STORED_MOMENTS, P, Quantity
-from fpsolve.output.tables import asked
+from fpsolve.model.quantity import (
+    OF_RATE,
+    RATE_FUNCTION,
+    RESPONSE_NUMBERS,
+    SECONDS,
+    STATUS,
+    STORED_MOMENTS,
+    P,
+    Quantity,
+)
+from fpsolve.output.tables import asked, response_columns
 from fpsolve.study.results import CurveResult, Status
 
 if TYPE_CHECKING:
@@ -97,6 +106,7 @@ def _variables(case: Case, results: Iterable[CurveResult]) -> dict[str, Variable
     moments = {name: np.full((planned, len(places)), math.nan) for name in stored if places}
     indices = {index: np.full((3, planned), math.nan) for index in asked(case)}
     status, seconds = np.full(planned, Status.MISSING, dtype=np.int8), np.full(planned, math.nan)
+    settled = {name: np.full((2, planned), math.nan) for name in response_columns(case)}
     for result in results:
         row, found = result.curve.number - 1, result.moments
         for name, values in moments.items():
@@ -104,10 +114,14 @@ def _variables(case: Case, results: Iterable[CurveResult]) -> dict[str, Variable
         for index, values in indices.items():
             if numbers := result.index(index):
                 values[:, row] = [*numbers.values()]
+        for name, estimate in (result.response.numbers if result.response else {}).items():
+            settled[name][:, row] = estimate.value, estimate.error_estimate
         status[row], seconds[row] = result.status, result.seconds
     columns: list[tuple[Quantity, Any]] = [(stored[name], values) for name, values in moments.items()]
     for index, three in indices.items():
         columns += zip((index, index.error(), index.perturbation), three, strict=True)
+    for name, two in settled.items():
+        columns += zip((RESPONSE_NUMBERS[name], RESPONSE_NUMBERS[name].error()), two, strict=True)
     columns += [(STATUS, status), (SECONDS, seconds)]
     flags = {
         "flag_values": np.array([int(each) for each in Status], dtype=np.int8),

@@ -38,8 +38,19 @@ from fpsolve.drawing import (
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import GROWTH, MOMENT, RATE_FUNCTION, P
+from fpsolve.model.quantity import (
+    AMPLITUDE,
+    AMPLITUDE_DENSITY,
+    DISPLACEMENT,
+    GROWTH,
+    JOINT_DENSITY,
+    MOMENT,
+    RATE_FUNCTION,
+    VELOCITY,
+    P,
+)
 from fpsolve.output.charts import held_in_words, read_line
+from fpsolve.study.response import CurveResponse, ResponseDensity
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory import perturbation
 from fpsolve.theory.perturbation import perturbed_moments
@@ -213,6 +224,64 @@ def draw_response(case: Case, simulated: SimulatedCurve, folder: Path, *, into: 
         simulated.response.plot(plane)
         figure.get_layout_engine().set(wspace=0.1)
         simulated.response.plot_amplitude(radial)
+
+
+def draw_stationary_responses(
+    case: Case,
+    results: Iterable[CurveResult],
+    simulated: Sequence[SimulatedCurve],
+    folder: Path,
+    *,
+    into: Path | None = None,
+) -> None:
+    """Draw response.png and .pdf of every curve with a stationary density: of (x, ẋ), and of the amplitude.
+
+    Beside that of the amplitude stands a simulated one, where there is one; above both, what they do at rest.
+    """
+    samples = {each.curve.key: each.response for each in simulated if each.response}
+    for result in results if case.has_response and case.output.figure else ():
+        found = result.response
+        if found is None or found.density is None:
+            continue
+        held = held_in_words(result.curve, (), case.units.time)
+        name = f"response{result.curve.suffix}"
+        with figure_for(*headed(folder, name, into, case.headline), held, Format(width=10.5)) as figure:
+            plane, radial = figure.subplots(1, 2)
+            figure.get_layout_engine().set(wspace=0.1)
+            _draw_joint_density(plane, found, found.density, case, result.curve.oscillator.omega)
+            _draw_amplitudes(radial, found, found.density, case)
+            if sample := samples.get(result.curve.key):
+                x = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
+                look: dict[str, Any] = {"marker": ".", "color": "black", "markersize": points(4), "capsize": points(2)}
+                words = "Monte Carlo ± 2 standard errors"
+                draw_dots(radial, x, sample.amplitude_density, sample.amplitude_error, label=words, **look)
+
+
+def _draw_joint_density(axes: Any, found: CurveResponse, density: ResponseDensity, case: Case, omega: float) -> None:
+    """ρ(x, ẋ) in colours over four decades; what is below has the colour of the lowest."""
+    from matplotlib.colors import LogNorm
+
+    about, x, v = (each.timed(case.units.time).attributes for each in (JOINT_DENSITY, DISPLACEMENT, VELOCITY))
+    a, phi, most = density.amplitude[:, None], density.phi, float(density.of_plane.max())
+    shown, look = np.maximum(density.of_plane, 1e-4 * most), {"norm": LogNorm(1e-4 * most, most), "shading": "gouraud"}
+    draw_colours(axes, a * np.cos(phi), -omega * a * np.sin(phi), shown, about, **look)
+    label_axes(axes, x, v)
+    axes.set_title(_at_rest("a crater around rest", found.stability_index, -2))
+
+
+def _draw_amplitudes(axes: Any, found: CurveResponse, density: ResponseDensity, case: Case) -> None:
+    """ρ(a) as a line."""
+    axes.plot(density.amplitude, density.of_amplitude, color=COLOURS[0], label="finite elements")
+    label_axes(axes, *(each.timed(case.units.time).attributes for each in (AMPLITUDE, AMPLITUDE_DENSITY)))
+    end = density.amplitude[0] + density.amplitude[-1]
+    axes.set(xlim=(0, end), ylim=(0, 1.1 * float(density.of_amplitude.max())))
+    axes.set_title(_at_rest("a hump away from rest", found.stability_index, -1))
+
+
+def _at_rest(words: str, index: float, limit: int) -> str:
+    """What a density does at rest: it vanishes there where δ_p is below a limit, and is infinite where it is above."""
+    below = index < limit
+    return rf"{words if below else 'infinite at rest'}: $\delta_p = {index:.3g} {'<' if below else '>'} {limit}$"
 
 
 def headed(folder: Path, name: str, into: Path | None, heading: str) -> tuple[list[Path], str]:

@@ -40,6 +40,8 @@ from fpsolve.exponent.solver import InvariantClass
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Message, message_of
 from fpsolve.model.kinds import source_of, version_of
+from fpsolve.model.quantity import STATIONARY_MEANS
+from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Numerics, Wanted, everything
 
@@ -244,6 +246,7 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
         **_of_curve(curve),
         p=wanted.p.tolist(),
         wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated, wanted.is_stated, wanted.start],
+        response=[wanted.response, wanted.grid],
         numerics=[numerics.rtol, budget.unknowns, budget.seconds, mesh and codec(CylinderMesh).plain(mesh)],
     )
 
@@ -293,6 +296,8 @@ def fits(result: CurveResult, asked: Sequence[float]) -> bool:
     if (rare := result.excursion) is not None:
         numbers = rare.lyapunov_exponent, rare.stability_index, rare.lower, rare.upper, rare.upcrossings
         indices += filter(None, numbers)
+    if (response := result.response) is not None:
+        indices += [*response.numbers.values(), response.balance]
     is_whole = (
         all(each.shape == found.p.shape for each in columns[:-1])
         and found.p.ndim == found.rare.ndim == 1
@@ -304,6 +309,7 @@ def fits(result: CurveResult, asked: Sequence[float]) -> bool:
         and len(result.jumps) in (0, len(result.curve.problem.system.jumps))
         and all(each.keys() <= BY_JUMP.keys() for each in result.jumps)
         and all(np.array_equal(each.p, found.p) and _is_finite(each, found.p.shape) for each in result.classes)
+        and (response is None or _can_be_drawn(response))
         and 0 <= result.seconds < math.inf
     )
     if is_whole and slopes is not None:
@@ -328,6 +334,23 @@ def _is_finite(each: InvariantClass, shape: tuple[int, ...]) -> bool:
         column.shape == shape and bool(np.isfinite(column).all()) for column in (each.value, each.error_estimate)
     )
     return is_whole and all(map(math.isfinite, (each.phase or 0.0, exponent.value, exponent.error_estimate)))
+
+
+def _can_be_drawn(response: CurveResponse) -> bool:
+    """Whether the numbers of a response are all there, and its density is one over a grid."""
+    density = response.density
+    numbers = response.stability_index, response.least
+    is_whole = response.means.keys() <= STATIONARY_MEANS.keys() and all(map(math.isfinite, numbers))
+    if density is None or not is_whole:
+        return is_whole
+    places = density.amplitude, density.phi, density.xi
+    shape = tuple(each.size for each in places)
+    tables = {1: density.of_amplitude, 2: density.of_plane, 3: density.whole}
+    return (
+        all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in places)
+        and all(each.shape == shape[:size] for size, each in tables.items())
+        and all(bool(np.isfinite(each).all()) for each in (*places, *tables.values()))
+    )
 
 
 def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:

@@ -25,14 +25,14 @@ from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.files import parsed_json, plain_text, write_text
 from fpsolve.messages import Code, Message, Severity, message_of
-from fpsolve.model.quantity import RATE_FUNCTION
+from fpsolve.model.quantity import RATE_FUNCTION, RESPONSE_NUMBERS
 from fpsolve.output.charts import draw_chart
 from fpsolve.output.directions import directions_file, draw_densities
-from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities
+from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities, draw_stationary_responses
 from fpsolve.output.meanings import equations_of, meanings, noises_of, parts_of, region_meaning, simulated_meanings
 from fpsolve.output.proofs import PROOF, between, excursion_in_words, proof_grid, proofs_grid
 from fpsolve.output.screen import Column, Grid
-from fpsolve.output.sentences import excursions
+from fpsolve.output.sentences import excursions, shape_of_response
 from fpsolve.output.terminal import (
     INTERVAL,
     MOST_TABLES,
@@ -153,7 +153,7 @@ class Reporter:
 def _about(case: Case, found: Found, curve: Curve) -> Iterator[str]:
     yield from noises_of(curve.problem)
     if case.system.is_nonlinear:
-        yield "The nonlinear damping acts on the simulated response only: Λ(p), λ and δ_p are of the linear system."
+        yield "The nonlinear damping acts on the stationary response only: Λ(p), λ and δ_p are of the linear system."
     if found.chart is not None:
         keys = f"{charted(case).x.key} and {charted(case).y.key}"
         yield f"The chart is over {keys}; the equation above has the values of the case."
@@ -190,6 +190,7 @@ def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str
             parameters = frozenset(result.curve.parameters.items())
             sure = [f"{each}, as parameters are uncertain." for each in verdicts(spreads_of(case, result))]
             rare = [text] if (text := excursions(case, result)) else []
+            rare += [shape_of_response(result.response)] if result.response else []
             if told := [*meanings(result, time_unit), *rare, *sure, *proven.get(parameters, [])]:
                 yield result.curve.label, told
     if not found.results and len(found.simulated) <= MOST_DRAWN:
@@ -225,6 +226,10 @@ def _figures(case: Case, found: Found, folder: Path) -> Iterator[Figure]:
             )
             draw_it = partial(draw_densities, case, [result], folder)
             jobs.append((f"densities{result.curve.suffix}", f"{title}{_of(result.curve)}", draw_it))
+        if result.response and result.response.density:
+            title = f"Stationary response{_of(result.curve)}"
+            draw_it = partial(draw_stationary_responses, case, [result], found.simulated, folder)
+            jobs.append((f"response{result.curve.suffix}", title, draw_it))
     for each in found.simulated[:MOST_PICTURES]:
         title = f"Simulated stationary response{_of(each.curve)}"
         jobs.append((f"monte_carlo_response{each.curve.suffix}", title, partial(draw_response, case, each, folder)))
@@ -293,6 +298,7 @@ def _grids(case: Case, found: Found) -> Iterator[Grid]:
         for result in results:
             yield from [_index_grid(case, result)] if any(result.estimates.values()) else []
             yield from [moment_grid(case, result)] if result.moments.p.size else []
+            yield from [_response_grid(case, result)] if result.response else []
     solved = {result.curve.key: result for result in results}
     pairs = [(each, solved.get(each.curve.key)) for each in simulated]
     if pairs and len(pairs) <= MOST_TABLES and case.figure.x == "p":
@@ -325,6 +331,17 @@ def _index_grid(case: Case, result: CurveResult) -> Grid:
         row = [index.words, index.symbol, number, f"{estimate.error_estimate:.0e}", "" if unit == "1" else unit, told]
         interval = interval_text(spreads[name]) if name in spreads else ""
         grid.rows.append([*row, *[interval] * bool(spreads)])
+    return grid
+
+
+def _response_grid(case: Case, result: CurveResult) -> Grid:
+    """The numbers of the stationary response with their errors."""
+    columns = [Column("symbol"), Column("value"), Column("± error"), Column("unit")]
+    grid = Grid(case.heading(result.curve), [Column("quantity", is_text=True), *columns])
+    for name, each in result.response.numbers.items() if result.response else ():
+        about = RESPONSE_NUMBERS[name].timed(case.units.time)
+        value = digits(each.value, each.error_estimate)
+        grid.rows.append([about.words, about.symbol, value, f"{each.error_estimate:.0e}", about.unit])
     return grid
 
 

@@ -7,6 +7,7 @@ import math
 from fpsolve.analysis.excursions import SYMBOL, Excursion
 from fpsolve.case.case import Case
 from fpsolve.exponent.error import digits
+from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult
 
 DIGITS = 4
@@ -27,6 +28,8 @@ def sentence(case: Case, result: CurveResult) -> str:
     found = result.moments
     rows = zip(found.p.tolist(), found.value.tolist(), found.error_estimate.tolist(), strict=True)
     second = next(((each, error) for p, each, error in rows if p == 2 and abs(each) > error), None)
+    if exponent.value > 0 and result.response is not None:
+        return f"Almost every path grows from rest ({value}) and settles into the stationary response."
     if exponent.value > 0:
         return f"Almost every path grows ({value}): it passes every level in the end."
     text, is_rare = f"Almost every path decays ({value})", second is not None and second[0] > 0
@@ -42,6 +45,14 @@ def sentence(case: Case, result: CurveResult) -> str:
     if is_rare and index is not None and index.value > 0:
         return f"{text}, {SYMBOL} falls as A^-{digits(index.value, index.error_estimate, DIGITS)}."
     return f"{text}."
+
+
+def shape_of_response(found: CurveResponse) -> str:
+    """Where the densities of a response are largest: what changes at δ_p = −1 and −2, the P-bifurcations."""
+    if not found.has_hump:
+        return "ρ(A) and ρ(x, ẋ) are infinite at rest, as δ_p > -1."
+    plane = "a crater around rest, as δ_p < -2" if found.has_crater else "is infinite there, as δ_p > -2"
+    return f"ρ(A) has a hump away from rest, as δ_p < -1, and ρ(x, ẋ) {plane}."
 
 
 def excursions(case: Case, result: CurveResult) -> str:

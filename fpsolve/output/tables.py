@@ -1,4 +1,4 @@
-"""Results as tables: summary.json, moments.csv, curves.csv; monte_carlo.json and monte_carlo_response.csv."""
+"""Results as tables: summary.json, moments.csv, curves.csv, response.csv; monte_carlo.json and its response."""
 
 from __future__ import annotations
 
@@ -26,13 +26,14 @@ from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.sections import EXCURSIONS, SENSITIVITIES
+from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
-from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION
+from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION, RESPONSE_NUMBERS, Quantity
+from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.uncertain import SAMPLE, Samples, spreads_of
 
@@ -79,6 +80,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
     """
     has_moments, names = MOMENT.name in case.output.quantities, columns_of(case)
     indices = [column.name for each in asked(case) for column in (each, each.error())]
+    settled = [column.name for each in response_columns(case).values() for column in (each, each.error())]
     ends = [f"{each.name}_{part}" for each in _uncertain(case) for part in ENDS]
     more = ENDS if case.uncertain else ()
     is_short = case.planned > MOST_SUMMARISED
@@ -88,7 +90,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
         )
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
         by_moment.writerow([*case.vary.keys, *names, *more])
-        by_curve.writerow([*case.vary.keys, *indices, *ends, "p_solved", "p_failed", "status", "seconds"])
+        by_curve.writerow([*case.vary.keys, *indices, *settled, *ends, "p_solved", "p_failed", "status", "seconds"])
         summary.write(_beginning(case, results, facts, held=is_short))
         for number, result in enumerate(results):
             varied, done, rows = result.curve.varied.values(), result.moments, _rows(result, names)
@@ -98,6 +100,8 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
                 by_moment.writerow([*varied, *row, *(_ends(spreads.moments.get(float(row[0] or 0.0))) if more else ())])
             intervals = [end for each in _uncertain(case) for end in _ends(spreads.indices.get(each.name))]
             found = [result.estimates[each.name] for each in asked(case)]
+            stationary = result.response.numbers if result.response else {}
+            found += [stationary.get(name) for name in response_columns(case)]
             numbers = [number for each in found for number in ((each.value, each.error_estimate) if each else ("", ""))]
             counts = [done.p.size, (case.p.size if has_moments else 0) - done.p.size]
             by_curve.writerow([*varied, *numbers, *intervals, *counts, result.status.word, round(result.seconds, 6)])
@@ -194,6 +198,19 @@ def columns_of(case: Case) -> list[str]:
 def asked(case: Case) -> list[Index]:
     """The indices that a case asks for."""
     return [index for name, index in INDICES.items() if name in case.output.quantities]
+
+
+def response_columns(case: Case) -> Mapping[str, Quantity]:
+    """The numbers of the stationary response by their names, if a case asks for them."""
+    return RESPONSE_NUMBERS if case.has_response else {}
+
+
+def write_response(result: CurveResult, folder: Path) -> None:
+    """response.csv of a curve, where it has a stationary density: that of the amplitude."""
+    if result.response is None or (density := result.response.density) is None:
+        return
+    rows = zip(density.amplitude.tolist(), density.of_amplitude.tolist(), strict=True)
+    write_csv(folder / f"response{result.curve.suffix}.csv", ["amplitude", "density"], rows)
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
@@ -304,27 +321,42 @@ def _beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
     if EXCURSIONS in case.output.quantities:
         found["excursions"] = None if result.excursion is None else _excursion(case, result.excursion)
+    if case.has_response:
+        found[RESPONSE] = None if result.response is None else _response(result.response)
     if case.uncertain:
         found["uncertainty"] = _spreads(case, result)
     return found
 
 
+def _number(each: Estimate | None) -> dict[str, float] | None:
+    return each and {"value": each.value, "error_estimate": each.error_estimate}
+
+
+def _response(found: CurveResponse) -> dict[str, Any]:
+    """The means and impacts with their errors, what the density does near rest, and how far these are to be trusted."""
+    return {
+        "means": {name: _number(each) for name, each in found.means.items()},
+        "impact_rate": _number(found.impact_rate),
+        "has_hump": found.has_hump,
+        "has_crater": found.has_crater,
+        "balance": _number(found.balance),
+        "least_over_largest_density": found.least,
+        "unknowns": found.unknowns,
+    }
+
+
 def _excursion(case: Case, found: Excursion) -> dict[str, Any]:
     """The start, the bounds and the asymptotic number of upcrossings at all levels, and what these follow from."""
-
-    def numbers(each: Estimate | None) -> dict[str, float] | None:
-        return each and {"value": each.value, "error_estimate": each.error_estimate}
-
     levels = np.array(case.excursions.levels)
     rows = zip(levels.tolist(), *(each.tolist() for each in found.bounds(levels)), strict=True)
     many = [None if math.isnan(each) else each for each in found.expected_upcrossings(levels).tolist()]
     return {
         "start": {"phi": found.phi, "xi": found.xi},
         "is_certain": found.is_certain,
-        "stability_index": numbers(found.stability_index),
-        "lower": numbers(found.lower),
-        "upper": numbers(found.upper),
-        "upcrossings": numbers(found.upcrossings),
+        "stability_index": _number(found.stability_index),
+        "lower": _number(found.lower),
+        "upper": _number(found.upper),
+        "upcrossings": _number(found.upcrossings),
         "levels": [
             {"level": level, "least_probable": low, "most_probable": high, "upcrossings": count}
             for (level, low, high), count in zip(rows, many, strict=True)

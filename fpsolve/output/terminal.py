@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,10 +17,10 @@ from rich.text import Text
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.sections import EXCURSIONS
+from fpsolve.case.sections import EXCURSIONS, RESPONSE
 from fpsolve.case.vary import map_key, short_names
 from fpsolve.data import Quantity, written
-from fpsolve.exponent.error import digits
+from fpsolve.exponent.error import Estimate, digits
 from fpsolve.exponent.quantities import (
     BY_JUMP,
     CRITICAL_RESTITUTION,
@@ -33,9 +33,9 @@ from fpsolve.exponent.quantities import (
     Index,
 )
 from fpsolve.messages import Code, Message, Severity, message_of
-from fpsolve.model.quantity import moment_at
+from fpsolve.model.quantity import RESPONSE_NUMBERS, STATIONARY_MEANS, moment_at
 from fpsolve.output.screen import Cell, Column, Grid, Screen
-from fpsolve.output.sentences import bounds_text, excursions, sentence
+from fpsolve.output.sentences import bounds_text, excursions, sentence, shape_of_response
 from fpsolve.output.tables import asked, in_case_words
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve, Status
@@ -133,7 +133,7 @@ def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
 def _quantities(case: Case) -> list[_Shown]:
     """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
     ordered = sorted(_told(case), key=lambda index: index not in MAIN)
-    rare = [_excursion(case)] * (EXCURSIONS in case.output.quantities)
+    rare = [_excursion(case)] * (EXCURSIONS in case.output.quantities) + [_mean_square()] * case.has_response
     if case.figure.x != "p":
         main = [
             each
@@ -195,6 +195,16 @@ def _excursion(case: Case) -> _Shown:
         return "" if result.excursion is None else bounds_text(result.excursion, level)
 
     return _Shown(f"P(sup ‖x‖ ≥ {level:g})", rank=1, text=text)
+
+
+def _mean_square() -> _Shown:
+    """⟨A²⟩ of the stationary response."""
+
+    def text(result: CurveResult) -> str:
+        found = result.response and result.response.means["amplitude_squared"]
+        return digits(found.value, found.error_estimate, DIGITS) if found else ""
+
+    return _Shown(STATIONARY_MEANS["amplitude_squared"].symbol, 1, text=text)
 
 
 def _moment(p: float, rank: int) -> _Shown:
@@ -268,6 +278,11 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
                 numbers = [f"{INDICES[name].symbol} = {each}" for name, each in found.items() if each]
                 screen.packed([f"φ = {ray.phase:.6g}:", *numbers])
             screen.packed(list(verdicts(spreads)))
+            if result.response:
+                stationary = result.response.numbers.items()
+                screen.say("Stationary response:")
+                screen.packed([f"{RESPONSE_NUMBERS[name].symbol} = {each}" for name, each in stationary], "  ")
+                screen.say(shape_of_response(result.response))
             for text in filter(None, (excursions(case, result), sentence(case, result))):
                 screen.say(text)
             screen.lines([""])
@@ -389,10 +404,12 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
         screen.show(exponent_grid(case, pairs))
         if not is_short:
             screen.say(f"{len(simulated)} curves; all numbers are in {MONTE_CARLO}, one for each curve")
-    for each in simulated if is_short else ():
+    for each, result in pairs if is_short else ():
         if each.response:
+            solved_means = result.response.means if result and result.response else {}
+            told = [_simulated_mean(name, *mean, solved_means) for name, mean in each.response.means.items()]
             screen.say(f"{case.place(each.curve)}: stationary means")
-            screen.packed([f"{name} = {_with_error(*mean)}" for name, mean in each.response.means.items()], "  ")
+            screen.packed(told, "  ")
             screen.lines([""])
     print_remarks(case, simulated, MONTE_CARLO)
 
@@ -450,6 +467,14 @@ def sampled(value: float, error: float) -> str:
         return f"{value:g}"
     decimals = 1 - math.floor(math.log10(error))
     return f"{value:.{decimals}f}" if 0 <= decimals <= 9 else f"{value:.3g}"
+
+
+def _simulated_mean(name: str, value: float, error: float, exact: Mapping[str, Estimate]) -> str:
+    """A mean of a simulated response, and how far that by finite elements is away, where there is one."""
+    text = f"{STATIONARY_MEANS[name].symbol} = {_with_error(value, error)}"
+    if name not in exact or not error:
+        return text
+    return f"{text} (finite elements {exact[name].value:.6g}, {_deviation(value, error, exact[name].value)} s.e. away)"
 
 
 def _deviation(value: float, error: float, exact: float) -> str:
@@ -619,3 +644,6 @@ def note_missing(case: Case, *, monte_carlo: bool) -> None:
         why = f"no eigenfunctions are written, as there are more than {MOST_DRAWN} curves"
         wanted = f"name the p that you want, as in [output] eigenfunctions = [{case.usual_p!r}]"
         print_remark(f"{case.name}: {why}; {wanted}")
+    if case.leaves_out_response:
+        why = f"no stationary response is computed, as there are more than {MOST_DRAWN} curves"
+        print_remark(f'{case.name}: {why}; name "{RESPONSE}" in [output] quantities to have its means')

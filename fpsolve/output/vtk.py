@@ -25,10 +25,10 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import FIELDS, Nodes, xi_marginal
 from fpsolve.files import write_text
 from fpsolve.model.problem import Problem, parameter_lines, parameter_words
-from fpsolve.model.quantity import Quantity
+from fpsolve.model.quantity import RESPONSE_NUMBERS, Quantity
 from fpsolve.output.directions import on_one_grid, write_densities
 from fpsolve.signals import signals_held
-from fpsolve.study.results import SimulatedCurve, Solved
+from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
 
 CURVES = "curves.pvd"
 MOST_STATES = 8
@@ -156,16 +156,31 @@ def _plain(axis: Quantity) -> str:
 
 def _write_plane(path: Path, grid: DirectionGrid, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file of quadrilaterals between the nodes; the first array of point data is shown first."""
-    pyvista, (a, b) = _pyvista(), (grid.first.size, grid.second.size)
-    first, second = (each.ravel() for each in np.meshgrid(grid.first, grid.second, indexing="ij"))
-    points = np.stack([first, second, 0 * first], axis=1)
+    first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
+    places = [first, second, 0 * first]
     if grid.dimension == 3:
         flat = np.cos(second)
-        points = np.stack([flat * np.cos(first), flat * np.sin(first), np.sin(second)], axis=1)
-    corner = (np.arange(a - 1)[:, None] * b + np.arange(b - 1)).ravel()
-    cells = np.stack([np.full_like(corner, 4), corner, corner + b, corner + b + 1, corner + 1], axis=1)
-    kinds = np.full(corner.size, pyvista.CellType.QUAD, dtype=np.uint8)
-    output = pyvista.UnstructuredGrid(cells.ravel(), kinds, points)
+        places = [flat * np.cos(first), flat * np.sin(first), np.sin(second)]
+    _write_between(path, places, data, facts)
+
+
+def _write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, Any], facts: Facts) -> None:
+    """Write a .vtu file of the quadrilaterals, or the hexahedra, between the nodes of a grid.
+
+    Args:
+        path: of the file.
+        places: x, y and z of the nodes, all of the shape of the grid.
+        data: point data of this shape; the first is shown first.
+        facts: field data.
+    """
+    pyvista, numbers = _pyvista(), np.arange(places[0].size).reshape(places[0].shape)
+    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    steps = square if numbers.ndim == 2 else [(*step, top) for top in (0, 1) for step in square]
+    corners = [numbers[tuple(slice(k, k - 1 or None) for k in step)].ravel() for step in steps]
+    kind = pyvista.CellType.QUAD if numbers.ndim == 2 else pyvista.CellType.HEXAHEDRON
+    cells = np.stack([np.full_like(corners[0], len(corners)), *corners], axis=1)
+    kinds = np.full(len(cells), kind, dtype=np.uint8)
+    output = pyvista.UnstructuredGrid(cells.ravel(), kinds, np.stack([each.ravel() for each in places], axis=1))
     for name, values in data.items():
         output.point_data[name] = values.ravel()
     output.GetPointData().SetActiveScalars(next(iter(data)))
@@ -193,7 +208,7 @@ def write_curves(case: Case, folder: Path) -> Path | None:
 
 
 def write_response(simulated: SimulatedCurve, folder: Path) -> None:
-    """Write the joint density of x and ẋ, if there is one, as cell data `density` of response.vti.
+    """Write the joint density of x and ẋ, if there is one, as cell data `density` of monte_carlo_response.vti.
 
     Field data: `lyapunov_exponent` and its standard error, `lyapunov_exponent_error`, and the parameters as in
     `write_eigenfunctions`.
@@ -208,6 +223,33 @@ def write_response(simulated: SimulatedCurve, folder: Path) -> None:
     known = {name: getattr(found, name) for name in ("lyapunov_exponent", "lyapunov_exponent_error")}
     parameters = {**curve.parameters, "curve": float(curve.number)}
     _write(path, grid, {**known, **_facts(parameters, curve.varied, curve.problem)})
+
+
+def write_stationary_response(result: CurveResult, folder: Path) -> None:
+    """Write the stationary density of a curve, if it has one, as response.vtu and response_3d.vtu.
+
+    The first shows (x, ẋ) as x and y, with the `density` of these, and `amplitude` and `phi`; the second shows
+    (a, φ, ξ) as x, y and z, with the `density` of these. Field data: the numbers of the response, `stability_index`,
+    and the parameters as in `write_eigenfunctions`.
+    """
+    found, curve = result.response, result.curve
+    if found is None or found.density is None:
+        return
+    density, omega = found.density, curve.oscillator.omega
+    known = {RESPONSE_NUMBERS[name].name: each.value for name, each in found.numbers.items()}
+    facts = {
+        **known,
+        "stability_index": found.stability_index,
+        "curve": float(curve.number),
+        **_facts(curve.parameters, curve.varied, curve.problem),
+    }
+    a, phi = np.meshgrid(density.amplitude, density.phi, indexing="ij")
+    plane = {"density": density.of_plane, "amplitude": a, "phi": phi}
+    places = [a * np.cos(phi), -a * omega * np.sin(phi), 0 * a]
+    _write_between(folder / f"response{curve.suffix}.vtu", places, plane, facts)
+    places = [*np.meshgrid(density.amplitude, density.phi, density.xi, indexing="ij")]
+    whole = {"density": density.whole.astype(np.float32)}
+    _write_between(folder / f"response_3d{curve.suffix}.vtu", places, whole, facts)
 
 
 def copy_show_script(directory: Path) -> Path:

@@ -15,7 +15,15 @@ from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import IMPACT_RATE
+from fpsolve.model.quantity import (
+    AMPLITUDE,
+    AMPLITUDE_DENSITY,
+    DISPLACEMENT,
+    IMPACT_RATE,
+    JOINT_DENSITY,
+    STATIONARY_MEANS,
+    VELOCITY,
+)
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.bounces import advance_and_count
 from fpsolve.simulation.setup import BATCHES, simulated_parts, starting_state
@@ -26,12 +34,6 @@ if TYPE_CHECKING:
 
 BINS = 100
 MEANS = ("x", "x_squared", "v_squared", "amplitude", "energy")
-_UNITS = dict(zip(MEANS, ("length", "length²", "length²/time²", "length", "length²/time²"), strict=True))
-X = Quantity("x", "x", "displacement", "$x$", "length", ("x",))
-V = Quantity("v", "v", "velocity", r"$\dot{x}$", "length/time", ("v",))
-AMPLITUDE = Quantity("amplitude", "A", "amplitude", r"$A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", "length", ("amplitude",))
-DENSITY = Quantity("density", "ρ", "density", r"of $(x, \dot{x})$", "time/length²", ("x", "v"))
-AMPLITUDE_DENSITY = Quantity("amplitude_density", "ρ(A)", "density of the amplitude", "$A$", "1/length", ("amplitude",))
 OUTSIDE = Quantity("outside", "outside", "share of the counts outside of the cells")
 _MARGIN = 1.5
 """Range of the histograms over the largest amplitude after the transient; what lies outside is counted apart."""
@@ -78,16 +80,16 @@ class Response(Result):
         """The densities over the middles of their cells, and the means."""
         kind = "standard error"
         numbers: dict[Quantity, Any] = {
-            DENSITY: self.density,
+            JOINT_DENSITY: self.density,
             AMPLITUDE_DENSITY: self.amplitude_density,
             AMPLITUDE_DENSITY.error(kind): self.amplitude_error,
         }
         for name, (value, deviation) in self.means.items():
-            mean = Quantity(f"mean_{name}", f"⟨{name}⟩", f"stationary mean of {name}", unit=_UNITS[name])
+            mean = STATIONARY_MEANS[name]
             numbers |= {mean: value, mean.error(kind): deviation}
         numbers |= {replace(IMPACT_RATE, latex="", equation=""): self.impact_rate, OUTSIDE: self.outside}
         coordinates: dict[Quantity, FloatArray] = {}
-        for side, edges in ((X, self.x_edges), (V, self.v_edges), (AMPLITUDE, self.amplitude_edges)):
+        for side, edges in ((DISPLACEMENT, self.x_edges), (VELOCITY, self.v_edges), (AMPLITUDE, self.amplitude_edges)):
             name, words = f"{side.name}_edges", f"edges of the cells of {side.name}"
             ends = Quantity(name, name, words, unit=side.unit, dims=(name,))
             coordinates |= {side: (edges[1:] + edges[:-1]) / 2, ends: edges}

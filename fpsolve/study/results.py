@@ -22,6 +22,7 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_IN
 from fpsolve.exponent.solver import InvariantClass
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, MOMENTS, P
+from fpsolve.study.response import CurveResponse
 
 if TYPE_CHECKING:  # which take half a second to import
     import xarray
@@ -91,6 +92,7 @@ class CurveResult(Result):
         classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
         sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
         excursion: the probability that ‖x‖ ever exceeds a level; None where it is not wanted, or did not converge.
+        response: the stationary response for c₂ or c₃ > 0; None where it is not wanted, or there is none.
         seconds: how long the processor took.
     """
 
@@ -105,6 +107,7 @@ class CurveResult(Result):
     classes: tuple[InvariantClass, ...] = ()
     sensitivities: Sensitivities | None = None
     excursion: Excursion | None = None
+    response: CurveResponse | None = None
     seconds: float = 0.0
 
     @property

@@ -24,9 +24,9 @@ from fpsolve.analysis.directions import SettledDirections, negative_part, settle
 from fpsolve.analysis.excursions import SYMBOL, Excursion, Start, StartOfNoise, solve_excursion
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.kinds import varying
-from fpsolve.case.sections import EIGENFUNCTIONS, EXCURSIONS, SENSITIVITIES, Varied
+from fpsolve.case.sections import EIGENFUNCTIONS, EXCURSIONS, RESPONSE, SENSITIVITIES, Varied
 from fpsolve.errors import FpsolveError, NoDerivative, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
@@ -38,6 +38,7 @@ from fpsolve.exponent.solver import ExponentSolver, InvariantClass, MomentLyapun
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity, message_of
 from fpsolve.model.problem import Problem
+from fpsolve.study.response import CurveResponse, Grid, solve_response
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns, Solved
 from fpsolve.theory.far import heavy_tail_note
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
@@ -62,6 +63,8 @@ class Wanted:
         density: whether the stationary density is.
         differentiated: the p at which Λ is differentiated by the parameters; None where no sensitivities are wanted.
         start: φ₀ and ξ₀ of excursions; None where these are not wanted.
+        response: rtol of the stationary response; None where that is not wanted.
+        grid: of its density; None where numbers are enough.
         is_stated: whether a case names what it wants, so that what there is not is told of.
     """
 
@@ -71,6 +74,8 @@ class Wanted:
     density: bool = False
     differentiated: tuple[float, ...] | None = None
     start: tuple[Start, StartOfNoise] | None = None
+    response: float | None = None
+    grid: Grid | None = None
     is_stated: bool = True
 
     @property
@@ -103,6 +108,7 @@ def everything(case: Case, number: int = 1) -> Wanted:
     names = set(case.output.quantities)
     draws, has_moments = EIGENFUNCTIONS in names and not case.problem.no_picture, MOMENT.name in names
     slopes = tuple(case.differentiated) if has_moments else ()
+    grid = case.response.grid
     return Wanted(
         case.p if has_moments else np.zeros(0),
         tuple(name for name in INDICES if name in names),
@@ -110,6 +116,8 @@ def everything(case: Case, number: int = 1) -> Wanted:
         density=draws and (number == 1 or case.shown.size > 0),
         differentiated=slopes if SENSITIVITIES in names or case.uncertain else None,
         start=(case.excursions.phi, case.excursions.xi) if EXCURSIONS in names else None,
+        response=case.response.rtol if case.has_response else None,
+        grid=(grid.amplitude, grid.phi, grid.xi) if case.has_response and case.planned <= MOST_DRAWN else None,
         is_stated=case.output.states_quantities,
     )
 
@@ -118,7 +126,11 @@ def expected(case: Case, varied: Varied) -> Wanted:
     """What the expectations of a case compare, of the curve with these values."""
     chosen = [each for each in case.expect if each.selects(varied)]
     p = np.unique([each.p for each in chosen if each.p is not None])
-    return Wanted(p, tuple(name for name in INDICES if any(each.quantity == name for each in chosen)))
+    return Wanted(
+        p,
+        tuple(name for name in INDICES if any(each.quantity == name for each in chosen)),
+        response=case.response.rtol if any(each.of_response for each in chosen) else None,
+    )
 
 
 def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
@@ -131,7 +143,8 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
             at = np.flatnonzero(np.isclose(result.moments.p, wanted.p, rtol=0, atol=1e-12))
             value = float(result.moments.value[at[0]]) if at.size else None
         else:
-            estimate = result.estimates[wanted.quantity]
+            numbers = result.response.numbers if result.response else {}
+            estimate = numbers.get(wanted.of_response) if wanted.of_response else result.estimates[wanted.quantity]
             value = None if estimate is None else estimate.value
         tolerance = max(wanted.atol or 0.0, (wanted.rtol or 0.0) * abs(wanted.value))
         met = value is not None and abs(value - wanted.value) <= tolerance
@@ -159,6 +172,8 @@ def solve_curve(
     classes = _solve_classes(solver, found.p)
     missing = [each for each in missing if wanted.is_stated or not each.tells_of(Code.NOT_ONE_RAY)] + more
     rare, told_of_it = _solve_excursion(solver, wanted, found, estimates[STABILITY_INDEX.name])
+    missing += told_of_it
+    response, told_of_it = _solve_response(curve.problem, wanted, found)
     missing += told_of_it
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
@@ -225,12 +240,13 @@ def solve_curve(
         warnings=(*found.warnings, *limits),
         sensitivities=slopes,
         excursion=rare,
+        response=response,
         notes=tuple(note for note in notes if note is not None),
         failures=found.failures or tuple(Failure(None, message) for message in of[Severity.FAILURE]),
         seconds=thread_time() - started,
     )
     told = (*(failure.reason for failure in result.failures), *result.warnings, *result.notes)
-    is_passing = any(each.tells_of(Code.NO_MEMORY) for each in told)
+    is_passing = any(each.tells_of(code) for each in told for code in (Code.NO_MEMORY, Code.FAULT))
     return Solved(result, pairs, stationary, is_passing, directions)
 
 
@@ -340,6 +356,29 @@ def _solve_excursion(
         reason = Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
     code = Code.INDEX_MISSING if moments.failures else Code.INDEX_FAILED
     return None, [Message(code, symbols=[SYMBOL], reason=reason)]
+
+
+def _solve_response(
+    problem: Problem, wanted: Wanted, moments: MomentLyapunov
+) -> tuple[CurveResponse | None, list[Message]]:
+    """The stationary response, or why there is none; nothing where it is not wanted."""
+    if wanted.response is None:
+        return None, []
+    try:
+        return solve_response(problem, wanted.response, wanted.grid), []
+    except FpsolveError as failure:
+        reason = failure.message
+    except MemoryError:
+        reason = Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
+    except OSError:
+        raise
+    except Exception as failure:  # the others are there already
+        reason = _fault(failure)
+    if reason.severity is Severity.NOTE:
+        return None, [reason]
+    return None, [
+        Message(Code.INDEX_MISSING if moments.failures else Code.INDEX_FAILED, symbols=[RESPONSE], reason=reason)
+    ]
 
 
 def _solve_jumps(
@@ -476,10 +515,14 @@ def solved(curve: Curve, order: Order, numerics: Numerics, progress: Callable[[]
     except OSError:
         raise
     except Exception as failure:
-        last = traceback.extract_tb(failure.__traceback__)[-1]
-        said = {"kind": type(failure).__name__, "text": str(failure)}
-        told = Message(Code.FAULT, **said, file=Path(last.filename).name, line=last.lineno)
-        return Solved(failed(curve, told), (), None, True)
+        return Solved(failed(curve, _fault(failure)), (), None, True)
+
+
+def _fault(failure: Exception) -> Message:
+    """What is said of a fault of fpsolve."""
+    last = traceback.extract_tb(failure.__traceback__)[-1]
+    said = {"kind": type(failure).__name__, "text": str(failure)}
+    return Message(Code.FAULT, **said, file=Path(last.filename).name, line=last.lineno)
 
 
 def failed(curve: Curve, reason: str) -> CurveResult:

@@ -20,7 +20,7 @@ from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
 from fpsolve.output.designs import write_design
 from fpsolve.output.directions import draw_densities
-from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities
+from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities, draw_stationary_responses
 from fpsolve.output.tables import write_samples, write_simulation
 from fpsolve.output.vtk import write_response
 from fpsolve.pool import Pool, cluster, parallel, serial
@@ -165,6 +165,7 @@ def run_case(
                 draw(case, sweep.results, simulated, folder)
                 draw_rates(case, sweep.results, folder)
                 draw_sensitivities(case, sweep.results, folder)
+                draw_stationary_responses(case, sweep.results, simulated, folder)
                 draw_densities(case, sweep.results, folder)
             if reporter is not None:
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo

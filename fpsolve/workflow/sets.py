@@ -28,8 +28,8 @@ from fpsolve.output.records import (
     simulation_fits,
     simulation_key,
 )
-from fpsolve.output.tables import facts_of, write_results
-from fpsolve.output.vtk import write_curves, write_functions
+from fpsolve.output.tables import facts_of, write_response, write_results
+from fpsolve.output.vtk import write_curves, write_functions, write_stationary_response
 from fpsolve.pool import Pool, serial
 from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
 from fpsolve.study.simulate import simulate_curve, simulate_curves, simulation_steps, simulation_work
@@ -134,9 +134,12 @@ class Sweep(_Kept):
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
-        """Write the tables, results.nc, and the series over the curves."""
+        """Write the tables, results.nc, the series over the curves, and the stationary densities."""
         self.write_tables()
         write_curves(self.case, self.folder)
+        for result in self.results if self.first.grid else ():
+            write_response(result, self.folder)
+            write_stationary_response(result, self.folder)
         write_dataset(self.case, self.results, self.folder, self.facts)
 
     def _wanted(self, number: int) -> Wanted:

@@ -40,7 +40,7 @@ def curves(name):
 
 def test_there_is_a_case_for_every_figure():
     figures = {"fig1", "fig2a", "fig2b", "fig2c", "fig3", "fig4", "fig5", "fig6"}
-    assert set(NAMES) == figures | {"minimal", "strong", "heavy_tails", "response", "chart", "theorem"}
+    assert set(NAMES) == figures | {"minimal", "strong", "heavy_tails", "response", "bouncing", "chart", "theorem"}
 
 
 @pytest.mark.parametrize("name", SAMPLE)

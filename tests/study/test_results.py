@@ -18,6 +18,8 @@ p = [1.0]
 [monte_carlo]
 paths = 640
 time = 40.0
+[response]
+off = true
 [[expect]]
 quantity = "lyapunov_exponent"
 value = 0.0

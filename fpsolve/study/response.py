@@ -1,0 +1,121 @@
+"""The stationary response of a curve, c₂ or c₃ > 0: what is kept of it, and how it is found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.exponent.error import Estimate
+from fpsolve.model.noise import Noise
+from fpsolve.model.problem import Problem
+
+if TYPE_CHECKING:
+    from fpsolve.nonlinear.response import StationaryResponse
+
+Grid = tuple[int, int, int]
+"""How many amplitudes, phases and values of the noise."""
+SPREAD = 4.0
+"""Standard deviations of the noise on each side of its mean in which its values lie."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseDensity:
+    """The stationary density on a grid; of the phase both ends are there, of the others the middles of cells.
+
+    Attributes:
+        amplitude, phi, xi: the places, shapes (n,), (m,) and (k,).
+        of_amplitude: ρ(a), shape (n,).
+        of_plane: that of (x, ẋ) at x = a cos φ, ẋ = −aω sin φ, shape (n, m).
+        whole: ρ(a, φ, ξ), shape (n, m, k), to the seven digits of a number of four bytes, which are what records and
+            files hold of it.
+    """
+
+    amplitude: FloatArray
+    phi: FloatArray
+    xi: FloatArray
+    of_amplitude: FloatArray
+    of_plane: FloatArray
+    whole: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class CurveResponse:
+    """The stationary response of one parameter set.
+
+    Attributes:
+        means: by the names of `STATIONARY_MEANS`.
+        impact_rate: impacts in unit time.
+        balance: what noise feeds into ln a less what impacts take, in unit time; 0 but for its error.
+        stability_index: δ_p of the linear system.
+        least: the least density over the largest, negative where it is not resolved.
+        unknowns: of the largest system solved.
+        density: on a grid; None where it is not wanted.
+    """
+
+    means: Mapping[str, Estimate]
+    impact_rate: Estimate
+    balance: Estimate
+    stability_index: float
+    least: float
+    unknowns: int
+    density: ResponseDensity | None = None
+
+    @property
+    def numbers(self) -> dict[str, Estimate]:
+        """The means and the impact rate by their names."""
+        return {**self.means, "impact_rate": self.impact_rate}
+
+    @property
+    def has_hump(self) -> bool:
+        """Whether ρ(a) vanishes at rest: δ_p < −1."""
+        return self.stability_index < -1
+
+    @property
+    def has_crater(self) -> bool:
+        """Whether ρ(x, ẋ) vanishes at rest: δ_p < −2."""
+        return self.stability_index < -2
+
+
+def solve_response(problem: Problem, rtol: float, grid: Grid | None) -> CurveResponse:
+    """The stationary response, with its density if a grid is given. Raises as `stationary_response`."""
+    from fpsolve.nonlinear.response import stationary_response  # which takes a while to import
+
+    found = stationary_response(problem, rtol=rtol)
+    return CurveResponse(
+        found.means,
+        found.impact_rate,
+        found.balance,
+        found.stability_index,
+        found.minimum_over_maximum,
+        found.unknowns,
+        None if grid is None else _density(found, grid),
+    )
+
+
+def _density(found: StationaryResponse, grid: Grid) -> ResponseDensity:
+    amplitudes, phases, values = grid
+    problem = found.problem
+    a = (np.arange(amplitudes) + 0.5) * found.reach / amplitudes
+    phi = np.linspace(-0.5, 0.5, phases) * math.pi
+    xi = _values_of(problem.coloured, values)
+    x, v = a[:, None] * np.cos(phi), -a[:, None] * problem.system.omega * np.sin(phi)  # type: ignore[attr-defined]
+    whole = [found.density([each], phi, xi)[0] for each in a]  # one by one, which takes little memory
+    return ResponseDensity(
+        a, phi, xi, found.amplitude_density(a), found.joint_density(np.maximum(x, 0.0), v), _short(np.array(whole))
+    )
+
+
+def _values_of(noise: Noise, count: int) -> FloatArray:
+    """Middles of cells in which nearly all of the noise is."""
+    far = SPREAD * noise.standard_deviation
+    low, high = max(noise.mean - far, -noise.half_width), min(noise.mean + far, noise.half_width)
+    return np.asarray(low + (np.arange(count) + 0.5) * (high - low) / count)
+
+
+def _short(values: FloatArray) -> FloatArray:
+    return np.asarray(values.astype(np.float32), dtype=float)
