@@ -421,8 +421,8 @@ class Code(Enum):
     )
     RESPONSE_NO_INDEX = "note: no stationary density by finite elements: there is no δ_p: {reason}"
     RESPONSE_TOO_LARGE = (
-        "failure: the stationary response did not converge: the next discretisation has {unknowns} unknowns, which "
-        "take {gigabytes:.1f} GB, more than {most:g} GB; use a larger rtol"
+        "failure: the stationary response did not converge: its means still change by {size:.1e} of them, and the next "
+        "discretisation has {unknowns} unknowns, more than {most}; use a larger rtol"
     )
     RESPONSE_OPEN = (
         "failure: the stationary response did not converge: its means still change by {size:.1e} of them; use a larger "

@@ -1,8 +1,9 @@
 """How many functions of u, φ and ξ there are, and on which interval of u, until the means of the response settle.
 
 Each direction has two levels. What the means change from the lower to the higher one is taken for what the higher one
-lacks; where they converge this is more than it does lack. The two ends of the interval are directions, too: they are
-compared with an interval that is shorter by one element.
+lacks; where they converge this is more than it does lack. The lower end of the interval is a direction, too: it is
+compared with an interval that is shorter by one element. What lies above the upper end follows from the shares of E a⁴
+in the last two elements, as ρ falls faster and faster there.
 """
 
 from __future__ import annotations
@@ -25,13 +26,14 @@ from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
 
 SHARE = 0.2
 """Of the tolerance that one direction may lack."""
+ABOVE = 0.02
+"""Of the tolerance that may lie above the interval of u."""
 FAR = 300.0
 """Times the tolerance from which on it takes two steps."""
 MOST_STAGES = 24
 CELLS = 2
 """Of the phase between two impacts."""
-GIGABYTES = 2.0
-"""Of memory for one solve."""
+MOST_UNKNOWNS = 200_000
 SPACING = 1.1
 """Of the vertices of u over the standard deviation of ln a in weak noise."""
 WIDEST = 0.5
@@ -39,7 +41,11 @@ WIDEST = 0.5
 FEWEST, HIGHEST_DEGREE = 4, 8
 """Elements in u, and their degree; beyond it they are halved."""
 QUANTILE = 1e-2
-"""Of the tolerance that the first interval leaves out on each side, in weak noise."""
+"""Of the tolerance that the first interval leaves out below, in weak noise; above it is the tolerance itself."""
+FURTHER = 0.5
+"""How far the lower end of u moves in a step."""
+MOST_HIGHER = 2
+"""Elements by which the upper end moves in a step."""
 ROUNDING = 1e-12
 
 
@@ -50,36 +56,32 @@ class Choice:
     Attributes:
         cells, phi_degree: elements of φ.
         part: functions of ξ.
-        left, right: the interval of u.
-        elements, degree: elements of u.
+        bottom, top: the interval of u.
+        step, degree: elements of u.
     """
 
     cells: int
     phi_degree: int
     part: NoisePart
-    left: float
-    right: float
-    elements: int
+    bottom: float
+    top: float
+    step: float
     degree: int
 
     @property
-    def plane_size(self) -> int:
-        return self.cells * self.phi_degree * self.part.size
+    def elements(self) -> int:
+        """In u."""
+        return max(FEWEST, math.ceil((self.top - self.bottom) / self.step - 1e-9))
+
+    @property
+    def lines(self) -> FloatArray:
+        """The vertices of u, from the top downwards, so that a change of the bottom moves none."""
+        return np.asarray(self.top - self.step * np.arange(self.elements + 1)[::-1])
 
     @property
     def size(self) -> int:
         """Unknowns."""
-        return self.plane_size * (self.elements * self.degree + 1)
-
-    @property
-    def gigabytes(self) -> float:
-        """Of an element with its factors, and of the columns that are kept."""
-        return 8e-9 * self.plane_size**2 * (3 * self.degree**2 + (self.degree + 4) + self.elements * self.degree)
-
-    @property
-    def step(self) -> float:
-        """The length of an element."""
-        return (self.right - self.left) / self.elements
+        return self.cells * self.phi_degree * self.part.size * (self.elements * self.degree + 1)
 
 
 def finer_phase(choice: Choice) -> Choice:
@@ -93,18 +95,14 @@ def finer_noise(choice: Choice) -> Choice:
 def finer_height(choice: Choice) -> Choice:
     if choice.degree < HIGHEST_DEGREE:
         return replace(choice, degree=choice.degree + 1)
-    return replace(choice, elements=math.ceil(1.3 * choice.elements))
-
-
-def further_up(choice: Choice) -> Choice:
-    return replace(choice, right=choice.right + choice.step, elements=choice.elements + 1)
+    return replace(choice, step=choice.step / 1.3)
 
 
 def further_down(choice: Choice) -> Choice:
-    return replace(choice, left=choice.left - choice.step, elements=choice.elements + 1)
+    return replace(choice, bottom=choice.bottom - FURTHER)
 
 
-DIRECTIONS = (finer_phase, finer_noise, finer_height, further_up, further_down)
+DIRECTIONS = (finer_phase, finer_noise, finer_height, further_down)
 Levels = tuple[int, ...]
 """How often a first discretisation is made finer in each direction."""
 
@@ -125,25 +123,26 @@ class Search:
     ) -> None:
         self.flow, self.index, self.rate, self._numbers, self.rtol = flow, index, rate, numbers, rtol
         self._planes: dict[Levels, tuple[Plane, Tail]] = {}
-        self._known: dict[Levels, FloatArray] = {}
-        self.unknowns = 0
+        self.unknowns, self._reached = 0, math.inf
 
     def settled(self) -> tuple[Solution, FloatArray, FloatArray]:
         """A solution whose means are settled, these, and their error estimates. Raises `NotConverged`."""
         levels: Levels = (1,) * len(DIRECTIONS)
+        top = self.base.top
         for _ in range(MOST_STAGES):
-            solution = self.solve(levels)
-            found = self._known[levels] = self._numbers(solution)
+            solution = self.solve(levels, top)
+            found, fall = self._numbers(solution), Fall.of(solution)
             lower = [tuple(level - (k == own) for own, level in enumerate(levels)) for k in range(len(levels))]
-            changes = np.abs([found - self.numbers(each) for each in lower])
+            changes = np.abs([found - self._numbers(self.solve(each, top)) for each in lower])
             scales = np.abs(found[:-1])
-            errors = changes.sum(axis=0) + ROUNDING * np.abs(found)
-            worst = np.max(changes[:, :-1] / (self.rtol * scales), axis=1)
-            if np.all(errors[:-1] <= self.rtol * scales):
+            errors = changes.sum(axis=0) + (fall.share_above(top) + ROUNDING) * np.append(scales, self.rate)
+            self._reached = float(np.max(errors[:-1] / scales))
+            if self._reached <= self.rtol:
                 return solution, found, errors
-            more = (worst > SHARE) | (worst == worst.max())
-            levels = tuple(int(n) for n in np.array(levels) + more + (worst > FAR))
-        raise NotConverged(Message(Code.RESPONSE_OPEN, size=float(np.max(errors[:-1] / scales))))
+            worst = np.max(changes[:, :-1] / (self.rtol * scales), axis=1)
+            levels = tuple(int(n) for n in np.array(levels) + (worst > min(SHARE, worst.max() / 2)) + (worst > FAR))
+            top = fall.top(ABOVE * self.rtol)
+        raise NotConverged(Message(Code.RESPONSE_OPEN, size=self._reached))
 
     @cached_property
     def base(self) -> Choice:
@@ -152,30 +151,22 @@ class Search:
         shape, digits = self.index / 2, -math.log10(self.rtol)
         damping = (motion.cubic + 3 * motion.rayleigh) / 8
         law = gamma(shape, scale=self.rate / damping / shape)
-        left, right = (
-            0.5 * math.log(max(law.ppf(q), 1e-300)) for q in (QUANTILE * self.rtol, 1 - QUANTILE * self.rtol)
-        )
+        bottom, top = (0.5 * math.log(max(law.ppf(q), 1e-300)) for q in (QUANTILE * self.rtol, 1 - self.rtol))
+        degree = round(4 + digits / 2)
         part = first_part(self.flow.problem.coloured, digits)
-        tail = solved_tail(Plane(self.flow, Circle(CELLS, round(4 + digits / 2)), part), self.index)
-        left = min(max(left, tail.reach(QUANTILE * self.rtol)), right - 1.0)
-        deviation = 0.5 / math.sqrt(shape)
-        elements = max(FEWEST, math.ceil((right - left) / min(SPACING * deviation, WIDEST)))
-        return Choice(CELLS, round(4 + digits / 2), part, left, right, elements, 4)
+        tail = solved_tail(Plane(self.flow, Circle(CELLS, degree), part), self.index)
+        bottom = min(max(bottom, tail.reach(QUANTILE * self.rtol)), top - 1.0)
+        step = min(SPACING * 0.5 / math.sqrt(shape), WIDEST, (top - bottom) / FEWEST)
+        return Choice(CELLS, degree, part, bottom, top, step, 4)
 
-    def numbers(self, levels: Levels) -> FloatArray:
-        """The means on one discretisation. Raises `NotConverged`."""
-        if levels not in self._known:
-            self._known[levels] = self._numbers(self.solve(levels))
-        return self._known[levels]
-
-    def solve(self, levels: Levels) -> Solution:
-        """The density on one discretisation. Raises `NotConverged` where it does not fit into the memory."""
-        choice = self.base
+    def solve(self, levels: Levels, top: float) -> Solution:
+        """The density on one discretisation. Raises `NotConverged` where it is too large."""
+        choice = replace(self.base, top=top)
         for finer, level in zip(DIRECTIONS, levels, strict=True):
             for _ in range(level):
                 choice = finer(choice)
-        if choice.gigabytes > GIGABYTES:
-            data = {"unknowns": choice.size, "gigabytes": choice.gigabytes, "most": GIGABYTES}
+        if choice.size > MOST_UNKNOWNS:
+            data = {"unknowns": choice.size, "most": MOST_UNKNOWNS, "size": self._reached}
             raise NotConverged(Message(Code.RESPONSE_TOO_LARGE, **data))
         self.unknowns = max(self.unknowns, choice.size)
         with one_thread():
@@ -183,5 +174,41 @@ class Search:
                 plane = Plane(self.flow, Circle(choice.cells, choice.phi_degree), choice.part)
                 self._planes[levels[:2]] = plane, solved_tail(plane, self.index)
             plane, tail = self._planes[levels[:2]]
-            lines = np.linspace(choice.left, choice.right, choice.elements + 1)
-            return solved(plane, Height(lines, choice.degree), tail)
+            return solved(plane, Height(choice.lines, choice.degree), tail)
+
+
+@dataclass(frozen=True)
+class Fall:
+    """How E a⁴ falls in the uppermost elements of u: faster and faster, as far up as it is resolved.
+
+    Attributes:
+        end: up to where it does.
+        step: the length of an element.
+        share: what lies above `end`.
+        ratio: of the shares of the last two elements below; 1 if they do not fall.
+    """
+
+    end: float
+    step: float
+    share: float
+    ratio: float
+
+    @classmethod
+    def of(cls, solution: Solution) -> Fall:
+        shares, lines = np.abs(solution.shares(4)), solution.height.lines
+        last, ratio = int(np.argmax(shares)), 1.0
+        while last + 1 < shares.size and shares[last + 1] < ratio * shares[last]:
+            last, ratio = last + 1, float(shares[last + 1] / shares[last])
+        share = shares[last] / shares.sum() * (ratio / (1 - ratio) if ratio < 1 else 1)
+        return cls(float(lines[last + 1]), float(lines[-1] - lines[-2]), float(share), ratio)
+
+    def share_above(self, top: float) -> float:
+        """At most, above a place not below `end`."""
+        return self.share * self.ratio ** ((top - self.end) / self.step)
+
+    def top(self, share: float) -> float:
+        """A place above which there is about a share, if what is above falls like exp(−const e^{2u}); not far above."""
+        if self.ratio == 1:
+            return self.end + self.step
+        rate = math.log(1 / self.ratio) / -math.expm1(-2 * self.step)
+        return self.end + min(0.5 * math.log1p(max(0.0, math.log(self.share / share)) / rate), MOST_HIGHER * self.step)

@@ -10,21 +10,22 @@ interval is known up to one factor, which the normalisation gives. Above the int
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve, solve
 
 from fpsolve.arrays import FloatArray, one
-from fpsolve.nonlinear.operator import Height, Plane
+from fpsolve.nonlinear.operator import Circle, Height, Plane
 
 TAIL_TERMS = 8
 """Of the series in e^{2u}."""
 STEPS = 30
 """Of the iteration for κ."""
+Tables = Sequence[FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +65,11 @@ class Tail:
 
 def solved_tail(plane: Plane, guess: float) -> Tail:
     """The tail whose exponent is closest to a guess, −δ_p."""
-    factors = lu_factor(plane.turn - guess * plane.rise)
+    rise, turn, steep, bend = map(plane.whole, (plane.rise, plane.turn, plane.steep, plane.bend))
+    factors = lu_factor(turn - guess * rise)
     psi, kappa = plane.constant.copy(), guess
     for _ in range(STEPS):  # turn Ψ = κ rise Ψ
-        new = lu_solve(factors, plane.rise @ psi)
+        new = lu_solve(factors, rise @ psi)
         change = float(psi @ psi / (psi @ new))
         psi = new / np.linalg.norm(new)
         if abs(change - (kappa - guess)) < 1e-13 * abs(guess):
@@ -78,8 +80,8 @@ def solved_tail(plane: Plane, guess: float) -> Tail:
     terms = [psi]
     for k in range(1, TAIL_TERMS):
         power = kappa + 2 * k
-        right = power * (plane.steep @ terms[-1]) - plane.bend @ terms[-1]
-        terms.append(np.linalg.solve(plane.turn - power * plane.rise, right))
+        right = power * (steep @ terms[-1]) - bend @ terms[-1]
+        terms.append(np.linalg.solve(turn - power * rise, right))
     return Tail(kappa, np.array(terms))
 
 
@@ -107,6 +109,15 @@ class Solution:
         inside = (height.weights * np.exp(n * height.points)) @ (height.line.values @ self.values)
         return np.asarray(inside + self.tail.moments(n, self.left))
 
+    def shares(self, n: float) -> FloatArray:
+        """E aⁿ by elements of u."""
+        phi = self.plane.circle.points
+        density = self.height.line.values @ (
+            self.values @ self.plane.integrals(np.exp(n * self.plane.flow.gauge(phi)), one)
+        )
+        inside = self.height.weights * np.exp(n * self.height.points) * density
+        return np.asarray(inside.reshape(self.height.lines.size - 1, -1).sum(axis=1))
+
     def mean(self, n: float, f: FloatArray, g: Any) -> float:
         """E e^{n u} f(φ) g(ξ), f at the points of φ."""
         return float(self.plane.integrals(f, g) @ self.moments(n))
@@ -120,44 +131,159 @@ class Solution:
         return inside
 
 
+class Cell:
+    """The functions that live in one cell of u and φ, eliminated from the lowest functions of ξ to the highest.
+
+    A matrix between functions is Σ_g W_g ⊗ N_g, W_g that of u and φ, N_g that of ξ, which couples neighbours only.
+
+    Args:
+        own: W_g between the functions of the cell.
+        into, out: W_g of what others do to them, and they to others.
+        noise: N_g.
+    """
+
+    def __init__(self, own: Tables, into: Tables, out: Tables, noise: Tables) -> None:
+        self._into, self._out, self._noise = into, out, noise
+        count = len(noise[0])
+        width = max(1, max(int(np.abs(np.subtract(*np.nonzero(each))).max(initial=0)) for each in noise))
+        self._groups = [slice(k, min(k + width, count)) for k in range(0, count, width)]
+
+        def block(rows: slice, columns: slice) -> FloatArray:
+            return _sum(np.kron(each[rows, columns], table) for each, table in zip(noise, own, strict=True))
+
+        self._below: list[FloatArray] = []
+        self._above: list[FloatArray] = []
+        self._factors: list[Any] = []
+        for k, group in enumerate(self._groups):
+            middle = block(group, group)
+            if k:
+                self._below.append(block(group, self._groups[k - 1]))
+                self._above.append(lu_solve(self._factors[-1], block(self._groups[k - 1], group), check_finite=False))
+                middle -= self._below[-1] @ self._above[-1]
+            self._factors.append(lu_factor(middle, overwrite_a=True, check_finite=False))
+
+    def solved(self, right: FloatArray) -> FloatArray:
+        """The inverse of the matrix between them, applied to columns of shape (n_ξ, n, columns)."""
+        columns, found = right.shape[-1], list[FloatArray]()
+        for k, group in enumerate(self._groups):
+            own = right[group].reshape(-1, columns)
+            if k:
+                own = own - self._below[k - 1] @ found[-1]
+            found.append(lu_solve(self._factors[k], own, check_finite=False))
+        for k in range(len(found) - 2, -1, -1):
+            found[k] -= self._above[k] @ found[k + 1]
+        return np.concatenate(found).reshape(right.shape)
+
+    def values(self, others: FloatArray) -> FloatArray:
+        """Of these functions from those of the others, shape (m, n_ξ); shape (n, n_ξ)."""
+        right = _sum(each @ (table @ others).T for each, table in zip(self._noise, self._into, strict=True))
+        return self.solved(-right[:, :, None])[:, :, 0].T
+
+    def correction(self) -> FloatArray:
+        """What eliminating them adds to the matrix between the others, shape (m, n_ξ, m, n_ξ)."""
+        m, count = self._into[0].shape[1], len(self._noise[0])
+        pairs = zip(self._noise, self._into, strict=True)
+        right = _sum(each[:, None, None, :] * table[:, :, None] for each, table in pairs)
+        values = self.solved(-right.reshape(count, -1, m * count))
+        pushed = [(table @ values).reshape(count, -1) for table in self._out]
+        total = _sum(each @ rows for each, rows in zip(self._noise, pushed, strict=True))
+        return total.reshape(count, m, m, count).swapaxes(0, 1)
+
+
+class Element:
+    """An element in u, of whose functions those that live in one cell are eliminated.
+
+    Args:
+        tables: W_g between the functions of u and φ, those of u slowest: of the vertex below, inner ones, and above.
+        noise: N_g.
+        circle: the functions of φ.
+
+    Attributes:
+        between: the matrix between the functions that are left, in the same order, those of ξ fastest.
+    """
+
+    def __init__(self, tables: Tables, noise: Tables, circle: Circle) -> None:
+        pairs = np.arange(len(tables[0])).reshape(-1, circle.size)
+        self._shape = *pairs.shape, len(noise[0])
+        inside = [pairs[1:-1][:, bubbles].ravel() for bubbles in circle.bubbles]
+        self._kept = np.setdiff1d(pairs, np.concatenate(inside))
+        kept = [table[np.ix_(self._kept, self._kept)] for table in tables]
+        self.between = _sum(np.kron(table, each) for table, each in zip(kept, noise, strict=True))
+        together = self.between.reshape(self._kept.size, len(noise[0]), self._kept.size, len(noise[0]))
+        self._cells: list[tuple[Any, Any, Cell]] = []
+        is_coupled = np.any([(table != 0) | (table != 0).T for table in tables], axis=0)
+        for inner in inside:
+            beside = np.flatnonzero(is_coupled[np.ix_(inner, self._kept)].any(axis=0))
+            others = self._kept[beside]
+            own, into, out = (
+                [table[np.ix_(rows, columns)] for table in tables]
+                for rows, columns in ((inner, inner), (inner, others), (others, inner))
+            )
+            cell = Cell(own, into, out, noise)
+            together[beside[:, None], :, beside] += cell.correction().transpose(0, 2, 1, 3)
+            self._cells.append((inner, beside, cell))
+
+    def values(self, kept: FloatArray) -> FloatArray:
+        """Of all functions from those that are left, shape (functions of u, those of φ and ξ)."""
+        levels, phases, count = self._shape
+        kept = kept.reshape(-1, count)
+        values = np.zeros((levels * phases, count))
+        values[self._kept] = kept
+        for inner, beside, cell in self._cells:
+            values[inner] = cell.values(kept[beside])
+        return values.reshape(levels, phases * count)
+
+
 def solved(plane: Plane, height: Height, tail: Tail) -> Solution:
     """The density on an interval, from below to above.
 
-    A vertex and the bubbles above it are coupled to the next vertex only. They are eliminated together, which changes
-    what couples that vertex with itself; the columns of the latter are kept.
+    A vertex of u and what is left of the element above it are coupled to the next vertex only. They are eliminated
+    together, which changes what couples that vertex with itself; the columns of the latter are kept.
     """
     flat, square = np.ones_like(height.points), np.exp(2 * height.points)
-    parts: list[tuple[Any, Any]] = [
+    parts = [
         (height.convection(flat), plane.rise),
         (height.convection(square), plane.steep),
         (height.mass(flat), plane.turn),
         (height.mass(square), plane.bend),
     ]
-    size, (first, last), (below, above) = plane.size, height.end_values[[0, -1]], np.exp(2 * height.lines[[0, -1]])
+
+    def tables(functions: Any) -> Tables:
+        """W_g between some functions of u and all of φ."""
+        some = [(matrix[functions][:, functions].toarray(), factors) for matrix, factors in parts]
+        return [_sum(np.kron(matrix, each[g]) for matrix, each in some if g in each) for g in plane.noise]
+
+    noise, size = list(plane.noise.values()), plane.size
+    (first, last), (below, above) = height.end_values[[0, -1]], np.exp(2 * height.lines[[0, -1]])
     front = -(first**2) * plane.outflow(below, -1)
     right = -first * (plane.outflow(below, 1) @ tail.at(height.lines[0]))
-    kept: list[tuple[Any, FloatArray]] = []
+    stack: list[tuple[Any, Element, FloatArray]] = []
     for j, bubbles in enumerate(height.bubbles):
-        own, following = np.append(height.vertices[j], bubbles), height.vertices[[j + 1]]
-        inner = _block(parts, own, own)
-        inner[:size, :size] += front
-        columns = np.zeros((len(inner), size + 1))
-        columns[:, :-1] = _block(parts, own, following)
+        functions = np.concatenate([height.vertices[[j]], bubbles, height.vertices[[j + 1]]])
+        own = tables(functions)
+        for table in own:
+            table[-plane.circle.size :, -plane.circle.size :] = 0  # they are the next element's
+        element = Element(own, noise, plane.circle)
+        matrix = element.between
+        matrix[:size, :size] += front
+        columns = np.zeros((len(matrix) - size, size + 1))
+        columns[:, :-1] = matrix[:-size, -size:]
         columns[:size, -1] = right
-        columns = solve(inner, columns, overwrite_a=True, overwrite_b=True, check_finite=False)
-        change = _block(parts, following, own) @ columns
-        front, right = -change[:, :-1], -change[:, -1]
-        kept.append((own, columns))
-    front += _block(parts, height.vertices[[-1]], height.vertices[[-1]]) - last**2 * plane.outflow(above, 1)
+        columns = solve(matrix[:-size, :-size], columns, overwrite_b=True, check_finite=False)
+        change = matrix[-size:, :-size] @ columns
+        front, right = matrix[-size:, -size:] - change[:, :-1], -change[:, -1]
+        stack.append((functions, element, columns))
+    front = front - last**2 * plane.outflow(above, 1)
+    front += _sum(np.kron(table, each) for table, each in zip(tables(height.vertices[[-1]]), noise, strict=True))
     values = np.zeros((height.size, size))
-    found = values[height.vertices[-1]] = np.linalg.solve(front, right)
-    for own, columns in reversed(kept):
-        values[own] = (columns[:, -1] - columns[:, :-1] @ found).reshape(own.size, size)
-        found = values[own[0]]
+    found = np.linalg.solve(front, right)
+    for functions, element, columns in reversed(stack):
+        kept = np.append(columns[:, -1] - columns[:, :-1] @ found, found)
+        values[functions] = element.values(kept)
+        found = kept[:size]
     mass = Solution(plane, height, tail, values).mean(0, np.ones_like(plane.circle.points), one)
     return Solution(plane, height, Tail(tail.exponent, tail.terms / mass), values / mass)
 
 
-def _block(parts: Sequence[tuple[Any, Any]], rows: Any, columns: Any) -> FloatArray:
-    """Σ U ⊗ V at some of the functions of u."""
-    return np.asarray(sum(np.kron(matrix[rows][:, columns].toarray(), plane) for matrix, plane in parts))
+def _sum(tables: Iterable[Any]) -> FloatArray:
+    return np.asarray(reduce(np.add, tables))

@@ -88,6 +88,10 @@ class Flow:
         return np.asarray(rate.q(phi) + self.log_factor / math.pi * rate.h(phi))
 
 
+Factors = dict[Coefficient | None, Any]
+"""Matrices of functions of φ, for functions of ξ."""
+
+
 class Circle:
     """Continuous elements in φ from impact to impact, whose ends are one.
 
@@ -100,6 +104,7 @@ class Circle:
         points, weights: a quadrature rule.
         values, slopes: the functions there, shape (n, size).
         seam: their values at φ = ±π/2, shape (size,).
+        bubbles: the functions of each cell that vanish at its ends.
         constant: coefficients of 1.
     """
 
@@ -114,6 +119,8 @@ class Circle:
         self.values, self.slopes = dense(self._line.values @ self._merge), dense(self._line.slopes @ self._merge)
         self.constant = self._line.constant()[kept]
         self.seam = self.at(HALF_TURN[:1])[0]
+        inner = self._line.modes[kept] > 1
+        self.bubbles = [np.flatnonzero(inner & (self._line.cells[kept] == j)) for j in range(cells)]
 
     def at(self, phi: FloatArray) -> FloatArray:
         """The functions at any φ, shape (len(phi), size)."""
@@ -169,9 +176,11 @@ class Plane:
 
     Attributes:
         size: number of unknowns, that of φ slowest.
-        unit: ∫P_s w ρ.
-        rise, turn: ∫P_s u̇ w ρ, and ∫P_s (φ̇ ∂w/∂φ + L_ξ w) ρ, of what does not depend on u.
+        noise: for each function of ξ in L its matrix ∫P_s g w ρ, and that of L_ξ for None.
+        rise, turn: for these the matrices of φ in ∫P_s u̇ w ρ and ∫P_s (φ̇ ∂w/∂φ + L_ξ w) ρ, of what does not depend
+            on u.
         steep, bend: the same of what e^{2u} multiplies.
+        unit: ∫P_s w ρ.
     """
 
     def __init__(self, flow: Flow, circle: Circle, part: NoisePart) -> None:
@@ -180,21 +189,23 @@ class Plane:
         phi = circle.points
         self.shape = circle.size, axis.size
         self.size = circle.size * axis.size
-        of_one, generator = dense(axis.matrix(one)), dense(axis.matrix(None))
-        still = circle.mass(np.ones_like(phi))
-        self.unit = np.kron(still, of_one)
-        self.rise = np.zeros((self.size, self.size))
-        self.turn = np.kron(still, generator.T)
+        still, cubic = circle.mass(np.ones_like(phi)), flow.cubic
+        self.rise: Factors = {}
+        self.turn: Factors = {None: still}
         for rate in flow.linear:
-            noise = dense(axis.matrix(rate.g))
-            self.rise += np.kron(circle.mass(flow.rise(rate, phi)), noise)
-            self.turn += np.kron(circle.convection(rate.h(phi)), noise)
-        cubic = flow.cubic
-        self.steep = np.kron(circle.mass(flow.rise(cubic, phi)), of_one)
-        self.bend = np.kron(circle.convection(cubic.h(phi)), of_one)
+            self.rise[rate.g] = self.rise.get(rate.g, 0) + circle.mass(flow.rise(rate, phi))
+            self.turn[rate.g] = self.turn.get(rate.g, 0) + circle.convection(rate.h(phi))
+        self.steep: Factors = {one: circle.mass(flow.rise(cubic, phi))}
+        self.bend: Factors = {one: circle.convection(cubic.h(phi))}
+        self.noise = {g: dense(axis.matrix(g)) for g in {one, *self.rise}} | {None: dense(axis.matrix(None)).T}
+        self.unit = np.kron(still, self.noise[one])
         self.constant = np.kron(circle.constant, axis.constant)
-        self.xi_mean = of_one @ axis.constant
+        self.xi_mean = self.noise[one] @ axis.constant
         """∫P_s of each function of ξ."""
+
+    def whole(self, factors: Factors) -> FloatArray:
+        """A matrix between all functions, shape (size, size)."""
+        return np.asarray(sum(np.kron(matrix, self.noise[g]) for g, matrix in factors.items()))
 
     def outflow(self, square: float, sign: int) -> FloatArray:
         """∫P_s max(±u̇, 0) w ρ at e^{2u} = `square`, by a rule with as many points as there are."""
