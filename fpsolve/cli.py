@@ -12,12 +12,12 @@ from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
 from shlex import quote
+from textwrap import fill
 from time import monotonic
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, CycloptsPanel, Parameter, Token
-from rich.console import Console
 
 from fpsolve import __version__
 from fpsolve.case.remedies import CASE_WORDS
@@ -120,7 +120,7 @@ def _run(argv: Sequence[str] | None) -> int:
             Path.cwd()
         except OSError:
             raise FpsolveError("the working folder does not exist any more; change to another folder") from None
-        code = app(argv, result_action="return_value", exit_on_error=False, error_console=Console(stderr=True))
+        code = _called(sys.argv[1:] if argv is None else argv)
         if sys.stdout is not None:  # as it is where the output is closed
             sys.stdout.flush()
     except CycloptsError:  # cyclopts has said what is wrong
@@ -145,8 +145,35 @@ def _run(argv: Sequence[str] | None) -> int:
     return code or 0
 
 
+def _called(arguments: Sequence[str]) -> int | None:
+    """The exit code of the command that is named; without one all are listed, without rich, whose import takes long."""
+    if not arguments or [*arguments] in (["--help"], ["-h"]):
+        print(_overview())
+        return 0
+    from rich.console import Console
+
+    errors = Console(stderr=True)
+    code: int | None = app(arguments, result_action="return_value", exit_on_error=False, error_console=errors)
+    return code
+
+
+def _overview() -> str:
+    """What fpsolve is for, and what each command does."""
+
+    def filled(text: str, first: str = "", rest: str = "") -> str:
+        return fill(" ".join(text.split()), initial_indent=first, subsequent_indent=rest)
+
+    commands = {name: app[name].help.partition("\n\n")[0] for name in sorted(app) if not name.startswith("-")}
+    width = max(map(len, commands))
+    about = [filled(part) for part in ["Usage: fpsolve COMMAND", *app.help.split("\n\n")]]
+    told = [filled(text, f"  {name:{width}}  ", " " * (width + 4)) for name, text in commands.items()]
+    told += ["", "fpsolve COMMAND --help tells of its arguments, fpsolve --version of the version."]
+    return "\n".join(["\n\n".join(about), "", "Commands:", *told])
+
+
 def print_error(text: str) -> None:
     """Print what is wrong on the standard error, in the words of case files."""
+    from rich.console import Console
     from rich.text import Text
 
     try:

@@ -50,12 +50,12 @@ def precision() -> Iterator[None]:
 
 def ball(number: str | float | Fraction | int) -> arb:
     """What encloses a number: a decimal as text, a fraction, or a float as it stands."""
-    from flint import arb, fmpq
+    import flint  # not from flint: that would take as long as the rest, a hundred thousand times
 
-    if isinstance(number, str | Fraction):
-        exact = Fraction(number)
-        return arb(fmpq(exact.numerator, exact.denominator))
-    return arb(number)
+    if isinstance(number, float | int) or not isinstance(number, str | Fraction):
+        return flint.arb(number)
+    exact = Fraction(number)
+    return flint.arb(flint.fmpq(exact.numerator, exact.denominator))
 
 
 def each(function: Callable[[Any], Any], numbers: Any) -> Balls:
@@ -66,7 +66,9 @@ def each(function: Callable[[Any], Any], numbers: Any) -> Balls:
 
 def balls(numbers: Any) -> Balls:
     """Floats as exact numbers, in the same shape."""
-    return each(ball, np.asarray(numbers, dtype=float))
+    from flint import arb
+
+    return each(arb, np.asarray(numbers, dtype=float))
 
 
 def roots(count: int) -> Balls:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import factorial
+from math import factorial, sqrt
 from typing import Any, ClassVar
 
 import numpy as np
@@ -26,7 +26,7 @@ from fpsolve.proofs.balls import Balls, ball, balls, each, magnitudes, matrix_pr
 from fpsolve.proofs.statement import Cylinder
 
 ORDER = 8
-"""Of Taylor's formula."""
+"""Of Taylor's formula, at most."""
 FINE = 8
 """Cells of a circle for each function."""
 
@@ -103,7 +103,9 @@ class Basis(ABC):
         """The ends of cells in the variable of `taylor`."""
 
     @abstractmethod
-    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+    def taylor(
+        self, parts: Balls, middle: Balls, half: FloatArray, rest: float = 0.0
+    ) -> tuple[Iterator[Balls], FloatArray]:
         """Derivatives of sums at the middles of cells from the zeroth on, up to signs, and a bound of what remains."""
 
 
@@ -156,7 +158,9 @@ class Core(Basis):
         left, right = ((balls(end) - ball(self.centre)) / ball(self.scale) for end in (low, high))
         return left, right
 
-    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+    def taylor(
+        self, parts: Balls, middle: Balls, half: FloatArray, rest: float = 0.0
+    ) -> tuple[Iterator[Balls], FloatArray]:
         """Derivatives of sums of He_m(y)/√m! at the middles of cells from the zeroth on, and a bound of what remains.
 
         By the mean value theorem sup|He_m| ≤ |He_m(middle)| + h m sup|He_{m−1}| on a cell.
@@ -167,12 +171,12 @@ class Core(Basis):
         bound = magnitudes(table)
         for m in range(1, degrees):
             bound[m] = raised(bound[m] + half * np.sqrt(m) * bound[m - 1], 8)
-        derived = [parts]
-        for _ in range(min(ORDER, degrees - 1)):
+        derived, order = [parts], _order(sqrt(degrees) * float(half.max()), rest)
+        for _ in range(min(order, degrees - 1)):
             derived.append(derived[-1][:, 1:] * root[1 : derived[-1].shape[1]])
-        last = derived[-1] if len(derived) > ORDER else derived[-1][:, :0]
-        rest = magnitudes(last) @ bound[: last.shape[1]] * half**ORDER / factorial(ORDER)
-        return (matrix_product(part, table[: part.shape[1]]) for part in derived[:ORDER]), raised(rest, 2 * degrees)
+        last = derived[-1] if len(derived) > order else derived[-1][:, :0]
+        left = magnitudes(last) @ bound[: last.shape[1]] * half**order / factorial(order)
+        return (matrix_product(part, table[: part.shape[1]]) for part in derived[:order]), raised(left, 2 * degrees)
 
 
 @dataclass(frozen=True)
@@ -223,9 +227,11 @@ class Whole(Basis):
         right, left = (each(lambda z: z.acos(), balls(end)) for end in (low, high))
         return left, right
 
-    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+    def taylor(
+        self, parts: Balls, middle: Balls, half: FloatArray, rest: float = 0.0
+    ) -> tuple[Iterator[Balls], FloatArray]:
         """The same of sums of cos mθ, up to signs."""
-        return cosine_taylor(parts, middle, half)
+        return cosine_taylor(parts, middle, half, rest)
 
 
 @dataclass(frozen=True)
@@ -259,9 +265,11 @@ class Circle(Basis):
         left, right = (balls(end) * ball(0).pi() for end in (low, high))
         return left, right
 
-    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+    def taylor(
+        self, parts: Balls, middle: Balls, half: FloatArray, rest: float = 0.0
+    ) -> tuple[Iterator[Balls], FloatArray]:
         """As `Whole.taylor`."""
-        return cosine_taylor(parts, middle, half)
+        return cosine_taylor(parts, middle, half, rest)
 
 
 @dataclass(frozen=True)
@@ -301,7 +309,9 @@ class States(Basis):
         """The states."""
         return balls(low), balls(high)
 
-    def taylor(self, parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+    def taylor(
+        self, parts: Balls, middle: Balls, half: FloatArray, rest: float = 0.0
+    ) -> tuple[Iterator[Balls], FloatArray]:
         """The values themselves."""
         return iter([parts]), np.zeros(parts.shape)
 
@@ -319,15 +329,21 @@ def times_cosine(u: Balls) -> Balls:
     return found
 
 
-def cosine_taylor(parts: Balls, middle: Balls, half: FloatArray) -> tuple[Iterator[Balls], FloatArray]:
+def cosine_taylor(parts: Balls, middle: Balls, half: FloatArray, rest: float) -> tuple[Iterator[Balls], FloatArray]:
     """Derivatives of sums of cos mθ at the middles of cells, up to signs, and a bound of what remains."""
+    order = _order(parts.shape[1] * float(half.max()), rest)
     degrees = np.arange(parts.shape[1])
     angles = np.outer(degrees, middle)
     waves = [np.cos(angles), np.sin(angles)]
-    powers = [each(ball, degrees) ** i for i in range(ORDER)]
-    rest = magnitudes(parts) @ (degrees.astype(float)[:, None] * half) ** ORDER / factorial(ORDER)
-    derivatives = (matrix_product(parts * powers[i], waves[i % 2]) for i in range(ORDER))
-    return derivatives, raised(rest, 16 + 2 * len(degrees))
+    powers = [each(ball, degrees) ** i for i in range(order)]
+    left = magnitudes(parts) @ (degrees.astype(float)[:, None] * half) ** order / factorial(order)
+    derivatives = (matrix_product(parts * powers[i], waves[i % 2]) for i in range(order))
+    return derivatives, raised(left, 16 + 2 * len(degrees))
+
+
+def _order(step: float, rest: float) -> int:
+    """Of the remainder: the least with which that is small, where the argument of the highest function takes a step."""
+    return next((n for n in range(1, ORDER) if step < 1 and step**n / factorial(n) <= rest), ORDER)
 
 
 def hermite_table(y: Any, root: Any) -> Any:

@@ -60,10 +60,11 @@ class Cells:
 
     Args:
         low, high: floats, low ≤ high, in [−1, 1] for `Whole`.
+        rest: what Taylor's formula may leave over of the highest function; 0 for as many terms as there may be.
     """
 
-    def __init__(self, basis: Basis, low: FloatArray, high: FloatArray) -> None:
-        self.basis = basis
+    def __init__(self, basis: Basis, low: FloatArray, high: FloatArray, rest: float = 0.0) -> None:
+        self.basis, self._rest = basis, rest
         left, right = basis.places(low, high)
         self._middle = (left + right) / 2
         self._half = np.array([max(above(half), NARROWEST) for half in (right - left) / 2])
@@ -72,7 +73,7 @@ class Cells:
         """Those of a sum with coefficients u of the polynomials; u_{−k} is the conjugate of u_k."""
         half = u[u.shape[0] // 2 :]
         parts = np.concatenate([each(lambda c: c.real, half), each(lambda c: c.imag, half)])
-        derivatives, stray = self.basis.taylor(parts, self._middle, self._half)
+        derivatives, stray = self.basis.taylor(parts, self._middle, self._half, self._rest)
         terms = []
         for i, derivative in enumerate(derivatives):
             size = self._half**i / factorial(i)
@@ -250,15 +251,17 @@ class Bounder:
 
     Args:
         phases: how many cells of φ.
+        rest: as for `Cells`; where it is not 0, bounds are wider, and come sooner.
     """
 
-    def __init__(self, trial: Trial, phases: int) -> None:
-        self.trial, self._phases = trial, Phases(phases, len(trial.cosine) + trial.noise.is_white)
+    def __init__(self, trial: Trial, phases: int, rest: float = 0.0) -> None:
+        self.trial, self._rest = trial, rest
+        self._phases = Phases(phases, len(trial.cosine) + trial.noise.is_white)
 
     def bounds(self, low: FloatArray, high: FloatArray) -> Bounds:
         """On cells [low, high]."""
         trial = self.trial
-        cells = Cells(trial.basis, low, high)
+        cells = Cells(trial.basis, low, high, self._rest)
         divisor = self._divisor(cells)
         mismatch = self._range(cells.modes(trial.mismatch), divisor)
         if trial.basis.cover(1) is not None:
@@ -286,7 +289,7 @@ class Bounder:
 
     def held(self, z: FloatArray, sign: int) -> list[HeldBounds]:
         """Where u may be held, on the right or, with sign −1, on the left."""
-        trial, cells, at = self.trial, Cells(self.trial.basis, z, z), balls(z)
+        trial, cells, at = self.trial, Cells(self.trial.basis, z, z, self._rest), balls(z)
         divisor = self._divisor(cells)
         drifts = (trial.noise.drift(at), trial.noise.drift_slope(at))
         ranges = [self._range(cells.modes(trial.slope), divisor)]

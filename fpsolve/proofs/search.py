@@ -35,11 +35,16 @@ ABSENT = 1e9
 PATIENCE, PROGRESS, FAR = {False: 2, True: 6}, 0.7, 1e-2
 """Enlargements that do not bring the bounds closer by this factor, after which no more are tried; more of them where
 the bounds are farther apart than this share of the number."""
+ROUGH, EARLY = 30.0, 0.1
+"""Sizes of a trial's highest functions, in widths, above which it is too small, and the share of the time up to which
+such trials are passed over."""
 WHOLE_BELOW = 6.0
 """End exponents a below which the ends of the support carry too much weight to be cut off."""
 CELLS, REACH, HELD_FROM, CANDIDATES = 480, 10.0, 3.5, 24
 FINE = 512
 """Cells of φ at least where the extremes of u matter."""
+REST = 1e-8
+"""What Taylor's formula may leave over; verification leaves less, so that it finds all that is found here."""
 SLACK = 1e-6
 """Of the mismatch, relative, so that another machine's rounding does not matter."""
 STEEPEST = 1e6
@@ -225,16 +230,19 @@ def enclose(
     Raises:
         NoSuchExponent: the noise has algebraic tails, r₀ > 1.
     """
-    noise, best, size, left = cylinder(stated), NOTHING, SMALLEST, countdown or Countdown(Budget().seconds)
+    noise, size, left = cylinder(stated), SMALLEST, countdown or Countdown(Budget().seconds)
     if noise.states is not None:
         size = size[0], len(noise.states)
+    found, closest = list[Certificate](), math.inf
     for basis in bases(noise, p):
-        for found, waves, degrees in _enlarged(stated, noise, basis, p, guess, size, left, progress):
-            if best.certificate is None or _apart(found) < _apart(best.certificate):
-                best, size = enclosure_of(found), (waves, degrees)
-            if best.width <= width:
-                return best
-    return best
+        for certificate, waves, degrees in _enlarged(stated, noise, basis, p, guess, width, size, left, progress):
+            if _apart(certificate) <= width and not objection(certificate):
+                return enclosure_of(certificate)
+            found.append(certificate)
+            if _apart(certificate) < closest:
+                closest, size = _apart(certificate), (waves, degrees)
+    proven = (each for each in sorted(found, key=_apart) if not objection(each))
+    return next(map(enclosure_of, proven), NOTHING)
 
 
 def _enlarged(
@@ -243,40 +251,56 @@ def _enlarged(
     basis: Basis,
     p: str | None,
     guess: float,
+    width: float,
     size: tuple[int, int],
     countdown: Countdown,
     progress: Callable[[], None],
 ) -> Iterator[tuple[Certificate, int, int]]:
-    """Certificates by larger and larger trials, as long as the bounds come closer, and the sizes of the trials."""
+    """Certificates by larger and larger trials, as long as the bounds come closer, and the sizes of the trials.
+
+    They are to be verified. While it costs little, trials whose highest functions tell that they are too small are
+    passed over; the last one serves where no larger one does.
+    """
     delta, idle, value, (waves, degrees) = math.inf, 0, math.inf, size
-    cost, unknowns = 0.0, (2 * waves + 1) * degrees
+    cost, unknowns, edge = 0.0, (2 * waves + 1) * degrees, math.inf
+    passed: tuple[Basis, Pair, int, int] | None = None
     while idle < PATIENCE[delta > FAR * abs(value)] and (2 * waves + 1) * degrees <= MOST_UNKNOWNS:
         begun = countdown.elapsed
         cost, unknowns = cost * ((2 * waves + 1) * degrees / unknowns) ** 1.5, (2 * waves + 1) * degrees
         if begun + cost > countdown.seconds:
-            return
+            break
         try:
             pair, basis = _solved(noise, basis, p, guess, waves, degrees)
         except ArithmeticError:
-            return
+            break
         value = pair.value
         if not math.isfinite(value):
-            return
-        certificate = certificate_of(stated, noise, basis, p, pair)
-        is_proof = certificate is not None and not objection(certificate)
-        progress()
-        if certificate is not None and is_proof:
-            idle = 0 if _apart(certificate) < PROGRESS * delta else idle + 1
-            delta = min(delta, _apart(certificate))
-            yield certificate, waves, degrees
-        elif delta < math.inf:
-            idle += 1
-        cost = countdown.elapsed - begun
+            break
         edges = pair.edges if noise.states is None else (pair.edges[0], 0.0)
+        before, edge = edge, max(edges)
+        if ROUGH * width < edge < PROGRESS * before and begun < EARLY * countdown.seconds:
+            passed = basis, pair, waves, degrees
+        else:
+            passed = None
+            certificate = certificate_of(stated, noise, basis, p, pair)
+            progress()
+            if certificate is not None:
+                idle = 0 if _apart(certificate) < PROGRESS * delta else idle + 1
+                delta = min(delta, _apart(certificate))
+                yield certificate, waves, degrees
+            elif delta < math.inf:
+                idle += 1
+        cost = countdown.elapsed - begun
         waves, degrees = (
-            min(math.ceil(GROWTH * n) + 1, most) if edge > 0.1 * max(edges) else n
-            for n, edge, most in zip((waves, degrees), edges, (MOST["rows"] - 1, MOST["columns"]), strict=True)
+            min(math.ceil(GROWTH * n) + 1, most) if of_it > 0.1 * edge else n
+            for n, of_it, most in zip((waves, degrees), edges, (MOST["rows"] - 1, MOST["columns"]), strict=True)
         )
+    if passed is not None:
+        basis, pair, waves, degrees = passed
+        certificate = certificate_of(stated, noise, basis, p, pair)
+        progress()
+        if certificate is not None:
+            yield certificate, waves, degrees
 
 
 @precision()
@@ -498,7 +522,7 @@ def _pull(value: float, inward: float, q: int) -> float:
 
 def _sides(trial: Trial, phases: int) -> tuple[SideRecord | None, SideRecord | None]:
     """The least δ of the upper and of the lower bound, to 1 %, each None where there is none."""
-    bounder = Bounder(trial, phases)
+    bounder = Bounder(trial, phases, REST)
     if (covered := trial.basis.cover(trial.cosine.shape[1])) is not None:
         bounds = bounder.bounds(*covered)
         if not np.all(bounds.is_positive):
