@@ -246,7 +246,7 @@ class Case(Section):
         is_wanted = EIGENFUNCTIONS in self.output.quantities
         return is_wanted and self.planned > MOST_DRAWN and not self.output.asks_for_eigenfunctions
 
-    @cached_property
+    @property
     def has_response(self) -> bool:
         """Whether the stationary response is computed: it is asked for, or some of at most ten curves are nonlinear."""
         if RESPONSE not in self.output.quantities or self.response.off:
