@@ -194,7 +194,7 @@ def test_when_it_is_computed(tmp_path):
         assert (everything(case).response, case.leaves_out_response) == (None, False)
     case = wanted(tmp_path, '[vary]\n"oscillator.c3" = [0.0, 0.2]\n', c2=0.0, c3=0.0)
     assert everything(case).response == 1e-6
-    case = wanted(tmp_path, '[uncertain]\nsample = 5\n"noise.D0" = 0.05\n')
+    case = wanted(tmp_path, '[uncertain]\nsample = 20\n"noise.D0" = 0.05\n')
     assert everything(case).response == 1e-6
     assert everything(sampled_case(case)).response is None
 
