@@ -17,6 +17,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.output.figures import draw_stationary_responses
 from fpsolve.output.records import fits, record_of, result_of
 from fpsolve.output.sentences import sentence, shape_of_response
+from fpsolve.output.terminal import simulated_mean
 from fpsolve.study import solve
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, compare, everything, expected, solve_curve
@@ -244,6 +245,12 @@ def test_p_bifurcations_are_told(result, case, index, words, titles, tmp_path, m
 
 def with_index(response, index):
     return replace(response, stability_index=index)
+
+
+def test_a_simulated_mean_stands_beside_that_of_finite_elements(result):
+    means = {"energy": replace(result.response.means["energy"], value=0.7)}
+    assert simulated_mean("energy", 0.75, 0.02, means) == "⟨E⟩ = 0.750 ± 2.0e-02 (finite elements 0.7, +2.5 s.e. away)"
+    assert simulated_mean("x", 0.75, 0.02, means) == "⟨x⟩ = 0.750 ± 2.0e-02"
 
 
 def test_the_sentence_tells_where_paths_end(result, case):
