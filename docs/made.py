@@ -99,15 +99,18 @@ def script(path: Path) -> str:
     few = case.figure.x == "p" and case.moments.values.size < 8
     sets = ["output={ quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"]
     if few:
-        sets = ["output={ quantities = ['moment'] }", "expect=[]", "figure={}"]
+        names = "['moment', 'response']" if case.has_response else "['moment']"
+        sets = [f"output={{ quantities = {names} }}", "expect=[]", "figure={}"]
         count, digits = (7, ", rtol = 1e-4") if path.stem in TWO_AXES else (13, "")
         sets += [f"moments={{ p = {{ start = 0.0, stop = 3.0, num = {count} }}{digits} }}"] * (path.stem not in OWN_P)
     title = re.sub(r"^(Fig\. \d\S*): (.*)", r"\1: \2", case.title)
     head = f'"""\n{title}\n{"=" * len(title)}\n\n{_rst(words)}\n"""\n\n'
     shown = f"# %%\n# The case file:\n#\n# .. literalinclude:: /generated/cases/{path.name}\n#    :language: toml\n"
+    shown_there = "The figure of the case" if path.stem in OWN_P or not few else "Λ(p) over a range of p"
+    shown_there += ", and the stationary response" if case.has_response else ""
     run = f"""
 # %%
-# {"The figure of the case:" if path.stem in OWN_P or not few else "Λ(p) over a range of p:"}
+# {shown_there}:
 
 import fpsolve
 

@@ -246,18 +246,24 @@ class Case(Section):
         is_wanted = EIGENFUNCTIONS in self.output.quantities
         return is_wanted and self.planned > MOST_DRAWN and not self.output.asks_for_eigenfunctions
 
-    @cached_property
+    @property
     def has_response(self) -> bool:
         """Whether the stationary response is computed: it is asked for, or some of at most ten curves are nonlinear."""
         if RESPONSE not in self.output.quantities or self.response.off:
             return False
-        return self.output.states_quantities or (self.planned <= MOST_DRAWN and any(map(_is_nonlinear, self.curves())))
+        return self.output.states_quantities or (self.planned <= MOST_DRAWN and self._is_nonlinear)
 
     @property
     def leaves_out_response(self) -> bool:
         """Whether it is not, as there are too many curves and nobody asks for it."""
         is_wanted = RESPONSE in self.output.quantities and not (self.response.off or self.has_response)
-        return is_wanted and self.planned > MOST_DRAWN and any(map(_is_nonlinear, self.curves(0, 1)))
+        return is_wanted and self.planned > MOST_DRAWN and self._is_nonlinear
+
+    @property
+    def _is_nonlinear(self) -> bool:
+        """Whether some of the first curves are."""
+        problem = varying(self.problem)
+        return any(problem(varied).system.is_nonlinear for varied in self.vary.sets(0, MOST_DRAWN))
 
     @property
     def differentiated(self) -> FloatArray:
@@ -384,10 +390,6 @@ def _faults_of_name(name: str) -> Iterator[Fault]:
         text = f"got {json.dumps(name)} as the file's name without its ending, which names the folder of its results; "
         remedy = "must have no control characters and no backslash, not end in a dot or a space, and be no device"
         yield Fault("", None, f"{text}{remedy}; rename the file")
-
-
-def _is_nonlinear(curve: Curve) -> bool:
-    return curve.problem.system.is_nonlinear
 
 
 def _spread(p: FloatArray, most: int = 9) -> FloatArray:

@@ -407,7 +407,7 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
     for each, result in pairs if is_short else ():
         if each.response:
             solved_means = result.response.means if result and result.response else {}
-            told = [_simulated_mean(name, *mean, solved_means) for name, mean in each.response.means.items()]
+            told = [simulated_mean(name, *mean, solved_means) for name, mean in each.response.means.items()]
             screen.say(f"{case.place(each.curve)}: stationary means")
             screen.packed(told, "  ")
             screen.lines([""])
@@ -469,7 +469,7 @@ def sampled(value: float, error: float) -> str:
     return f"{value:.{decimals}f}" if 0 <= decimals <= 9 else f"{value:.3g}"
 
 
-def _simulated_mean(name: str, value: float, error: float, exact: Mapping[str, Estimate]) -> str:
+def simulated_mean(name: str, value: float, error: float, exact: Mapping[str, Estimate]) -> str:
     """A mean of a simulated response, and how far that by finite elements is away, where there is one."""
     text = f"{STATIONARY_MEANS[name].symbol} = {_with_error(value, error)}"
     if name not in exact or not error:

@@ -95,9 +95,12 @@ def test_what_else_the_paper_says_of_its_figures() -> None:
 
 @pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
 def test_expected_values_agree_with_their_source(path: Path) -> None:
-    """Second-order values are those of Eqs. (37)-(39); the others lie within O(ε⁴) of them, relative 1e-3."""
+    """Second-order values are those of Eqs. (37)-(39); the others lie within O(ε⁴) of them, relative 1e-3.
+
+    There are none of the nonlinear response.
+    """
     case = load_case(path)
-    for item in case.expect:
+    for item in (each for each in case.expect if not each.of_response):
         curves = [curve for curve in case.curves() if item.selects(curve.varied)]
         assert len(curves) == 1
         p = () if item.p is None else (item.p,)

@@ -61,6 +61,7 @@ def test_quantities_are_whole(case, width, capsys, terminal):
     for show, names in (
         (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)", "N", "R_c", *MEANS} - {"⟨x⟩"}),
         (lambda: print_simulation(case, simulated), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
+        (lambda: print_simulation(case, simulated, results), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
     ):
         show()
         lines = capsys.readouterr().out.splitlines()

@@ -17,9 +17,11 @@ from fpsolve.messages import Code, Message
 from fpsolve.output.figures import draw_stationary_responses
 from fpsolve.output.records import fits, record_of, result_of
 from fpsolve.output.sentences import sentence, shape_of_response
+from fpsolve.output.terminal import simulated_mean
 from fpsolve.study import solve
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, compare, everything, expected, solve_curve
+from fpsolve.study.uncertain import sampled_case
 from tests.solving import case_in, case_text
 
 SECTIONS = """[moments]
@@ -193,6 +195,9 @@ def test_when_it_is_computed(tmp_path):
         assert (everything(case).response, case.leaves_out_response) == (None, False)
     case = wanted(tmp_path, '[vary]\n"oscillator.c3" = [0.0, 0.2]\n', c2=0.0, c3=0.0)
     assert everything(case).response == 1e-6
+    case = wanted(tmp_path, '[uncertain]\nsample = 20\n"noise.D0" = 0.05\n')
+    assert everything(case).response == 1e-6
+    assert everything(sampled_case(case)).response is None
 
 
 @pytest.mark.parametrize(
@@ -240,6 +245,12 @@ def test_p_bifurcations_are_told(result, case, index, words, titles, tmp_path, m
 
 def with_index(response, index):
     return replace(response, stability_index=index)
+
+
+def test_a_simulated_mean_stands_beside_that_of_finite_elements(result):
+    means = {"energy": replace(result.response.means["energy"], value=0.7)}
+    assert simulated_mean("energy", 0.75, 0.02, means) == "⟨E⟩ = 0.750 ± 2.0e-02 (finite elements 0.7, +2.5 s.e. away)"
+    assert simulated_mean("x", 0.75, 0.02, means) == "⟨x⟩ = 0.750 ± 2.0e-02"
 
 
 def test_the_sentence_tells_where_paths_end(result, case):
