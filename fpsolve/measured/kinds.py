@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.model import Bounded, Filter, Noise, OrnsteinUhlenbeck
 
 Shape = Callable[[FloatArray, FloatArray], FloatArray]
+Path = Callable[[FloatArray, float, int, np.random.Generator], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Kind:
         covariance: C(t) by t ≥ 0, shape (n,), and the values.
         amplitude: which of the parameters multiplies ξ.
         start: values from a place ω₀ and a relative width w of a peak, before the amplitude is known.
-        is_gaussian: whether ξ is.
+        path: of a noise that is not Gaussian, ξ at n equal steps by the step and the values; None of a Gaussian one.
     """
 
     names: tuple[str, ...]
@@ -33,7 +35,7 @@ class Kind:
     covariance: Shape
     amplitude: int
     start: Callable[[float, float], Sequence[float]]
-    is_gaussian: bool = True
+    path: Path | None = None
 
 
 def _ou_density(omega: FloatArray, theta: FloatArray) -> FloatArray:
@@ -55,6 +57,12 @@ def _bounded_density(omega: FloatArray, theta: FloatArray) -> FloatArray:
 def _bounded_covariance(t: FloatArray, theta: FloatArray) -> FloatArray:
     mu, nu, sigma = theta
     return 0.5 * mu**2 * np.exp(-0.5 * sigma**2 * t) * np.cos(nu * t)
+
+
+def _bounded_path(theta: FloatArray, step: float, n: int, rng: np.random.Generator) -> FloatArray:
+    mu, nu, sigma = theta
+    turns = nu * step + sigma * math.sqrt(step) * rng.standard_normal(n)
+    return np.asarray(mu * np.cos(rng.uniform(0, 2 * math.pi) + np.cumsum(turns)))
 
 
 def _filter(has_value: bool, has_slope: bool) -> Kind:
@@ -109,7 +117,7 @@ BOUNDED = Kind(
     _bounded_covariance,
     0,
     lambda omega, width: (1.0, omega, (2 * width * omega) ** 0.5),
-    is_gaussian=False,
+    path=_bounded_path,
 )
 KINDS = {
     "ornstein-uhlenbeck": (OU,),
