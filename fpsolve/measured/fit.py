@@ -125,7 +125,7 @@ class NoiseFit:
     def off(self) -> float:
         """The largest share by which the fit is off where it matters, without what its standard error explains."""
         squares = [each.relative**2 - each.error**2 for each in self.misfit]
-        return math.sqrt(max([0.0, *squares]))
+        return float(np.sqrt(np.max([0.0, *squares])))  # not a number where one is not
 
     def at(self, values: Mapping[str, float]) -> NoiseFit:
         """The same with other values of some parameters, by their keys."""
@@ -235,9 +235,10 @@ def _refuse_far(spectrum: Spectrum, matter: Mapping[str, float]) -> None:
         near = omega[0] <= 0.1 * max(matter.values()) if target == 0 else bracketed(omega, target)
         if not near:
             k = int(np.argmin(abs(omega - target)))
+            where, nearest = (f"{each:.4g} rad/time ({each / (2 * math.pi):.4g} cycles)" for each in (target, omega[k]))
             raise ValueError(
-                f"nothing was measured near {name} = {target:.4g} rad/time, which stability depends on; the nearest "
-                f"point is {omega[k]:.4g}; measure there, or correct the natural frequency or its unit"
+                f"nothing was measured near {f'{name} = {where}' if target else '0'}, which stability depends on; the "
+                f"nearest point is {nearest}; measure there, or correct the natural frequency or its unit"
             )
 
 

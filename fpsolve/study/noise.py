@@ -152,6 +152,10 @@ def measure(data: Spectrum | Record, wanted: Wanted) -> NoiseOutcome:
                 raise ValueError("a spectrum does not tell r0; name a record by --record")
             if wanted.terms > 1:
                 raise ValueError(f"got --terms {wanted.terms} for --kind {NON_GAUSSIAN}, which has one; leave it out")
+            if wanted.method != "spectrum":
+                raise ValueError(
+                    f"got --method {wanted.method} for --kind {NON_GAUSSIAN}, which has none; leave it out"
+                )
             fit = non_gaussian_from_record(converted)
         else:
             second = omega[1] if len(omega) > 1 else None

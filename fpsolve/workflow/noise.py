@@ -97,10 +97,15 @@ def measurement_of(stated: Statement) -> tuple[Spectrum | Record, Wanted, Path]:
         raise FpsolveError(f"got --gm {stated.gm}; must be > 0, in m")
     wanted = Wanted(of, stated.kind, stated.terms, stated.method, modes, stated.gm, stated.case)
     record = read_record(stated.record, rate=stated.rate, of=of, column=stated.column) if stated.record else None
+    if stated.spectrum is not None:
+        if stated.method == "whittle":
+            raise FpsolveError("--method whittle is for a record, and a spectrum was named; leave it out")
+        if stated.rate is not None and record is None:
+            raise FpsolveError("--rate is for a record, and a spectrum was named; leave it out, or name it by --record")
     if stated.spectrum is None and record is not None:
-        left_out = [name for name in ("per", "sided", "averages") if getattr(stated, name) is not None]
-        if stated.averages is not None or stated.sided is not None:
-            raise FpsolveError(f"--{left_out[-1]} is for a spectrum, and a record was named; leave it out")
+        for name in ("sided", "averages"):
+            if getattr(stated, name) is not None:
+                raise FpsolveError(f"--{name} is for a spectrum, and a record was named; leave it out")
         return record, wanted, source
     data = read_spectrum(
         stated.spectrum or source,
@@ -117,6 +122,8 @@ def measurement_of(stated: Statement) -> tuple[Spectrum | Record, Wanted, Path]:
 def _modes(stated: Statement, of: str) -> Modes:
     """The natural frequencies and the damping by the one option that states them."""
     restitution, zeta = stated.restitution, stated.damping_ratio
+    if zeta is not None and math.isnan(zeta):
+        raise FpsolveError("got --damping-ratio nan; must be -1 < value < 1; leave it out if it is not known")
     if stated.mode and stated.modes is None:
         raise FpsolveError("--mode is for the table that --modes names; name one, or leave it out")
     if stated.case and (zeta is not None or restitution is not None or stated.modes is not None):
