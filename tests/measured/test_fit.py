@@ -110,6 +110,7 @@ def test_wrong_sides_are_told_by_the_variance():
     [
         (OMEGA, -exact(NOISES[0]), r"row 1 is -.*must be > 0"),
         (OMEGA[::-1], exact(NOISES[0]), "sort the rows"),
+        (OMEGA - 1, exact(NOISES[0]), "row 1 is negative; remove such rows"),
         (OMEGA[:3], exact(NOISES[0])[:3], "at least 5"),
         (OMEGA, exact(NOISES[0])[:-1], "one for each"),
         (OMEGA, np.where(OMEGA > 3, np.nan, 1.0), "value nan at row"),
