@@ -22,13 +22,29 @@ from fpsolve.measured.spectrum import UNITS
 from fpsolve.measured.units import GRAVITY
 from fpsolve.measured.weak import Where
 from fpsolve.output.noises import Convention, write_noise
-from fpsolve.study.noise import CLOSE, NoiseOutcome, Wanted, measure, natural_frequencies, refuse_wrong_case
+from fpsolve.study.noise import (
+    CLOSE,
+    STEPS_OF_A_FIT,
+    NoiseOutcome,
+    Wanted,
+    measure,
+    natural_frequencies,
+    refuse_wrong_case,
+)
+from fpsolve.workflow.progress import SILENT, SOLVES, Phase, Watch
 
 
 def noise_case(
-    data: Spectrum | Record, wanted: Wanted, source: Path, shown: Convention, out: Path
+    data: Spectrum | Record, wanted: Wanted, source: Path, shown: Convention, out: Path, watch: Watch = SILENT
 ) -> tuple[NoiseOutcome, Path, list[str]]:
     """Fit a noise, and write it with a figure into a folder called as the file of the measurement.
+
+    Args:
+        data, wanted: see `measure`.
+        source: the file.
+        shown: how densities are shown.
+        out: where the folder is made.
+        watch: of the progress, with a bar for the fit and what it means.
 
     Returns:
         What became of it, the folder, and the names of the files.
@@ -39,8 +55,8 @@ def noise_case(
     """
     folder = out / source.stem
     try:
-        with one_thread():  # the arrays are small
-            outcome = measure(data, wanted)
+        with one_thread(), watch.bar(Phase(source.stem, "solving", STEPS_OF_A_FIT, SOLVES)) as progress:
+            outcome = measure(data, wanted, progress)  # the arrays are small
     except FpsolveError as error:
         raise FpsolveError(f"{source}: {error}") from None
     with alone(folder), writable(folder):
