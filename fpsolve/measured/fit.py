@@ -36,6 +36,8 @@ FLOOR, WIDTH = 0.02, 0.3
 NAMES = ("first", "second", "third")
 """Of the noises of a sum."""
 MOST_TERMS = len(NAMES)
+AT_END = 1e-4
+"""Below the logarithm of its largest value a parameter counts as fixed there."""
 UNTOLD = 1e-8
 """Of the information of scaled parameters: a smaller eigenvalue is of a direction that the values do not tell."""
 SEGMENTS, LEAST_SEGMENTS, SAMPLES, BLOCK = 2000, 200, 2e7, 63
@@ -195,11 +197,7 @@ def fit_noise(
         noise_in: "stiffness", for which S(2ω) counts, or "damping", for which S(0) counts as well; of two modes
             S(2ω₁), S(2ω₂), S(ω₁ ± ω₂).
         terms: 1 to 3, how many independent noises of the kind ξ is the sum of. A `Problem` takes two of them at most.
-        method: of a record "spectrum", Welch's estimate, or "whittle", the periodogram of the whole record. With
-            "whittle" values are taken as independent, as of a Gaussian noise.
-
-    Standard errors of bounded noise from a record of 250 correlation times are too small, by up to a quarter, as seen
-    in `python -m tests.random_fits`; with method = "whittle" that of its amplitude is far too large.
+        method: of a record "spectrum", Welch's estimate, or "whittle", the periodogram of the whole record.
 
     Raises:
         ValueError: an argument is none of these, or nothing was measured near a frequency that matters.
@@ -343,10 +341,11 @@ def _fitted(data: _Data, families: Sequence[Kind], weights: FloatArray) -> tuple
         half = np.zeros_like(first)
         half[families[0].amplitude] = 0.5 * math.log(2)
         starts.append(np.concatenate([first - half - shift, first - half + shift, fewer[first.size :]]))
-    found = [
-        least_squares(residuals, start, bounds=(start - 15, start + 15), ftol=1e-10, xtol=1e-8, max_nfev=100)
-        for start in starts
-    ]
+    highest = np.concatenate([family.highest for family in families])
+    found = []
+    for start in (np.minimum(each, highest) for each in starts):
+        bounds = (start - 15, np.minimum(start + 15, highest))
+        found.append(least_squares(residuals, start, bounds=bounds, ftol=1e-10, xtol=1e-8, max_nfev=100))
     best = min(found, key=lambda each: each.cost)
     return best.x, 2 * best.cost
 
@@ -371,6 +370,7 @@ def _told(
     method: str,
 ) -> NoiseFit:
     fitted, slopes = _sum(data, families, theta), _slopes(data, families, theta)
+    slopes[:, theta > np.concatenate([family.highest for family in families]) - AT_END] = 0.0  # fixed there
     ratio = data.values / fitted - 1
     n, k = data.values.size, theta.size
     unknown = method == "spectrum" and spectrum.relative_error is None

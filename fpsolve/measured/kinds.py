@@ -12,6 +12,8 @@ from fpsolve.arrays import FloatArray
 from fpsolve.model import Bounded, Filter, Noise, OrnsteinUhlenbeck
 
 Shape = Callable[[FloatArray, FloatArray], FloatArray]
+LARGEST_DAMPING = 10.0
+"""Of a filter: its spectrum is that of noise of first order, up to 400 times its corner, and tells no larger one."""
 Path = Callable[[FloatArray, float, int, np.random.Generator], FloatArray]
 
 
@@ -26,6 +28,7 @@ class Kind:
         covariance: C(t) by t ≥ 0, shape (n,), and the values.
         amplitude: which of the parameters multiplies ξ.
         start: values from a place ω₀ and a relative width w of a peak, before the amplitude is known.
+        most: the largest value of each parameter.
         path: of a noise that is not Gaussian, ξ at n equal steps by the step and the values; None of a Gaussian one.
     """
 
@@ -35,7 +38,13 @@ class Kind:
     covariance: Shape
     amplitude: int
     start: Callable[[float, float], Sequence[float]]
+    most: tuple[float, ...] = ()
     path: Path | None = None
+
+    @property
+    def highest(self) -> FloatArray:
+        """The logarithms of the largest values, shape (k,)."""
+        return np.log(self.most or (math.inf,) * len(self.names))
 
 
 def _ou_density(omega: FloatArray, theta: FloatArray) -> FloatArray:
@@ -99,6 +108,7 @@ def _filter(has_value: bool, has_slope: bool) -> Kind:
         covariance,
         2,
         lambda omega, width: (omega, width, 1.0, 0.3 / omega)[: 4 if both else 3],
+        most=(math.inf, LARGEST_DAMPING, math.inf, math.inf)[: 4 if both else 3],
     )
 
 

@@ -51,6 +51,25 @@ def test_the_kinds_have_the_covariance_and_density_of_the_noises():
                 assert transform == pytest.approx(noise.spectral_density(omega), rel=1e-4)
 
 
+def test_a_filter_without_a_peak_has_no_absurd_parameters():
+    """σ²/(α² + ω²) is that of a filter whose second corner is far above, as far as ζ = 10 allows."""
+    fit = fitted(Spectrum(OMEGA, exact(NOISES[0]), np.full(OMEGA.size, 0.1)), "filter")
+    assert fit.parameters["zeta"] <= 10
+    assert fit.parameters["omega"] < 1e3
+    assert fit.spectral_density(4.0) == pytest.approx(NOISES[0].spectral_density(4.0), rel=1e-3)
+    assert any("do not tell all parameters" in each for each in fit.messages)
+
+
+def test_standard_errors_of_bounded_noise_are_those_of_its_phase():
+    """That of ν is at least σ/√T, of the phase itself; that of μ is below μ/√(2Tσ²), of Gaussian noise with such a S."""
+    bounded, T = NOISES[3], 400.0
+    fit = fitted(record_of(bounded, np.random.default_rng(0), 4000), "bounded")
+    assert 1 < fit.errors["nu"] / (bounded.sigma / math.sqrt(T)) < 1.5
+    assert fit.errors["mu"] < 0.5 * bounded.mu / math.sqrt(2 * T * bounded.sigma**2)
+    for name, value in fit.parameters.items():
+        assert abs(value - bounded.values[name]) < 4 * fit.errors[name], name
+
+
 def test_standard_errors_of_spectra():
     """25 seeds: 95 % within 1.96 errors; fewer than 19 has a probability below 1e-3."""
     shares, others, _ = coverage(
