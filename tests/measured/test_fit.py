@@ -61,7 +61,7 @@ def test_a_filter_without_a_peak_has_no_absurd_parameters():
 
 
 def test_standard_errors_of_bounded_noise_are_those_of_its_phase():
-    """That of ν is at least σ/√T, of the phase itself; that of μ is below μ/√(2Tσ²), of Gaussian noise with such a S."""
+    """That of ν is at least σ/√T, of the phase itself; that of μ is below μ/√(2Tσ²) of a Gaussian noise."""
     bounded, T = NOISES[3], 400.0
     fit = fitted(record_of(bounded, np.random.default_rng(0), 4000), "bounded")
     assert 1 < fit.errors["nu"] / (bounded.sigma / math.sqrt(T)) < 1.5
@@ -100,6 +100,22 @@ def test_noise_of_eq_7_from_a_record(r0):
     fit = non_gaussian_from_record(record_of(noise, np.random.default_rng(0), 40_000, 0.04))
     for name, value in fit.parameters.items():
         assert abs(value - noise.values[name]) < 4 * fit.errors[name], name
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (
+            np.random.default_rng(1).uniform(-1, 1, 400),
+            r"the steps of the record are 1, too long .* below 0\.1\d*, 0\.3 of",
+        ),
+        (np.sin(0.02 * np.arange(1000)), "kurtosis of the record is 1.5"),
+        (np.random.default_rng(1).standard_t(3, 400), "has one between 1.8 and 3; fit another kind"),
+    ],
+)
+def test_what_is_no_noise_of_eq_7_is_refused(values, said):
+    with pytest.raises(ValueError, match=said):
+        non_gaussian_from_record(Record(values, 1.0))
 
 
 @pytest.mark.parametrize(
