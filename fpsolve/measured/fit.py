@@ -44,8 +44,8 @@ SEGMENTS, LEAST_SEGMENTS, SAMPLES, BLOCK = 2000, 200, 2e7, 63
 """How many segments are simulated for standard errors: fewer of long ones, for some samples in all; in such blocks."""
 LAGS = 3
 """How many steps apart segments count as correlated."""
-MISFIT = 3.0
-"""Standard errors by which a fit may be wrong where it matters before that is said."""
+MISFIT, UNSURE_MISFIT = 3.0, 2.0
+"""Standard errors by which a fit may be off where it matters before that is said; fewer where they count how far it is."""
 
 
 class Misfit(NamedTuple):
@@ -396,10 +396,11 @@ def _told(
         keys += [f"{name}.{each}" if len(families) > 1 else each for each in family.names]
         place += len(family.names)
     misfit = tuple(_misfit(name, at, data, ratio, dispersion) for name, at in matter.items())
+    most = UNSURE_MISFIT if unknown else MISFIT
     messages = [
         Message(Code.NOISE_MISFIT, name=each.name, relative=each.relative, error=each.error)
         for each in misfit
-        if abs(each.relative) > max(MISFIT * each.error, 0.02)
+        if abs(each.relative) > max(most * each.error, 0.02)
     ]
     messages += [Message(Code.SPECTRUM_GAP, low=low, high=high) for low, high in gaps(spectrum)]
     if unknown:

@@ -17,6 +17,8 @@ LARGEST = 1e100
 """Of any value, so that squares are numbers."""
 MOST_AVERAGES = 1e12
 """Of periodograms: their errors are far below any other then."""
+MOST_VARIANCE = 1.5
+"""Of a density over that of its record, which has the other frequencies as well."""
 SHORTEST = 256
 """Samples of a record at least."""
 SEGMENTS = 64
@@ -105,6 +107,11 @@ class Spectrum:
             raise ValueError(
                 f"the density has the variance {self.covered_variance:.4g}, but the record {variance:.4g}, some "
                 f"{near:.3g} times as much; state another {factors[near]}"
+            )
+        if ratio > MOST_VARIANCE:
+            raise ValueError(
+                f"the density has the variance {self.covered_variance:.4g}, {ratio:.3g} times that of the record, "
+                f"{variance:.4g}; correct the unit of one of them"
             )
 
     @property
