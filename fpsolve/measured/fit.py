@@ -45,7 +45,7 @@ SEGMENTS, LEAST_SEGMENTS, SAMPLES, BLOCK = 2000, 200, 2e7, 63
 LAGS = 3
 """How many steps apart segments count as correlated."""
 MISFIT, UNSURE_MISFIT = 3.0, 2.0
-"""Standard errors by which a fit may be off where it matters before that is said; fewer where they count how far it is."""
+"""Standard errors by which a fit may be off where it matters before that is said; fewer where they count it."""
 
 
 class Misfit(NamedTuple):
