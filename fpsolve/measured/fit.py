@@ -454,7 +454,7 @@ def _misfit(name: str, at: float, data: _Data, ratio: FloatArray, dispersion: fl
     distance = abs(data.omega - at)
     near = distance <= max(0.1 * at, float(np.sort(distance)[min(4, distance.size - 1)]))
     number = data.number[near]
-    # Hann's window correlates neighbours: the variance of a sum over many is 35/18 times as large
-    inflation = 35 / 18 if data.record is not None else 1.0
+    # Hann's window, of several segments, correlates neighbours: the variance of a sum over many is 35/18 times as large
+    inflation = 35 / 18 if data.record is not None and data.number[0] > 1 else 1.0
     error = math.sqrt(dispersion * inflation / float(np.sum(number)))
     return Misfit(name, at, float(np.average(ratio[near], weights=number)), error)
