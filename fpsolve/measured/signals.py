@@ -56,8 +56,9 @@ class Density(NamedTuple):
 
 
 def plain(unit: str) -> str:
-    """A unit in small letters without spaces, with ^ for powers."""
-    return re.sub(r"\s|\*\*", lambda found: "^" if found[0] == "**" else "", unit.translate(_RAISED)).lower()
+    """A unit in small letters without spaces, with ^ for powers, also for those of "m2"."""
+    text = re.sub(r"\s|\*\*", lambda found: "^" if found[0] == "**" else "", unit.translate(_RAISED)).lower()
+    return re.sub(r"(?<=[a-z])\d", r"^\g<0>", text)
 
 
 def density_unit(unit: str) -> Density:
