@@ -749,7 +749,7 @@ def noise(
     )  # fmt: skip
     data, wanted, source = measurement_of(stated)
     shown = Convention(per or "Hz", sided or "one")
-    outcome, folder, names = noise_case(data, wanted, source, shown, out)
+    outcome, folder, names = noise_case(data, wanted, source, shown, out, _watch(is_json=json))
     if json:
         print(" ".join(line.strip() for line in (folder / names[0]).read_text(encoding="utf-8").splitlines()))
     else:

@@ -3,9 +3,9 @@
 Of 100 seeds 95 ± 5 must have a parameter within 1.96 standard errors.
 """
 
+import functools
 import math
 import sys
-from functools import partial
 
 import numpy as np
 
@@ -53,7 +53,8 @@ def record_of(noise, rng, n=20_000, step=0.1):
     return Record(values, step)
 
 
-def _of_eq_7(noise, rng, n, step, parts=20):
+@functools.cache
+def _path_of_eq_7():
     """A single path in a compiled loop."""
     from numba import njit
 
@@ -76,10 +77,14 @@ def _of_eq_7(noise, rng, n, step, parts=20):
             values[i] = xi
         return values
 
+    return path
+
+
+def _of_eq_7(noise, rng, n, step, parts=20):
     b = (1 - noise.r0) * noise.tau0 / (2 * noise.D0)
     h = step / parts
     kick = math.sqrt(2 * noise.D0 * h) / noise.tau0
-    return Record(path(0.0, n, parts, h, b, noise.tau0, kick, int(rng.integers(2**31))), step)
+    return Record(_path_of_eq_7()(0.0, n, parts, h, b, noise.tau0, kick, int(rng.integers(2**31))), step)
 
 
 def scores(noise, fit):
@@ -112,7 +117,7 @@ def main(seeds=100):
             "whittle": (record_of, {"method": "whittle"}),
         }
         for name, (make, options) in rows.items():
-            shares, others, known = coverage(noise, make, partial(fitted, kind=noise.kind, **options), seeds)
+            shares, others, known = coverage(noise, make, functools.partial(fitted, kind=noise.kind, **options), seeds)
             print(noise, name, shares, "std", known.std(axis=0).round(2), "others", others, flush=True)
     for r0 in (0.7, 0.95):
         noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=r0)

@@ -10,7 +10,7 @@ gᵢ = ∂ ln Sᵢ/∂θ the estimate has the covariance A⁻¹BA⁻¹, A = Σ w
 
 Sᵢ(θ) of a record is the mean of its estimate: the transform of w⋆w(t) C(t), C the autocovariance of ξ and w the window.
 So it has neither the bias of aliases nor that of leakage. There B has the correlation of neighbouring frequencies too.
-Of bounded noise, which is not Gaussian, it is that of the scores of the segments themselves.
+Of bounded noise, which is not Gaussian, B is that of segments of simulated records of the fitted noise.
 """
 
 from __future__ import annotations
@@ -36,10 +36,16 @@ FLOOR, WIDTH = 0.02, 0.3
 NAMES = ("first", "second", "third")
 """Of the noises of a sum."""
 MOST_TERMS = len(NAMES)
+AT_END = 1e-4
+"""Below the logarithm of its largest value a parameter counts as fixed there."""
 UNTOLD = 1e-8
 """Of the information of scaled parameters: a smaller eigenvalue is of a direction that the values do not tell."""
-MISFIT = 3.0
-"""Standard errors by which a fit may be wrong where it matters before that is said."""
+SEGMENTS, LEAST_SEGMENTS, SAMPLES, BLOCK = 2000, 200, 2e7, 63
+"""How many segments are simulated for standard errors: fewer of long ones, for some samples in all; in such blocks."""
+LAGS = 3
+"""How many steps apart segments count as correlated."""
+MISFIT, UNSURE_MISFIT = 3.0, 2.0
+"""Standard errors by which a fit may be off where it matters before that is said; fewer where they count it."""
 
 
 class Misfit(NamedTuple):
@@ -121,7 +127,7 @@ class NoiseFit:
     def off(self) -> float:
         """The largest share by which the fit is off where it matters, without what its standard error explains."""
         squares = [each.relative**2 - each.error**2 for each in self.misfit]
-        return math.sqrt(max([0.0, *squares]))
+        return float(np.sqrt(np.max([0.0, *squares])))  # not a number where one is not
 
     def at(self, values: Mapping[str, float]) -> NoiseFit:
         """The same with other values of some parameters, by their keys."""
@@ -134,18 +140,41 @@ class NoiseFit:
         return replace(self, parts=parts, parameters=parameters)
 
 
+class _Cut(NamedTuple):
+    """Segments of a record that overlap by half: their window, of the length of one, and the step of time."""
+
+    window: FloatArray
+    step: float
+
+    @property
+    def hop(self) -> int:
+        return self.window.size - self.window.size // 2
+
+    @property
+    def inside(self) -> slice:
+        """Of the frequencies: neither those on which the mean acts nor the highest."""
+        return slice(2, self.window.size // 2)
+
+    def periodograms(self, values: FloatArray) -> FloatArray:
+        """Of each segment, one a row."""
+        length = self.window.size
+        starts = range(0, values.size - length + 1, self.hop)
+        rows = [abs(np.fft.rfft(self.window * values[i : i + length])[self.inside]) ** 2 for i in starts]
+        return self.step * np.array(rows, dtype=float)
+
+
 class _Data(NamedTuple):
     """Values, of how many each is the mean, and what `expected` makes of kinds: Sᵢ(θ).
 
-    Of a record `segments` are the values of each, and `variance` that of a mean over its square.
+    Of a record `variance` is that of a mean over its square, and `record` how it is cut.
     """
 
     omega: FloatArray
     values: FloatArray
     number: FloatArray
     expected: Callable[[Kind, FloatArray], FloatArray]
-    segments: FloatArray | None
     variance: float
+    record: _Cut | None
 
 
 def fit_noise(
@@ -168,11 +197,7 @@ def fit_noise(
         noise_in: "stiffness", for which S(2ω) counts, or "damping", for which S(0) counts as well; of two modes
             S(2ω₁), S(2ω₂), S(ω₁ ± ω₂).
         terms: 1 to 3, how many independent noises of the kind ξ is the sum of. A `Problem` takes two of them at most.
-        method: of a record "spectrum", Welch's estimate, or "whittle", the periodogram of the whole record. With
-            "whittle" values are taken as independent, as of a Gaussian noise.
-
-    Standard errors of bounded noise from a record of 250 correlation times are too small, by up to a quarter, as seen
-    in `python -m tests.random_fits`; with method = "whittle" that of its amplitude is far too large.
+        method: of a record "spectrum", Welch's estimate, or "whittle", the periodogram of the whole record.
 
     Raises:
         ValueError: an argument is none of these, or nothing was measured near a frequency that matters.
@@ -208,9 +233,10 @@ def _refuse_far(spectrum: Spectrum, matter: Mapping[str, float]) -> None:
         near = omega[0] <= 0.1 * max(matter.values()) if target == 0 else bracketed(omega, target)
         if not near:
             k = int(np.argmin(abs(omega - target)))
+            where, nearest = (f"{each:.4g} rad/time ({each / (2 * math.pi):.4g} cycles)" for each in (target, omega[k]))
             raise ValueError(
-                f"nothing was measured near {name} = {target:.4g} rad/time, which stability depends on; the nearest "
-                f"point is {omega[k]:.4g}; measure there, or correct the natural frequency or its unit"
+                f"nothing was measured near {f'{name} = {where}' if target else '0'}, which stability depends on; the "
+                f"nearest point is {nearest}; measure there, or correct the natural frequency or its unit"
             )
 
 
@@ -232,8 +258,8 @@ def _of_spectrum(data: Spectrum) -> _Data:
         data.density[positive],
         number[positive],
         lambda kind, theta: kind.density(omega[positive], theta),
-        None,
         math.nan,
+        None,
     )
 
 
@@ -242,24 +268,22 @@ def _of_record(record: Record, whole: bool) -> _Data:
     length = record.values.size if whole else record.segment_length()
     window = np.asarray(np.ones(length) if whole else np.hanning(length + 1)[:-1], dtype=float)
     window /= math.sqrt(float(window @ window))
-    hop = length - length // 2
-    starts = range(0, record.values.size - length + 1, hop)
-    inside = slice(2, length // 2)
-    segments: FloatArray = np.array(
-        [record.step * abs(np.fft.rfft(window * record.values[i : i + length])[inside]) ** 2 for i in starts]
-    )
-    omega: FloatArray = np.asarray(2 * math.pi * np.fft.rfftfreq(length, record.step)[inside], dtype=float)
+    cut = _Cut(window, record.step)
+    segments = cut.periodograms(record.values)
+    omega: FloatArray = np.asarray(2 * math.pi * np.fft.rfftfreq(length, record.step)[cut.inside], dtype=float)
     size = 2 * length
     lags = np.asarray(np.fft.irfft(abs(np.fft.rfft(window, size)) ** 2, size)[:length], dtype=float)
     lags[0] *= 0.5  # as C(0) stands once in 2 Re Σ
     t = np.asarray(record.step * np.arange(length), dtype=float)
 
     def expected(kind: Kind, theta: FloatArray) -> FloatArray:
-        found = 2 * record.step * np.fft.rfft(np.multiply(lags, kind.covariance(t, theta), dtype=float)).real[inside]
+        found = (
+            2 * record.step * np.fft.rfft(np.multiply(lags, kind.covariance(t, theta), dtype=float)).real[cut.inside]
+        )
         return np.asarray(np.maximum(found, 1e-300), dtype=float)
 
-    number, variance = np.full(omega.size, float(len(starts))), welch_variance(record.values.size, length)
-    return _Data(omega, segments.mean(axis=0), number, expected, None if whole else segments, variance)
+    number, variance = np.full(omega.size, float(len(segments))), welch_variance(record.values.size, length)
+    return _Data(omega, segments.mean(axis=0), number, expected, variance, cut)
 
 
 def _sum(data: _Data, families: Sequence[Kind], theta: FloatArray) -> FloatArray:
@@ -317,10 +341,11 @@ def _fitted(data: _Data, families: Sequence[Kind], weights: FloatArray) -> tuple
         half = np.zeros_like(first)
         half[families[0].amplitude] = 0.5 * math.log(2)
         starts.append(np.concatenate([first - half - shift, first - half + shift, fewer[first.size :]]))
-    found = [
-        least_squares(residuals, start, bounds=(start - 15, start + 15), ftol=1e-10, xtol=1e-8, max_nfev=100)
-        for start in starts
-    ]
+    highest = np.concatenate([family.highest for family in families])
+    found = []
+    for start in (np.minimum(each, highest) for each in starts):
+        bounds = (start - 15, np.minimum(start + 15, highest))
+        found.append(least_squares(residuals, start, bounds=bounds, ftol=1e-10, xtol=1e-8, max_nfev=100))
     best = min(found, key=lambda each: each.cost)
     return best.x, 2 * best.cost
 
@@ -345,27 +370,23 @@ def _told(
     method: str,
 ) -> NoiseFit:
     fitted, slopes = _sum(data, families, theta), _slopes(data, families, theta)
+    slopes[:, theta > np.concatenate([family.highest for family in families]) - AT_END] = 0.0  # fixed there
     ratio = data.values / fitted - 1
     n, k = data.values.size, theta.size
     unknown = method == "spectrum" and spectrum.relative_error is None
     dispersion = float(np.sum(weights * ratio**2) / np.sum(weights)) * n / max(n - k, 1) if unknown else 1.0
     information = slopes.T @ (slopes * (weights * data.number)[:, None])
     bread = np.linalg.pinv(information, hermitian=True)
-    if data.segments is None:
+    if data.record is not None and any(family.path for family in families):
+        meat = _simulated(data, data.record, families, theta, fitted, weights[:, None] * slopes)
+    elif data.record is None or method == "whittle":
         meat = dispersion * slopes.T @ (slopes * (weights**2 * data.number)[:, None])
-    elif all(family.is_gaussian for family in families):
+    else:
         # Hann's window correlates neighbours: of a Gaussian noise by 4/9, and by 1/36 at two steps
         rows = slopes * (weights * data.number * math.sqrt(data.variance))[:, None]
         meat = rows.T @ rows
         for lag, share in ((1, 4 / 9), (2, 1 / 36)):
             meat += share * (rows[lag:].T @ rows[:-lag] + rows[:-lag].T @ rows[lag:])
-    else:
-        scores = (data.segments / fitted - 1) * weights @ slopes
-        scores -= scores.mean(axis=0)
-        count = len(scores)
-        meat = scores.T @ scores
-        meat += scores[1:].T @ scores[:-1] + scores[:-1].T @ scores[1:]  # neighbours overlap
-        meat *= count / max(count - 1.5, 1.0)
     values = np.exp(theta)
     covariance = bread @ meat @ bread * np.outer(values, values)
     parts, keys, place = [], list[str](), 0
@@ -375,10 +396,11 @@ def _told(
         keys += [f"{name}.{each}" if len(families) > 1 else each for each in family.names]
         place += len(family.names)
     misfit = tuple(_misfit(name, at, data, ratio, dispersion) for name, at in matter.items())
+    most = UNSURE_MISFIT if unknown else MISFIT
     messages = [
         Message(Code.NOISE_MISFIT, name=each.name, relative=each.relative, error=each.error)
         for each in misfit
-        if abs(each.relative) > max(MISFIT * each.error, 0.02)
+        if abs(each.relative) > max(most * each.error, 0.02)
     ]
     messages += [Message(Code.SPECTRUM_GAP, low=low, high=high) for low, high in gaps(spectrum)]
     if unknown:
@@ -397,12 +419,42 @@ def _told(
     )
 
 
+def _simulated(
+    data: _Data, cut: _Cut, families: Sequence[Kind], theta: FloatArray, fitted: FloatArray, rows: FloatArray
+) -> FloatArray:
+    """The covariance of the sum of the scores of all segments, by segments of paths of the fitted noise.
+
+    Args:
+        data, cut: of the record.
+        families: of the parts, none of which is Gaussian.
+        theta: the logarithms of their parameters.
+        fitted: Sᵢ(θ).
+        rows: wᵢgᵢ, shape (n, k).
+    """
+    rng, measured = np.random.default_rng(0), int(data.number[0])
+    block = min(measured, BLOCK)
+    n = cut.window.size + (block - 1) * cut.hop
+    blocks = math.ceil(min(SEGMENTS, max(LEAST_SEGMENTS, SAMPLES / cut.hop)) / block)
+    sums = np.zeros((min(block, LAGS + 1), theta.size, theta.size))
+    for _ in range(blocks):
+        values, k = np.zeros(n), 0
+        for family in families:
+            assert family.path is not None  # the parts are of one kind
+            values += family.path(np.exp(theta[k : k + len(family.names)]), cut.step, n, rng)
+            k += len(family.names)
+        scores = (cut.periodograms(values) / fitted - 1) @ rows
+        for lag, each in enumerate(sums):
+            each += scores[lag:].T @ scores[: block - lag] * (measured - lag) / (block - lag) / blocks
+    meat: FloatArray = sums[0] + sum(each + each.T for each in sums[1:])
+    return meat
+
+
 def _misfit(name: str, at: float, data: _Data, ratio: FloatArray, dispersion: float) -> Misfit:
     """In the band within 10 % of ω, or among the five nearest values."""
     distance = abs(data.omega - at)
     near = distance <= max(0.1 * at, float(np.sort(distance)[min(4, distance.size - 1)]))
     number = data.number[near]
-    # Hann's window correlates neighbours: the variance of a sum over many is 35/18 times as large
-    inflation = 35 / 18 if data.segments is not None else 1.0
+    # Hann's window, of several segments, correlates neighbours: the variance of a sum over many is 35/18 times as large
+    inflation = 35 / 18 if data.record is not None and data.number[0] > 1 else 1.0
     error = math.sqrt(dispersion * inflation / float(np.sum(number)))
     return Misfit(name, at, float(np.average(ratio[near], weights=number)), error)

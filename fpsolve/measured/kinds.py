@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,9 @@ from fpsolve.arrays import FloatArray
 from fpsolve.model import Bounded, Filter, Noise, OrnsteinUhlenbeck
 
 Shape = Callable[[FloatArray, FloatArray], FloatArray]
+LARGEST_DAMPING = 10.0
+"""Of a filter: its spectrum is that of noise of first order, up to 400 times its corner, and tells no larger one."""
+Path = Callable[[FloatArray, float, int, np.random.Generator], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,8 @@ class Kind:
         covariance: C(t) by t ≥ 0, shape (n,), and the values.
         amplitude: which of the parameters multiplies ξ.
         start: values from a place ω₀ and a relative width w of a peak, before the amplitude is known.
-        is_gaussian: whether ξ is.
+        most: the largest value of each parameter.
+        path: of a noise that is not Gaussian, ξ at n equal steps by the step and the values; None of a Gaussian one.
     """
 
     names: tuple[str, ...]
@@ -33,7 +38,13 @@ class Kind:
     covariance: Shape
     amplitude: int
     start: Callable[[float, float], Sequence[float]]
-    is_gaussian: bool = True
+    most: tuple[float, ...] = ()
+    path: Path | None = None
+
+    @property
+    def highest(self) -> FloatArray:
+        """The logarithms of the largest values, shape (k,)."""
+        return np.log(self.most or (math.inf,) * len(self.names))
 
 
 def _ou_density(omega: FloatArray, theta: FloatArray) -> FloatArray:
@@ -55,6 +66,12 @@ def _bounded_density(omega: FloatArray, theta: FloatArray) -> FloatArray:
 def _bounded_covariance(t: FloatArray, theta: FloatArray) -> FloatArray:
     mu, nu, sigma = theta
     return 0.5 * mu**2 * np.exp(-0.5 * sigma**2 * t) * np.cos(nu * t)
+
+
+def _bounded_path(theta: FloatArray, step: float, n: int, rng: np.random.Generator) -> FloatArray:
+    mu, nu, sigma = theta
+    turns = nu * step + sigma * math.sqrt(step) * rng.standard_normal(n)
+    return np.asarray(mu * np.cos(rng.uniform(0, 2 * math.pi) + np.cumsum(turns)))
 
 
 def _filter(has_value: bool, has_slope: bool) -> Kind:
@@ -91,6 +108,7 @@ def _filter(has_value: bool, has_slope: bool) -> Kind:
         covariance,
         2,
         lambda omega, width: (omega, width, 1.0, 0.3 / omega)[: 4 if both else 3],
+        most=(math.inf, LARGEST_DAMPING, math.inf, math.inf)[: 4 if both else 3],
     )
 
 
@@ -109,7 +127,7 @@ BOUNDED = Kind(
     _bounded_covariance,
     0,
     lambda omega, width: (1.0, omega, (2 * width * omega) ** 0.5),
-    is_gaussian=False,
+    path=_bounded_path,
 )
 KINDS = {
     "ornstein-uhlenbeck": (OU,),

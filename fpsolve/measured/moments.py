@@ -21,6 +21,8 @@ from fpsolve.model import NonGaussianNoise
 
 BLOCKS = 40
 LEAST_TIMES = 20 * BLOCKS
+LONGEST_STEP = 0.3
+"""Of V/(D₀/τ₀²), after which C = V has fallen by its first slope: D₀/τ₀² is then wrong by a third of its cube."""
 
 
 def non_gaussian_from_record(record: Record) -> NoiseFit:
@@ -43,6 +45,13 @@ def non_gaussian_from_record(record: Record) -> NoiseFit:
     steps = 1e-5 * means
     slopes = np.array([(_parameters(means + h) - _parameters(means - h)) / (2 * h.max()) for h in np.diag(steps)]).T
     noise = NonGaussianNoise(D0=float(theta[0]), tau0=float(theta[1]), r0=float(theta[2]))
+    decay = 2 * noise.tau0 / (5 - 3 * noise.r0)
+    if record.step > LONGEST_STEP * decay:
+        raise ValueError(
+            f"the steps of the record are {record.step:.4g}, too long for its quadratic variation; they must be below "
+            f"{LONGEST_STEP * decay:.4g}, {LONGEST_STEP:g} of V/(D0/tau0²); record at a higher rate, or fit "
+            "another kind"
+        )
     times = record.duration / noise.correlation_time
     messages = (Message(Code.SHORT_RECORD, times=times, least=LEAST_TIMES),) if times < LEAST_TIMES else ()
     return NoiseFit(

@@ -13,7 +13,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
-from fpsolve.measured.signals import FREQUENCIES, TIMES, Density, density_unit, factor_of, plain
+from fpsolve.measured.signals import FREQUENCIES, INVERSE_TIMES, TIMES, Density, density_unit, factor_of, plain
 from fpsolve.measured.spectrum import Record, Spectrum
 from fpsolve.measured.tables import Column, Table, read_table
 
@@ -63,7 +63,8 @@ def read_spectrum(
             raise ValueError("is a record, not a spectrum; name it by --record")
         if sided not in ("one", "two"):
             raise ValueError('states not whether the density is one-sided; state sided, "one" or "two" (--sided)')
-        over = _abscissa(table, FREQUENCY_NAMES, lambda unit: unit in FREQUENCIES)
+        over = _abscissa(table, FREQUENCY_NAMES, lambda unit: unit in FREQUENCIES, "frequencies, such as f (Hz),")
+        _refuse_other_unit(over, table.columns[over])
         name = _ordinate(table, over, column)
         stated, unit = FREQUENCIES.get(plain(table.columns[over].unit), ""), _density_unit(table.columns[name], name)
         for found, where in ((stated, over), (unit.per, name)):
@@ -108,7 +109,8 @@ def read_record(
         rate = rate or table.rate
         over = ""
         if rate is None or len(table.columns) > 1:
-            over = _abscissa(table, TIME_NAMES, lambda unit: unit in TIMES, must=rate is None)
+            wanted = "times, such as t (s)," if rate is None else ""
+            over = _abscissa(table, TIME_NAMES, lambda unit: unit in TIMES, wanted)
         name = _ordinate(table, over, column)
         step = _step(over, table.columns[over]) if rate is None else 1 / rate
         factor = factor_of(of, table.columns[name].unit) if of else 1.0
@@ -159,8 +161,24 @@ def _has(table: Table) -> str:
     return f"its columns are {', '.join(table.columns)}"
 
 
-def _abscissa(table: Table, names: Sequence[str], is_unit: Callable[[str], bool], must: bool = True) -> str:
-    """The column that the others are over: that of the file, of a known name or unit, or else the first of several."""
+def _refuse_other_unit(name: str, column: Column) -> None:
+    """Refuse what is over times, or over a unit of frequencies that is not known. Raises `ValueError`."""
+    unit = plain(column.unit)
+    if unit in TIMES or (not unit and name.lower() in TIME_NAMES):
+        raise ValueError(f"is over times, in the column {name}, so that it is a record; name it by --record")
+    if unit and unit not in FREQUENCIES and unit not in INVERSE_TIMES:
+        known = ", ".join(dict.fromkeys(FREQUENCIES.values()))
+        raise ValueError(f'has the unit "{column.unit}" of the column {name}; must be {known}; convert the frequencies')
+
+
+def _abscissa(table: Table, names: Sequence[str], is_unit: Callable[[str], bool], wanted: str) -> str:
+    """The column that the others are over: that of the file, of a known name or unit, or else the first of several.
+
+    Args:
+        table: of the file.
+        names, is_unit: of such columns.
+        wanted: what there must be, in words; empty if there need be none.
+    """
     if table.abscissa:
         return table.abscissa
     lower = {name.lower(): name for name in table.columns}
@@ -168,10 +186,11 @@ def _abscissa(table: Table, names: Sequence[str], is_unit: Callable[[str], bool]
     known = known or [name for name, each in table.columns.items() if is_unit(plain(each.unit))]
     if known:
         return known[0]
-    if not must:
+    if not wanted:
         return ""
     if len(table.columns) < 2:
-        raise ValueError(f"has one column only; it needs {names[-1]} beside it")
+        rate = ", or state --rate" if names is TIME_NAMES else ""
+        raise ValueError(f"has one column only; write a column of {wanted} beside it{rate}")
     return next(iter(table.columns))
 
 
@@ -179,11 +198,13 @@ def _ordinate(table: Table, over: str, wanted: str | None) -> str:
     """The column of values: the wanted one, or the only one."""
     others = [name for name in table.columns if name != over]
     if wanted is not None:
-        if wanted in table.columns:
+        if wanted in others:
             return wanted
         lower = {name.lower(): name for name in others}
         close = get_close_matches(wanted.lower(), lower, n=1)
         guess = f' did you mean "{lower[close[0]]}"?' if close else ""
+        if wanted == over:
+            raise ValueError(f"has frequencies or times in the column {wanted}; state one of {', '.join(others)}")
         raise ValueError(f'has no column "{wanted}";{guess} {_has(table)}')
     if len(others) != 1:
         raise ValueError(f"has several columns of values; state one by --column; {_has(table)}")

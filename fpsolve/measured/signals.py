@@ -41,6 +41,8 @@ SIGNALS: Mapping[str, Signal] = {
 """By the word of `fpsolve noise --of`."""
 TIMES = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "min": 60.0}
 FREQUENCIES = {"hz": "Hz", "cycles/s": "Hz", "rad/s": "rad/s", "rad/sec": "rad/s"}
+INVERSE_TIMES = ("1/s", "s^-1", "s-1")
+"""Of frequencies, which may be in Hz or in rad/s."""
 _RAISED = str.maketrans({"²": "^2", "³": "^3", "⁴": "^4", "·": "*", "−": "-"})
 ENDINGS = {"/hz": "Hz", "/(rad/s)": "rad/s", "*s/rad": "rad/s"}
 _SQUARE = re.compile(r"\((?P<round>.+)\)\^2|(?P<plain>[^/^()]+)\^2|1/(?P<inverse>[a-z]+)\^2")
@@ -54,8 +56,9 @@ class Density(NamedTuple):
 
 
 def plain(unit: str) -> str:
-    """A unit in small letters without spaces, with ^ for powers."""
-    return re.sub(r"\s|\*\*", lambda found: "^" if found[0] == "**" else "", unit.translate(_RAISED)).lower()
+    """A unit in small letters without spaces, with ^ for powers, also for those of "m2"."""
+    text = re.sub(r"\s|\*\*", lambda found: "^" if found[0] == "**" else "", unit.translate(_RAISED)).lower()
+    return re.sub(r"(?<=[a-z])\d", r"^\g<0>", text)
 
 
 def density_unit(unit: str) -> Density:

@@ -15,6 +15,10 @@ from fpsolve.arrays import FloatArray, is_whole, shown
 
 LARGEST = 1e100
 """Of any value, so that squares are numbers."""
+MOST_AVERAGES = 1e12
+"""Of periodograms: their errors are far below any other then."""
+MOST_VARIANCE = 1.5
+"""Of a density over that of its record, which has the other frequencies as well."""
 SHORTEST = 256
 """Samples of a record at least."""
 SEGMENTS = 64
@@ -65,9 +69,17 @@ class Spectrum:
             raise ValueError(f"got {omega.size} frequencies and {density.size} values; there must be one for each")
         if omega.size < 5:
             raise ValueError(f"got {omega.size} frequencies; must be at least 5")
-        if omega[0] < 0 or np.any(np.diff(omega) <= 0):
-            i = 0 if omega[0] < 0 else int(np.flatnonzero(np.diff(omega) <= 0)[0]) + 1
-            raise ValueError(f"the frequency in row {i + 1} is negative or not above the one before; sort the rows")
+        if np.any(omega < 0):
+            i = int(np.flatnonzero(omega < 0)[0])
+            raise ValueError(
+                f"the frequency in row {i + 1} is negative; remove such rows, whose densities are those of positive "
+                "frequencies, and state that the density is two-sided"
+            )
+        if np.any(np.diff(omega) <= 0):
+            i = int(np.flatnonzero(np.diff(omega) <= 0)[0]) + 1
+            raise ValueError(
+                f"the frequency in row {i + 1} is not above the one before; sort the rows, keep one of each"
+            )
         if np.any(density <= 0):
             i = int(np.flatnonzero(density <= 0)[0])
             raise ValueError(
@@ -95,6 +107,11 @@ class Spectrum:
             raise ValueError(
                 f"the density has the variance {self.covered_variance:.4g}, but the record {variance:.4g}, some "
                 f"{near:.3g} times as much; state another {factors[near]}"
+            )
+        if ratio > MOST_VARIANCE:
+            raise ValueError(
+                f"the density has the variance {self.covered_variance:.4g}, {ratio:.3g} times that of the record, "
+                f"{variance:.4g}; correct the unit of one of them"
             )
 
     @property
@@ -136,8 +153,8 @@ class Spectrum:
         error = None
         if averages is not None:
             number = np.broadcast_to(np.asarray(averages, dtype=float), omega.shape)
-            if not np.all((number >= 1) & np.isfinite(number)):
-                raise ValueError(f"got averages = {shown(averages)}; must be at least 1 and finite")
+            if not np.all((number >= 1) & (number <= MOST_AVERAGES)):
+                raise ValueError(f"got averages = {shown(averages)}; must be from 1 to {MOST_AVERAGES:g}")
             error = 1 / np.sqrt(number)
         kept = omega != 0
         if omega.size == density.size:

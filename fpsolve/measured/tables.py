@@ -9,7 +9,6 @@ import csv
 import io
 import math
 import re
-import struct
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -86,18 +85,24 @@ def _looked_at(shape: tuple[int, ...], name: str, itemsize: int = 8, size: float
     """Refuse what is too large, or states more numbers than its file can hold. Raises Unreadable."""
     count = math.prod(shape)
     if count > MOST_NUMBERS:
-        raise Unreadable(f"{name} has {count} numbers, and at most {MOST_NUMBERS} are read; cut the measurement")
+        text = f"has {count} numbers, and at most {MOST_NUMBERS} are read; cut the measurement"
+        raise Unreadable(_of_name(name, text))
     if count * itemsize > size:
-        raise Unreadable(f"states {count} numbers in {name}, more than the file holds; copy or export it again")
+        raise Unreadable(_of_name(name, f"states {count} numbers, more than the file holds; copy or export it again"))
+
+
+def _of_name(name: str, text: str) -> str:
+    """A sentence on an array of a file; on the only one, which has no name, it is one on the file."""
+    return f"{name} {text}".strip()
 
 
 def _split(name: str, array: Any, unit: str = "") -> Iterator[tuple[str, Column]]:
     """The columns of an array of real numbers; those of a table by their numbers."""
     found = np.asarray(array)
     if found.dtype.kind == "c":
-        raise Unreadable(f"{name} has complex numbers; export real ones, such as a power spectral density")
+        raise Unreadable(_of_name(name, "has complex numbers; export real ones, such as a power spectral density"))
     if found.dtype.kind not in "iufb":
-        raise Unreadable(f"{name} has no numbers; export numbers")
+        raise Unreadable(_of_name(name, "has no numbers; export numbers"))
     with np.errstate(invalid="ignore"):  # what is no number is said of its row later
         found = np.squeeze(found).astype(float)
     if found.ndim == 0:
@@ -106,11 +111,11 @@ def _split(name: str, array: Any, unit: str = "") -> Iterator[tuple[str, Column]
         yield name or "1", Column(found, unit)
         return
     if found.ndim > 2:
-        raise Unreadable(f"{name} has {found.ndim} dimensions; export one or two, a column for each quantity")
+        raise Unreadable(_of_name(name, f"has {found.ndim} dimensions; export one or two, a column for each quantity"))
     if found.shape[1] > MOST_COLUMNS and found.shape[0] <= MOST_COLUMNS:
         found = found.T
     if found.shape[1] > MOST_COLUMNS:
-        raise Unreadable(f"{name} has {found.shape[1]} columns; export at most {MOST_COLUMNS}")
+        raise Unreadable(_of_name(name, f"has {found.shape[1]} columns; export at most {MOST_COLUMNS}"))
     for i, values in enumerate(found.T):
         yield f"{name} {i + 1}".strip(), Column(values, unit)
 
@@ -182,7 +187,7 @@ def _of_text(path: Path) -> Table:
 
 def _of_npy(path: Path) -> Table:
     content = read_bytes(path, WORDS)
-    return Table(path, dict(_of_array("", _npy(content, path.name))))
+    return Table(path, dict(_of_array("", _npy(content, ""))))
 
 
 def _of_array(name: str, array: Any) -> Iterator[tuple[str, Column]]:
@@ -200,11 +205,14 @@ def _npy(content: bytes, name: str) -> Any:
     try:
         version = np.lib.format.read_magic(file)
         read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-        if version in read:
-            shape, _, dtype = read[version](file)
-            if dtype.hasobject:
-                raise Unreadable(f"{name} holds Python objects, which are not loaded; save an array of numbers")
-            _looked_at(shape, name, dtype.itemsize, len(content))
+        if version not in read:  # names of fields that are not Latin letters, or none of NumPy's
+            text = f"has the version {'.'.join(map(str, version))} of NumPy's format; save an array of numbers"
+            raise Unreadable(_of_name(name, text))
+        shape, _, dtype = read[version](file)
+        if dtype.hasobject:
+            text = "holds Python objects, which are not loaded; save an array of numbers"
+            raise Unreadable(_of_name(name, text))
+        _looked_at(shape, name, dtype.itemsize, len(content))
         file.seek(0)
         return np.load(file, allow_pickle=False)
     except Unreadable:
@@ -222,15 +230,9 @@ def _of_npz(path: Path) -> Table:
                 name = entry.filename.removesuffix(".npy")
                 _looked_at((entry.file_size // 8,), name)
                 columns |= _of_array(name, _npy(archive.read(entry), name))
-    except (
-        zipfile.BadZipFile,
-        OSError,
-        ValueError,
-        NotImplementedError,
-        RuntimeError,
-        EOFError,
-        struct.error,
-    ) as error:
+    except Unreadable:
+        raise
+    except Exception as error:  # each part of the archive raises its own kinds
         raise Unreadable(f"is no file of NumPy ({_reason(error)}); save it with numpy.savez") from None
     return Table(path, columns)
 
@@ -257,6 +259,9 @@ def _of_wav(path: Path) -> Table:
     from scipy.io import wavfile
 
     content = read_bytes(path, WORDS)
+    stated = int.from_bytes(content[4:8], "big" if content.startswith(b"RIFX") else "little") + 8
+    if content[:4] in (b"RIFF", b"RIFX") and stated > len(content):
+        raise Unreadable(f"states {stated} bytes and has {len(content)}; copy or export it again")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", wavfile.WavFileWarning)
@@ -366,6 +371,8 @@ def _look_into_hdf(content: bytes) -> None:
         for name in file:
             link = file.get(name, getlink=True)
             each = file.get(name) if isinstance(link, h5py.HardLink) else None
+            if isinstance(link, h5py.HardLink) and each is None:
+                raise Unreadable(f"{name} cannot be read; copy the file, or write it again by xarray's to_netcdf")
             if each is None or (isinstance(each, h5py.Dataset) and (each.is_virtual or each.external)):
                 raise Unreadable(f"{name} leads to another file; write one file by xarray's to_netcdf")
             if isinstance(each, h5py.Dataset):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -29,6 +29,7 @@ from fpsolve.measured import (
 )
 from fpsolve.measured.fit import NAMES
 from fpsolve.measured.signals import SIGNALS
+from fpsolve.measured.stability import STEPS
 from fpsolve.measured.weak import Where
 from fpsolve.messages import Message
 from fpsolve.model import ParametricOscillator, PlaneSystem, Problem, VibroImpactOscillator
@@ -38,6 +39,8 @@ from fpsolve.model.systems.vibro_impact import ImpactLaw
 NON_GAUSSIAN = "non-gaussian"
 CLOSE = 0.02
 """By which share of it two statements of a frequency may differ."""
+STEPS_OF_A_FIT = 1 + STEPS
+"""How often `measure` calls `progress` at most."""
 RTOL = 1e-4
 """Of λ and Λ(2), whose errors by the fit are some percent."""
 STILL = 1e-6
@@ -128,12 +131,13 @@ def refuse_wrong_case(case: Case, wanted_of: str, terms: int) -> None:
         raise FpsolveError(f"{case.path}: has the unit of time {case.units.time}, and measurements are in s; use s")
 
 
-def measure(data: Spectrum | Record, wanted: Wanted) -> NoiseOutcome:
+def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None] = lambda: None) -> NoiseOutcome:
     """Fit a noise to what was measured, and say what it means.
 
     Args:
         data: in the unit of its signal, 1, 1/s, m/s² or m.
         wanted: see there.
+        progress: called once for the fit, and as `verdict` does.
 
     Raises:
         FpsolveError: the kind does not fit, or nothing was measured where it matters.
@@ -152,6 +156,10 @@ def measure(data: Spectrum | Record, wanted: Wanted) -> NoiseOutcome:
                 raise ValueError("a spectrum does not tell r0; name a record by --record")
             if wanted.terms > 1:
                 raise ValueError(f"got --terms {wanted.terms} for --kind {NON_GAUSSIAN}, which has one; leave it out")
+            if wanted.method != "spectrum":
+                raise ValueError(
+                    f"got --method {wanted.method} for --kind {NON_GAUSSIAN}, which has none; leave it out"
+                )
             fit = non_gaussian_from_record(converted)
         else:
             second = omega[1] if len(omega) > 1 else None
@@ -166,13 +174,14 @@ def measure(data: Spectrum | Record, wanted: Wanted) -> NoiseOutcome:
             )
     except ValueError as error:
         raise FpsolveError(str(error)) from None
+    progress()
     scaled = fit.scaled(_factor(wanted))
     found = {"exponent": None, "moment": None, "verdict": None, "failure": None} | _critical(fit, wanted)
     system = _system(wanted, len(fit.parts))
     if system is not None and wanted.terms < len(NAMES):
         try:
             problem = Problem(system, scaled.noise)
-            found["verdict"] = verdict(problem, scaled, rtol=max(problem.usual_rtol, RTOL))
+            found["verdict"] = verdict(problem, scaled, rtol=max(problem.usual_rtol, RTOL), progress=progress)
         except NotConverged as failure:
             found["failure"] = failure.message
         except ValueError as error:

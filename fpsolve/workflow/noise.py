@@ -22,13 +22,29 @@ from fpsolve.measured.spectrum import UNITS
 from fpsolve.measured.units import GRAVITY
 from fpsolve.measured.weak import Where
 from fpsolve.output.noises import Convention, write_noise
-from fpsolve.study.noise import CLOSE, NoiseOutcome, Wanted, measure, natural_frequencies, refuse_wrong_case
+from fpsolve.study.noise import (
+    CLOSE,
+    STEPS_OF_A_FIT,
+    NoiseOutcome,
+    Wanted,
+    measure,
+    natural_frequencies,
+    refuse_wrong_case,
+)
+from fpsolve.workflow.progress import SILENT, SOLVES, Phase, Watch
 
 
 def noise_case(
-    data: Spectrum | Record, wanted: Wanted, source: Path, shown: Convention, out: Path
+    data: Spectrum | Record, wanted: Wanted, source: Path, shown: Convention, out: Path, watch: Watch = SILENT
 ) -> tuple[NoiseOutcome, Path, list[str]]:
     """Fit a noise, and write it with a figure into a folder called as the file of the measurement.
+
+    Args:
+        data, wanted: see `measure`.
+        source: the file.
+        shown: how densities are shown.
+        out: where the folder is made.
+        watch: of the progress, with a bar for the fit and what it means.
 
     Returns:
         What became of it, the folder, and the names of the files.
@@ -39,8 +55,8 @@ def noise_case(
     """
     folder = out / source.stem
     try:
-        with one_thread():  # the arrays are small
-            outcome = measure(data, wanted)
+        with one_thread(), watch.bar(Phase(source.stem, "solving", STEPS_OF_A_FIT, SOLVES)) as progress:
+            outcome = measure(data, wanted, progress)  # the arrays are small
     except FpsolveError as error:
         raise FpsolveError(f"{source}: {error}") from None
     with alone(folder), writable(folder):
@@ -97,10 +113,15 @@ def measurement_of(stated: Statement) -> tuple[Spectrum | Record, Wanted, Path]:
         raise FpsolveError(f"got --gm {stated.gm}; must be > 0, in m")
     wanted = Wanted(of, stated.kind, stated.terms, stated.method, modes, stated.gm, stated.case)
     record = read_record(stated.record, rate=stated.rate, of=of, column=stated.column) if stated.record else None
+    if stated.spectrum is not None:
+        if stated.method == "whittle":
+            raise FpsolveError("--method whittle is for a record, and a spectrum was named; leave it out")
+        if stated.rate is not None and record is None:
+            raise FpsolveError("--rate is for a record, and a spectrum was named; leave it out, or name it by --record")
     if stated.spectrum is None and record is not None:
-        left_out = [name for name in ("per", "sided", "averages") if getattr(stated, name) is not None]
-        if stated.averages is not None or stated.sided is not None:
-            raise FpsolveError(f"--{left_out[-1]} is for a spectrum, and a record was named; leave it out")
+        for name in ("sided", "averages"):
+            if getattr(stated, name) is not None:
+                raise FpsolveError(f"--{name} is for a spectrum, and a record was named; leave it out")
         return record, wanted, source
     data = read_spectrum(
         stated.spectrum or source,
@@ -117,6 +138,8 @@ def measurement_of(stated: Statement) -> tuple[Spectrum | Record, Wanted, Path]:
 def _modes(stated: Statement, of: str) -> Modes:
     """The natural frequencies and the damping by the one option that states them."""
     restitution, zeta = stated.restitution, stated.damping_ratio
+    if zeta is not None and math.isnan(zeta):
+        raise FpsolveError("got --damping-ratio nan; must be -1 < value < 1; leave it out if it is not known")
     if stated.mode and stated.modes is None:
         raise FpsolveError("--mode is for the table that --modes names; name one, or leave it out")
     if stated.case and (zeta is not None or restitution is not None or stated.modes is not None):

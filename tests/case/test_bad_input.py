@@ -245,6 +245,12 @@ def test_names_that_are_no_folder(tmp_path: Path, name: str, monkeypatch: pytest
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
 
 
+def test_a_key_of_an_earlier_release_says_where_it_went(tmp_path):
+    path = write(tmp_path, GOOD)
+    said = only_message(path, ['figure.time_unit="s"'])
+    assert 'figure.time_unit: moved; write time = "s", or another unit, in [units]' in said
+
+
 @pytest.mark.parametrize("override", [[], 2.0, None])
 def test_an_override_that_is_no_text(tmp_path: Path, override: Any) -> None:
     path = tmp_path / "bad.toml"

@@ -51,6 +51,25 @@ def test_the_kinds_have_the_covariance_and_density_of_the_noises():
                 assert transform == pytest.approx(noise.spectral_density(omega), rel=1e-4)
 
 
+def test_a_filter_without_a_peak_has_no_absurd_parameters():
+    """σ²/(α² + ω²) is that of a filter whose second corner is far above, as far as ζ = 10 allows."""
+    fit = fitted(Spectrum(OMEGA, exact(NOISES[0]), np.full(OMEGA.size, 0.1)), "filter")
+    assert fit.parameters["zeta"] <= 10
+    assert fit.parameters["omega"] < 1e3
+    assert fit.spectral_density(4.0) == pytest.approx(NOISES[0].spectral_density(4.0), rel=1e-3)
+    assert any("do not tell all parameters" in each for each in fit.messages)
+
+
+def test_standard_errors_of_bounded_noise_are_those_of_its_phase():
+    """That of ν is at least σ/√T, of the phase itself; that of μ is below μ/√(2Tσ²) of a Gaussian noise."""
+    bounded, T = NOISES[3], 400.0
+    fit = fitted(record_of(bounded, np.random.default_rng(0), 4000), "bounded")
+    assert 1 < fit.errors["nu"] / (bounded.sigma / math.sqrt(T)) < 1.5
+    assert fit.errors["mu"] < 0.5 * bounded.mu / math.sqrt(2 * T * bounded.sigma**2)
+    for name, value in fit.parameters.items():
+        assert abs(value - bounded.values[name]) < 4 * fit.errors[name], name
+
+
 def test_standard_errors_of_spectra():
     """25 seeds: 95 % within 1.96 errors; fewer than 19 has a probability below 1e-3."""
     shares, others, _ = coverage(
@@ -84,6 +103,22 @@ def test_noise_of_eq_7_from_a_record(r0):
 
 
 @pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (
+            np.random.default_rng(1).uniform(-1, 1, 400),
+            r"the steps of the record are 1, too long .* below 0\.1\d*, 0\.3 of",
+        ),
+        (np.sin(0.02 * np.arange(1000)), "kurtosis of the record is 1.5"),
+        (np.random.default_rng(1).standard_t(3, 400), "has one between 1.8 and 3; fit another kind"),
+    ],
+)
+def test_what_is_no_noise_of_eq_7_is_refused(values, said):
+    with pytest.raises(ValueError, match=said):
+        non_gaussian_from_record(Record(values, 1.0))
+
+
+@pytest.mark.parametrize(
     ("options", "factor"),
     [(("Hz", "one"), 2), (("Hz", "two"), 1), (("rad/s", "one"), 1 / math.pi), (("rad/s", "two"), 0.5 / math.pi)],
 )
@@ -103,6 +138,9 @@ def test_wrong_sides_are_told_by_the_variance():
         Spectrum(omega, 2 * density, variance=variance)
     with pytest.raises(ValueError, match=r"state another per"):
         Spectrum(omega, 2 * math.pi * density, variance=variance)
+    with pytest.raises(ValueError, match=r"9\d\.\d times that of the record.*correct the unit"):
+        Spectrum(omega, 9.80665**2 * density, variance=variance)
+    assert Spectrum(omega, 0.02 * density, variance=variance).covered_variance < variance  # as of a narrow band
 
 
 @pytest.mark.parametrize(
@@ -110,6 +148,7 @@ def test_wrong_sides_are_told_by_the_variance():
     [
         (OMEGA, -exact(NOISES[0]), r"row 1 is -.*must be > 0"),
         (OMEGA[::-1], exact(NOISES[0]), "sort the rows"),
+        (OMEGA - 1, exact(NOISES[0]), "row 1 is negative; remove such rows"),
         (OMEGA[:3], exact(NOISES[0])[:3], "at least 5"),
         (OMEGA, exact(NOISES[0])[:-1], "one for each"),
         (OMEGA, np.where(OMEGA > 3, np.nan, 1.0), "value nan at row"),

@@ -163,7 +163,7 @@ REFUSED = {
     "no file": ([], "name a file"),
     "no frequency": (FILE, "state the natural frequency by --frequency"),
     "no sides": (["spectrum.csv", "--frequency", "2"], "one-sided"),
-    "far": ([*FILE, "--frequency", "40"], "nothing was measured near 2ω"),
+    "far": ([*FILE, "--frequency", "40"], "near 2ω = 502.7 rad/time (80 cycles)"),
     "two places": (
         [*AT_2, "--of", "damping", "--noise-in", "stiffness"],
         "leave one out",
@@ -182,7 +182,15 @@ REFUSED = {
     "no record": ([*AT_2, "--kind", "non-gaussian"], "name a record"),
     "column": ([*AT_2, "--column", "g"], 'no column "g"; did you mean "G"?'),
     "mode": ([*AT_2, "--mode", "1"], "--mode is for the table"),
-    "averages": ([*AT_2, "--averages", "0"], "at least 1"),
+    "averages": ([*AT_2, "--averages", "0"], "from 1 to 1e+12"),
+    "many averages": ([*AT_2, "--averages", "1e300"], "from 1 to 1e+12"),
+    "no number": ([*AT_2, "--damping-ratio", "nan"], "got --damping-ratio nan"),
+    "rate": ([*AT_2, "--rate", "10"], "--rate is for a record"),
+    "whittle": ([*AT_2, "--method", "whittle"], "--method whittle is for a record"),
+    "whittle of moments": (
+        ["--record", "record.csv", "--method", "whittle", "--kind", "non-gaussian", "--frequency", "2"],
+        "got --method whittle for --kind non-gaussian",
+    ),
     "sides of a record": (["--record", "record.csv", "--sided", "one", "--frequency", "2"], "is for a spectrum"),
     "wrong sides": (
         ["spectrum.csv", "--sided", "two", "--frequency", "2", "--record", "record.csv"],

@@ -119,6 +119,9 @@ def test_channels_and_columns_are_chosen_by_name(tmp_path):
         ("(m/s^2)^2/Hz", "acceleration", 1.0),
         ("g²/Hz", "acceleration", 9.80665**2),
         ("m²/s⁴/Hz", "acceleration", 1.0),
+        ("(m/s2)^2/Hz", "acceleration", 1.0),
+        ("g2/Hz", "acceleration", 9.80665**2),
+        ("m2/Hz", "height", 1.0),
         ("%^2/Hz", "stiffness", 1e-4),
         ("1/s²/Hz", "damping", 1.0),
         ("cm²/Hz", "height", 1e-4),
@@ -163,6 +166,21 @@ def npy_header(shape):
     return content.getvalue()
 
 
+def damaged_npz():
+    """Whose first array, which is compressed, is no more."""
+    content = io.BytesIO()
+    np.savez_compressed(content, f=F)
+    found = bytearray(content.getvalue())
+    found[60:100] = b"\xff" * 40
+    return bytes(found)
+
+
+def cut_wav():
+    content = io.BytesIO()
+    wavfile.write(content, 50, X.astype("<f4"))
+    return content.getvalue()[:-400]
+
+
 BROKEN = {
     "empty.csv": (b"", "is empty"),
     "binary.csv": (b"\0\1\2", "is binary"),
@@ -177,6 +195,10 @@ BROKEN = {
     "short.npy": (npy_header((1000,)) + b"12345678", "more than the file holds"),
     "text.npy": (b"no numpy", "is no file of NumPy"),
     "text.npz": (b"PK\3\4 no zip", "is no file of NumPy"),
+    "damaged.npz": (damaged_npz(), "is no file of NumPy"),
+    "new.npy": (b"\x93NUMPY\3\0" + npy_header((2**40,))[8:], "has the version 3.0"),
+    "texts.npz": (npz_of(f=np.array(["a"])), "f has no numbers"),
+    "cut.wav": (cut_wav(), "states 1658 bytes and has 1258"),
     "text.mat": (b"x" * 200, "is no MATLAB file"),
     "new.mat": (b"MATLAB 7.3 MAT-file" + b" " * 200, '-v7'),
     "text.wav": (b"RIFF" + struct.pack("<I", 4) + b"none", "is no WAV file"),
@@ -218,11 +240,24 @@ def test_a_missing_file_and_a_folder(tmp_path):
         ("f (Hz),G (1/Hz)", {"sided": "one", "per": "rad/s"}, "state --per Hz"),
         ("f (Hz),G (V^2/Hz)", {"sided": "one", "of": "acceleration"}, 'the unit "V\\^?2?"|the unit "v"'),
         ("f (Hz),G (m/s^2)", {"sided": "one"}, "in the column G has the unit"),
+        ("f (kHz),G (1/Hz)", {"sided": "one", "per": "Hz"}, 'has the unit "kHz" of the column f; must be Hz, rad/s'),
+        ("t (s),G (1/Hz)", {"sided": "one", "per": "Hz"}, "over times, in the column t, so that it is a record"),
+        ("time,G", {"sided": "one", "per": "Hz"}, "over times, in the column time, so that it is a record"),
+        ("f (1/s),G", {"sided": "one"}, "states no unit of its frequencies"),
+        ("f (Hz),G", {"sided": "one", "column": "f"}, "frequencies or times in the column f; state one of G"),
     ],
 )
 def test_what_a_spectrum_must_state(header, options, said, tmp_path):
     with pytest.raises(FpsolveError, match=said):
         read_spectrum(csv(tmp_path / "a.csv", header, F, G), **options)
+
+
+def test_one_column_needs_another(tmp_path):
+    path = csv(tmp_path / "a.csv", "x", X)
+    with pytest.raises(FpsolveError, match=r"write a column of frequencies, such as f \(Hz\), beside it$"):
+        read_spectrum(path, sided="one")
+    with pytest.raises(FpsolveError, match=r"write a column of times, such as t \(s\), beside it, or state --rate$"):
+        read_record(path)
 
 
 def test_the_wrong_option(tmp_path):
