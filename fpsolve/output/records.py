@@ -484,6 +484,8 @@ def _unpacked(packed: Any) -> FloatArray:
         raise ValueError(f"there is no array of shape {shape}")
     unpacker = zlib.decompressobj()
     data = unpacker.decompress(b64decode(_checked(packed["data"], str), validate=True), 8 * count + 1)
+    if not unpacker.eof:
+        raise ValueError("an array is cut off")
     return np.frombuffer(data, dtype="<f8").reshape(shape).astype(float)
 
 

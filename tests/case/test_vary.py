@@ -294,7 +294,7 @@ def test_thousands_of_sets_are_read_within_seconds(write: Write, tmp_path: Path,
 
 def test_quantities(write: Write) -> None:
     everything = ("moment", "lyapunov_exponent", "stability_index", "variance_rate", "impact_rate")
-    everything += ("critical_impact_factor", "critical_restitution", "sensitivities", "eigenfunctions")
+    everything += ("critical_impact_factor", "critical_restitution", "sensitivities", "eigenfunctions", "response")
     assert load_case(write("")).output.quantities == everything
     some = '[output]\nquantities = ["stability_index", "moment"]\neigenfunctions = []\nsensitivities = false\n'
     assert load_case(write("", some)).output.quantities == ("stability_index", "moment")

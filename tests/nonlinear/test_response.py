@@ -5,10 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import ExponentSolver, lyapunov_exponent
+from fpsolve import ExponentSolver, lyapunov_exponent, stability_index
 from fpsolve.errors import FpsolveError
-from fpsolve.model import NonGaussianNoise, OrnsteinUhlenbeck, VibroImpactOscillator
+from fpsolve.fem.discretisation import Polynomials
+from fpsolve.model import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.nonlinear import stationary_response
+from fpsolve.nonlinear.elimination import Tail, solved
+from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
 from tests.oracles.upwind_chain import Chain
 
 SMOOTH = {"omega": 1.0, "epsilon": 0.5, "restitution": 1.0, "c1": 0.4, "c2": 0.5, "c3": 0.2}
@@ -57,6 +60,35 @@ def test_a_chain_approaches_it_with_the_first_order():
     for name in ("amplitude_squared", "x_squared", "v_squared"):
         first, second = (each[name] - means[name].value for each in (coarse, fine))
         assert 0.8 < math.log2(first / second) < 1.3
+
+
+@pytest.mark.slow
+def test_white_noise_is_approached_with_the_first_order():
+    """With c₁ = D₀, c₂ = 0, R = 1 and ε = ω = 1, white noise has ρ ∝ exp(−c₃(x² + ẋ²)/(2D₀)), closed form."""
+    D0, c3 = 0.3, 0.5
+    system = {"omega": 1.0, "epsilon": 1.0, "restitution": 1.0, "c1": D0, "c2": 0.0, "c3": c3}
+    square = 2 * D0 / c3
+    limits = {"amplitude_squared": square, "amplitude_fourth": 2 * square**2}
+    means = [response(system, D0, tau0, 1e-4).means for tau0 in (0.01, 0.005)]
+    for name, limit in limits.items():
+        first, second = (each[name].value - limit for each in means)
+        assert math.log2(first / second) == pytest.approx(1, abs=0.12)
+
+
+@pytest.mark.slow
+def test_without_an_imposed_tail_the_density_falls_as_that_of_the_linear_system():
+    """On a deep interval, with any inflow from below, ln ρ = −δ_p u + b e^{2u} + … far from its lower end."""
+    system = VibroImpactOscillator(omega=1.0, epsilon=0.5, restitution=0.97, c1=0.1, c2=0.5, c3=0.2)
+    problem = Problem(system, noise_of(0.3, 0.5))
+    plane = Plane(Flow(problem), Circle(2, 14), Polynomials(16))
+    any_inflow = Tail(1.0, plane.constant[None])
+    found = solved(plane, Height(np.linspace(-10, 1.8, 48), 8), any_inflow)
+    u = np.linspace(-5.5, -3, 101)
+    logs = np.log(found.at(u) @ plane.unit @ plane.constant)
+    shapes = np.stack([np.ones_like(u), u, np.exp(2 * u), np.exp(4 * u)], axis=1)
+    sizes = np.linalg.norm(shapes, axis=0)
+    slope = (np.linalg.lstsq(shapes / sizes, logs, rcond=None)[0] / sizes)[1]
+    assert slope == pytest.approx(-stability_index(problem).value, abs=1e-6)
 
 
 def test_what_has_no_response_is_refused():

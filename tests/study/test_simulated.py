@@ -201,9 +201,9 @@ def test_a_response_that_cannot_be_drawn_is_none(curve):
 )
 def test_a_damaged_array_is_refused(curve, change, rng):
     record = record_of(SimulatedCurve(curve, RESULT, response(rng), ()))
-    place = [each.name for each in fields(Response)].index("amplitude_density")
+    place = [each.name for each in fields(Response)].index("density")
     packed = record["response"][place]
-    assert simulated_of(record, curve).response.amplitude_density.shape == (3,)
+    assert simulated_of(record, curve).response.density.shape == (3, 6)
     record["response"][place] = packed | {
         key: value(packed["data"]) if callable(value) else value for key, value in change.items()
     }
