@@ -33,7 +33,7 @@ FAR = 300.0
 MOST_STAGES = 24
 CELLS = 2
 """Of the phase between two impacts."""
-MOST_UNKNOWNS = 200_000
+MOST_UNKNOWNS = 100_000
 SPACING = 1.1
 """Of the vertices of u over the standard deviation of ln a in weak noise."""
 WIDEST = 0.5
@@ -125,23 +125,22 @@ class Search:
         self._planes: dict[Levels, tuple[Plane, Tail]] = {}
         self.unknowns, self._reached = 0, math.inf
 
-    def settled(self) -> tuple[Solution, FloatArray, FloatArray]:
-        """A solution whose means are settled, these, and their error estimates. Raises `NotConverged`."""
+    def settled(self) -> Settled:
+        """Raises `NotConverged`."""
         levels: Levels = (1,) * len(DIRECTIONS)
         top = self.base.top
         for _ in range(MOST_STAGES):
-            solution = self.solve(levels, top)
-            found, fall = self._numbers(solution), Fall.of(solution)
             lower = [tuple(level - (k == own) for own, level in enumerate(levels)) for k in range(len(levels))]
-            changes = np.abs([found - self._numbers(self.solve(each, top)) for each in lower])
-            scales = np.abs(found[:-1])
-            errors = changes.sum(axis=0) + (fall.share_above(top) + ROUNDING) * np.append(scales, self.rate)
+            found = Settled(self.solve(levels, top), tuple(self.solve(each, top) for each in lower))
+            numbers = self._numbers(found.solution)
+            scales, changes = np.abs(numbers[:-1]), found.changes(self._numbers)
+            errors = found.errors(self._numbers, np.append(scales, self.rate))
             self._reached = float(np.max(errors[:-1] / scales))
             if self._reached <= self.rtol:
-                return solution, found, errors
+                return found
             worst = np.max(changes[:, :-1] / (self.rtol * scales), axis=1)
             levels = tuple(int(n) for n in np.array(levels) + (worst > min(SHARE, worst.max() / 2)) + (worst > FAR))
-            top = fall.top(ABOVE * self.rtol)
+            top = found.fall.top(ABOVE * self.rtol)
         raise NotConverged(Message(Code.RESPONSE_OPEN, size=self._reached))
 
     @cached_property
@@ -177,9 +176,36 @@ class Search:
             return solved(plane, Height(choice.lines, choice.degree), tail)
 
 
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A density, and those by which its errors are estimated.
+
+    Attributes:
+        solution: on the finest discretisation.
+        lower: on one that is coarser in each direction.
+    """
+
+    solution: Solution
+    lower: tuple[Solution, ...]
+
+    @cached_property
+    def fall(self) -> Fall:
+        return Fall.of(self.solution, 4)
+
+    def changes(self, numbers: Callable[[Solution], FloatArray]) -> FloatArray:
+        """By how much numbers of a solution change in each direction."""
+        found = numbers(self.solution)
+        return np.abs([found - numbers(each) for each in self.lower])
+
+    def errors(self, numbers: Callable[[Solution], FloatArray], scales: FloatArray, order: int = 4) -> FloatArray:
+        """Error estimates of numbers that grow with a like its power of an order at most, and have these scales."""
+        above = Fall.of(self.solution, order).share_above(float(self.solution.height.lines[-1]))
+        return np.asarray(self.changes(numbers).sum(axis=0) + (above + ROUNDING) * scales)
+
+
 @dataclass(frozen=True)
 class Fall:
-    """How E a⁴ falls in the uppermost elements of u: faster and faster, as far up as it is resolved.
+    """How E aⁿ falls in the uppermost elements of u: faster and faster, as far up as it is resolved.
 
     Attributes:
         end: up to where it does.
@@ -194,8 +220,8 @@ class Fall:
     ratio: float
 
     @classmethod
-    def of(cls, solution: Solution) -> Fall:
-        shares, lines = np.abs(solution.shares(4)), solution.height.lines
+    def of(cls, solution: Solution, n: int) -> Fall:
+        shares, lines = np.abs(solution.shares(n)), solution.height.lines
         last, ratio = int(np.argmax(shares)), 1.0
         while last + 1 < shares.size and shares[last + 1] < ratio * shares[last]:
             last, ratio = last + 1, float(shares[last + 1] / shares[last])

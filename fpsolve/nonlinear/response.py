@@ -8,7 +8,7 @@ the P-bifurcations.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -33,7 +33,7 @@ from fpsolve.model.quantity import (
     STATIONARY_MEANS,
     VELOCITY,
 )
-from fpsolve.nonlinear.adapt import Search
+from fpsolve.nonlinear.adapt import Search, Settled
 from fpsolve.nonlinear.elimination import Solution
 from fpsolve.nonlinear.operator import HALF_TURN, Flow
 
@@ -59,7 +59,7 @@ class StationaryResponse(Result):
         stability_index: δ_p of the linear system.
         unknowns: of the largest system solved.
         interval: of u = ln a − γ(φ), below which the tail of the linear system holds.
-        solution: the density's coefficients.
+        settled: the density's coefficients, and coarser ones.
     """
 
     problem: Problem
@@ -70,7 +70,7 @@ class StationaryResponse(Result):
     stability_index: float
     unknowns: int
     interval: tuple[float, float]
-    solution: Solution = field(repr=False)
+    settled: Settled = field(repr=False)
 
     @property
     def has_hump(self) -> bool:
@@ -82,11 +82,18 @@ class StationaryResponse(Result):
         """Whether ρ(x, ẋ) vanishes at rest: δ_p < −2."""
         return self.stability_index < -2
 
-    def moment(self, n: int, m: int) -> float:
-        """E xⁿ ẋᵐ, x ≥ 0, without an error estimate. Raises `ValueError` unless both are whole numbers >= 0."""
+    @property
+    def solution(self) -> Solution:
+        """The density's coefficients."""
+        return self.settled.solution
+
+    def moment(self, n: int, m: int) -> Estimate:
+        """E xⁿ ẋᵐ, x ≥ 0; its scale is E |xⁿ ẋᵐ|. Raises `ValueError` unless both are whole numbers >= 0."""
         if not (is_whole(n, 0) and is_whole(m, 0)):
             raise ValueError(f"got n = {shown(n)}, m = {shown(m)}; must be whole numbers >= 0")
-        return _moment(self.solution, n, m)
+        scale = np.array([abs(_moment(self.solution, n, m, np.abs))])
+        [error] = self.settled.errors(lambda solution: np.array([_moment(solution, n, m)]), scale, n + m)
+        return Estimate(_moment(self.solution, n, m), float(error), float(scale[0]))
 
     @cached_property
     def _without_noise(self) -> tuple[FloatArray, FloatArray]:
@@ -222,13 +229,15 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryRe
         raise ValueError(f"got rtol = {rtol!r}; must be from 1e-10 to 0.1")
     rate, index = _linear(problem)
     search = Search(Flow(problem), -index, rate, _numbers, rtol)
-    solution, found, errors = search.settled()
+    settled = search.settled()
+    found = _numbers(settled.solution)
     scales = np.append(np.abs(found[:-1]), rate)
+    errors = settled.errors(_numbers, scales)
     *means, impacts, balance = map(Estimate, found.tolist(), errors.tolist(), scales.tolist())
-    lines = solution.height.lines
+    lines = settled.solution.height.lines
     return StationaryResponse(
         problem, rtol, dict(zip(MEANS, means, strict=True)), impacts, balance, index, search.unknowns,
-        (float(lines[0]), float(lines[-1])), solution,
+        (float(lines[0]), float(lines[-1])), settled,
     )  # fmt: skip
 
 
@@ -256,11 +265,11 @@ def _linear(problem: Problem) -> tuple[float, float]:
     return rate.value, index.value
 
 
-def _moment(solution: Solution, n: int, m: int) -> float:
-    """E xⁿ ẋᵐ."""
+def _moment(solution: Solution, n: int, m: int, of: Callable[[FloatArray], FloatArray] = np.asarray) -> float:
+    """E xⁿ ẋᵐ, or that of a function of cosⁿφ sinᵐφ in place of it."""
     plane, phi = solution.plane, solution.plane.circle.points
     omega = plane.flow.problem.system.omega  # type: ignore[attr-defined]
-    return solution.mean(n + m, _scaled(solution, n + m) * np.cos(phi) ** n * (-omega * np.sin(phi)) ** m, one)
+    return solution.mean(n + m, _scaled(solution, n + m) * of(np.cos(phi) ** n * (-omega * np.sin(phi)) ** m), one)
 
 
 def _scaled(solution: Solution, n: int) -> FloatArray:

@@ -45,9 +45,16 @@ def test_density_of_amplitude_has_the_means(rough):
 
 def test_x_drifts_nowhere(rough):
     """E ẋ = 0 and E xẋ = 0, as x and x² are continuous at impacts: the discrete equations do not imply it."""
-    size = math.sqrt(rough.means["v_squared"].value)
-    assert abs(rough.moment(0, 1)) <= 1e-2 * size
-    assert abs(rough.moment(1, 1)) <= 1e-2 * size**2
+    for n in (0, 1):
+        assert agrees(rough.moment(n, 1), 0)
+        assert rough.moment(n, 1).error_estimate <= 1e-2 * rough.moment(n, 1).scale
+
+
+def test_moments_have_errors(rough):
+    assert rough.moment(2, 0) == rough.means["x_squared"]
+    finer = response(BOUNCING, 0.05, 0.5, 1e-4)
+    for n, m in ((1, 0), (3, 1), (0, 6)):
+        assert agrees(rough.moment(n, m), finer.moment(n, m).value, finer.moment(n, m).error_estimate)
 
 
 @pytest.mark.slow
