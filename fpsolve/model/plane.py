@@ -324,7 +324,7 @@ class System(Parametrised):
     terms: Sequence[CoefficientMatrix]
     jumps: Sequence[Jump]
 
-    @property
+    @cached_property
     def dimension(self) -> int:
         """n, that of the state."""
         return max((len(term.matrix) for term in self.terms), default=2)

@@ -180,7 +180,7 @@ class Problem:
     def _struck(self) -> Sequence[Impulse]:
         return self.noise.impulses(self.system)
 
-    @property
+    @cached_property
     def dimension(self) -> int:
         """Of the state."""
         return self.system.dimension

@@ -9,7 +9,7 @@ import pytest
 
 from fpsolve import load_case, moment_lyapunov
 from tests.solving import case_text
-from tests.test_sweeps import CASE, MAIN, dask_cluster
+from tests.test_sweeps import CASE, MAIN, SIZE, dask_cluster
 
 WEAK = case_text(
     """[moments]
@@ -57,7 +57,10 @@ def test_a_sweep_beside_a_loop(tmp_path):
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one processor")
 def test_two_processes_beside_one(tmp_path):
     """A minute of work by one process, by two, and by two workers of a Dask cluster on this machine."""
-    text = CASE.format(size=20).replace("num = 4", "num = 33").replace("epsilon = 0.5", "epsilon = 0.85")
+    changes = {"stop = 4.0, num = 4": "stop = 4.0, num = 33", f"num = {SIZE}": "num = 20", "n = 0.5": "n = 0.85"}
+    text = CASE
+    for old, new in changes.items():
+        text = text.replace(old, new)
     (tmp_path / "sweep.toml").write_text(text, encoding="utf-8")
     one, two = seconds(tmp_path, "--jobs", "1"), seconds(tmp_path, "--jobs", "2")
     with dask_cluster() as (address, *_):

@@ -112,7 +112,7 @@ def test_killed_paths_are_a_lower_bound():
     case, p = problem(0.5, 1.0, 1.1, 0.2), -0.5
     unit, value = case.noise.standard_deviation, moment_lyapunov(case, p).value[0]
     slab = -200 * unit, -13.5 * unit
-    rate, error = killed_paths.growth(case.system, case.noise, p, slab, paths=2048, time=800, transient=800)
+    rate, error = killed_paths.growth(case.system, case.noise, p, slab, paths=2048, time=400, transient=400)
     assert error < 0.01 * value
     assert 0.97 * value < rate < value
 
