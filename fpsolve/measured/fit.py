@@ -301,12 +301,15 @@ def _start(data: _Data, families: Sequence[Kind], weights: FloatArray) -> FloatA
     places = np.geomspace(max(data.omega[0], 1e-3 * data.omega[-1]), data.omega[-1], 40)
     widths = (1.0,) if len(family.names) == 2 else (0.02, 0.06, 0.2, 0.7, 2.0)
     candidates = [np.array(family.start(place, width), dtype=float) for place in places for width in widths]
-    blocks = np.array_split(np.arange(data.omega.size), min(data.omega.size, 400))
+    firsts = [int(block[0]) for block in np.array_split(np.arange(data.omega.size), min(data.omega.size, 400))]
+
+    def sums(each: FloatArray) -> FloatArray:
+        return np.asarray(np.add.reduceat(weights * each, firsts), dtype=float)
 
     def mean(each: FloatArray) -> FloatArray:
-        return np.array([np.average(each[block], weights=weights[block]) for block in blocks])
+        return sums(each) / sums(np.ones_like(each))
 
-    root = np.sqrt([np.sum((weights * data.number)[b]) for b in blocks])
+    root = np.sqrt(sums(data.number))
     measured = mean(data.values)
     columns = np.array([mean(data.expected(family, each)) for each in candidates]).T
     scaled = columns / measured[:, None] * root[:, None]
