@@ -42,6 +42,8 @@ UNTOLD = 1e-8
 """Of the information of scaled parameters: a smaller eigenvalue is of a direction that the values do not tell."""
 SEGMENTS, LEAST_SEGMENTS, SAMPLES, BLOCK = 2000, 200, 2e7, 63
 """How many segments are simulated for standard errors: fewer of long ones, for some samples in all; in such blocks."""
+FADING = 0.1
+"""The share of a whole record that fades, by halves at its ends."""
 LAGS = 3
 """How many steps apart segments count as correlated."""
 MISFIT, UNSURE_MISFIT = 3.0, 2.0
@@ -155,6 +157,11 @@ class _Cut(NamedTuple):
         """Of the frequencies: neither those on which the mean acts nor the highest."""
         return slice(2, self.window.size // 2)
 
+    @property
+    def inflation(self) -> float:
+        """n Σw⁴/(Σw²)²: by so much the variance of a sum over frequencies is larger, as neighbours are correlated."""
+        return float(self.window.size * np.sum(self.window**4) / np.sum(self.window**2) ** 2)
+
     def periodograms(self, values: FloatArray) -> FloatArray:
         """Of each segment, one a row."""
         length = self.window.size
@@ -264,9 +271,14 @@ def _of_spectrum(data: Spectrum) -> _Data:
 
 
 def _of_record(record: Record, whole: bool) -> _Data:
-    """Periodograms of segments with Hann's window that overlap by half, or of the whole record."""
+    """Periodograms of segments with Hann's window that overlap by half, or of the whole record, whose ends fade.
+
+    Without that its ends would leak into all high frequencies alike, whose values were then not independent.
+    """
+    from scipy.signal.windows import tukey
+
     length = record.values.size if whole else record.segment_length()
-    window = np.asarray(np.ones(length) if whole else np.hanning(length + 1)[:-1], dtype=float)
+    window = np.asarray(tukey(length, FADING) if whole else np.hanning(length + 1)[:-1], dtype=float)
     window /= math.sqrt(float(window @ window))
     cut = _Cut(window, record.step)
     segments = cut.periodograms(record.values)
@@ -301,12 +313,15 @@ def _start(data: _Data, families: Sequence[Kind], weights: FloatArray) -> FloatA
     places = np.geomspace(max(data.omega[0], 1e-3 * data.omega[-1]), data.omega[-1], 40)
     widths = (1.0,) if len(family.names) == 2 else (0.02, 0.06, 0.2, 0.7, 2.0)
     candidates = [np.array(family.start(place, width), dtype=float) for place in places for width in widths]
-    blocks = np.array_split(np.arange(data.omega.size), min(data.omega.size, 400))
+    firsts = [int(block[0]) for block in np.array_split(np.arange(data.omega.size), min(data.omega.size, 400))]
+
+    def sums(each: FloatArray) -> FloatArray:
+        return np.asarray(np.add.reduceat(weights * each, firsts), dtype=float)
 
     def mean(each: FloatArray) -> FloatArray:
-        return np.array([np.average(each[block], weights=weights[block]) for block in blocks])
+        return sums(each) / sums(np.ones_like(each))
 
-    root = np.sqrt([np.sum((weights * data.number)[b]) for b in blocks])
+    root = np.sqrt(sums(data.number))
     measured = mean(data.values)
     columns = np.array([mean(data.expected(family, each)) for each in candidates]).T
     scaled = columns / measured[:, None] * root[:, None]
@@ -380,7 +395,8 @@ def _told(
     if data.record is not None and any(family.path for family in families):
         meat = _simulated(data, data.record, families, theta, fitted, weights[:, None] * slopes)
     elif data.record is None or method == "whittle":
-        meat = dispersion * slopes.T @ (slopes * (weights**2 * data.number)[:, None])
+        inflation = dispersion if data.record is None else data.record.inflation
+        meat = inflation * slopes.T @ (slopes * (weights**2 * data.number)[:, None])
     else:
         # Hann's window correlates neighbours: of a Gaussian noise by 4/9, and by 1/36 at two steps
         rows = slopes * (weights * data.number * math.sqrt(data.variance))[:, None]
@@ -454,7 +470,6 @@ def _misfit(name: str, at: float, data: _Data, ratio: FloatArray, dispersion: fl
     distance = abs(data.omega - at)
     near = distance <= max(0.1 * at, float(np.sort(distance)[min(4, distance.size - 1)]))
     number = data.number[near]
-    # Hann's window, of several segments, correlates neighbours: the variance of a sum over many is 35/18 times as large
-    inflation = 35 / 18 if data.record is not None and data.number[0] > 1 else 1.0
+    inflation = 1.0 if data.record is None else data.record.inflation
     error = math.sqrt(dispersion * inflation / float(np.sum(number)))
     return Misfit(name, at, float(np.average(ratio[near], weights=number)), error)

@@ -219,6 +219,8 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
         exponent, moment = _percent(outcome.exponent), _percent(outcome.moment)
         yield f"In weak noise{walls} λ < 0 above {exponent} of critical damping, and Λ(2) < 0 above {moment}."
     if outcome.verdict is None:
+        if outcome.failure is None:
+            yield _missing(outcome)
         return
     for symbol, each, below, above in (
         ("λ", outcome.verdict.exponent, "almost every path decays", "almost every path grows"),
@@ -230,6 +232,15 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
         yield f"{number}: {symbol} {'<' if is_below else '>'} 0 with {sure}, {below if is_below else above}."
     off = f", and that it is {outcome.fit.off:.0%} off where stability depends on it" if outcome.fit.off else ""
     yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."
+
+
+def _missing(outcome: NoiseOutcome) -> str:
+    """What to do for λ and Λ(2)."""
+    if len(outcome.fit.parts) == len(NAMES):
+        return "No case takes three noises; for λ and Λ(2) use --terms 1 or 2."
+    if len(outcome.wanted.modes.omega) > 1:
+        return "For λ and Λ(2) of two modes state their case by --case; `fpsolve new my.toml --kind modes` starts one."
+    return "For λ and Λ(2) of an oscillator state its damping by --damping-ratio."
 
 
 def _percent(each: Critical) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from fpsolve import ExponentSolver
 from fpsolve.measured import (
     Record,
     Spectrum,
@@ -19,7 +20,7 @@ from fpsolve.measured import (
     weak_moment,
 )
 from fpsolve.measured.kinds import KINDS
-from fpsolve.model import NonGaussianNoise, OrnsteinUhlenbeck, ParametricOscillator, Problem
+from fpsolve.model import NonGaussianNoise, OrnsteinUhlenbeck, ParametricOscillator, Problem, VibroImpactOscillator
 from tests.random_fits import NOISES, coverage, fitted, record_of, spectrum_of
 
 OMEGA = np.linspace(0.05, 20, 200)
@@ -100,6 +101,14 @@ def test_noise_of_eq_7_from_a_record(r0):
     fit = non_gaussian_from_record(record_of(noise, np.random.default_rng(0), 40_000, 0.04))
     for name, value in fit.parameters.items():
         assert abs(value - noise.values[name]) < 4 * fit.errors[name], name
+    system, scaled = VibroImpactOscillator(1.0, 0.9, -0.4, 1.0, impact="restitution"), fit.scaled(0.5)
+    found = verdict(Problem(system, scaled.noise), scaled, rtol=1e-5)
+    truth = ExponentSolver(Problem(system, noise.at({"D0": 0.25 * noise.D0})))
+    for spread, value in (
+        (found.exponent, truth.lyapunov_exponent().value),
+        (found.moment, truth.solution(2.0).pair.value),
+    ):
+        assert abs(spread.value - value) < 4 * spread.deviation
 
 
 @pytest.mark.parametrize(

@@ -150,6 +150,23 @@ def test_terms_that_are_not_told_apart(capsys):
     assert "do not tell all parameters" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--sided", "one", "--frequency", "2"], "state its damping by --damping-ratio"),
+        (
+            ["--sided", "one", "--frequency", "2", "--frequency", "3", "--damping-ratio", "0.01"],
+            "state their case by --case",
+        ),
+        (["--sided", "one", "--frequency", "2", "--terms", "3", "--averages", "9"], "use --terms 1 or 2"),
+    ],
+)
+def test_without_a_system_it_is_said_what_to_state(options, said, capsys):
+    found = noise(spectrum(), *options)
+    assert found["second_moment"] is None
+    assert said in " ".join(capsys.readouterr().out.split())
+
+
 def test_natural_frequencies_of_systems():
     for name, expected in (("flutter", 2), ("hoisted", 1), ("coupled", 2)):
         assert len(natural_frequencies(load_case(ROOT / f"cases/systems/{name}.toml").system)) == expected
