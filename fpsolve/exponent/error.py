@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.corners import Corner, corners, left_on_mesh, slow_shares
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.fem.axis import along
+from fpsolve.fem.axis import TensorSpace, along
 from fpsolve.fem.discretisation import ModeEffects
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.quantity import UNNAMED
@@ -218,30 +219,105 @@ class SumOfSolutions(Solution):
         return sum(each.error for each in self.parts) + self.search
 
 
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """The functions of a space by their modes along one direction.
+
+    Attributes:
+        at: the axis.
+        cells, modes: of its functions, shape (size,), see `Axis`.
+        degrees: of its cells, shape (cells,).
+        slowest: see `ModeEffects`.
+        nested: for each axis the matrix to coefficients of modes; None where they are that already.
+    """
+
+    at: int
+    cells: Any
+    modes: Any
+    degrees: Any
+    slowest: float
+    nested: tuple[Any, ...]
+
+    def highest(self, depth: int) -> Any:
+        """Which functions of the axis are of so many highest modes of their cell, shape (size,)."""
+        return (self.cells >= 0) & (self.modes > self.degrees[self.cells] - depth)
+
+    def along(self, of_functions: Any) -> Any:
+        """Numbers for the functions of the axis as a factor of tables."""
+        return of_functions.reshape([-1 if k == self.at else 1 for k in range(len(self.nested))])
+
+
+def ladders(space: TensorSpace) -> Iterator[Ladder | None]:
+    """Those of all directions; None for one that has states."""
+    for at, axis in enumerate(space.axes):
+        for cells, modes, own in axis.ladders:
+            if (count := int(cells.max()) + 1) == 0:
+                yield None
+                continue
+            degrees = np.zeros(count, dtype=int)
+            np.maximum.at(degrees, cells[cells >= 0], modes[cells >= 0])
+            nested = tuple(own if k == at else None for k in range(len(space.axes)))
+            yield Ladder(at, cells, modes, degrees, axis.slowest, nested)
+
+
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     """The effects along every direction of every axis; None along one that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
     operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
     tables, found = (space.table(pair.right), space.table(pair.left)), list[ModeEffects | None]()
-    directions = [(at, axis, *ladder) for at, axis in enumerate(space.axes) for ladder in axis.ladders]
-    for at, axis, cells, modes, own in directions:
-        inner, count = cells >= 0, int(cells.max()) + 1
-        if count == 0:
+    for ladder in ladders(space):
+        if ladder is None:
             found.append(None)
             continue
-        degrees = np.zeros(count, dtype=int)
-        np.maximum.at(degrees, cells[inner], modes[inner])
-        nested = [own if k == at else None for k in range(len(space.axes))]
-        effects, (right, left) = [], (along(nested, table) for table in tables)
+        effects, (right, left) = [], (along(ladder.nested, table) for table in tables)
+        others = tuple(k for k in range(len(space.axes)) if k != ladder.at)
         for depth in (2, 4):
-            high = inner & (modes > degrees[cells] - depth)
-            mask = high.reshape([-1 if k == at else 1 for k in range(len(space.axes))])
+            high = ladder.highest(depth)
+            mask = ladder.along(high)
             image = space.table(operator @ np.ravel(right * mask))
-            others = tuple(k for k in range(len(space.axes)) if k != at)
             shares = np.abs(left * mask * image).sum(axis=others)[high]
-            effects.append(np.bincount(cells[high], shares, minlength=count) / abs(norm))
-        found.append(ModeEffects(degrees, effects[0], effects[1], axis.slowest))
+            effects.append(np.bincount(ladder.cells[high], shares, minlength=ladder.degrees.size) / abs(norm))
+        found.append(ModeEffects(ladder.degrees, effects[0], effects[1], ladder.slowest))
     return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class MissingModes:
+    """e = Σ ⟨y_k, (L − Λ) x_k⟩/⟨T*, T⟩, about what Λ lacks: x_k is what T has of the two highest modes along the k-th
+    direction, y_k the same of T*, each coefficient times the share that is thought to be left, with the sign of its
+    product.
+
+    Attributes:
+        right, left: the x_k and y_k, each of shape (size,).
+        by_right, by_left: the derivatives of e ⟨T*, T⟩ by the coefficients of T and of T*, shape (size,).
+    """
+
+    right: Sequence[FloatArray]
+    left: Sequence[FloatArray]
+    by_right: FloatArray
+    by_left: FloatArray
+
+    @classmethod
+    def of(cls, solution: Solution) -> MissingModes:
+        """Those of a pair and its effects."""
+        pair, space = solution.pair, solution.pair.space
+        operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
+        rights, lefts, loads = [], [], [np.zeros(space.shape), np.zeros(space.shape)]
+        for ladder, effects in zip(ladders(space), solution.effects, strict=True):
+            if ladder is None or effects is None:
+                continue
+            mask = ladder.along(ladder.highest(2))
+            right, left = (mask * along(ladder.nested, space.table(each)) for each in (pair.right, pair.left))
+            image = space.table(operator @ np.ravel(right))
+            shares = effects.of_cells / np.maximum(effects.two, sys.float_info.min)
+            weights = ladder.along(shares[ladder.cells]) * np.sign(left * image)
+            back = tuple(None if each is None else each.T for each in ladder.nested)
+            other = space.table(operator.T @ np.ravel(weights * left))
+            for load, each in zip(loads, (other, weights * image), strict=True):
+                load += along(back, mask * each)
+            rights.append(np.ravel(right))
+            lefts.append(np.ravel(weights * left))
+        return cls(rights, lefts, np.ravel(loads[0]), np.ravel(loads[1]))
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:

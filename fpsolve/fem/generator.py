@@ -131,7 +131,7 @@ class Generator:
         """L(p) term by term."""
         return tuple(self._own_terms.whole())
 
-    @property
+    @cached_property
     def _own_terms(self) -> Any:
         return Terms(self.problem, self.space(0.0))
 
@@ -145,8 +145,8 @@ class Generator:
         """
         return self._sum.matrix(self.space(p), p, derivative, orders)
 
-    def changed(self, by: ParameterDerivative, p: float, *, derivative: int = 0) -> KroneckerSum:
-        """The matrix of ∂/∂θ dᵏL/dpᵏ, the functions of φ and ξ held; that of P_s, and so of `mass`, is in it."""
+    def changed(self, by: ParameterDerivative, p: float, rate: float, *, derivative: int = 0) -> KroneckerSum:
+        """The matrix of ∂/∂θ (dᵏL/dpᵏ − rate M), the functions of φ and ξ held, M = `mass`; that of P_s is in it."""
         axes = self.space(p).axes[1:]
         if by not in self._changes:
             self._changes[by] = tuple(self._own_terms.changed(by))
@@ -156,21 +156,15 @@ class Generator:
             if (phase := term.at(p, derivative)) is not None
         ]
         if by.noise is not None:
-            phases = self._sum.phases(p, derivative)
-            parts += [(phase, *self._changed(by, axes, noises)) for noises, phase in phases.items()]
+            (noises, phase), *others = self._sum.phases(p, derivative).items()  # the first is that of 1
+            moved = [(noises, phase - rate * self.phi.identity), *others]
+            parts += [(phase, *self._changed(by, axes, noises)) for noises, phase in moved]
         return KroneckerSum(parts or [(0.0 * self.phi.identity, *(axis.matrix(one) for axis in axes))])
-
-    def changed_mass(self, by: ParameterDerivative, p: float) -> KroneckerSum | None:
-        """∂/∂θ of `mass`; None where the noise does not change."""
-        if by.noise is None:
-            return None
-        axes = self.space(p).axes[1:]
-        return KroneckerSum([(self.phi.identity, *self._changed(by, axes, [one] * len(axes)))])
 
     def _changed(self, by: ParameterDerivative, axes: Sequence[Any], noises: Sequence[Any]) -> Iterator[Any]:
         """The factors of the noises of ∂/∂θ of a term, where one of them changes."""
         for k, (axis, g) in enumerate(zip(axes, noises, strict=True)):
-            yield axis.changed(by.noise, g) if k == by.part else axis.matrix(g)
+            yield axis.changed_matrix(by.noise, g) if k == by.part else axis.matrix(g)
 
     @cached_property
     def _sum(self) -> TermSum:
