@@ -23,7 +23,7 @@ from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.corners import Corner, corners, left_on_mesh, slow_shares
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.fem.axis import TensorSpace, along
+from fpsolve.fem.axis import KroneckerSum, TensorSpace, along
 from fpsolve.fem.discretisation import ModeEffects
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.quantity import UNNAMED
@@ -260,22 +260,32 @@ def ladders(space: TensorSpace) -> Iterator[Ladder | None]:
             yield Ladder(at, cells, modes, degrees, axis.slowest, nested)
 
 
+def sides(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
+    """T, T* and L − Λ; for p < −1 T*, T and the adjoint: whichever of both is the smoother one comes first.
+
+    T for p and T* for −2 − p solve the same equation but for the direction of time: that of the paths for p < −1 has
+    layers where the paths for p > −1 leave.
+    """
+    operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
+    return (pair.left, pair.right, operator.T) if pair.p < -1 else (pair.right, pair.left, operator)
+
+
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     """The effects along every direction of every axis; None along one that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
-    operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
-    tables, found = (space.table(pair.right), space.table(pair.left)), list[ModeEffects | None]()
+    smooth, rough, operator = sides(pair)
+    tables, found = (space.table(smooth), space.table(rough)), list[ModeEffects | None]()
     for ladder in ladders(space):
         if ladder is None:
             found.append(None)
             continue
-        effects, (right, left) = [], (along(ladder.nested, table) for table in tables)
+        effects, (first, last) = [], (along(ladder.nested, table) for table in tables)
         others = tuple(k for k in range(len(space.axes)) if k != ladder.at)
         for depth in (2, 4):
             high = ladder.highest(depth)
             mask = ladder.along(high)
-            image = space.table(operator @ np.ravel(right * mask))
-            shares = np.abs(left * mask * image).sum(axis=others)[high]
+            image = space.table(operator @ np.ravel(first * mask))
+            shares = np.abs(last * mask * image).sum(axis=others)[high]
             effects.append(np.bincount(ladder.cells[high], shares, minlength=ladder.degrees.size) / abs(norm))
         found.append(ModeEffects(ladder.degrees, effects[0], effects[1], ladder.slowest))
     return tuple(found)
@@ -284,8 +294,8 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
 @dataclass(frozen=True, eq=False)
 class MissingModes:
     """e = Σ ⟨y_k, (L − Λ) x_k⟩/⟨T*, T⟩, about what Λ lacks: x_k is what T has of the two highest modes along the k-th
-    direction, y_k the same of T*, each coefficient times the share that is thought to be left, with the sign of its
-    product.
+    direction, y_k the same of T*, the coefficients of the rougher of both times the share that is thought to be left,
+    with the sign of the product.
 
     Attributes:
         right, left: the x_k and y_k, each of shape (size,).
@@ -301,23 +311,26 @@ class MissingModes:
     def of(cls, solution: Solution) -> MissingModes:
         """Those of a pair and its effects."""
         pair, space = solution.pair, solution.pair.space
-        operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
-        rights, lefts, loads = [], [], [np.zeros(space.shape), np.zeros(space.shape)]
+        smooth, rough, operator = sides(pair)
+        firsts, lasts, loads = [], [], [np.zeros(space.shape), np.zeros(space.shape)]
         for ladder, effects in zip(ladders(space), solution.effects, strict=True):
             if ladder is None or effects is None:
                 continue
             mask = ladder.along(ladder.highest(2))
-            right, left = (mask * along(ladder.nested, space.table(each)) for each in (pair.right, pair.left))
-            image = space.table(operator @ np.ravel(right))
+            first, last = (mask * along(ladder.nested, space.table(each)) for each in (smooth, rough))
+            image = space.table(operator @ np.ravel(first))
             shares = effects.of_cells / np.maximum(effects.two, sys.float_info.min)
-            weights = ladder.along(shares[ladder.cells]) * np.sign(left * image)
+            weights = ladder.along(shares[ladder.cells]) * np.sign(last * image)
             back = tuple(None if each is None else each.T for each in ladder.nested)
-            other = space.table(operator.T @ np.ravel(weights * left))
+            other = space.table(operator.T @ np.ravel(weights * last))
             for load, each in zip(loads, (other, weights * image), strict=True):
                 load += along(back, mask * each)
-            rights.append(np.ravel(right))
-            lefts.append(np.ravel(weights * left))
-        return cls(rights, lefts, np.ravel(loads[0]), np.ravel(loads[1]))
+            firsts.append(np.ravel(first))
+            lasts.append(np.ravel(weights * last))
+        by_first, by_last = (np.ravel(load) for load in loads)
+        if smooth is pair.left:
+            return cls(lasts, firsts, by_last, by_first)
+        return cls(firsts, lasts, by_first, by_last)
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:

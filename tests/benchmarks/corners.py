@@ -61,7 +61,7 @@ def seconds(solve: Callable[[], Any], rounds: int = 1) -> float:
         started, sign = time.thread_time(), 1
         try:
             solve()
-        except NotConverged:
+        except (NotConverged, MemoryError):
             sign = -1
         found.append(sign * (time.thread_time() - started))
     return min(found, key=abs)
