@@ -19,10 +19,12 @@ from threadpoolctl import ThreadpoolController
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.rings import Ring, RingFactors, ring_seconds
 
 MAX_DENSE_UNKNOWNS = 350
 """Below it one dense matrix is the fastest."""
 MAX_BLOCK, MAX_BAND = 400, 6
+"""Functions in a level, and diagonals on each side, up to which elimination by them is faster than SuperLU."""
 MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 MAX_LEVEL = 0.2
@@ -56,26 +58,30 @@ class Factors(Protocol):
         """x of A x = b, or of Aᵀx = b."""
 
 
-def factorised(operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: bool = False) -> Factors:
+def factorised(
+    operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: bool = False, ring: Ring | None = None
+) -> Factors:
     """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted.
 
     Args:
         operator: the sum.
         levels: for each axis the functions that are eliminated together, see `Axis`; nothing where none are.
         is_full: whether most functions of the first axis are coupled, so that no order of elimination spares anything.
+        ring: the cells of the first axis, where only their end values couple them.
     """
     if operator.size <= MAX_DENSE_UNKNOWNS and not operator.is_sparse:
         return DenseFactors(operator.toarray())
     m, n = operator.halves
     if is_full:
         return _of_full(operator, levels)
+    if len(operator.shape) == 2 and (not levels or levels[-1] is None):
+        return _of_plane(operator, ring)
     if operator.is_sparse:
         return SparseFactors(operator)
     if len(operator.shape) == 3 and operator.shape[1] > n:
         return SwappedFactors(operator, levels)
-    most = MAX_THICK_BLOCK if len(operator.shape) == 3 else MAX_BLOCK
     own = levels[-1] if levels else None
-    if own is None and m <= most and operator.band <= MAX_BAND < n:
+    if own is None and m <= MAX_THICK_BLOCK and operator.band <= MAX_BAND < n:
         return BlockFactors(operator)
     if own is not None and m <= MAX_BLOCK:
         own = own or levels_of(operator)
@@ -84,6 +90,25 @@ def factorised(operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: b
                 with suppress(SingularMatrix):
                     return LevelFactors(operator, along_last(operator, each))
     return SparseFactors(operator)
+
+
+def _of_plane(operator: KroneckerSum, ring: Ring | None) -> Factors:
+    """Of the phase and one noise: cell by cell, by blocks, or sparse, what should take the least time."""
+    (m, n), band = operator.shape, max(operator.band, 1)
+    blocks = n * (4e-5 * band**2 + m**3 * (2.2e-11 + 7.1e-11 * band + 2.5e-11 * band**2))
+    width = min(m * band, n * operator.couplings)
+    choices: list[tuple[float, Callable[[], Factors]]] = [
+        (blocks, lambda: BlockFactors(operator.with_dense_first())),
+        (2e-6 * m * n + 2e-9 * m * n * width**2, lambda: SparseFactors(operator)),
+    ]
+    if ring is not None and len(ring.number) > 2:
+        choices.append((ring_seconds(operator, ring), lambda: RingFactors(operator, ring)))
+    if 2 * band >= n:
+        del choices[0]
+    cheapest, *others = [factorise for _, factorise in sorted(choices, key=lambda choice: choice[0])]
+    with suppress(SingularMatrix):
+        return cheapest()
+    return others[0]()
 
 
 def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:

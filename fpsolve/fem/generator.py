@@ -16,6 +16,7 @@ from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.rings import Ring
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.plane import (
     Harmonics,
@@ -49,17 +50,19 @@ class Pencil:
         space: the trial and test functions.
         matrix: that of L(p), its first term with the matrices of noise that `space.mass` has.
         levels: for each axis, see `Axis`.
+        ring: the cells of φ, where only their end values couple them.
     """
 
     p: float
     space: TensorSpace
     matrix: KroneckerSum
     levels: Sequence[Any]
+    ring: Ring | None = None
 
     @staticmethod
-    def of(p: float, space: TensorSpace, matrix: KroneckerSum) -> Pencil:
+    def of(p: float, space: TensorSpace, matrix: KroneckerSum, ring: Ring | None = None) -> Pencil:
         """That of all functions."""
-        return Pencil(p, space, matrix, [axis.levels for axis in space.axes])
+        return Pencil(p, space, matrix, [axis.levels for axis in space.axes], ring)
 
     def on(self, axis: int, kept: Any) -> Pencil:
         """What it is on some functions of an axis, where a mask is true."""
@@ -70,7 +73,7 @@ class Pencil:
 
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM: dense, by blocks along an axis, or sparse."""
-        return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full)
+        return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full, ring=self.ring)
 
 
 class Generator:
@@ -120,8 +123,13 @@ class Generator:
     def at(self, p: float) -> Pencil:
         """What is solved at p; the last one is kept."""
         if self._last is None or self._last.p != p:
-            self._last = Pencil.of(p, self.space(p), self.matrix(p))
+            self._last = Pencil.of(p, self.space(p), self.matrix(p), self._ring)
         return self._last
+
+    @property
+    def _ring(self) -> Ring | None:
+        """The cells of φ, if noise without a value does not couple what lies within them."""
+        return None if self.problem.diffusions or self.problem.impulses else self.phi.ring
 
     def enriched(self) -> Generator:
         """That of the next finer discretisation."""
