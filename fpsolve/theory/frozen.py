@@ -123,8 +123,11 @@ class FrozenNoise:
     def _peak(self, p: float, best: int) -> tuple[float, float]:
         """z and F of the maximum next to a number of `z`."""
         held = self._held
-        while (ends := held.z[[max(best - 1, 0), min(best + 1, held.z.size - 1)]])[1] - ends[0] > CLOSE:
-            held = _Held(self._problem, np.linspace(*ends, ZOOM))
+        while True:
+            lower, upper = held.z[[max(best - 1, 0), min(best + 1, held.z.size - 1)]]
+            if upper - lower <= CLOSE:
+                break
+            held = _Held(self._problem, np.linspace(float(lower), float(upper), ZOOM))
             best = int(np.argmax(held.rate(p)))
         return float(held.z[best]), float(held.rate(p)[best])
 

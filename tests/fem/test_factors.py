@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, kron, random
 
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials, States
 from fpsolve.fem.factors import (
     MAX_DENSE_UNKNOWNS,
     BlockFactors,
@@ -15,6 +17,9 @@ from fpsolve.fem.factors import (
     along_first,
     factorised,
 )
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.rings import RingFactors
+from fpsolve.model import Telegraph, White
 
 
 def banded(rng, n, band):
@@ -112,3 +117,27 @@ def test_levels_of_the_first_axis(rng):
     few = factorised(operator, [np.split(np.arange(90), 2), None], is_full=True)
     assert isinstance(few, BlockFactors)
     np.testing.assert_allclose(few.solve(b), found.solve(b), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [OrnsteinUhlenbeck(alpha=0.8, sigma=0.9), NonGaussianNoise(D0=0.5, tau0=0.6, r0=0.6), Telegraph(0.7, 1.1)],
+    ids=["one diagonal", "three", "states"],
+)
+@pytest.mark.parametrize("degrees", [[4, 4, 4], [7, 2, 5, 5, 3, 1]])
+def test_cells_of_a_ring_one_after_the_other(noise, degrees, rng):
+    """Any number of cells, of unequal degrees, whose phase turns both ways for some ξ."""
+    problem = Problem(VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.9), noise)
+    lines = 0.5 * np.pi + np.pi * np.linspace(0, 1, len(degrees) + 1) ** 1.2
+    part = States(2) if noise.has_states else Polynomials(9, 0.2)
+    pencil = Generator(problem, Discretisation(PhaseCells(lines, np.array(degrees)), (part,))).at(1.3)
+    operator, b = pencil.matrix.shifted(0.7), rng.standard_normal(pencil.space.size)
+    factors, matrix = RingFactors(operator, pencil.ring), operator.toarray()
+    for transposed, expected in ((False, matrix), (True, matrix.T)):
+        np.testing.assert_allclose(factors.solve(b, transposed=transposed), np.linalg.solve(expected, b), rtol=1e-9)
+
+
+def test_white_noise_couples_more_than_the_ends_of_cells():
+    problem = Problem(VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.9), White(0.4))
+    lines = 0.5 * np.pi + np.pi * np.linspace(0, 1, 4)
+    assert Generator(problem, Discretisation(PhaseCells(lines, np.full(3, 5)), (States(1),))).at(1.0).ring is None
