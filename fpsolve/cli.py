@@ -1,7 +1,8 @@
-"""The command line, fpsolve run | check | simulate | chart | design | prove | mesh | new | schema, and its messages."""
+"""The command line, fpsolve run | check | simulate | chart | design | prove | noise and others, and its messages."""
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import sys
@@ -13,7 +14,7 @@ from pathlib import Path
 from shlex import quote
 from time import monotonic
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, CycloptsPanel, Parameter, Token
 from rich.console import Console
@@ -94,6 +95,12 @@ Interactive = Annotated[
 ]
 
 
+Modes = Annotated[
+    Path | None, Parameter(help="A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it.")
+]
+Mode = Annotated[list[Count] | None, Parameter(help="A row of this table; of two modes twice.", negative="")]
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command, and return its exit code, see the help of `app`.
 
@@ -162,17 +169,61 @@ def _drop_blocked_output() -> None:
 
 @app.command
 def new(
-    name: Annotated[str, Parameter(help="A case that comes with fpsolve; if omitted, all are listed.")] = "",
+    name: Annotated[
+        str,
+        Parameter(
+            help="A case that comes with fpsolve; if omitted, all are listed. With options the new file; if omitted, "
+            "KIND.toml here."
+        ),
+    ] = "",
     file: Annotated[Path | None, Parameter(help="The new file, or its folder; if omitted, NAME.toml here.")] = None,
+    *,
+    kind: Annotated[
+        str | None,
+        Parameter(
+            help="Write a case of this kind with comments: oscillator, which is meant if only other options are given, "
+            "system for an equation of your own, parametric for noise in the stiffness, modes or plane."
+        ),
+    ] = None,
+    frequency: Annotated[
+        list[float] | None, Parameter(help="Its natural frequency in Hz; of two modes twice.", negative="")
+    ] = None,
+    damping_ratio: Annotated[
+        list[float] | None,
+        Parameter(help="Its damping as a share of critical damping; 0.01 if omitted.", negative=""),
+    ] = None,
+    modes: Modes = None,
+    mode: Mode = None,
+    restitution: Annotated[
+        float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
+    ] = None,
 ) -> int:
-    """Copy a case that comes with fpsolve, or list these cases with their titles.
+    """Copy a case that comes with fpsolve, list these cases with their titles, or write a commented one of a kind.
 
-    Beside the copy is fpsolve.schema.json, with which editors complete and check it.
+    Beside the new case is fpsolve.schema.json, with which editors complete and check it.
 
     Example: fpsolve new fig1 my_case.toml
-    """
-    from fpsolve.workflow.shipped import copy_case, described_cases
 
+    Example: fpsolve new my.toml --frequency 2 --damping-ratio 0.01 --restitution 0.9
+    """
+    from fpsolve.case.templates import modes_of
+    from fpsolve.workflow.noise import modes_from
+    from fpsolve.workflow.shipped import copy_case, described_cases, write_case
+
+    if any(each is not None for each in (kind, frequency, damping_ratio, restitution, modes, mode)):
+        if file is not None:
+            raise FpsolveError(f"got {name} and {file}; with --kind and other options name the new file only")
+        if modes is not None and (frequency or damping_ratio):
+            raise FpsolveError("--modes states frequencies and damping; leave out --frequency and --damping-ratio")
+        if modes is None and mode is not None:
+            raise FpsolveError("--mode is for the table that --modes names; name one, or leave it out")
+        if modes is not None:
+            table = modes_from(modes, mode or (), restitution)
+            frequency = [each / (2 * math.pi) for each in table.omega]
+            damping_ratio = [each for each in table.zeta if not math.isnan(each)]
+        made = modes_of(frequency or [], damping_ratio or [], restitution)
+        print(f"written: {escaped(str(write_case(kind or 'oscillator', made, Path(name) if name else None)))}")
+        return 0
     if name:
         print(f"written: {escaped(str(copy_case(name, file)))}")
         return 0
@@ -574,6 +625,110 @@ def prove(
         if unmet:
             code = NOT_CONVERGED
     return code
+
+
+@app.command
+def noise(
+    spectrum: Annotated[
+        Path | None,
+        Parameter(
+            help="A spectral density: .csv, .txt, .npy, .npz, .mat, .uff or .nc, with a column of frequencies.",
+        ),
+    ] = None,
+    *,
+    record: Annotated[
+        Path | None,
+        Parameter(
+            help="A record of values over time instead, also .wav; beside a spectrum its variance is compared with it."
+        ),
+    ] = None,
+    per: Annotated[
+        Literal["Hz", "rad/s"] | None,
+        Parameter(help="The unit of the frequencies; if omitted that of the file, which must state it."),
+    ] = None,
+    sided: Annotated[
+        Literal["one", "two"] | None,
+        Parameter(help="Whether the integral over f > 0 is the variance, one, or half of it, two."),
+    ] = None,
+    frequency: Annotated[
+        list[float] | None,
+        Parameter(
+            help="Natural frequency in the unit of --per, Hz if that is omitted; of two modes twice.", negative=""
+        ),
+    ] = None,
+    damping_ratio: Annotated[
+        float | None,
+        Parameter(help="Damping as a share of critical damping: states an oscillator, whose verdict is told."),
+    ] = None,
+    restitution: Annotated[
+        float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
+    ] = None,
+    case: Annotated[Path | None, Parameter(help="A case instead, whose noise is replaced.")] = None,
+    modes: Modes = None,
+    mode: Mode = None,
+    noise_in: Annotated[
+        Literal["stiffness", "damping"] | None,
+        Parameter(help="Where the noise is; stiffness if neither this nor --of is stated."),
+    ] = None,
+    of: Annotated[
+        Literal["stiffness", "damping", "acceleration", "height"] | None,
+        Parameter(
+            help="What was measured: the relative stiffness, the damping in 1/s, the vertical acceleration of the "
+            "support of a pendulum in m/s^2, or the metacentric height of a ship in m; that of --noise-in if omitted."
+        ),
+    ] = None,
+    length: Annotated[
+        float | None, Parameter(help="Length of the pendulum in m, from which its natural frequency follows.")
+    ] = None,
+    gm: Annotated[float | None, Parameter(help="Mean metacentric height in m, for --of height.")] = None,
+    kind: Annotated[
+        Literal["ornstein-uhlenbeck", "filter", "bounded", "non-gaussian"], Parameter(help="The kind of noise.")
+    ] = "ornstein-uhlenbeck",
+    terms: Annotated[Count, Parameter(help="How many noises of the kind are added, 1 to 3.")] = 1,
+    method: Annotated[
+        Literal["spectrum", "whittle"],
+        Parameter(help="Of a record: its spectrum by Welch's method, or Whittle's likelihood."),
+    ] = "spectrum",
+    column: Annotated[str | None, Parameter(help="The column of values, if the file has several.")] = None,
+    rate: Annotated[
+        float | None, Parameter(help="Values of the record per second, if the file states no times.")
+    ] = None,
+    averages: Annotated[
+        float | None, Parameter(help="How many independent periodograms the spectrum is the mean of: tells its errors.")
+    ] = None,
+    out: Out = Path("results"),
+    json: Annotated[bool, Parameter(help="Print noise.json in one line.", negative="")] = False,
+) -> int:
+    """Fit a noise to what was measured, most of all at twice the natural frequency; say what it means for stability.
+
+    Prints the section [noise] of a case, and writes noise.toml, a case with it, noise.json and a figure into
+    OUT/<file>/. Frequencies of the fit are 2f, of two modes 2f1, 2f2, f1 + f2 and |f1 - f2|, and 0 for noise in the
+    damping.
+
+    Example: fpsolve noise spectrum.csv --per Hz --sided one --frequency 2.0 --damping-ratio 0.01 --averages 64
+
+    Example: fpsolve noise --record shaking.csv --of acceleration --length 0.5 --damping-ratio 0.02 --kind filter
+    """
+    from fpsolve.output.noises import Convention, print_noise
+    from fpsolve.output.terminal import print_written
+    from fpsolve.workflow.noise import Statement, measurement_of, noise_case
+
+    start = monotonic()
+    stated = Statement(
+        spectrum=spectrum, record=record, per=per, sided=sided, frequency=tuple(frequency or ()),
+        damping_ratio=damping_ratio, restitution=restitution, case=load([case], None)[0] if case else None, modes=modes,
+        mode=tuple(mode or ()), noise_in=noise_in, of=of, length=length, gm=gm, kind=kind, terms=terms, method=method,
+        column=column, rate=rate, averages=averages,
+    )  # fmt: skip
+    data, wanted, source = measurement_of(stated)
+    shown = Convention(per or "Hz", sided or "one")
+    outcome, folder, names = noise_case(data, wanted, source, shown, out)
+    if json:
+        print(" ".join(line.strip() for line in (folder / names[0]).read_text(encoding="utf-8").splitlines()))
+    else:
+        print_noise(outcome, source, shown)
+        print_written(folder, ", ".join(names), monotonic() - start)
+    return NOT_CONVERGED if outcome.failure is not None else 0
 
 
 @app.command

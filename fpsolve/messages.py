@@ -302,6 +302,23 @@ class Code(Enum):
     UNSEEN_TAILS = (
         f"note: algebraic tails: {_RARE}; a simulation shows Λ(p) without these paths, and λ is the {ALMOST_EVERY}"
     )
+    NOISE_MISFIT = (
+        "warning: near {name} the measured density is {relative:+.1%} off the fitted one, with a standard error of "
+        "{error:.1%}; take another kind of noise, or more terms"
+    )
+    SPECTRUM_GAP = "note: nothing was measured from {low:.4g} to {high:.4g} rad/time"
+    NO_SPECTRUM_ERROR = (
+        "note: the errors of the measured values are not known, and are taken from how far these are from the fit; "
+        "state how many averages they are of"
+    )
+    UNTOLD_PARAMETERS = (
+        "warning: the values do not tell all parameters of the fit, whose errors are then not known, though that of "
+        "the density is; use fewer terms, or another kind"
+    )
+    SHORT_RECORD = (
+        "warning: the record is {times:.3g} correlation times long, too few for its standard errors; use a record of "
+        "at least {least:g}"
+    )
     FAR_FROM_GAUSSIAN = (
         "note: the Ornstein-Uhlenbeck reduction is meant for r0 near 1, but |r0 - 1| = {departure:.3g} > {most:g}: its "
         "variance is {reduced:.4g}, and that of the noise, Eq. (10), is {variance:.4g}"
@@ -385,6 +402,31 @@ class Code(Enum):
     AT_REST = (
         "warning: no stationary response: λ = {value:.3g} ± {error:.1e} {most:?is not {most:g} standard errors above "
         "0¦is not positive}, and if λ < 0 almost every path comes to rest"
+    )
+    RESPONSE_LINEAR = (
+        "note: no stationary response: it is that of a vibro-impact oscillator with c2 or c3 > 0; in a linear system "
+        "nothing limits the amplitude"
+    )
+    RESPONSE_NOISE = (
+        "note: no stationary density by finite elements: it is for one noise with a density, and no white noise, "
+        "impulses or chains; simulate the response instead"
+    )
+    RESPONSE_TAILS = (
+        "note: no stationary density by finite elements: for r0 > 1 the noise has algebraic tails and there is no δ_p, "
+        "which tells the density near rest; use r0 <= 1, or simulate the response"
+    )
+    RESPONSE_DIES = (
+        "note: no stationary response: λ = {value:.6g} ± {error:.1g} is not positive, so that almost every path comes "
+        "to rest"
+    )
+    RESPONSE_NO_INDEX = "note: no stationary density by finite elements: there is no δ_p: {reason}"
+    RESPONSE_TOO_LARGE = (
+        "failure: the stationary response did not converge: the next discretisation has {unknowns} unknowns, which "
+        "take {gigabytes:.1f} GB, more than {most:g} GB; use a larger rtol"
+    )
+    RESPONSE_OPEN = (
+        "failure: the stationary response did not converge: its means still change by {size:.1e} of them; use a larger "
+        "rtol"
     )
     RESPONSE_STOPPED = "warning: the simulation of the response was stopped early, after the time {time:.3g}"
     RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"

@@ -21,11 +21,12 @@ from fpsolve.exponent import INDICES, perturbation_series
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate, Failure
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import CoefficientMatrix, LinearSystem, Telegraph, White
+from fpsolve.model import CoefficientMatrix, LinearSystem, OrnsteinUhlenbeck, Telegraph, White
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT
 from fpsolve.model.systems import ParametricOscillator
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.nonlinear import stationary_response
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
 from fpsolve.simulation.response import MEANS
 from fpsolve.study.solve import Numerics, Wanted, solve_curve
@@ -42,6 +43,7 @@ TURNING = Problem(
     ),
     White(s=1.0),
 )
+SETTLING = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.4, epsilon=0.5, c2=0.5, c3=0.2)
 FRAME = Axis("oscillator.omega", 0.5, 2.0, "log"), Axis("noise.D0", 0.01, 2.0, "log")
 MAIN = {
     "moments": "moment",
@@ -61,6 +63,7 @@ MAIN = {
     "simulation": "moment",
     "no estimate": "moment",
     "response": "density",
+    "stationary response": "density",
     "curve": "moment",
     "indices of a curve": "moment",
     "directions": "density",
@@ -122,6 +125,7 @@ def results(fig1_solver):
         "simulation": simulated(estimates),
         "no estimate": simulated(()),
         "response": response(),
+        "stationary response": stationary_response(SETTLING, OrnsteinUhlenbeck(alpha=2.0, sigma=0.9), rtol=0.1),
         "curve": curve([-1.0, 2.0], "lyapunov_exponent"),
         "indices of a curve": curve([], "lyapunov_exponent", "stability_index"),
         "directions": fpsolve.tilted_density(ExponentSolver(TURNING, rtol=1e-3).pair(1.0)),

@@ -15,7 +15,7 @@ from tests.solving import case_in, case_text
 NESTED = "[" * 100_000
 TABLES = {
     "summary.json": ["curves.csv", "figure.png"],
-    "monte_carlo.json": ["response.csv"],
+    "monte_carlo.json": ["monte_carlo_response.csv"],
     "chart.json": ["chart.csv", "chart.png"],
     "proof.json": [],
 }

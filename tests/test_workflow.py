@@ -92,7 +92,7 @@ def beside_records(folder):
 def test_summary_has_the_promised_form_and_the_computed_values(whole):
     results = whole.results
     summary = json.loads((whole.folder / "summary.json").read_text(encoding="utf-8"))
-    state = ["case", "title", "fpsolve_version", "complete", "planned", "done"]
+    state = ["case", "title", "fpsolve_version", "units", "complete", "planned", "done"]
     facts = ["versions", "command", "host", "started", "wall_seconds", "overrides", "case_text"]
     assert list(summary) == [*state, *facts, "curves"]
     assert (summary["case"], summary["title"]) == ("test", "A test")
@@ -382,7 +382,13 @@ def test_a_run_goes_on_where_it_was_interrupted(whole, tmp_path, monkeypatch):
     assert files(folder) == TABLES
 
 
-SIMULATED = {"monte_carlo.json", "monte_carlo-2.json", "response.vti", "response.csv", "response-2.png"}
+SIMULATED = {
+    "monte_carlo.json",
+    "monte_carlo-2.json",
+    "monte_carlo_response.vti",
+    "monte_carlo_response.csv",
+    "monte_carlo_response-2.png",
+}
 """Files of simulations."""
 
 
@@ -395,7 +401,7 @@ def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(
 ):
     """It begins anew and ends in the first curve: there are tables that say so, and the files of others."""
     folder = shutil.copytree(whole.folder, tmp_path / "test")
-    others = {"monte_carlo.txt", "response-a.vti", "eigenfunctions.png", "figure.svg", "notes/summary.json"}
+    others = {"monte_carlo.txt", "monte_carlo_response-a.vti", "eigenfunctions.png", "figure.svg", "notes/summary.json"}
     (folder / "notes").mkdir()
     for name in others | SIMULATED:
         (folder / name).write_text("mine", encoding="utf-8")

@@ -39,6 +39,7 @@ from fpsolve.case.sections import (
     OutputSection,
     Section,
     Text,
+    UnitsSection,
     Value,
     Varied,
 )
@@ -152,6 +153,7 @@ class Case(Section):
     monte_carlo: Annotated[MonteCarloSection, parameter("how the system is simulated", "[monte_carlo]")] = (
         MonteCarloSection()
     )
+    units: Annotated[UnitsSection, parameter("what units are called", "[units]")] = UnitsSection()
     figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
     output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
     excursions: Annotated[ExcursionSection, parameter("how far ‖x‖ may rise, and its start", "[excursions]")] = (
@@ -183,8 +185,8 @@ class Case(Section):
         return self.problem.parameters
 
     def about(self, key: str) -> Quantity:
-        """What a parameter is, in the time unit of [figure]."""
-        return self.parameters[key].quantity.timed(self.figure.time_unit)
+        """What a parameter is, in the time unit of [units]."""
+        return self.parameters[key].quantity.timed(self.units.time)
 
     @property
     def path(self) -> Path:

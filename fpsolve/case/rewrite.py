@@ -50,6 +50,26 @@ def rewritten(case: Case, values: Mapping[str, float], expect: Mapping[str, Any]
     return _dumped(data) + end
 
 
+def with_noise(case: Case, noise: str, folder: Path) -> str:
+    """The text of a case with other sections of noise, at its end, and without what it expects.
+
+    Args:
+        noise: their text.
+        folder: where the file will be.
+    """
+    was, document = document_of(case.text), document_of(case.text)
+    data = document.data
+    if file := table_of(data.get("mesh")).get("file"):
+        data["mesh"]["file"] = Path(os.path.relpath(case.path.parent / file, folder)).as_posix()
+    for name in ("noise", "expect"):
+        data.pop(name, None)
+    with suppress(ValueError, LookupError):
+        text = _edited(was, data)
+        if loads(text) == data:
+            return f"{text.rstrip()}\n{noise}"
+    return f"{_dumped(data)}{noise}"
+
+
 def _set(data: dict[str, Any], key: str, value: float) -> None:
     """Set a parameter where a case states it, or else as the only value of a key that is varied."""
     section, _, name = key.rpartition(".")

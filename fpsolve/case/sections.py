@@ -309,7 +309,7 @@ def _limits(value: Any) -> tuple[float, float]:
 def _time_unit(value: Any) -> Any:
     if type(value) is str and re.fullmatch(r"[^\W\d_]{1,12}", value):
         return value
-    text = f'got {shown_with_kind(value)}; must be a unit of 1 to 12 letters; write, for example, time_unit = "s"'
+    text = f'got {shown_with_kind(value)}; must be a unit of 1 to 12 letters; write, for example, time = "s"'
     raise ValueError(text)
 
 
@@ -340,11 +340,6 @@ class FigureSection(Section):
         ),
         parameter("what is marked", 'mark = ["stability_index"]'),
     ] = ("stability_index",)
-    time_unit: Annotated[
-        str,
-        BeforeValidator(_time_unit, json_schema_input_type=UnitName),
-        parameter("what the unit of time is called", 'time_unit = "s"'),
-    ] = "time"
 
     @property
     def moment(self) -> float | None:
@@ -378,6 +373,16 @@ class FigureSection(Section):
             text = f'got {shown(self.mark)}; only Λ(p) over p has marks; write x = "p", or remove it'
             refuse([(("mark",), self.mark, text)])
         return self
+
+
+class UnitsSection(Section):
+    """[units]: what the unit of time of all numbers is called, which labels outputs and changes no number."""
+
+    time: Annotated[
+        str,
+        BeforeValidator(_time_unit, json_schema_input_type=UnitName),
+        parameter("what the unit of time is called", 'time = "s"'),
+    ] = "time"
 
 
 class OutputSection(Section):

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.errors import CaseError, Fault
 from fpsolve.messages import is_control
+from fpsolve.reading import Unreadable, Words, read_text
 
 _BLANK = re.compile(r"(?:\s|#[^\n]*)*")
 _KEY = re.compile(r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')

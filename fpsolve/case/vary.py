@@ -30,12 +30,12 @@ from fpsolve.case.messages import (
     shown_with_kind,
     too_long,
 )
-from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.case.sections import MAX_MOMENTS, MOST_NAMED, FigureSection, Sweep, Value, Values, flat, same
 from fpsolve.data import written
 from fpsolve.model.faults import accepted, choices, table_of
 from fpsolve.model.parameters import STRICT, meaning_of
 from fpsolve.model.quantity import Quantity
+from fpsolve.reading import Unreadable, Words, read_text
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
 _START = "its first row must name keys, as in noise.D0,noise.tau0"

@@ -84,7 +84,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
 
 def draw_chart(case: Case, chart: Chart, folder: Path, *, into: Path | None = None) -> None:
     """chart.png and .pdf, or `into` another file: the lines, their closed forms dashed, and the regions with names."""
-    frame, unit = (charted(case).x.axis, charted(case).y.axis), case.figure.time_unit
+    frame, unit = (charted(case).x.axis, charted(case).y.axis), case.units.time
     keys = frame[0].key, frame[1].key
     held = held_in_words(case.curve({}), keys, unit)
     paths = [into] if into else [folder / "chart.png", folder / "chart.pdf"]

@@ -72,12 +72,16 @@ def dataset_of(case: Case, results: Iterable[CurveResult], facts: Mapping[str, A
         columns += zip((index, index.error(), index.perturbation), three, strict=True)
     columns += [(STATUS, status), (SECONDS, seconds)]
     variables = {
-        each.name: ((*over, *each.dims), values.reshape(shape + values.shape[1:]), each.attributes)
+        each.name: (
+            (*over, *each.dims),
+            values.reshape(shape + values.shape[1:]),
+            each.timed(case.units.time).attributes,
+        )
         for each, values in columns
     }
     coordinates: dict[str, Any] = {}
     for key in vary.keys:
-        about = {} if vary.is_text(key) else case.parameters[key].quantity.attributes
+        about = {} if vary.is_text(key) else case.about(key).attributes
         coordinates[key] = (SET, list(vary.columns[key]), about) if is_list else (key, list(vary.values(key)), about)
     if MOMENT.name in case.output.quantities:
         coordinates["p"] = ("p", case.p, P.attributes)

@@ -109,7 +109,7 @@ def _draw(case: Case, curve: Curve, found: xarray.Dataset, paths: list[Path], ti
     columns = 1 if len(panels) == 1 else 2
     rows = -(-len(panels) // columns)
     form = Format(width=7.2 if columns == 1 else 11.5, height=3.6 if rows == 1 else 2.6, scale=1.1)
-    with figure_for(paths, title, held_in_words(curve, (), case.figure.time_unit), form) as figure:
+    with figure_for(paths, title, held_in_words(curve, (), case.units.time), form) as figure:
         axes = np.ravel(figure.subplots(rows, columns))
         for place, (axis, (words, values)) in enumerate(zip(axes, panels, strict=False)):
             is_right = place % columns == columns - 1 or place == len(panels) - 1

@@ -150,7 +150,7 @@ def draw(
     setting = case.figure
     if not case.output.figure or setting.needed not in case.output.quantities or not results:
         return
-    held = held_in_words(results[0].curve, case.vary.keys, setting.time_unit)
+    held = held_in_words(results[0].curve, case.vary.keys, case.units.time)
     with figure_for(*headed(folder, "figure", into, case.caption), held, FORMATS[setting.width]) as figure:
         axes = figure.add_subplot()
         if other := map_key(setting, case.vary):
@@ -171,13 +171,13 @@ def draw_rates(case: Case, results: Sequence[CurveResult], folder: Path, *, into
     """Draw rate_function.png and .pdf, if the case asks for it: I(s) at s = Λ′(p) of every p, 0 at s = λ."""
     if RATE_FUNCTION.name not in case.output.quantities or not case.output.figure or not results:
         return
-    held, is_few = held_in_words(results[0].curve, case.vary.keys, case.figure.time_unit), len(results) <= MOST_NAMED
+    held, is_few = held_in_words(results[0].curve, case.vary.keys, case.units.time), len(results) <= MOST_NAMED
     shown = _some(len(results))
     series = [_rates(result, with_theory=i in shown) for i, result in enumerate(results)]
     form = FORMATS[case.figure.width]
     with figure_for(*headed(folder, "rate_function", into, case.headline), held, form) as figure:
         axes = figure.add_subplot()
-        label_axes(axes, *(each.timed(case.figure.time_unit).attributes for each in (GROWTH, RATE_FUNCTION)))
+        label_axes(axes, *(each.timed(case.units.time).attributes for each in (GROWTH, RATE_FUNCTION)))
         mark_zero(axes)
         is_exact = any(result.curve.is_exact for result in results)
         (_draw_few if is_few else _draw_many)(axes, case, series, MOMENT.closed_form + ", reduced noise" * is_exact)
@@ -195,7 +195,7 @@ def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path,
         for label, (p, slopes) in found.shown().items():
             size = float(scale.moment(p)) if p else scale.linear
             bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
-        held = held_in_words(result.curve, (), case.figure.time_unit)
+        held = held_in_words(result.curve, (), case.units.time)
         name = f"sensitivities{result.curve.suffix}"
         with figure_for(*headed(folder, name, into, case.headline), held) as figure:
             words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
@@ -203,10 +203,10 @@ def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path,
 
 
 def draw_response(case: Case, simulated: SimulatedCurve, folder: Path, *, into: Path | None = None) -> None:
-    """Draw response.png and .pdf of a curve, if it has one: the joint density of x and ẋ, and that of the amplitude."""
+    """Draw monte_carlo_response.png and .pdf of a curve: the density of (x, ẋ) and of the amplitude."""
     if simulated.response is None:
         return
-    name = f"response{simulated.curve.suffix}"
+    name = f"monte_carlo_response{simulated.curve.suffix}"
     held = held_in_words(simulated.curve, (), "time")
     with figure_for(*headed(folder, name, into, case.headline), held, Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
@@ -327,7 +327,7 @@ def draw_series(axes: Any, case: Case, series: Sequence[Series], equation: str) 
     """Draw what [figure] says over its x for several curves; the lines are of perturbation theory, by an equation."""
     setting, is_few = case.figure, len(series) <= MOST_NAMED
     over = P if setting.x == "p" else case.about(setting.x)
-    label_axes(axes, over.attributes, setting.quantity.timed(setting.time_unit).attributes)
+    label_axes(axes, over.attributes, setting.quantity.timed(case.units.time).attributes)
     mark_zero(axes)
     colours = (_draw_few if is_few else _draw_many)(axes, case, series, equation)
     if any(np.any(item.rare) for item in series):
@@ -480,7 +480,7 @@ def _draw_map(axes: Any, case: Case, results: Sequence[CurveResult], keys: tuple
         failed[row, column] = math.isnan(number) and result.status.fails
     edges = _edges(x), _edges(y)
     label_axes(axes, *(case.about(key).attributes for key in keys))
-    _draw_values(axes, values, edges, setting.quantity.timed(setting.time_unit).attributes)
+    _draw_values(axes, values, edges, setting.quantity.timed(case.units.time).attributes)
     limits = setting.xlim, setting.ylim
     for axis, each, ends, limit in zip((axes.xaxis, axes.yaxis), (x, y), edges, limits, strict=True):
         scale_axis(axis, scale_of(each), limit or (float(ends[0]), float(ends[-1])))

@@ -163,7 +163,7 @@ def _about(case: Case, found: Found, curve: Curve) -> Iterator[str]:
 
 def _parameters(case: Case, curve: Curve) -> Iterator[dict[str, Any]]:
     for key, each in curve.problem.parameters.items():
-        quantity = each.quantity.timed(case.figure.time_unit)
+        quantity = each.quantity.timed(case.units.time)
         values = dict.fromkeys(case.vary.values(key)) if key in case.vary.keys else [each.value]
         shown = ", ".join(map(written, values)) if len(values) <= MOST_TABLES else f"{len(values)} values"
         unit = "" if quantity.unit in ("1", "unknown") else plain_unit(quantity.unit)
@@ -184,7 +184,7 @@ def _proven(folder: Path) -> dict[frozenset[Any], list[str]]:
 
 def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str]]) -> Iterator[tuple[str, list[str]]]:
     """By curves what their numbers say, and what is proven of them; of many curves, whose table is enough, nothing."""
-    time_unit = case.figure.time_unit
+    time_unit = case.units.time
     if len(found.results) <= MOST_DRAWN:
         for result in found.results:
             parameters = frozenset(result.curve.parameters.items())
@@ -227,7 +227,7 @@ def _figures(case: Case, found: Found, folder: Path) -> Iterator[Figure]:
             jobs.append((f"densities{result.curve.suffix}", f"{title}{_of(result.curve)}", draw_it))
     for each in found.simulated[:MOST_PICTURES]:
         title = f"Simulated stationary response{_of(each.curve)}"
-        jobs.append((f"response{each.curve.suffix}", title, partial(draw_response, case, each, folder)))
+        jobs.append((f"monte_carlo_response{each.curve.suffix}", title, partial(draw_response, case, each, folder)))
     if found.chart is not None and found.chart.lines:
         title = f"Where stability ends, over {charted(case).x.key} and {charted(case).y.key}"
         jobs.append(("chart", title, partial(draw_chart, case, found.chart, folder)))
@@ -319,7 +319,7 @@ def _index_grid(case: Case, result: CurveResult) -> Grid:
         estimate = result.estimates[name]
         if estimate is None:
             continue
-        theory, unit = index.theory(result.curve.problem), index.timed(case.figure.time_unit).unit
+        theory, unit = index.theory(result.curve.problem), index.timed(case.units.time).unit
         told = f"{theory:.6g}, Eq. {index.closed_form}" if abs(theory) < float("inf") else ""
         number = digits(estimate.value, estimate.error_estimate)
         row = [index.words, index.symbol, number, f"{estimate.error_estimate:.0e}", "" if unit == "1" else unit, told]
@@ -365,7 +365,7 @@ def _plotly() -> str:
 
 def _plots(case: Case, found: Found) -> Iterator[dict[str, Any]]:
     """Λ(p) of the curves and the lines of a chart as plotly takes them; texts are escaped, as it reads them as HTML."""
-    unit = escape(MOMENT.timed(case.figure.time_unit).unit)
+    unit = escape(MOMENT.timed(case.units.time).unit)
     if MOMENT.name in case.output.quantities and found.results:
         moments = [(result.curve.label or MOMENT.symbol, result.moments) for result in found.results[:MOST_TABLES]]
         lines = [

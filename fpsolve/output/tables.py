@@ -1,4 +1,4 @@
-"""Results as tables: summary.json, moments.csv, curves.csv; of simulated curves monte_carlo.json and response.csv."""
+"""Results as tables: summary.json, moments.csv, curves.csv; monte_carlo.json and monte_carlo_response.csv."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def asked(case: Case) -> list[Index]:
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
-    """monte_carlo.json of a curve, and response.csv where there is a response."""
+    """monte_carlo.json of a curve, and monte_carlo_response.csv where there is a response."""
     suffix, result, response = simulated.curve.suffix, simulated.result, simulated.response
     content = {
         **head(case),
@@ -183,7 +183,7 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> Non
     columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
     rows = (map(float, row) for row in zip(*columns, strict=True))
     header = ["amplitude_from", "amplitude_to", "density", "standard_error"]
-    write_csv(folder / f"response{suffix}.csv", header, rows)
+    write_csv(folder / f"monte_carlo_response{suffix}.csv", header, rows)
 
 
 def in_case_words(messages: Sequence[str]) -> list[str]:
@@ -191,9 +191,10 @@ def in_case_words(messages: Sequence[str]) -> list[str]:
     return [message_of(each).words(CASE_WORDS) for each in messages]
 
 
-def head(case: Case) -> dict[str, str]:
+def head(case: Case) -> dict[str, Any]:
     """What every table begins with."""
-    return {"case": case.name, "title": case.title, "fpsolve_version": __version__}
+    units = {"units": {"time": case.units.time}}
+    return {"case": case.name, "title": case.title, "fpsolve_version": __version__, **units}
 
 
 def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:

@@ -19,7 +19,7 @@ from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import EXCURSIONS
 from fpsolve.case.vary import map_key, short_names
-from fpsolve.data import written
+from fpsolve.data import Quantity, written
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import (
     BY_JUMP,
@@ -91,11 +91,20 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
     is_whole = all(result.status == Status.CONVERGED for _, result in chosen)
     columns += [Column("status", 1 if is_whole else 0)] * has_status + [Column("which", is_text=True)] * is_digest
     told = [THEORY] * bool(theories) + [STAR] * any("*" in each.heading for each in theories)
-    grid = Grid(case.headline, columns, remark="; ".join(told))
+    has_moments = case.figure.x == "p" and MOMENT.name in case.output.quantities
+    units = units_in_words(case, [*_told(case), *[MOMENT] * has_moments])
+    grid = Grid(case.headline, columns, remark="; ".join(filter(None, [*told, units])))
     for which, result in chosen:
         varied, numbers = map(written, result.curve.varied.values()), (each.text(result) for each in quantities)
         grid.rows.append([*varied, *numbers, *[result.status.word] * has_status, *[which] * is_digest])
     return grid
+
+
+def units_in_words(case: Case, quantities: Iterable[Quantity]) -> str:
+    """The unit of those that have one, where the case names its unit of time: "λ, N in 1/s"; else nothing."""
+    unit = case.units.time
+    timed = [each.symbol for each in quantities if each.unit != each.timed(unit).unit]
+    return f"{', '.join(timed)} in 1/{unit}" if timed else ""
 
 
 def varied_columns(case: Case) -> list[Column]:
@@ -394,7 +403,7 @@ def simulation_grid(case: Case, simulated: SimulatedCurve, result: CurveResult |
     is_direct = any(each.estimator == "direct" for each in simulated.result.estimates)
     effective = "effective windows" if is_direct else "effective paths"  # a path has many windows
     columns = [Column("p"), Column(MOMENT.symbol), Column("± s.e."), *compared, Column(effective, 3)]
-    grid = Grid(case.heading(simulated.curve), columns)
+    grid = Grid(case.heading(simulated.curve), columns, remark=units_in_words(case, [MOMENT]))
     exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
     for estimate in simulated.result.estimates:
         known = exact.get(estimate.p) if estimate.p else 0.0
@@ -408,7 +417,8 @@ def exponent_grid(case: Case, pairs: Sequence[tuple[SimulatedCurve, CurveResult 
     compared = [Column("finite elements", 2), Column("s.e. away", 1)] if any(result for _, result in pairs) else []
     is_digest, symbol = len(pairs) > MOST_ROWS, LYAPUNOV_EXPONENT.symbol
     which = [Column("which", is_text=True)] * is_digest
-    grid = Grid(case.headline, [*varied_columns(case), Column(symbol), Column("± s.e."), *compared, *which])
+    columns = [*varied_columns(case), Column(symbol), Column("± s.e."), *compared, *which]
+    grid = Grid(case.headline, columns, remark=units_in_words(case, [LYAPUNOV_EXPONENT]))
     if is_digest:
         ordered = sorted(pairs, key=lambda pair: pair[0].result.lyapunov_exponent)
         pairs = [ordered[0], ordered[-1]]
@@ -454,7 +464,7 @@ def moment_grid(case: Case, result: CurveResult) -> Grid:
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
     moments = result.moments
     has_theory = any(map(math.isfinite, moments.perturbation))
-    remark = STAR if is_exact and has_theory else ""
+    remark = "; ".join(filter(None, [STAR * (is_exact and has_theory), units_in_words(case, [MOMENT, *_told(case)])]))
     shown_columns = [*columns[:3], *intervals, *(columns[3:] if has_theory else [])]
     grid = Grid(case.heading(result.curve), shown_columns, remark=remark)
     for p, value, error, closed in zip(

@@ -201,7 +201,7 @@ def write_response(simulated: SimulatedCurve, folder: Path) -> None:
     response, curve, found = simulated.response, simulated.curve, simulated.result
     if response is None:
         return
-    path, x, v = folder / f"response{curve.suffix}.vti", response.x_edges, response.v_edges
+    path, x, v = folder / f"monte_carlo_response{curve.suffix}.vti", response.x_edges, response.v_edges
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
     grid = _pyvista().ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
     grid.cell_data["density"] = response.density.ravel(order="F")

@@ -148,7 +148,7 @@ class _Batch:
 
 
 @of_problem
-def stationary_response(
+def simulated_response(
     problem: Problem,
     exponent: float,
     variance_rate: float,

@@ -108,9 +108,9 @@ def simulate_curve(
                 progress()
             at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
             return SimulatedCurve(curve, result, None, (*noted, at_rest))
-        from fpsolve.simulation.response import stationary_response
+        from fpsolve.simulation.response import simulated_response
 
-        response = stationary_response(
+        response = simulated_response(
             curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
             time=result.time, step=result.step, seed=result.seed, progress=progress,
         )  # fmt: skip

@@ -18,7 +18,7 @@ SOLVED = (
     r"|density\.vtu|densities(-\d+)?\.nc|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
     r"|sample\.json|sample/(summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc)"
 )
-SIMULATED = r"monte_carlo(-\d+)?\.json|response(-\d+)?\.(csv|vti|png|pdf)"
+SIMULATED = r"monte_carlo(-\d+)?\.json|monte_carlo_response(-\d+)?\.(csv|vti|png|pdf)"
 REPORT = r"report\.html"
 """Pattern of the name of the report of what was done last, which whatever is done next makes stale."""
 CHART, PROVEN, DESIGNED = r"chart\.(csv|json|png|pdf)", r"proof\.json", r"design\.(json|toml)"

@@ -10,12 +10,12 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from fpsolve.case.case import Case
-from fpsolve.case.reading import Unreadable, Words, read_text
 from fpsolve.files import writable
 from fpsolve.output.proofs import write_proof
 from fpsolve.pool import Pool, serial
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import Claims, claims_from
+from fpsolve.reading import Unreadable, Words, read_text
 from fpsolve.study.prove import Answer, CurveProof, Plan, answer, refuse_unprovable_case
 from fpsolve.workflow.folders import ANEW, PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch

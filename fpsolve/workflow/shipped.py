@@ -1,4 +1,4 @@
-"""The cases that come with fpsolve, to start from: a wheel holds them, a copy of the repository has them beside it."""
+"""Cases to start from: those that come with fpsolve, which a wheel or a copy of the repository holds, and made ones."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fpsolve.case.messages import nearest, shown
 from fpsolve.case.schema import SCHEMA, schema_text
+from fpsolve.case.templates import Modes, case_text
 from fpsolve.errors import FpsolveError
 from fpsolve.files import write_text
 
@@ -56,12 +57,40 @@ def copy_case(name: str, target: Path | None = None) -> Path:
     if mesh := tomllib.loads(text).get("mesh", {}).get("file"):
         beside = path.parent / Path(mesh).name
         copies = {beside: (source.parent / mesh).read_text(encoding="utf-8"), path: text.replace(mesh, beside.name)}
-    for each in copies:
-        if each.exists() or each.is_symlink():
-            raise FpsolveError(f"{each} is there already; write `fpsolve new {source.stem} FILE` with another FILE")
-    schema = path.parent / SCHEMA
-    if not schema.exists():
-        copies[schema] = schema_text()
-    for each, content in copies.items():
-        write_text(each, content)
+    _write_new(copies, path, f"write `fpsolve new {source.stem} FILE` with another FILE")
     return path
+
+
+def write_case(kind: str, modes: Modes, target: Path | None = None) -> Path:
+    """Write a commented case of a kind of system, and beside it the schema.
+
+    Args:
+        kind: one of `TEMPLATES`.
+        modes: its frequencies, damping and wall.
+        target: the new file, or a folder for it; a file called as the kind in the working folder if None.
+
+    Returns:
+        The new file.
+
+    Raises:
+        FpsolveError: there is no such kind, or a file stands there; nothing is written.
+    """
+    text = f"#:schema {SCHEMA}\n{case_text(kind, modes)}"
+    name = f"{kind}.toml"
+    path = Path(name) if target is None else target / name if target.is_dir() else target
+    if path.suffix != ".toml":
+        raise FpsolveError(f"got {path} as the new file; must end in .toml; write, for example, {path}.toml")
+    _write_new({path: text}, path, "name another file")
+    return path
+
+
+def _write_new(contents: dict[Path, str], case: Path, remedy: str) -> None:
+    """Write files that are not there yet, and the schema beside a case. Raises `FpsolveError` where one is there."""
+    for each in contents:
+        if each.exists() or each.is_symlink():
+            raise FpsolveError(f"{each} is there already; {remedy}")
+    schema = case.parent / SCHEMA
+    if not schema.exists():
+        contents = {**contents, schema: schema_text()}
+    for each, content in contents.items():
+        write_text(each, content)

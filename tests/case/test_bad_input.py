@@ -84,7 +84,7 @@ def test_an_override_of_two_lines(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "lines",
     [
-        'title = "Mine"\nwidth = "single column"\nxlim = [-1, 2.5]\nylim = [-1e-3, 1e-3]\nmark = []\ntime_unit = "µs"',
+        'title = "Mine"\nwidth = "single column"\nxlim = [-1, 2.5]\nylim = [-1e-3, 1e-3]\nmark = []',
         'mark = ["lyapunov_exponent", "stability_index"]\nmap = false',
     ],
 )

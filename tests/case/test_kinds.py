@@ -222,7 +222,7 @@ def test_records_of_a_changed_kind_are_others(windy: None, tmp_path: Path, monke
 
 def test_figures_speak_of_the_parameters_of_the_case(tmp_path: Path) -> None:
     """Two kinds may have a parameter of one name."""
-    case = load_case(write(tmp_path, OSCILLATOR, SINE, MOMENTS, '[figure]\ntime_unit = "s"\n'))
+    case = load_case(write(tmp_path, OSCILLATOR, SINE, MOMENTS, '[units]\ntime = "s"\n'))
     quantities = {key: each.quantity for key, each in case.parameters.items()}
     assert case.about("noise.sigma").latex == quantities["noise.sigma"].latex == r"$\sigma$"
     assert "time" not in case.about("noise.amplitude").unit

@@ -31,7 +31,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.discretisation import Discretisation, Polynomials, first_part
 from fpsolve.fem.sphere import SphereCells
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
-from fpsolve.simulation.response import stationary_response
+from fpsolve.simulation.response import simulated_response
 from tests.oracles import kronecker
 
 FREE = np.array([[0, 1, 0, 0], [-1, -0.1, 0, 0], [0, 0, 0, 1], [0, 0, -2.56, -0.16]])
@@ -239,7 +239,7 @@ def test_what_is_refused():
     with pytest.raises(ValueError, match="the same for all terms"):
         LinearSystem([*terms, CoefficientMatrix(0, [[0.0, 1.0], [-1.0, 0.0]])])
     with pytest.raises(FpsolveError, match="the nonlinear response is that of a VibroImpactOscillator"):
-        stationary_response(problem(OU), 0.1, 0.1, paths=32, time=1.0, step=0.1, seed=0)
+        simulated_response(problem(OU), 0.1, 0.1, paths=32, time=1.0, step=0.1, seed=0)
     heavy = NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.2)
     for noise in (Poisson(1.0, (0.1,), (1.0,)), heavy):
         with pytest.raises(ValueError, match="are for two variables only"):

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 import fpsolve
+from fpsolve.cli import main
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.model.quantity import MOMENT
@@ -260,3 +261,19 @@ def test_what_is_no_plain_file_is_refused(runs, tmp_path):
         fpsolve.open_results(tmp_path)
     with pytest.raises(FpsolveError, match='errors is "raise" or "warn", not "ignore"'.replace('"ignore"', "'ignore'")):
         fpsolve.open_results(runs / "alone", errors="ignore")
+
+
+def test_the_unit_of_time_labels_files_and_tables(tmp_path, capsys):
+    """And changes no number."""
+    found = {}
+    for unit, line in {"time": "", "s": '[units]\ntime = "s"\n'}.items():
+        path = tmp_path / f"{unit}.toml"
+        path.write_text(TEXT + line, encoding="utf-8")
+        assert main(["run", str(path), "--out", str(tmp_path), "--set", "output.quantities=['moment']"]) == 0
+        data, told = fpsolve.open_results(tmp_path / unit), capsys.readouterr().out
+        assert data.moment.units == f"1/{unit}"
+        assert ("Λ(p) in 1/s" in told) is (unit == "s")
+        summary = json.loads((tmp_path / unit / "summary.json").read_text(encoding="utf-8"))
+        assert summary["units"] == {"time": unit}
+        found[unit] = data.moment.values.tolist()
+    assert found["s"] == found["time"]

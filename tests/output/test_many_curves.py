@@ -58,7 +58,7 @@ FIGURES = {
     ],
     "small numbers": [intensities(2), "oscillator.epsilon=0.001"],
     "near numbers": ["vary.noise.D0={start=1.0, stop=1.0001, num=12}", over("noise.D0")],
-    "seconds": [intensities(9), "figure.time_unit='s'"],
+    "seconds": [intensities(9), "units.time='s'"],
     "one decade": ["vary.noise.D0={start=0.3, stop=2.9, num=40, scale='log'}", over("noise.D0")],
     "six decades": ["vary.noise.D0={start=1e-5, stop=10.0, num=40, scale='log'}", over("noise.D0")],
 }  # fmt: skip
@@ -132,7 +132,7 @@ def test_many_values_side_by_side_are_numbered(drawn, tmp_path):
 
 
 def test_the_parameters_that_are_held_stand_below_the_title(drawn, tmp_path):
-    drawn_case(tmp_path, [intensities(9), "oscillator.omega=2.0", "figure.time_unit='s'", "figure.title='Mine'"])
+    drawn_case(tmp_path, [intensities(9), "oscillator.omega=2.0", "units.time='s'", "figure.title='Mine'"])
     headings = [drawn[0].texts[0], drawn[0].subfigs[0].texts[0]]
     title, told = (text.get_text() for text in headings)
     assert title.startswith("Mine\nwith vary.noise.D0 = ")

@@ -329,7 +329,7 @@ def simulated():
 
 def test_response_file(tmp_path, simulated):
     write_response(simulated, tmp_path)
-    grid = pyvista.read(tmp_path / "response-2.vti")
+    grid = pyvista.read(tmp_path / "monte_carlo_response-2.vti")
     assert grid.bounds == pytest.approx((0, 3, -2, 2, 0, 0))
     np.testing.assert_array_equal(grid.cell_data["density"].reshape(80, 100).T, simulated.response.density)
     known = {name: values[0] for name, values in grid.field_data.items()}
@@ -345,7 +345,7 @@ def test_a_response_that_does_not_fit_on_the_disk_is_not_left_in_part(tmp_path, 
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
     try:
-        with pytest.raises(OSError, match=r"response-2\.vti"):
+        with pytest.raises(OSError, match=r"monte_carlo_response-2\.vti"):
             write_response(simulated, tmp_path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)

@@ -16,7 +16,7 @@ from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import DAMPING, VibroImpactOscillator
 from fpsolve.simulation.estimators import simulate
-from fpsolve.simulation.response import stationary_response
+from fpsolve.simulation.response import simulated_response
 from fpsolve.simulation.setup import PROGRESS_STEPS
 from tests.conftest import sampled
 
@@ -40,9 +40,7 @@ def moments(*args, estimator="direct", **kwargs):
 
 
 def response(*args, **kwargs):
-    return stationary_response(
-        *args, exponent=0.05, variance_rate=0.01, paths=32, time=50.0, step=0.1, seed=1, **kwargs
-    )
+    return simulated_response(*args, exponent=0.05, variance_rate=0.01, paths=32, time=50.0, step=0.1, seed=1, **kwargs)
 
 
 @pytest.mark.parametrize("estimator", sampled("direct", "population"))

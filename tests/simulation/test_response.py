@@ -11,7 +11,7 @@ from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation import batches
-from fpsolve.simulation.response import stationary_response
+from fpsolve.simulation.response import simulated_response
 from fpsolve.simulation.setup import default_step
 
 NOISE = NonGaussianNoise(D0=0.3, tau0=0.5, r0=0.9).ou_reduction()
@@ -31,7 +31,7 @@ def weak():
     )
     exponent, s_square, _ = averaged(oscillator)
     step = default_step(oscillator, NOISE)
-    return oscillator, stationary_response(
+    return oscillator, simulated_response(
         oscillator, NOISE, exponent, s_square, paths=1024, time=100.0, step=step, seed=1
     )
 
@@ -84,7 +84,7 @@ def test_seed_decides_whatever_the_threads(weak, monkeypatch):
     arguments, found = (oscillator, NOISE, 0.05, 0.01), []
     for threads, seed in ((1, 1), (2, 1), (2, 2)):
         monkeypatch.setattr(batches, "processors", lambda threads=threads: threads)
-        found.append(stationary_response(*arguments, paths=32, time=50.0, step=0.1, seed=seed))
+        found.append(simulated_response(*arguments, paths=32, time=50.0, step=0.1, seed=seed))
     first, again, other = found
     assert first.means == again.means != other.means
     np.testing.assert_array_equal(first.density, again.density)

@@ -139,7 +139,14 @@ def test_each_curve_has_its_file_and_stale_ones_go(case, out):
 def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out, capsys, fails):
     """Nor of a run, whose figure may have its dots."""
     (out / "quick").mkdir(parents=True)
-    earlier = {"monte_carlo.json", "monte_carlo-2.json", "response.png", "summary.json", "figure.png", "density.vtu"}
+    earlier = {
+        "monte_carlo.json",
+        "monte_carlo-2.json",
+        "monte_carlo_response.png",
+        "summary.json",
+        "figure.png",
+        "density.vtu",
+    }
     for name in (*earlier, "notes.txt"):
         (out / "quick" / name).write_text("{}", encoding="utf-8")
     fails(1)
@@ -155,17 +162,23 @@ def test_the_nonlinear_response_is_written(case, out):
     ]
     assert simulate(case, "--out", out, *nonlinear) == 0
     folder = out / "quick"
-    written = {"monte_carlo.json", "response.csv", "response.vti", "response.png", "response.pdf"}
+    written = {
+        "monte_carlo.json",
+        "monte_carlo_response.csv",
+        "monte_carlo_response.vti",
+        "monte_carlo_response.png",
+        "monte_carlo_response.pdf",
+    }
     assert names(folder) == written
     response = read(folder / "monte_carlo.json")["response"]
     assert response["means"].keys() == {"x", "x_squared", "v_squared", "amplitude", "energy"}
-    with (folder / "response.csv").open(encoding="utf-8") as file:
+    with (folder / "monte_carlo_response.csv").open(encoding="utf-8") as file:
         rows = np.array([[float(cell) for cell in row.values()] for row in csv.DictReader(file)])
     width, density = rows[:, 1] - rows[:, 0], rows[:, 2]
     assert np.sum(width * density) == pytest.approx(1, abs=1e-3)
     middle = (rows[:, 0] + rows[:, 1]) / 2
     assert np.sum(width * density * middle) == pytest.approx(response["means"]["amplitude"]["value"], rel=1e-2)
-    grid = pyvista.read(folder / "response.vti")
+    grid = pyvista.read(folder / "monte_carlo_response.vti")
     spacing = grid.spacing
     assert np.sum(grid.cell_data["density"]) * spacing[0] * spacing[1] == pytest.approx(1, abs=1e-3)
     x = grid.cell_centers().points[:, 0]
@@ -236,7 +249,7 @@ def test_an_interrupted_simulation_of_a_run_says_how_to_go_on(case, out, capsys,
 
 
 def test_an_interrupt_before_the_response_ends_the_simulation(case, out, capsys, monkeypatch):
-    monkeypatch.setattr(response, "stationary_response", MagicMock(side_effect=KeyboardInterrupt))
+    monkeypatch.setattr(response, "simulated_response", MagicMock(side_effect=KeyboardInterrupt))
     assert simulate(case, "--out", out, "--set=oscillator.c2=0.5", "--set=oscillator.c1=0.8", *TWO) == 130
     assert names(out / "quick") == {"monte_carlo.json"}
     found = read(out / "quick/monte_carlo.json")

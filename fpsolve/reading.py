@@ -1,4 +1,4 @@
-"""The text of a file that somebody wrote, or one sentence on why it is none."""
+"""The bytes or the text of a file that somebody wrote, or one sentence on why it has none."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fpsolve.files import LARGEST
 
 
 class Unreadable(Exception):
-    """A file that is no text: a sentence on why, and what to do; the line, where that is in the file."""
+    """A file that is not what it should be: a sentence on why, and what to do; the line, where that is in the file."""
 
     def __init__(self, sentence: str, line: int | None = None) -> None:
         super().__init__(sentence)
@@ -29,8 +29,8 @@ class Words(NamedTuple):
     may_have_mark: bool = False
 
 
-def read_text(path: Path, words: Words) -> str:
-    """The text of a file in UTF-8, without a byte order mark where it may have one. Raises Unreadable."""
+def read_bytes(path: Path, words: Words) -> bytes:
+    """What a plain file of a reasonable size holds. Raises Unreadable."""
     try:
         about = path.stat()
         mode = about.st_mode
@@ -41,12 +41,17 @@ def read_text(path: Path, words: Words) -> str:
         if about.st_size > LARGEST:
             said = f"has {about.st_size} bytes, and {words.kind} has at most {LARGEST}"
             raise Unreadable(f"{said}; name another, such as {words.example}")
-        content = path.read_bytes()
+        return path.read_bytes()
     except FileNotFoundError:
         raise Unreadable(f"no such file; look in {path.parent.resolve()} or give the full path") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise Unreadable(f"cannot be read ({reason}); check its name and permissions") from None
+
+
+def read_text(path: Path, words: Words) -> str:
+    """The text of a file in UTF-8, without a byte order mark where it may have one. Raises Unreadable."""
+    content = read_bytes(path, words)
     if content.startswith(BOM_UTF8) and not words.may_have_mark:
         raise Unreadable('starts with a byte order mark; save it as "UTF-8", not "UTF-8 with BOM"', 1)
     content = content.removeprefix(BOM_UTF8)

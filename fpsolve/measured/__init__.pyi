@@ -1,0 +1,15 @@
+from .fit import NoiseFit as NoiseFit
+from .fit import fit_noise as fit_noise
+from .moments import non_gaussian_from_record as non_gaussian_from_record
+from .reading import read_modes as read_modes
+from .reading import read_record as read_record
+from .reading import read_spectrum as read_spectrum
+from .spectrum import Record as Record
+from .spectrum import Spectrum as Spectrum
+from .stability import Verdict as Verdict
+from .stability import verdict as verdict
+from .units import of_relative_stiffness as of_relative_stiffness
+from .units import of_stability_height as of_stability_height
+from .units import of_support_acceleration as of_support_acceleration
+from .weak import weak_exponent as weak_exponent
+from .weak import weak_moment as weak_moment

@@ -1,0 +1,400 @@
+"""Columns of numbers with names and units, from the files of measuring systems and of programs.
+
+A column of an array of NumPy or MATLAB with several columns is called by its number, "2", or "name 2".
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+import struct
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import FpsolveError
+from fpsolve.measured.matlab import MatError, read_mat
+from fpsolve.reading import Unreadable, Words, read_bytes, read_text
+
+MOST_NUMBERS = 2**26
+"""Of an array that is read."""
+MOST_COLUMNS = 64
+WORDS = Words("the measurement", "a file of numbers", "spectrum.csv", "comma-separated", "export the data again", True)
+NO_TEXT_TABLE = "has no table of numbers"
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """Numbers with a unit; an empty text where it is not stated."""
+
+    values: FloatArray
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """What a file holds.
+
+    Attributes:
+        path: where it is from.
+        columns: by their names, in the order of the file.
+        rate: values per second, where the file states it.
+        abscissa: the name of the column that the others are over, where the file states it.
+        kind: "record" or "spectrum", where the file states it.
+    """
+
+    path: Path
+    columns: Mapping[str, Column]
+    rate: float | None = None
+    abscissa: str = ""
+    kind: str = ""
+
+
+def read_table(path: str | Path) -> Table:
+    """The columns of a file by its ending.
+
+    Args:
+        path: .csv, .txt, .dat, .tsv: text; .npy, .npz: NumPy; .mat: MATLAB; .wav: sound; .uff, .unv, .uf: universal
+            files, which need pyuff; .nc: netCDF, as xarray writes it.
+
+    Raises:
+        FpsolveError: the file is none of these, or broken: one sentence.
+    """
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    try:
+        if reader is None:
+            known = ", ".join(READERS)
+            raise Unreadable(f'has the unknown ending "{path.suffix}"; must be one of {known}; export it as .csv')
+        table = reader(path)
+        if not table.columns:
+            raise Unreadable(f"{NO_TEXT_TABLE}; export columns of numbers")
+        return table
+    except Unreadable as error:
+        place = path if error.line is None else f"{path}:{error.line}"
+        raise FpsolveError(f"{place}: {error.sentence}") from None
+
+
+def _looked_at(shape: tuple[int, ...], name: str, itemsize: int = 8, size: float = math.inf) -> None:
+    """Refuse what is too large, or states more numbers than its file can hold. Raises Unreadable."""
+    count = math.prod(shape)
+    if count > MOST_NUMBERS:
+        raise Unreadable(f"{name} has {count} numbers, and at most {MOST_NUMBERS} are read; cut the measurement")
+    if count * itemsize > size:
+        raise Unreadable(f"states {count} numbers in {name}, more than the file holds; copy or export it again")
+
+
+def _split(name: str, array: Any, unit: str = "") -> Iterator[tuple[str, Column]]:
+    """The columns of an array of real numbers; those of a table by their numbers."""
+    found = np.asarray(array)
+    if found.dtype.kind == "c":
+        raise Unreadable(f"{name} has complex numbers; export real ones, such as a power spectral density")
+    if found.dtype.kind not in "iufb":
+        raise Unreadable(f"{name} has no numbers; export numbers")
+    with np.errstate(invalid="ignore"):  # what is no number is said of its row later
+        found = np.squeeze(found).astype(float)
+    if found.ndim == 0:
+        return
+    if found.ndim == 1:
+        yield name or "1", Column(found, unit)
+        return
+    if found.ndim > 2:
+        raise Unreadable(f"{name} has {found.ndim} dimensions; export one or two, a column for each quantity")
+    if found.shape[1] > MOST_COLUMNS and found.shape[0] <= MOST_COLUMNS:
+        found = found.T
+    if found.shape[1] > MOST_COLUMNS:
+        raise Unreadable(f"{name} has {found.shape[1]} columns; export at most {MOST_COLUMNS}")
+    for i, values in enumerate(found.T):
+        yield f"{name} {i + 1}".strip(), Column(values, unit)
+
+
+_HEADING = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
+
+
+def _heading(text: str) -> tuple[str, str]:
+    """The name and the unit of a column: "a (m/s²)" or "a [m/s²]"."""
+    found = _HEADING.fullmatch(text.strip())
+    if found is None or not found["name"]:
+        return text.strip(), ""
+    return found["name"], (found["square"] or found["round"] or "").strip()
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _of_text(path: Path) -> Table:
+    """A header, then a row for each line; cells separated by commas, semicolons, tabs or spaces; # begins a remark."""
+    lines = read_text(path, WORDS).splitlines()
+    rows = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
+    if len(rows) < 2:
+        raise Unreadable(f"{NO_TEXT_TABLE}; it needs a header and a row for each frequency or time")
+    _, second = rows[1]
+    separator = next((each for each in ("\t", ";", ",") if each in second), None)
+
+    def cells(line: str) -> list[str]:
+        if separator is None:
+            return line.split()
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+
+    try:
+        split = [(i, cells(line)) for i, line in rows]
+    except csv.Error as error:
+        raise Unreadable(f"is no table ({error}); export it again") from None
+    first = split[0][1]
+    has_header = not all(map(_is_number, first))
+    headings = [_heading(each) for each in first] if has_header else [(str(i + 1), "") for i in range(len(first))]
+    names = [name for name, _ in headings]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise Unreadable(f'has two columns called "{twice}"; rename one', split[0][0])
+    if len(names) > MOST_COLUMNS:
+        raise Unreadable(f"has {len(names)} columns; export at most {MOST_COLUMNS}", split[0][0])
+    body = split[has_header:]
+    values = np.empty((len(body), len(names)))
+    for row, (line, entries) in enumerate(body):
+        if len(entries) != len(names):
+            text = f"has {len(entries)} cells, and the header has {len(names)}; complete the row, or remove it"
+            raise Unreadable(text, line)
+        for column, cell in enumerate(entries):
+            try:
+                values[row, column] = float(cell)
+            except ValueError:
+                remedy = (
+                    "write decimal points" if _DECIMAL_COMMA.fullmatch(cell) else "write a number or remove the row"
+                )
+                told = f'"{cell}"' if cell else "nothing"
+                raise Unreadable(f"has {told} in the column {names[column]}; {remedy}", line) from None
+    return Table(path, {name: Column(values[:, i], unit) for i, (name, unit) in enumerate(headings)})
+
+
+def _of_npy(path: Path) -> Table:
+    content = read_bytes(path, WORDS)
+    return Table(path, dict(_of_array("", _npy(content, path.name))))
+
+
+def _of_array(name: str, array: Any) -> Iterator[tuple[str, Column]]:
+    """The columns of an array, by the names of its fields where it has such."""
+    if array.dtype.names is None:
+        yield from _split(name, array)
+        return
+    for each in array.dtype.names:
+        yield from _split(each, array[each])
+
+
+def _npy(content: bytes, name: str) -> Any:
+    """An array in the format of NumPy without Python objects, whose size is looked at first."""
+    file = io.BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(file)
+        read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+        if version in read:
+            shape, _, dtype = read[version](file)
+            if dtype.hasobject:
+                raise Unreadable(f"{name} holds Python objects, which are not loaded; save an array of numbers")
+            _looked_at(shape, name, dtype.itemsize, len(content))
+        file.seek(0)
+        return np.load(file, allow_pickle=False)
+    except Unreadable:
+        raise
+    except Exception as error:  # what reads the header raises many kinds for what is none
+        raise Unreadable(f"is no file of NumPy ({_reason(error)}); save it with numpy.save or numpy.savez") from None
+
+
+def _of_npz(path: Path) -> Table:
+    content = read_bytes(path, WORDS)
+    columns = dict[str, Column]()
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            for entry in archive.infolist():
+                name = entry.filename.removesuffix(".npy")
+                _looked_at((entry.file_size // 8,), name)
+                columns |= _of_array(name, _npy(archive.read(entry), name))
+    except (
+        zipfile.BadZipFile,
+        OSError,
+        ValueError,
+        NotImplementedError,
+        RuntimeError,
+        EOFError,
+        struct.error,
+    ) as error:
+        raise Unreadable(f"is no file of NumPy ({_reason(error)}); save it with numpy.savez") from None
+    return Table(path, columns)
+
+
+def _of_mat(path: Path) -> Table:
+    content = read_bytes(path, WORDS)
+    if content[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in content[:128]:
+        raise Unreadable('is a MATLAB 7.3 file, which is HDF5; save it by save(..., "-v7")')
+    columns = dict[str, Column]()
+    try:
+        for name, array in read_mat(content, MOST_NUMBERS):
+            columns |= _split(name, array)
+    except MatError as error:
+        raise Unreadable(f'is no MATLAB file ({_reason(error)}); save it by save(..., "-v7")') from None
+    if not columns:
+        raise Unreadable("has no arrays of real numbers at its top level; save vectors, not structs or cells")
+    return Table(path, columns)
+
+
+def _of_wav(path: Path) -> Table:
+    """Channels as shares of full scale."""
+    import warnings
+
+    from scipy.io import wavfile
+
+    content = read_bytes(path, WORDS)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", wavfile.WavFileWarning)
+            rate, data = wavfile.read(io.BytesIO(content))
+    except Exception as error:  # scipy raises many kinds for what is no such file
+        raise Unreadable(f"is no WAV file ({_reason(error)}); export it again as PCM") from None
+    if not rate > 0:
+        raise Unreadable("states a rate of 0; export it again")
+    if data.dtype.kind in "iu":
+        limits = np.iinfo(data.dtype)
+        half = 0.5 * (float(limits.max) - float(limits.min) + 1)
+        data = (data.astype(float) - (half if data.dtype.kind == "u" else 0.0)) / half
+    return Table(path, dict(_split("" if data.ndim == 1 else "channel", data)), rate=float(rate), kind="record")
+
+
+UFF_KINDS = {1: "record", 9: "spectrum"}
+"""What the functions of dataset 58 are: time response, power spectral density."""
+
+
+def _of_uff(path: Path) -> Table:
+    read_bytes(path, WORDS)
+    try:
+        import pyuff
+    except ImportError:
+        raise Unreadable("is a universal file, which needs pyuff: pip install 'fpsolve[measured]'") from None
+    try:
+        found = pyuff.UFF(str(path))
+        sets = [found.read_sets(i) for i, number in enumerate(found.get_set_types()) if int(number) == 58]
+        used = [each for each in sets if each["func_type"] in UFF_KINDS]
+        columns, kinds, axes = dict[str, Column](), list[str](), list[FloatArray]()
+        for i, each in enumerate(used):
+            x, y = np.asarray(each["x"], dtype=float), np.asarray(each["data"])
+            if np.iscomplexobj(y):
+                y = y.real if not np.any(y.imag) else y
+            unit = str(each.get("ordinate_axis_units_lab", "")).strip()
+            if unit.upper() == "NONE":
+                unit = ""
+            elif each["func_type"] == 9 and unit and "hz" not in unit.lower():  # that of the signal
+                unit = f"({unit})^2/Hz"
+            [(_, column)] = _split(str(i + 1), y, unit)
+            if x.shape != column.values.shape:
+                raise Unreadable(
+                    f"has {x.size} abscissae and {column.values.size} values in set {i + 1}; export it again"
+                )
+            title = str(each.get("id1", "")).strip()
+            name = title if title and title.upper() != "NONE" and title not in columns else f"set {i + 1}"
+            columns[name] = column
+            axes.append(x)
+            kinds.append(UFF_KINDS[each["func_type"]])
+    except Unreadable:
+        raise
+    except Exception as error:  # pyuff raises many kinds for what is no such file
+        raise Unreadable(f"is no universal file ({_reason(error)}); export datasets 58 again") from None
+    if not columns:
+        raise Unreadable("has no time response and no power spectral density (datasets 58 of function type 1 or 9)")
+    if len(set(kinds)) > 1 or any(not np.array_equal(axes[0], each) for each in axes):
+        raise Unreadable("has functions over several abscissae; export those of one kind and one abscissa")
+    is_record = kinds[0] == "record"
+    abscissa = "time" if is_record else "frequency"
+    return Table(
+        path,
+        {abscissa: Column(axes[0], "s" if is_record else "Hz"), **columns},
+        abscissa=abscissa,
+        kind=kinds[0],
+    )
+
+
+def _of_netcdf(path: Path) -> Table:
+    import xarray as xr
+
+    content = read_bytes(path, WORDS)
+    try:
+        if content[:8] == b"\x89HDF\r\n\x1a\n":
+            _look_into_hdf(content)
+            engine: Any = "h5netcdf"
+        else:
+            engine = "scipy"
+        options: dict[str, Any] = {"decode_times": False, "decode_timedelta": False}
+        with xr.open_dataset(io.BytesIO(content), engine=engine, **options) as found:
+            found = found.squeeze(drop=True)
+            wide = [str(name) for name, each in found.data_vars.items() if each.ndim > 1]
+            vectors = {str(name): each for name, each in found.variables.items() if each.ndim == 1}
+            numbers = {name: each for name, each in vectors.items() if each.dtype.kind in "iuf"}
+            sizes = {each.dims[0] for each in numbers.values()}
+            if not numbers:
+                raise Unreadable(f"has no variable of one dimension{_such_as(wide)}; select one, such as one time")
+            if len(sizes) > 1:
+                names = ", ".join(sorted(map(str, sizes)))
+                raise Unreadable(f"has variables over several dimensions ({names}); keep those over one of them")
+            columns = {
+                name: Column(np.asarray(each.values, dtype=float), str(each.attrs.get("units", "")))
+                for name, each in numbers.items()
+            }
+            [dimension] = sizes
+            return Table(path, columns, abscissa=str(dimension) if dimension in columns else "")
+    except Unreadable:
+        raise
+    except Exception as error:  # each engine raises its own kinds for what is no such file
+        raise Unreadable(f"is no netCDF file ({_reason(error)}); write it by xarray's to_netcdf") from None
+
+
+def _look_into_hdf(content: bytes) -> None:
+    """Refuse variables elsewhere, and those that are too large. Raises Unreadable."""
+    import h5py
+
+    with h5py.File(io.BytesIO(content), "r") as file:
+        for name in file:
+            link = file.get(name, getlink=True)
+            each = file.get(name) if isinstance(link, h5py.HardLink) else None
+            if each is None or (isinstance(each, h5py.Dataset) and (each.is_virtual or each.external)):
+                raise Unreadable(f"{name} leads to another file; write one file by xarray's to_netcdf")
+            if isinstance(each, h5py.Dataset):
+                _looked_at(each.shape or (), name)
+
+
+def _such_as(names: list[str]) -> str:
+    return f" but {names[0]}, which has more" if names else ""
+
+
+def _reason(error: BaseException) -> str:
+    """What a library says, in one line of a readable length."""
+    said = str(error)
+    text = " ".join(said.split()) or type(error).__name__
+    return text if len(text) <= 100 else f"{text[:97]}..."
+
+
+READERS: Mapping[str, Callable[[Path], Table]] = {
+    ".csv": _of_text,
+    ".txt": _of_text,
+    ".dat": _of_text,
+    ".tsv": _of_text,
+    ".npy": _of_npy,
+    ".npz": _of_npz,
+    ".mat": _of_mat,
+    ".wav": _of_wav,
+    ".uff": _of_uff,
+    ".unv": _of_uff,
+    ".uf": _of_uff,
+    ".nc": _of_netcdf,
+}
+"""By the endings of files."""

@@ -1,0 +1,2 @@
+from .response import StationaryResponse as StationaryResponse
+from .response import stationary_response as stationary_response

@@ -1,0 +1,169 @@
+"""Reading a measurement, fitting a noise to it, and writing what became of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from fpsolve.case.case import Case
+from fpsolve.case.templates import Modes, modes_of
+from fpsolve.errors import FpsolveError
+from fpsolve.fem.factors import one_thread
+from fpsolve.files import alone, writable
+from fpsolve.measured import Record, Spectrum, read_modes, read_record, read_spectrum
+from fpsolve.measured.reading import Per, Sided
+from fpsolve.measured.signals import SIGNALS
+from fpsolve.measured.spectrum import UNITS
+from fpsolve.measured.units import GRAVITY
+from fpsolve.measured.weak import Where
+from fpsolve.output.noises import Convention, write_noise
+from fpsolve.study.noise import CLOSE, NoiseOutcome, Wanted, measure, natural_frequencies, refuse_wrong_case
+
+
+def noise_case(
+    data: Spectrum | Record, wanted: Wanted, source: Path, shown: Convention, out: Path
+) -> tuple[NoiseOutcome, Path, list[str]]:
+    """Fit a noise, and write it with a figure into a folder called as the file of the measurement.
+
+    Returns:
+        What became of it, the folder, and the names of the files.
+
+    Raises:
+        FpsolveError: there is no fit; nothing is written.
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+    """
+    folder = out / source.stem
+    try:
+        with one_thread():  # the arrays are small
+            outcome = measure(data, wanted)
+    except FpsolveError as error:
+        raise FpsolveError(f"{source}: {error}") from None
+    with alone(folder), writable(folder):
+        names = write_noise(outcome, source, shown, folder)
+    return outcome, folder, names
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What a user says of a measurement, by the options of `fpsolve noise`."""
+
+    spectrum: Path | None = None
+    record: Path | None = None
+    per: Per | None = None
+    sided: Sided | None = None
+    frequency: tuple[float, ...] = ()
+    damping_ratio: float | None = None
+    restitution: float | None = None
+    case: Case | None = None
+    modes: Path | None = None
+    mode: tuple[int, ...] = ()
+    noise_in: Where | None = None
+    of: str | None = None
+    length: float | None = None
+    gm: float | None = None
+    kind: str = "ornstein-uhlenbeck"
+    terms: int = 1
+    method: Literal["spectrum", "whittle"] = "spectrum"
+    column: str | None = None
+    rate: float | None = None
+    averages: float | None = None
+
+
+def measurement_of(stated: Statement) -> tuple[Spectrum | Record, Wanted, Path]:
+    """What was measured, in the unit of its signal, what is to be fitted, and the file.
+
+    Raises:
+        FpsolveError: the options contradict each other, or a file cannot be read.
+    """
+    of = stated.of or stated.noise_in or "stiffness"
+    place = SIGNALS[of].noise_in
+    if stated.noise_in not in (None, place):
+        raise FpsolveError(f"got --of {of} and --noise-in {stated.noise_in}; {of} is in the {place}; leave one out")
+    source = stated.spectrum or stated.record
+    if source is None:
+        raise FpsolveError("name a file: that of a spectrum, or of a record by --record")
+    modes = _modes(stated, of)
+    if stated.case:
+        refuse_wrong_case(stated.case, of, stated.terms)
+    if (of == "height") != (stated.gm is not None):
+        remedy = "leave it out" if stated.gm is not None else "state the mean metacentric height in m by --gm"
+        raise FpsolveError(f"--gm belongs to --of height; {remedy}")
+    if stated.gm is not None and not 0 < stated.gm < math.inf:
+        raise FpsolveError(f"got --gm {stated.gm}; must be > 0, in m")
+    wanted = Wanted(of, stated.kind, stated.terms, stated.method, modes, stated.gm, stated.case)
+    record = read_record(stated.record, rate=stated.rate, of=of, column=stated.column) if stated.record else None
+    if stated.spectrum is None and record is not None:
+        left_out = [name for name in ("per", "sided", "averages") if getattr(stated, name) is not None]
+        if stated.averages is not None or stated.sided is not None:
+            raise FpsolveError(f"--{left_out[-1]} is for a spectrum, and a record was named; leave it out")
+        return record, wanted, source
+    data = read_spectrum(
+        stated.spectrum or source,
+        per=stated.per,
+        sided=stated.sided,
+        of=of,
+        column=stated.column if record is None else None,
+        averages=stated.averages,
+        variance=None if record is None else float(np.var(record.values)),
+    )
+    return data, wanted, source
+
+
+def _modes(stated: Statement, of: str) -> Modes:
+    """The natural frequencies and the damping by the one option that states them."""
+    restitution, zeta = stated.restitution, stated.damping_ratio
+    if stated.mode and stated.modes is None:
+        raise FpsolveError("--mode is for the table that --modes names; name one, or leave it out")
+    if stated.case and (zeta is not None or restitution is not None or stated.modes is not None):
+        raise FpsolveError("--case states the system; leave out --damping-ratio, --restitution and --modes")
+    if stated.restitution is not None and zeta is None and stated.modes is None:
+        raise FpsolveError("--restitution needs the damping of the oscillator, too; state --damping-ratio")
+    hertz = UNITS[stated.per or "Hz"] / (2 * math.pi)
+    found = dict[str, tuple[float, ...]]()
+    if stated.frequency:
+        found["--frequency"] = tuple(each * hertz for each in stated.frequency)
+    if stated.length is not None:
+        if of != "acceleration" or not 0 < stated.length < math.inf:
+            raise FpsolveError(f"got --length {stated.length}; must be > 0, in m, and is for --of acceleration")
+        found["--length"] = (math.sqrt(GRAVITY / stated.length) / (2 * math.pi),)
+    if stated.case:
+        found["--case"] = tuple(each / (2 * math.pi) for each in natural_frequencies(stated.case.system)[:2])
+        if not found["--case"]:
+            raise FpsolveError(
+                f"{stated.case.path}: does not oscillate without noise, so that no frequency matters most"
+            )
+    table = modes_from(stated.modes, stated.mode, restitution) if stated.modes else None
+    if table is not None:
+        found["--modes"] = tuple(each / (2 * math.pi) for each in table.omega)
+    if not found:
+        raise FpsolveError("state the natural frequency by --frequency, or a system by --case or --modes")
+    (first, frequencies), *others = found.items()
+    for name, other in others:
+        if len(other) != len(frequencies) or not np.allclose(np.sort(other), np.sort(frequencies), rtol=CLOSE):
+            told = " and ".join(f"{key} {', '.join(f'{f:.4g} Hz' for f in each)}" for key, each in found.items())
+            raise FpsolveError(f"got {told}; leave out one of {first} and {name}")
+    known = zeta if zeta is not None else table.zeta[0] if table is not None else math.nan
+    checked = modes_of(frequencies, [] if math.isnan(known) else [known], restitution)
+    return replace(checked, zeta=(known,) * len(frequencies))
+
+
+def modes_from(path: Path, numbers: Sequence[int], restitution: float | None) -> Modes:
+    """One or two modes of a table, by their rows from 1 on; all if none are stated. Unknown damping is NaN.
+
+    Raises:
+        FpsolveError: the file is none, there are more than two modes, or a number is none of a row.
+    """
+    found = read_modes(path)
+    for number in numbers:
+        if not 1 <= number <= len(found):
+            raise FpsolveError(f"{path}: got --mode {number}; must be from 1 to {len(found)}, the number of its row")
+    chosen = [found[number - 1] for number in numbers] if numbers else found
+    if len(chosen) > 2:
+        raise FpsolveError(f"{path}: has {len(chosen)} modes; choose one or two by --mode, such as --mode 1 --mode 2")
+    omega = tuple(2 * math.pi * each.frequency for each in chosen)
+    return Modes(omega, tuple(each.damping_ratio for each in chosen), restitution)

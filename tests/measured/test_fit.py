@@ -1,0 +1,199 @@
+"""Fits of known noises, what they mean for stability, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+
+from fpsolve.measured import (
+    Record,
+    Spectrum,
+    fit_noise,
+    non_gaussian_from_record,
+    of_relative_stiffness,
+    of_stability_height,
+    of_support_acceleration,
+    verdict,
+    weak_exponent,
+    weak_moment,
+)
+from fpsolve.measured.kinds import KINDS
+from fpsolve.model import NonGaussianNoise, OrnsteinUhlenbeck, ParametricOscillator, Problem
+from tests.random_fits import NOISES, coverage, fitted, record_of, spectrum_of
+
+OMEGA = np.linspace(0.05, 20, 200)
+
+
+def exact(noise, omega=OMEGA):
+    return np.array([noise.spectral_density(each) for each in omega])
+
+
+@pytest.mark.parametrize("noise", NOISES, ids=lambda noise: f"{noise.kind}")
+def test_a_fit_of_an_exact_spectrum_is_the_noise(noise):
+    fit = fitted(Spectrum(OMEGA, exact(noise), np.full(OMEGA.size, 0.1)), noise.kind)
+    for name, value in fit.parameters.items():
+        assert value == pytest.approx(noise.values[name], rel=1e-3), name
+    assert fit.spectral_density(4.0) == pytest.approx(noise.spectral_density(4.0), rel=1e-4)
+
+
+def test_the_kinds_have_the_covariance_and_density_of_the_noises():
+    """C(0) is the variance, and 2∫ C cos ωt dt over t > 0 the density."""
+    t = np.linspace(0, 200, 200_001)
+    for families in KINDS.values():
+        for family in families:
+            theta = np.array([1.3, 0.4, 0.7, 0.8][: len(family.names)])
+            noise, c = family.make(*theta.tolist()), family.covariance(t, theta)
+            assert c[0] == pytest.approx(noise.standard_deviation**2)
+            for omega in (0.3, 2.0):
+                assert family.density(np.array([omega]), theta)[0] == pytest.approx(noise.spectral_density(omega))
+                transform = 2 * trapezoid(c * np.cos(omega * t), t)
+                assert transform == pytest.approx(noise.spectral_density(omega), rel=1e-4)
+
+
+def test_standard_errors_of_spectra():
+    """25 seeds: 95 % within 1.96 errors; fewer than 19 has a probability below 1e-3."""
+    shares, others, _ = coverage(
+        NOISES[0],
+        lambda noise, rng: spectrum_of(noise, rng, omega=OMEGA),
+        lambda data: fitted(data, NOISES[0].kind),
+        25,
+    )
+    assert others == 0
+    assert np.all(shares >= 19 / 25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [{}, {"method": "whittle"}], ids=["welch", "whittle"])
+def test_standard_errors_of_records(options):
+    noise = NOISES[0]
+    shares, others, _ = coverage(
+        noise, lambda n, rng: record_of(n, rng, 8000), lambda data: fitted(data, noise.kind, **options), 25
+    )
+    assert others == 0
+    assert np.all(shares >= 19 / 25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("r0", [0.7, 0.95])
+def test_noise_of_eq_7_from_a_record(r0):
+    noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=r0)
+    fit = non_gaussian_from_record(record_of(noise, np.random.default_rng(0), 40_000, 0.04))
+    for name, value in fit.parameters.items():
+        assert abs(value - noise.values[name]) < 4 * fit.errors[name], name
+
+
+@pytest.mark.parametrize(
+    ("options", "factor"),
+    [(("Hz", "one"), 2), (("Hz", "two"), 1), (("rad/s", "one"), 1 / math.pi), (("rad/s", "two"), 0.5 / math.pi)],
+)
+def test_sides_and_units(options, factor):
+    noise = NOISES[0]
+    f = OMEGA / (2 * math.pi) if options[0] == "Hz" else OMEGA
+    spectrum = Spectrum.from_columns(f, factor * exact(noise), *options, averages=16)
+    assert spectrum.density == pytest.approx(exact(noise))
+    assert spectrum.relative_error == pytest.approx(0.25)
+
+
+def test_wrong_sides_are_told_by_the_variance():
+    omega = np.linspace(0.001, 400, 100_000)
+    density, variance = exact(NOISES[0], omega), NOISES[0].standard_deviation ** 2
+    assert Spectrum(omega, density, variance=variance).covered_variance == pytest.approx(variance, rel=1e-2)
+    with pytest.raises(ValueError, match=r"some 2 times as much; state another sided"):
+        Spectrum(omega, 2 * density, variance=variance)
+    with pytest.raises(ValueError, match=r"state another per"):
+        Spectrum(omega, 2 * math.pi * density, variance=variance)
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "density", "said"),
+    [
+        (OMEGA, -exact(NOISES[0]), r"row 1 is -.*must be > 0"),
+        (OMEGA[::-1], exact(NOISES[0]), "sort the rows"),
+        (OMEGA[:3], exact(NOISES[0])[:3], "at least 5"),
+        (OMEGA, exact(NOISES[0])[:-1], "one for each"),
+        (OMEGA, np.where(OMEGA > 3, np.nan, 1.0), "value nan at row"),
+    ],
+)
+def test_broken_spectra_are_refused(frequencies, density, said):
+    with pytest.raises(ValueError, match=said):
+        Spectrum(frequencies, density)
+
+
+def test_nothing_near_what_matters_is_refused():
+    spectrum = Spectrum(OMEGA, exact(NOISES[0]))
+    with pytest.raises(ValueError, match="nothing was measured near 2ω = 100"):
+        fit_noise(spectrum, frequency=50.0)
+    gap = (OMEGA < 3) | (OMEGA > 5)
+    with pytest.raises(ValueError, match="nothing was measured near 2ω = 4"):
+        fit_noise(Spectrum(OMEGA[gap], exact(NOISES[0])[gap]), frequency=2.0)
+    with pytest.raises(ValueError, match="nothing was measured near 0"):
+        fit_noise(Spectrum(OMEGA[20:], exact(NOISES[0])[20:]), frequency=2.0, noise_in="damping")
+    fit = fit_noise(Spectrum(OMEGA[gap], exact(NOISES[0])[gap]), frequency=1.0)
+    assert any("from" in str(each) and "nothing was measured" in str(each) for each in fit.messages)
+
+
+def test_units_of_signals():
+    """ω²ξ = a/ℓ for a pendulum, ω² = g/ℓ."""
+    assert of_relative_stiffness(3.0) * of_support_acceleration() == pytest.approx(9.0 / 9.80665)
+    assert of_stability_height(0.5) == 2.0
+    with pytest.raises(ValueError, match="omega = -1"):
+        of_relative_stiffness(-1)
+
+
+def test_a_fit_scales_with_the_signal():
+    spectrum = Spectrum(OMEGA, exact(NOISES[1]), np.full(OMEGA.size, 0.1))
+    fit, other = fitted(spectrum, "filter").scaled(4.0), fitted(spectrum.scaled(4.0), "filter")
+    assert fit.parameters == pytest.approx(other.parameters, rel=1e-3)
+    assert fit.noise.spectral_density(4.0) == pytest.approx(16 * NOISES[1].spectral_density(4.0), rel=1e-3)
+    assert fit.errors == pytest.approx(other.errors, rel=1e-2)
+
+
+def test_verdict_has_the_weak_noise_limit():
+    """With S known up to a share e at 2ω, Λ(2) = −2ζω + ω²S/2 has the error ω²S e/2."""
+    omega, zeta = 2.0, 0.01
+    noise = OrnsteinUhlenbeck(alpha=1.5, sigma=0.05)
+    fit = fitted(Spectrum(OMEGA, exact(noise), np.full(OMEGA.size, 0.25)), noise.kind).scaled(
+        of_relative_stiffness(omega)
+    )
+    found = verdict(Problem(ParametricOscillator(stiffness=omega**2, damping=zeta * omega), fit.noise), fit)
+    at_double = noise.spectral_density(2 * omega)
+    assert found.exponent.value == pytest.approx(weak_exponent(omega, zeta, at_double, "stiffness"), abs=1e-5)
+    assert found.moment.value == pytest.approx(weak_moment(2, omega, zeta, at_double, 0, "stiffness"), abs=1e-5)
+    alpha, sigma = fit.parameters.values()
+    slope = np.array([-2 * alpha / (alpha**2 + 16), 2 / sigma])
+    share = math.sqrt(slope @ fit.covariance @ slope)
+    assert found.moment.deviation == pytest.approx(omega**2 * at_double / 2 * share, rel=0.02)
+    assert found.moment.below > 0.99
+
+
+@pytest.mark.slow
+def test_von_karman_by_filters():
+    """S ~ 1/(1 + (ω/2)²)^(5/6): more filters do better at 2ω, and with it λ and Λ(2) by the averaged formulas."""
+    omega = np.geomspace(0.05, 30, 120)
+    density = 0.01 / (1 + (omega / 2) ** 2) ** (5 / 6)
+    truth = 0.01 / (1 + 4) ** (5 / 6)
+    spectrum = Spectrum(omega, density, np.full(omega.size, 0.1))
+    fits = [fit_noise(spectrum, "filter", frequency=2.0, terms=terms) for terms in (1, 2)]
+    errors = [abs(fit.spectral_density(4.0) / truth - 1) for fit in fits]
+    assert errors[0] < 0.05
+    assert errors[1] < 0.02
+    fit = fits[0].scaled(4.0)
+    found = verdict(Problem(ParametricOscillator(stiffness=4.0, damping=0.02), fit.noise), fit)
+    assert found.exponent.value == pytest.approx(weak_exponent(2.0, 0.01, truth, "stiffness"), abs=5e-4)
+
+
+def test_what_is_no_argument_is_refused():
+    spectrum = Spectrum(OMEGA, exact(NOISES[0]))
+    for options, said in (
+        ({"kind": "pink"}, "kind"),
+        ({"terms": 4}, "terms"),
+        ({"noise_in": "mass"}, "noise_in"),
+        ({"method": "x"}, "method"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            fit_noise(spectrum, **{"frequency": 2.0, **options})
+    with pytest.raises(TypeError, match="Spectrum or a Record"):
+        fit_noise([1, 2], frequency=2.0)
+    with pytest.raises(ValueError, match="at least 256"):
+        Record(np.arange(10.0), 0.1)

@@ -1,0 +1,231 @@
+"""`fpsolve noise`: from a file to a case, a figure and what it means; and what it refuses."""
+
+import json
+import math
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.cli import BAD_INPUT, main
+from fpsolve.measured import read_spectrum, weak_exponent, weak_moment
+from fpsolve.model import OrnsteinUhlenbeck
+from fpsolve.study.noise import natural_frequencies
+
+ROOT = Path(__file__).parents[2]
+F = np.linspace(0.05, 20, 400)
+NOISE = OrnsteinUhlenbeck(alpha=12.0, sigma=0.15)
+OMEGA = 4 * math.pi
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def spectrum(name="spectrum.csv", header="f (Hz),G (1/Hz)", factor=1.0, noises=(NOISE,)):
+    """One-sided per Hz, G = 2S."""
+    G = [2 * factor * sum(noise.spectral_density(2 * math.pi * each) for noise in noises) for each in F]
+    np.savetxt(name, np.column_stack([F, G]), delimiter=",", header=header, comments="", fmt="%.10g")
+    return name
+
+
+def noise(*options):
+    assert main(["noise", *options]) == 0
+    return json.loads(next(Path("results").glob("*/noise.json")).read_text(encoding="utf-8"))
+
+
+def test_a_spectrum_becomes_a_case_and_a_verdict(capsys):
+    """By the averaged formulas; a fit of an exact spectrum is the noise.
+
+    A wall adds N ln r to λ, πN = ω√(1 − ζ²) − (ω²/4)∫ C(τ) sin 2ωτ dτ, and C is exponential.
+    """
+    options = ["--sided", "one", "--frequency", "2", "--damping-ratio", "0.01", "--restitution", "0.9"]
+    found = noise(spectrum(), "--per", "Hz", "--averages", "64", "--noise-in", "stiffness", *options)
+    assert found["fit"]["parameters"] == pytest.approx({"alpha": 12.0, "sigma": 0.15}, rel=1e-4)
+    assert found["noise"]["parameters"] == pytest.approx({"alpha": 12.0, "sigma": 0.15 * OMEGA**2}, rel=1e-4)
+    at_double = NOISE.spectral_density(2 * OMEGA)
+    turns = OMEGA * math.sqrt(1 - 1e-4) - OMEGA**3 * at_double / (4 * NOISE.alpha)
+    wall = turns / math.pi * math.log(0.9)
+    exponent = weak_exponent(OMEGA, 0.01, at_double, "stiffness") + wall
+    moment = weak_moment(2, OMEGA, 0.01, at_double, 0, "stiffness") + 2 * wall
+    assert found["lyapunov_exponent"]["value"] == pytest.approx(exponent, rel=1e-5)
+    assert found["second_moment"]["value"] == pytest.approx(moment, rel=1e-4)
+    assert found["second_moment"]["probability_below_0"] > 0.999
+    critical = found["critical_damping_ratio"]
+    assert critical["moment"]["value"] == pytest.approx(OMEGA * at_double / 4, rel=1e-3)
+    assert critical["lyapunov_exponent"]["value"] == pytest.approx(OMEGA * at_double / 8, rel=1e-3)
+    case, printed = load_case("results/spectrum/noise.toml"), capsys.readouterr().out
+    assert case.problem.values == pytest.approx(
+        {
+            "system.stiffness": OMEGA**2,
+            "system.damping": 0.01 * OMEGA,
+            "system.restitution": 0.9,
+            "noise.alpha": found["noise"]["parameters"]["alpha"],
+            "noise.sigma": found["noise"]["parameters"]["sigma"],
+        },
+        rel=1e-5,
+    )
+    assert 'kind = "ornstein-uhlenbeck"' in printed
+    assert "Λ(2) < 0 with > 99.9 %, the mean square decays" in printed
+    assert {path.name for path in Path("results/spectrum").iterdir()} == {
+        f"noise.{ending}" for ending in ("json", "png", "pdf", "toml")
+    }
+
+
+def test_noise_in_the_damping_of_a_case_needs_0_too(capsys):
+    """Λ(2) = −2ζω + S(2ω)/2 + S(0)/2, and S(0) here is some ten times S(2ω)."""
+    assert main(["new", "my.toml", "--frequency", "2", "--damping-ratio", "0.02"]) == 0
+    file = spectrum(header="f (Hz),G (1/s²/Hz)", factor=0.4)
+    found = noise(file, "--sided", "one", "--of", "damping", "--case", "my.toml")
+    assert [each["name"] for each in found["frequencies"]] == ["2ω", "0"]
+    at_double, at_zero = (0.4 * NOISE.spectral_density(each) for each in (2 * OMEGA, 0.0))
+    expected = weak_moment(2, OMEGA, 0.02, at_double, at_zero, "damping")
+    assert found["second_moment"]["value"] == pytest.approx(expected, rel=1e-3)
+    assert load_case("results/spectrum/noise.toml").problem.values["oscillator.omega"] == pytest.approx(OMEGA)
+
+
+@pytest.mark.slow
+def test_acceleration_of_a_support_and_two_terms():
+    """ω² = g/ℓ and ξ = a/g; the sum of two noises is one with the same spectrum."""
+    length = 9.80665 / OMEGA**2
+    noises = OrnsteinUhlenbeck(alpha=4.0, sigma=0.1), OrnsteinUhlenbeck(alpha=60.0, sigma=0.3)
+    found = noise(
+        spectrum(header="f (Hz),G ((m/s^2)^2/Hz)", factor=9.80665**2, noises=noises), "--sided", "one",
+        "--of", "acceleration", "--length", f"{length!r}", "--damping-ratio", "0.01", "--averages", "64",
+        "--terms", "2",
+    )  # fmt: skip
+    assert found["natural_frequencies"] == pytest.approx([OMEGA])
+    at_double = sum(each.spectral_density(2 * OMEGA) for each in noises)
+    assert found["frequencies"][0]["density"] == pytest.approx(at_double, rel=1e-3)
+    expected = weak_moment(2, OMEGA, 0.01, at_double, 0, "stiffness")
+    assert found["second_moment"]["value"] == pytest.approx(expected, rel=5e-3)
+    assert load_case("results/spectrum/noise.toml").system.noise_sections == ("noise.first", "noise.second")
+
+
+def test_the_sea_at_a_buoy():
+    """Public data to a verdict: λ and Λ(2) by the averaged formulas with the fitted density, and that of the sea."""
+    path = ROOT / "cases/measured/buoy.csv"
+    options = ["--of", "acceleration", "--column", "acceleration", "--sided", "one", "--averages", "12"]
+    found = noise(str(path), *options, "--length", "60", "--damping-ratio", "0.001", "--kind", "filter")
+    omega = math.sqrt(9.80665 / 60)
+    sea = read_spectrum(path, sided="one", of="height", column="elevation")
+    by_hand = sea.frequencies**4 * sea.density / 9.80665**2
+    [row] = found["frequencies"]
+    near = np.abs(sea.frequencies - 2 * omega) <= 0.2 * omega
+    assert row["density"] == pytest.approx(np.mean(by_hand[near]), rel=0.3)
+    assert found["lyapunov_exponent"]["value"] == pytest.approx(
+        weak_exponent(omega, 0.001, row["density"], "stiffness"), rel=1e-3
+    )
+    assert found["second_moment"]["value"] == pytest.approx(
+        weak_moment(2, omega, 0.001, row["density"], 0, "stiffness"), rel=2e-3
+    )
+    assert found["second_moment"]["probability_below_0"] > 0.99
+    case = load_case(ROOT / "cases/systems/hoisted.toml")
+    assert case.problem.values == pytest.approx(load_case("results/buoy/noise.toml").problem.values, rel=1e-5)
+
+
+def test_a_fit_that_is_off_counts_its_distance(capsys):
+    """Noise that is not of the family: the error of Λ(2) is at least what the fit is off at 2f."""
+    path = ROOT / "cases/measured/buoy.csv"
+    options = ["--of", "acceleration", "--column", "acceleration", "--sided", "one", "--averages", "12"]
+    found = noise(str(path), *options, "--length", "60", "--damping-ratio", "0.001")
+    [row], omega = found["frequencies"], math.sqrt(9.80665 / 60)
+    off = math.sqrt((row["measured_over_fitted"] - 1) ** 2 - row["measured_over_fitted_error"] ** 2)
+    assert off > 0.3
+    effect = 0.5 * omega**2 * row["density"] * off
+    assert found["second_moment"]["standard_error"] == pytest.approx(effect, rel=0.05)
+    said = capsys.readouterr()
+    assert "off the fitted one" in said.err
+    assert "off where stability depends on it" in said.out
+
+
+def test_terms_that_are_not_told_apart(capsys):
+    """Two equal noises for one: their density is right, and a warning says that their parameters are not known."""
+    found = noise(spectrum(), *AT_2[1:], "--terms", "2", "--averages", "64")
+    assert found["frequencies"][0]["density"] == pytest.approx(NOISE.spectral_density(2 * OMEGA), rel=1e-3)
+    assert "do not tell all parameters" in capsys.readouterr().err
+
+
+def test_natural_frequencies_of_systems():
+    for name, expected in (("flutter", 2), ("hoisted", 1), ("coupled", 2)):
+        assert len(natural_frequencies(load_case(ROOT / f"cases/systems/{name}.toml").system)) == expected
+    assert natural_frequencies(load_case(ROOT / "cases/systems/coupled.toml").system) == pytest.approx((1.0, 1.6))
+    assert natural_frequencies(load_case(ROOT / "cases/fig1.toml").system) == pytest.approx((1.0,))
+
+
+FILE = ["spectrum.csv", "--sided", "one"]
+AT_2 = [*FILE, "--frequency", "2"]
+REFUSED = {
+    "no file": ([], "name a file"),
+    "no frequency": (FILE, "state the natural frequency by --frequency"),
+    "no sides": (["spectrum.csv", "--frequency", "2"], "one-sided"),
+    "far": ([*FILE, "--frequency", "40"], "nothing was measured near 2ω"),
+    "two places": (
+        [*AT_2, "--of", "damping", "--noise-in", "stiffness"],
+        "leave one out",
+    ),
+    "no gm": ([*AT_2, "--of", "height"], "metacentric height in m by --gm"),
+    "gm": ([*AT_2, "--gm", "1"], "--gm belongs to --of height"),
+    "length": ([*FILE, "--length", "2"], "is for --of acceleration"),
+    "apart": (
+        [*FILE, "--of", "acceleration", "--length", "2", "--frequency", "2"],
+        "--length 0.3524 Hz",
+    ),
+    "unit": ([*AT_2, "--of", "acceleration"], 'has the unit "1"'),
+    "percent": ([*AT_2, "--damping-ratio", "1"], "0.01 is 1 %"),
+    "half": ([*AT_2, "--restitution", "0.9"], "state --damping-ratio"),
+    "terms": ([*AT_2, "--terms", "4"], "from 1 to 3"),
+    "no record": ([*AT_2, "--kind", "non-gaussian"], "name a record"),
+    "column": ([*AT_2, "--column", "g"], 'no column "g"; did you mean "G"?'),
+    "mode": ([*AT_2, "--mode", "1"], "--mode is for the table"),
+    "averages": ([*AT_2, "--averages", "0"], "at least 1"),
+    "sides of a record": (["--record", "record.csv", "--sided", "one", "--frequency", "2"], "is for a spectrum"),
+    "wrong sides": (
+        ["spectrum.csv", "--sided", "two", "--frequency", "2", "--record", "record.csv"],
+        "state another sided",
+    ),
+    "case": ([*FILE, "--case", "my.toml"], "has its noise in the damping"),
+    "both": ([*FILE, "--case", "my.toml", "--damping-ratio", "0.1"], "leave out --damping-ratio"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_refused(name, capsys):
+    """One sentence, exit code 2, nothing written."""
+    options, said = REFUSED[name]
+    spectrum()
+    x = np.random.default_rng(0).normal(size=512)
+    x *= NOISE.standard_deviation / x.std()
+    np.savetxt("record.csv", np.column_stack([np.arange(512) / 64, x]), delimiter=",", header="t (s),x", comments="")
+    if "my.toml" in options:
+        assert main(["new", "my.toml", "--frequency", "2"]) == 0
+        capsys.readouterr()
+    before = sorted(Path().rglob("*"))
+    assert main(["noise", *options]) == BAD_INPUT
+    out, error = capsys.readouterr()
+    assert said in error
+    assert error.count("\n") == 1
+    assert not out
+    assert sorted(Path().rglob("*")) == before
+
+
+@pytest.mark.slow
+def test_the_page_of_the_docs(tmp_path, monkeypatch, capsys):
+    """Each command of the page runs, and prints what the page says it does."""
+    (tmp_path / "cases").symlink_to(ROOT / "cases")
+    page = (ROOT / "docs/guide/measurement.md").read_text(encoding="utf-8")
+    names, printed = {}, ""
+    for language, block in re.findall(r"^```(python|sh|text)\n(.*?)^```", page, re.DOTALL | re.MULTILINE):
+        if language == "python" and "fit_noise" not in block:
+            exec(block, names)
+        elif language == "sh":
+            for line in block.splitlines():
+                assert main(shlex.split(line)[1:]) == 0, line
+            printed = " ".join(capsys.readouterr().out.split())
+        elif language == "text":
+            for line in block.splitlines():
+                assert " ".join(line.split()) in printed, line
