@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
+_EPS = sys.float_info.epsilon
 SMALL_P = 1e-4
 """For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
 RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
@@ -141,13 +142,14 @@ class Changed:
 
     @cached_property
     def value(self) -> Estimate:
-        """∂Λ/∂θ with the error of rounding; the scale is that of the terms of L − Λ."""
+        """∂Λ/∂θ with the error of rounding, also in T and T*; the scale is that of the terms of L − Λ."""
         pair = self._pair
         x, y, turns = pair.right, pair.left, pair.space.turns
         operator = self._operator(0)
         parts = turns * np.array([y @ (KroneckerSum([term]) @ x) for term in operator.terms])
-        sizes = turns * float(abs(y) @ (abs(operator) @ abs(x)))
-        return Estimate(float(np.sum(parts)), sys.float_info.epsilon * sizes, float(np.sum(np.abs(parts))))
+        sizes, scale = turns * float(abs(y) @ (abs(operator) @ abs(x))), float(np.sum(np.abs(parts)))
+        of_pair = (pair.residual + _EPS) * self._around.size / pair.generator.unit_rate
+        return Estimate(float(np.sum(parts)), _EPS * sizes + of_pair * scale, scale)
 
     @cached_property
     def slope(self) -> Estimate:
@@ -328,7 +330,8 @@ class Gradient:
         changed = _changed(around, along)
         values = {key: each.value for key, each in changed.items()}
         if modes_tell(solution):
-            return _with_errors(values, changes_of_error(solution, around, changed))
+            errors = changes_of_errors(solution, around, changed)
+            return _with_errors(values, {key: float(np.sum(np.abs(each))) for key, each in errors.items()})
         finer = solver.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
         return _compared(values, {key: each.value for key, each in _changed(Bordered(finer), along).items()})
 
@@ -340,8 +343,10 @@ class Gradient:
         if not modes_tell(near):
             return _compared(values, {key: each.slope for key, each in self._finer_at_zero.items()})
         around = Bordered(near.pair)
-        errors = changes_of_error(near, around, _changed(around, along))
-        return _with_errors(values, {key: each / near.pair.p for key, each in errors.items()})
+        errors = changes_of_errors(near, around, _changed(around, along))
+        return _with_errors(
+            values, {key: float(np.sum(np.abs(each))) / abs(near.pair.p) for key, each in errors.items()}
+        )
 
     def variance_rate(self) -> Slopes:
         """∂Λ″(0)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
@@ -393,23 +398,26 @@ def modes_tell(solution: Solution) -> bool:
     return is_whole and not solution.pair.generator.chosen.noise.lines.size
 
 
-def changes_of_error(solution: Solution, around: Bordered, changed: Mapping[str, Changed]) -> dict[str, float]:
-    """∂e/∂θ along some directions, e being about what Λ lacks by its highest modes, see `MissingModes`; but for the
-    change of P_s in ⟨T*, T⟩, which changes e only by its own size.
+def changes_of_errors(solution: Solution, around: Bordered, changed: Mapping[str, Changed]) -> dict[str, list[float]]:
+    """∂e/∂θ along some directions, for every e of `MissingModes`; but for the change of P_s in ⟨T*, T⟩, which changes e
+    only by its own size.
 
     T and T* change by (L − Λ)T_θ = −BT and its adjoint, of which one pair of equations takes account for all θ:
-    ∂e/∂θ ⟨T*, T⟩ = Σ ⟨y_k, Bx_k⟩ − ⟨w, BT⟩ − ⟨T*, Bv⟩, (L − Λ)ᵀw and (L − Λ)v the derivatives of e by T and T*.
+    ∂e/∂θ ⟨T*, T⟩ = ⟨y, Bx⟩ − ⟨w, BT⟩ − ⟨T*, Bv⟩, (L − Λ)ᵀw and (L − Λ)v the derivatives of e by T and T*.
     """
-    pair, missing = solution.pair, MissingModes.of(solution)
-    w, v = around.solve(missing.by_right, adjoint=True), around.solve(missing.by_left)
-    modes = [*zip(missing.left, missing.right, strict=True)]
-    sides, mass = [*modes, (-w, pair.right), (-pair.left, v)], sum(float(a @ pair.space.weighed(b)) for a, b in modes)
-
-    def change(by: Changed) -> float:
-        total = sum(float(a @ by.image(b, 0)) for a, b in sides)
-        return (total - by.value.value * mass) / around.norm
-
-    return {key: change(each) for key, each in changed.items()}
+    pair, found = solution.pair, dict[str, list[float]]({key: [] for key in changed})
+    for each in MissingModes.of(solution):
+        w, v = (
+            around.solve(load, adjoint=k == 0, refinements=1) for k, load in enumerate((each.by_right, each.by_left))
+        )
+        sides, mass = (
+            ((each.left, each.right), (-w, pair.right), (-pair.left, v)),
+            each.left @ pair.space.weighed(each.right),
+        )
+        for key, by in changed.items():
+            total = sum(a @ by.image(b, 0) for a, b in sides)
+            found[key].append(float(total - by.value.value * mass) / around.norm)
+    return found
 
 
 def _with_errors(values: Slopes, errors: Mapping[str, float]) -> dict[str, Estimate]:
@@ -433,7 +441,7 @@ def _compared(coarse: Slopes, fine: Slopes) -> dict[str, Estimate]:
 def _summed(parts: Sequence[Any], norm: float) -> Estimate:
     """The sum of some parts over a norm, with about what rounding may change in it."""
     size = float(np.sum(np.abs(parts))) / norm
-    return Estimate(float(np.sum(parts)) / norm, 1e3 * sys.float_info.epsilon * size, size)
+    return Estimate(float(np.sum(parts)) / norm, 1e3 * _EPS * size, size)
 
 
 def _times(factor: float, estimate: Estimate) -> Estimate:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
@@ -293,44 +293,42 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
 
 @dataclass(frozen=True, eq=False)
 class MissingModes:
-    """e = Σ ⟨y_k, (L − Λ) x_k⟩/⟨T*, T⟩, about what Λ lacks: x_k is what T has of the two highest modes along the k-th
-    direction, y_k the same of T*, the coefficients of the rougher of both times the share that is thought to be left,
-    with the sign of the product.
+    """e = ⟨y, (L − Λ)x⟩/⟨T*, T⟩, about what Λ lacks in every second cell along one direction.
+
+    x is what T has of the two highest modes, and y the same of T* in these cells, the coefficients of the rougher of
+    both times the share that is thought to be left, with the sign of the product.
 
     Attributes:
-        right, left: the x_k and y_k, each of shape (size,).
+        right, left: x and y, shape (size,).
         by_right, by_left: the derivatives of e ⟨T*, T⟩ by the coefficients of T and of T*, shape (size,).
     """
 
-    right: Sequence[FloatArray]
-    left: Sequence[FloatArray]
+    right: FloatArray
+    left: FloatArray
     by_right: FloatArray
     by_left: FloatArray
 
     @classmethod
-    def of(cls, solution: Solution) -> MissingModes:
-        """Those of a pair and its effects."""
+    def of(cls, solution: Solution) -> Iterator[MissingModes]:
+        """Those of a pair and its effects: of the even and of the odd cells along every direction."""
         pair, space = solution.pair, solution.pair.space
         smooth, rough, operator = sides(pair)
-        firsts, lasts, loads = [], [], [np.zeros(space.shape), np.zeros(space.shape)]
         for ladder, effects in zip(ladders(space), solution.effects, strict=True):
             if ladder is None or effects is None:
                 continue
-            mask = ladder.along(ladder.highest(2))
+            mask, back = ladder.along(ladder.highest(2)), [None if each is None else each.T for each in ladder.nested]
             first, last = (mask * along(ladder.nested, space.table(each)) for each in (smooth, rough))
             image = space.table(operator @ np.ravel(first))
             shares = effects.of_cells / np.maximum(effects.two, sys.float_info.min)
             weights = ladder.along(shares[ladder.cells]) * np.sign(last * image)
-            back = tuple(None if each is None else each.T for each in ladder.nested)
-            other = space.table(operator.T @ np.ravel(weights * last))
-            for load, each in zip(loads, (other, weights * image), strict=True):
-                load += along(back, mask * each)
-            firsts.append(np.ravel(first))
-            lasts.append(np.ravel(weights * last))
-        by_first, by_last = (np.ravel(load) for load in loads)
-        if smooth is pair.left:
-            return cls(lasts, firsts, by_last, by_first)
-        return cls(firsts, lasts, by_first, by_last)
+            for turn in range(min(2, ladder.degrees.size)):
+                own = weights * ladder.along(ladder.cells % 2 == turn)
+                of_last = space.table(operator.T @ np.ravel(own * last))
+                by_first, by_last = (np.ravel(along(back, mask * each)) for each in (of_last, own * image))
+                found = np.ravel(first), np.ravel(own * last), by_first, by_last
+                if smooth is pair.left:
+                    found = found[1], found[0], by_last, by_first
+                yield cls(*found)
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:

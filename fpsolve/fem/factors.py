@@ -9,8 +9,7 @@ from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.linalg.blas import dgemm, dtrsm
-from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.linalg.blas import dgemm
 from scipy.sparse import csr_matrix, identity
 from scipy.sparse.csgraph import shortest_path
 from scipy.sparse.linalg import splu
@@ -19,6 +18,7 @@ from threadpoolctl import ThreadpoolController
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.dense import DenseFactors
 from fpsolve.fem.rings import Ring, RingFactors, ring_seconds
 
 MAX_DENSE_UNKNOWNS = 350
@@ -140,30 +140,6 @@ def _by_levels(operator: KroneckerSum, levels: Sequence[Any]) -> tuple[float, Ca
 def _dense_cost(size: int) -> float:
     """Operations of an LU of a dense matrix."""
     return 2 / 3 * size**3
-
-
-class DenseFactors:
-    """LAPACK's LU of an array."""
-
-    def __init__(self, matrix: FloatArray) -> None:
-        self._lu, self._pivots, info = dgetrf(matrix, overwrite_a=1)
-        if info > 0:
-            pivots = np.einsum("ii->i", self._lu)
-            pivots[pivots == 0] = np.finfo(float).eps * np.max(np.abs(pivots))
-
-    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
-        return np.asarray(dgetrs(self._lu, self._pivots, b, trans=transposed)[0])
-
-    def right_quotient(self, b: FloatArray) -> FloatArray:
-        """b A⁻¹."""
-        half = dtrsm(1.0, self._lu, b, side=1)
-        half = dtrsm(1.0, self._lu, half, side=1, lower=1, diag=1, overwrite_b=1)
-        order = list(range(self._pivots.size))
-        for i, j in enumerate(self._pivots.tolist()):
-            order[i], order[j] = order[j], order[i]
-        found = np.empty(half.T.shape)
-        found[order] = half.T
-        return found.T
 
 
 class BlockFactors:

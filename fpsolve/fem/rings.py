@@ -23,6 +23,7 @@ from scipy.sparse import coo_matrix, issparse
 from fpsolve.arrays import FloatArray, dense
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.dense import DenseFactors
 
 LARGEST_GROWTH = 1e10
 """Of an inverse, over one over the norm of all, in an elimination that does not exchange rows of different cells."""
@@ -107,7 +108,7 @@ class RingFactors:
             products = flat.T @ chosen.transpose(1, 0, 2, 3).reshape(terms, -1)
             table = products.reshape(cells, modes, modes, at.size, self._group, self._group)
             side = modes * self._group
-            found.append(table.transpose(3, 0, 1, 4, 2, 5).reshape(at.size, cells, side, side))
+            found.append(np.ascontiguousarray(table.transpose(3, 0, 1, 4, 2, 5)).reshape(at.size, cells, side, side))
         missing = np.zeros((self._levels, cells, modes, self._group), dtype=bool)
         missing |= (self._ring.number < 0)[None, :, :, None]
         missing |= np.arange(self._levels * self._group).reshape(-1, 1, 1, self._group) >= self._n
@@ -180,7 +181,7 @@ class RingFactors:
             self._rounds.append(_Round(a12, a22, b11, b12, b21, inverse, h1, h2))
             scattering = np.concatenate([joined, scattering[2 * pairs :]])
         whole = scattering[0].transpose(0, 2, 1, 3)[:, :, ::-1].reshape(2 * self._n, 2 * self._n)
-        self._closed = _inverse(np.eye(2 * self._n) - whole, np.inf)
+        self._closed = DenseFactors(np.eye(2 * self._n) - whole)
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b, refined until only rounding is left."""
@@ -246,7 +247,7 @@ class RingFactors:
             upper = b[:, 1] + _times(at.b21, v)
             known.append((v, b[:, 0]))
             values = np.concatenate([np.stack([lower, upper], axis=1), rest])
-        come = (self._closed @ values.ravel()).reshape(1, 2, self._n)[:, ::-1]
+        come = self._closed.solve(values.ravel()).reshape(1, 2, self._n)[:, ::-1]
         for at, (v, g) in zip(reversed(self._rounds), reversed(known), strict=True):
             below, above = come[: len(v), 0], come[: len(v), 1]
             right = _times(at.h1, below) + _times(at.h2, above) + v
@@ -266,7 +267,7 @@ class RingFactors:
             below = a[:, 0] + _times(at.h1, right, True)
             known.append((right, left))
             come = np.concatenate([np.stack([below, above], axis=1), rest])
-        values = (self._closed.T @ come[:, ::-1].ravel()).reshape(1, 2, self._n)
+        values = self._closed.solve(come[:, ::-1].ravel(), transposed=True).reshape(1, 2, self._n)
         for at, (v, g) in zip(reversed(self._rounds), reversed(known), strict=True):
             lower, upper = values[: len(v), 0], values[: len(v), 1]
             moved = _times(at.a12, lower, True)
