@@ -413,9 +413,12 @@ class _Search:
         nearest = min(self.place.known, key=lambda q: abs(q - self.p), default=None)
         if nearest is None:
             return None
-        generator = self.place.known[nearest].pair.generator
-        if (chosen := self.place.trimmed(self.place.known[nearest], self.tolerance)) is not generator.chosen:
+        known = self.place.known[nearest]
+        generator = known.pair.generator
+        if (chosen := self.place.trimmed(known, self.tolerance)) is not generator.chosen:
             generator = Generator(self.place.problem, chosen)
+        elif nearest == self.p:
+            return known
         try:
             solution = self.tried(generator) if self.place.fits(generator, nearest, self.p) else None
         except NotConverged:

@@ -39,7 +39,8 @@ POSITIVE = 1e-2
 SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
 DOUBT = 1e-3
-"""Share of its terms by which a tangent of Λ may lie too high: the errors of its p."""
+"""Share of its terms by which a tangent of Λ may lie too high, and Λ change from one discretisation to the next where
+both are surely its: the errors of its p."""
 _EPS = float(np.finfo(float).eps)
 REFINEMENTS = 3
 """Of T′."""
@@ -135,7 +136,7 @@ def principal_pair(
         except NotConverged:  # the other searches may still find it
             continue
         pair = _pair(generator, pencil, rayleigh_iteration(pencil, *vectors, clock))
-        most = POSITIVE if is_doubtful else SURELY_POSITIVE
+        most = POSITIVE if is_doubtful or _goes_on(pair, pairs or ()) else SURELY_POSITIVE
         is_found = pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= most
         if is_found and (pair.value >= least or search is searches[-1]):
             break
@@ -169,6 +170,11 @@ def _has_other_positive(problem: Problem, p: float, pairs: Sequence[PrincipalPai
         return True
     frozen = frozen_noise(problem)
     return frozen is not None and frozen.rests(p) and not pairs
+
+
+def _goes_on(pair: PrincipalPair, pairs: Sequence[PrincipalPair]) -> bool:
+    """Whether a pair is next to one at the same p, of another discretisation, that was found to be the principal one."""
+    return any(each.p == pair.p and abs(pair.value - each.value) <= DOUBT * abs(each.value) for each in pairs)
 
 
 def _tangents(problem: Problem, p: float, pairs: Sequence[PrincipalPair]) -> float:

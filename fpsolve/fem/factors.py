@@ -95,20 +95,16 @@ def factorised(
 def _of_plane(operator: KroneckerSum, ring: Ring | None) -> Factors:
     """Of the phase and one noise: cell by cell, by blocks, or sparse, what should take the least time."""
     (m, n), band = operator.shape, max(operator.band, 1)
-    blocks = n * (4e-5 * band**2 + m**3 * (2.2e-11 + 7.1e-11 * band + 2.5e-11 * band**2))
     width = min(m * band, n * operator.couplings)
     choices: list[tuple[float, Callable[[], Factors]]] = [
-        (blocks, lambda: BlockFactors(operator.with_dense_first())),
         (2e-6 * m * n + 2e-9 * m * n * width**2, lambda: SparseFactors(operator)),
     ]
-    if ring is not None and len(ring.number) > 2:
+    if band <= MAX_BAND and 2 * band < n:
+        seconds = n * (4e-5 * band**2 + m**3 * (2.2e-11 + 7.1e-11 * band + 2.5e-11 * band**2))
+        choices.append((seconds, lambda: BlockFactors(operator.with_dense_first())))
+    if band <= MAX_BAND and ring is not None and len(ring.number) > 2:
         choices.append((ring_seconds(operator, ring), lambda: RingFactors(operator, ring)))
-    if 2 * band >= n:
-        del choices[0]
-    cheapest, *others = [factorise for _, factorise in sorted(choices, key=lambda choice: choice[0])]
-    with suppress(SingularMatrix):
-        return cheapest()
-    return others[0]()
+    return _cheapest(choices)
 
 
 def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
@@ -124,10 +120,16 @@ def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
         choices.append((cost, lambda: BlockFactors(operator.with_dense_first())))
     if levels and levels[0] is not None:
         choices.append(_by_levels(operator, along_first(operator, levels[0])))
-    cheapest, *others = [factorise for _, factorise in sorted(choices, key=lambda choice: choice[0])]
-    with suppress(SingularMatrix):
-        return cheapest()
-    return others[0]()
+    return _cheapest(choices)
+
+
+def _cheapest(choices: Sequence[tuple[float, Callable[[], Factors]]]) -> Factors:
+    """The factors that take least, or the next ones where those cannot be made."""
+    *others, last = [factorise for _, factorise in sorted(choices, key=lambda choice: choice[0])]
+    for factorise in others:
+        with suppress(SingularMatrix):
+            return factorise()
+    return last()
 
 
 def _by_levels(operator: KroneckerSum, levels: Sequence[Any]) -> tuple[float, Callable[[], Factors]]:
