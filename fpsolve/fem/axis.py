@@ -176,8 +176,9 @@ class KroneckerSum:
     @property
     def couplings(self) -> int:
         """About how many functions of the first axis one of them is coupled to on each side."""
-        pattern = sum(abs(csc_matrix(first)) for first, *_ in self.terms)
-        return int(np.ceil(pattern.nnz / (2 * self.shape[0])))
+        pattern = sum(abs(first) for first, *_ in self.terms)
+        count = pattern.nnz if issparse(pattern) else np.count_nonzero(pattern)
+        return math.ceil(count / (2 * self.shape[0]))
 
     def blocks(self, offset: int) -> FloatArray:
         """The matrices between the functions i and i + offset of the last axis, by the lesser; Fortran order each."""
