@@ -99,6 +99,7 @@ class FrozenNoise:
         self.z = np.concatenate([-side[:0:-1], side])
         self._problem, self._held = problem, _Held(problem, self.z)
         self._slope = np.gradient(noise.log_density(unit * self.z), self.z)
+        self._known = dict[tuple[float, int], tuple[float, float]]()
 
     def rate(self, p: float) -> FloatArray:
         """F at `z`."""
@@ -120,8 +121,13 @@ class FrozenNoise:
             return float(peaks[np.argmin(np.abs(peaks))]) if peaks.size else 0.0
         return self._peak(p, int(np.argmax(self.rate(p))))[0]
 
-    def _peak(self, p: float, best: int) -> tuple[float, float]:
-        """z and F of the maximum next to a number of `z`."""
+    def _peak(self, p: float, number: int) -> tuple[float, float]:
+        """z and F of the maximum next to a number of `z`, looked for once."""
+        if (p, number) not in self._known:
+            self._known[p, number] = self._zoomed(p, number)
+        return self._known[p, number]
+
+    def _zoomed(self, p: float, best: int) -> tuple[float, float]:
         held = self._held
         while True:
             lower, upper = held.z[[max(best - 1, 0), min(best + 1, held.z.size - 1)]]
