@@ -72,9 +72,9 @@ def slow_noise(tau0: float, std: float, r0: float = 0.8) -> NonGaussianNoise:
     return NonGaussianNoise(D0=0.5 * std**2 * tau0 * (5 - 3 * r0), tau0=tau0, r0=r0)
 
 
-def one_moment(noise: Any, p: float) -> float:
+def one_moment(noise: Any, p: float, oscillator: VibroImpactOscillator = OSCILLATOR) -> float:
     """Of Λ(p)."""
-    return seconds(lambda: ExponentSolver(Problem(OSCILLATOR, noise)).solution(p))
+    return seconds(lambda: ExponentSolver(Problem(oscillator, noise)).solution(p))
 
 
 def derivatives() -> dict[str, float]:
@@ -132,8 +132,7 @@ def heavy_tails() -> dict[str, float]:
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
     found = {}
     for r0, p in itertools.product(TAILS, (-0.9, -0.5, -0.1)):
-        problem = Problem(oscillator, NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0))
-        found[f"r₀ = {r0:g}, p = {p:g}"] = seconds(lambda problem=problem, p=p: ExponentSolver(problem).moments([p]))
+        found[f"r₀ = {r0:g}, p = {p:g}"] = one_moment(NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0), p, oscillator)
     return found
 
 
