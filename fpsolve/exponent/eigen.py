@@ -173,7 +173,7 @@ def _has_other_positive(problem: Problem, p: float, pairs: Sequence[PrincipalPai
 
 
 def _goes_on(pair: PrincipalPair, pairs: Sequence[PrincipalPair]) -> bool:
-    """Whether a pair is next to one at the same p, of another discretisation, that was found to be the principal one."""
+    """Whether a pair is next to the principal one at the same p on another discretisation."""
     return any(each.p == pair.p and abs(pair.value - each.value) <= DOUBT * abs(each.value) for each in pairs)
 
 

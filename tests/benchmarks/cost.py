@@ -112,7 +112,7 @@ def _reference(case: Case) -> FloatArray | None:
 
 
 def tuned_size(case: Case, reference: FloatArray) -> tuple[int, int] | None:
-    """Harmonics and Hermite functions: both grow until the accuracy is reached, then each is made as small as it may."""
+    """Harmonics and Hermite functions: both grow until the accuracy is reached, then each falls as far as it may."""
 
     def suffices(size: tuple[int, int]) -> bool:
         try:
