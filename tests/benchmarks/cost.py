@@ -164,7 +164,7 @@ def draw(name: str, folder: Path) -> None:
     if name == "cost_accuracy":
         axes.invert_xaxis()
     axes.grid(visible=True, which="major", alpha=0.3)
-    axes.legend(fontsize=8, loc="upper left")
+    figure.legend(fontsize=8, loc="outside lower center", ncols=2 if len(axes.lines) > len(CODES) else len(CODES))
     figure.savefig(folder / f"{name}.png", dpi=110)
 
 
