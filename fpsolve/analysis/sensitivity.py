@@ -145,11 +145,24 @@ class Changed:
         """∂Λ/∂θ with the error of rounding, also in T and T*; the scale is that of the terms of L − Λ."""
         pair = self._pair
         x, y, turns = pair.right, pair.left, pair.space.turns
-        operator = self._operator(0)
-        parts = turns * np.array([y @ (KroneckerSum([term]) @ x) for term in operator.terms])
-        sizes, scale = turns * float(abs(y) @ (abs(operator) @ abs(x))), float(np.sum(np.abs(parts)))
+        parts = turns * np.array([y @ image for image in self._images])
+        sizes, scale = turns * float(abs(y) @ (abs(self._operator(0)) @ abs(x))), float(np.sum(np.abs(parts)))
         of_pair = (pair.residual + _EPS) * self._around.size / pair.generator.unit_rate
         return Estimate(float(np.sum(parts)), _EPS * sizes + of_pair * scale, scale)
+
+    @cached_property
+    def of_right(self) -> FloatArray:
+        """(∂L − Λ∂M)T."""
+        return np.asarray(sum(self._images))
+
+    @cached_property
+    def of_left(self) -> FloatArray:
+        """(∂L − Λ∂M)ᵀT*."""
+        return self._operator(0).T @ self._pair.left
+
+    @cached_property
+    def _images(self) -> list[FloatArray]:
+        return [KroneckerSum([term]) @ self._pair.right for term in self._operator(0).terms]
 
     @cached_property
     def slope(self) -> Estimate:
@@ -405,18 +418,13 @@ def changes_of_errors(solution: Solution, around: Bordered, changed: Mapping[str
     T and T* change by (L − Λ)T_θ = −BT and its adjoint, of which one pair of equations takes account for all θ:
     ∂e/∂θ ⟨T*, T⟩ = ⟨y, Bx⟩ − ⟨w, BT⟩ − ⟨T*, Bv⟩, (L − Λ)ᵀw and (L − Λ)v the derivatives of e by T and T*.
     """
-    pair, found = solution.pair, dict[str, list[float]]({key: [] for key in changed})
+    found: dict[str, list[float]] = {key: [] for key in changed}
     for each in MissingModes.of(solution):
-        w, v = (
-            around.solve(load, adjoint=k == 0, refinements=1) for k, load in enumerate((each.by_right, each.by_left))
-        )
-        sides, mass = (
-            ((each.left, each.right), (-w, pair.right), (-pair.left, v)),
-            each.left @ pair.space.weighed(each.right),
-        )
+        w = around.solve(each.by_right, adjoint=True, refinements=1)
+        v = around.solve(each.by_left, refinements=1)
         for key, by in changed.items():
-            total = sum(a @ by.image(b, 0) for a, b in sides)
-            found[key].append(float(total - by.value.value * mass) / around.norm)
+            own = each.left @ by.image(each.right, 0, by.value.value)
+            found[key].append(float(own - w @ by.of_right - by.of_left @ v) / around.norm)
     return found
 
 
