@@ -175,13 +175,6 @@ class KroneckerSum:
         rows, columns = np.nonzero(sum(abs(term[-1]) for term in self.terms))
         return int(np.max(np.abs(rows - columns), initial=0))
 
-    @property
-    def couplings(self) -> int:
-        """About how many functions of the first axis one of them is coupled to on each side."""
-        pattern = sum(abs(first) for first, *_ in self.terms)
-        count = pattern.nnz if issparse(pattern) else np.count_nonzero(pattern)
-        return math.ceil(count / (2 * self.shape[0]))
-
     def blocks(self, offset: int) -> FloatArray:
         """The matrices between the functions i and i + offset of the last axis, by the lesser; Fortran order each."""
         m, n = self.halves

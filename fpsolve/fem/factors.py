@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
@@ -93,17 +94,14 @@ def factorised(
 
 
 def _of_plane(operator: KroneckerSum, ring: Ring | None) -> Factors:
-    """Of the phase and one noise: cell by cell, by blocks, or sparse, what should take the least time."""
+    """Of the phase and one noise: by blocks or cell by cell, what should take less time with four solves, or sparse."""
     (m, n), band = operator.shape, max(operator.band, 1)
-    width = min(m * band, n * operator.couplings)
-    choices: list[tuple[float, Callable[[], Factors]]] = [
-        (2e-6 * m * n + 2e-9 * m * n * width**2, lambda: SparseFactors(operator)),
-    ]
-    if band <= MAX_BAND and 2 * band < n:
-        seconds = n * (4e-5 * band**2 + m**3 * (2.2e-11 + 7.1e-11 * band + 2.5e-11 * band**2))
+    choices: list[tuple[float, Callable[[], Factors]]] = [(math.inf, lambda: SparseFactors(operator))]
+    if 2 * band < n and band <= MAX_BAND:
+        seconds = 1.4 * n * (1.5e-5 + 4e-6 * band**2 + 5e-11 * (1 + band) ** 2 * m**3)
         choices.append((seconds, lambda: BlockFactors(operator.with_dense_first())))
-    if band <= MAX_BAND and ring is not None and len(ring.number) > 2:
-        choices.append((ring_seconds(operator, ring), lambda: RingFactors(operator, ring)))
+    if ring is not None and len(ring.number) > 2 and band <= MAX_BAND:
+        choices.append((5e-4 + 2 * ring_seconds(operator, ring), lambda: RingFactors(operator, ring)))
     return _cheapest(choices)
 
 

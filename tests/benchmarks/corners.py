@@ -89,13 +89,12 @@ def derivatives() -> dict[str, float]:
         "Λ″(0)": lambda solver: solver.variance_rate(),
     }
 
-    def everything(solver: ExponentSolver) -> None:
-        for solve in values.values():
-            solve(solver)
+    def everything(solver: ExponentSolver) -> dict[str, Any]:
+        return {name: solve(solver) for name, solve in values.items()}
 
     def sensitivities(solver: ExponentSolver) -> None:
-        everything(solver)
-        solve_sensitivities(solver, p, problem.derivatives())
+        root = everything(solver)["δ_p"].value
+        solve_sensitivities(solver, p, problem.derivatives(), root=root)
 
     solves = {**values, "all four": everything, "with sensitivities": sensitivities}
     return {name: seconds(lambda solve=solve: solve(ExponentSolver(problem)), ROUNDS) for name, solve in solves.items()}
