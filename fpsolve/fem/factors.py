@@ -97,7 +97,7 @@ def _of_plane(operator: KroneckerSum, ring: Ring | None) -> Factors:
     """Of the phase and one noise: by blocks or cell by cell, what should take less time with four solves, or sparse."""
     (m, n), band = operator.shape, max(operator.band, 1)
     choices: list[tuple[float, Callable[[], Factors]]] = [(math.inf, lambda: SparseFactors(operator))]
-    if 2 * band < n and band <= MAX_BAND:
+    if m <= MAX_BLOCK and band <= MAX_BAND and 2 * band < n:
         seconds = 1.4 * n * (1.5e-5 + 4e-6 * band**2 + 5e-11 * (1 + band) ** 2 * m**3)
         choices.append((seconds, lambda: BlockFactors(operator.with_dense_first())))
     if ring is not None and len(ring.number) > 2 and band <= MAX_BAND:

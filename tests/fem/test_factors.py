@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_matrix, kron, random
+from scipy.sparse import csr_matrix, identity, kron, random
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.errors import SingularMatrix
@@ -12,6 +12,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials, States
 from fpsolve.fem.factors import (
+    MAX_BLOCK,
     MAX_DENSE_UNKNOWNS,
     BlockFactors,
     DenseFactors,
@@ -75,8 +76,8 @@ def test_the_kind_follows_from_the_factors(rng):
     m = MAX_DENSE_UNKNOWNS // 10
     assert isinstance(factorised(sum_of(m, 12, 1)), BlockFactors)
     assert isinstance(factorised(sum_of(m, 12, 11)), SparseFactors)
-    dense = sum_of(10, 5, 1).terms[0]
-    assert isinstance(factorised(KroneckerSum([(csr_matrix(dense[0]), dense[1])])), SparseFactors)
+    many = KroneckerSum([(identity(MAX_BLOCK + 1, format="csr"), banded(rng, 5, 1) + 5 * np.eye(5))])
+    assert isinstance(factorised(many), SparseFactors)
 
 
 def test_a_singular_matrix_gives_its_null_vector():
