@@ -34,6 +34,7 @@ from fpsolve.exponent.error import Estimate, MissingModes, Solution, SumOfSoluti
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import Noise
@@ -420,8 +421,9 @@ def changes_of_errors(solution: Solution, around: Bordered, changed: Mapping[str
     """
     found: dict[str, list[float]] = {key: [] for key in changed}
     for each in MissingModes.of(solution):
-        w = around.solve(each.by_right, adjoint=True, refinements=1)
-        v = around.solve(each.by_left, refinements=1)
+        with one_thread():
+            w = around.solve(each.by_right, adjoint=True, refinements=1)
+            v = around.solve(each.by_left, refinements=1)
         for key, by in changed.items():
             own = each.left @ by.image(each.right, 0, by.value.value)
             found[key].append(float(own - w @ by.of_right - by.of_left @ v) / around.norm)

@@ -442,17 +442,16 @@ class Bordered:
         return self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self.pair.generator.unit_rate)
 
     def solve(self, source: FloatArray, *, adjoint: bool = False, refinements: int = REFINEMENTS) -> FloatArray:
-        """v from the load f; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""
+        """v from the load f, in `one_thread`; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""
         own, other = self.pair.right, self.pair.left
         weighed, operator, change = self._weighed[0], self._operator, 0.0 * own
         if adjoint:
             own, other, weighed, operator = other, own, self._weighed[1], operator.T
-        with one_thread():
-            for _ in range(refinements):
-                rest = source - operator @ change
-                rest -= (other @ rest) / self.norm * weighed
-                change += self._factor.solve(rest, transposed=adjoint)
-                change -= (other @ self.pair.space.weighed(change)) / self.norm * own
+        for _ in range(refinements):
+            rest = source - operator @ change
+            rest -= (other @ rest) / self.norm * weighed
+            change += self._factor.solve(rest, transposed=adjoint)
+            change -= (other @ self.pair.space.weighed(change)) / self.norm * own
         return change
 
     @cached_property
@@ -473,17 +472,20 @@ class Bordered:
     @cached_property
     def by_p(self) -> FloatArray:
         """T′: (L − Λ)T′ = −(L′ − Λ′)T."""
-        return self.solve(self.pair.derivative * self._weighed[0] - self._slope @ self.pair.right)
+        with one_thread():
+            return self.solve(self.pair.derivative * self._weighed[0] - self._slope @ self.pair.right)
 
     @cached_property
     def adjoint_by_p(self) -> FloatArray:
         """T*′/P_s."""
-        return self.solve(self.pair.derivative * self._weighed[1] - self._slope.T @ self.pair.left, adjoint=True)
+        with one_thread():
+            return self.solve(self.pair.derivative * self._weighed[1] - self._slope.T @ self.pair.left, adjoint=True)
 
     @cached_property
     def second_by_p(self) -> FloatArray:
         """T″: (L − Λ)T″ = −(L″ − Λ″)T − 2(L′ − Λ′)T′."""
-        return self.solve(self.second_derivative * self._weighed[0] - self._curved - self._mixed)
+        with one_thread():
+            return self.solve(self.second_derivative * self._weighed[0] - self._curved - self._mixed)
 
     @cached_property
     def second_derivative(self) -> float:
