@@ -29,11 +29,12 @@ from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, widened
-from fpsolve.exponent.eigen import Bordered, PrincipalPair
-from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.eigen import Bordered
+from fpsolve.exponent.error import Estimate, MissingModes, Solution, SumOfSolutions
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import Noise
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
+_EPS = sys.float_info.epsilon
 SMALL_P = 1e-4
 """For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
 RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
@@ -127,53 +129,77 @@ class Sensitivities(Result):
         return f"of {', '.join(what) or 'nothing'} by {len(self.theta)} parameters"
 
 
-def changed_value(pair: PrincipalPair, by: ParameterDerivative) -> Estimate:
-    """∂Λ/∂θ on one discretisation, with the error of rounding; the scale is that of the terms of L."""
-    x, y, turns = pair.right, pair.left, pair.space.turns
-    factors = list(pair.generator.changed(by, pair.p).terms)
-    if (mass := pair.generator.changed_mass(by, pair.p)) is not None:
-        factors += [(-pair.eigenvalue * phase, *noises) for phase, *noises in mass.terms]
-    terms = [KroneckerSum([each]) for each in factors]
-    parts = turns * np.array([y @ (term @ x) for term in terms])
-    sizes = turns * np.array([abs(y) @ (abs(term) @ abs(x)) for term in terms])
-    return Estimate(float(np.sum(parts)), sys.float_info.epsilon * float(np.sum(sizes)), float(np.sum(np.abs(parts))))
+class Changed:
+    """∂/∂θ of what a pair says, on its discretisation.
 
+    Args:
+        around: the pair; its derivatives by p are used where they are needed.
+        by: the direction of θ.
+    """
 
-def changed_slope(around: Bordered, by: ParameterDerivative) -> Estimate:
-    """∂Λ′/∂θ on one discretisation."""
-    pair = around.pair
-    x, y = pair.right, pair.left
-    zeroth, first = _operator(pair, by, 0, changed_value(pair, by).value), _operator(pair, by, 1, 0.0)
-    return _summed((y @ first(x), y @ zeroth(around.by_p), around.adjoint_by_p @ zeroth(x)), around.norm)
+    def __init__(self, around: Bordered, by: ParameterDerivative) -> None:
+        self._around, self._pair, self._by = around, around.pair, by
+        self._operators: dict[int, KroneckerSum] = {}
 
+    @cached_property
+    def value(self) -> Estimate:
+        """∂Λ/∂θ with the error of rounding, also in T and T*; the scale is that of the terms of L − Λ."""
+        pair = self._pair
+        x, y, turns = pair.right, pair.left, pair.space.turns
+        parts = turns * np.array([y @ image for image in self._images])
+        sizes, scale = turns * float(abs(y) @ (abs(self._operator(0)) @ abs(x))), float(np.sum(np.abs(parts)))
+        of_pair = (pair.residual + _EPS) * self._around.size / pair.generator.unit_rate
+        return Estimate(float(np.sum(parts)), _EPS * sizes + of_pair * scale, scale)
 
-def changed_curvature(around: Bordered, by: ParameterDerivative) -> Estimate:
-    """∂Λ″/∂θ at p = 0 on one discretisation."""
-    pair, x, y = around.pair, around.pair.right, around.pair.left
-    zeroth = _operator(pair, by, 0, changed_value(pair, by).value)
-    first = _operator(pair, by, 1, changed_slope(around, by).value)
-    parts = (
-        y @ _operator(pair, by, 2, 0.0, around.second_derivative)(x),
-        2 * (y @ first(around.by_p)),
-        2 * (around.adjoint_by_p @ first(x)),
-        2 * (around.adjoint_by_p @ zeroth(around.by_p)),
-        y @ zeroth(around.second_by_p),
-    )
-    return _summed(parts, around.norm)
+    @cached_property
+    def of_right(self) -> FloatArray:
+        """(∂L − Λ∂M)T."""
+        return np.asarray(sum(self._images))
 
+    @cached_property
+    def of_left(self) -> FloatArray:
+        """(∂L − Λ∂M)ᵀT*."""
+        return self._operator(0).T @ self._pair.left
 
-def _operator(
-    pair: PrincipalPair, by: ParameterDerivative, k: int, change: float, own: float | None = None
-) -> Callable[[FloatArray], FloatArray]:
-    """∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M − ∂Λ⁽ᵏ⁾/∂θ M."""
-    value = own if own is not None else (pair.eigenvalue, pair.derivative)[k]
-    operator, mass = pair.generator.changed(by, pair.p, derivative=k), pair.generator.changed_mass(by, pair.p)
+    @cached_property
+    def _images(self) -> list[FloatArray]:
+        return [KroneckerSum([term]) @ self._pair.right for term in self._operator(0).terms]
 
-    def image(v: FloatArray) -> FloatArray:
-        lost = 0.0 if mass is None else value * (mass @ v)
-        return operator @ v - lost - change * pair.space.weighed(v)
+    @cached_property
+    def slope(self) -> Estimate:
+        """∂Λ′/∂θ."""
+        around, x, y = self._around, self._pair.right, self._pair.left
+        parts = [y @ self.image(x, 1), y @ self.image(around.by_p, 0, self.value.value)]
+        if self._pair.p:  # for p = 0 BT = 0
+            parts.append(around.adjoint_by_p @ self.image(x, 0, self.value.value))
+        return _summed(parts, around.norm)
 
-    return image
+    @cached_property
+    def curvature(self) -> Estimate:
+        """∂Λ″/∂θ at p = 0."""
+        around, x, y = self._around, self._pair.right, self._pair.left
+        image, more = self.image(around.by_p, 0, self.value.value), self.slope.value
+        parts = (
+            y @ self.image(x, 2),
+            2 * (y @ self.image(around.by_p, 1, more)),
+            2 * (around.adjoint_by_p @ self.image(x, 1, more)),
+            2 * (around.adjoint_by_p @ image),
+            y @ self.image(around.second_by_p, 0, self.value.value),
+        )
+        return _summed(parts, around.norm)
+
+    def image(self, v: FloatArray, k: int, change: float = 0.0) -> FloatArray:
+        """(∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M − change M)v."""
+        found = self._operator(k) @ v
+        return found - change * self._pair.space.weighed(v) if change else found
+
+    def _operator(self, k: int) -> KroneckerSum:
+        """∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M."""
+        if k not in self._operators:
+            pair = self._pair
+            rate = (pair.eigenvalue, pair.derivative)[k] if k < 2 else self._around.second_derivative
+            self._operators[k] = pair.generator.changed(self._by, pair.p, rate, derivative=k)
+        return self._operators[k]
 
 
 @of_problem
@@ -293,8 +319,12 @@ def held_by(
 
 
 class Gradient:
-    """The derivatives along some directions; their errors are from the differences to those of a finer discretisation,
-    for algebraic tails also a wider one: at their ends ∂ ln P_s/∂r₀ is large.
+    """The derivatives along some directions, with their errors.
+
+    That of ∂Λ(p)/∂θ is about how what Λ(p) lacks by its highest modes changes, see `MissingModes`; that of ∂λ/∂θ is
+    the same next to p = 0, over p. Where the modes do not tell, on a given mesh, for algebraic tails, at corners and
+    beyond the plane, errors are from the differences to a finer discretisation, for algebraic tails also a wider one:
+    at their ends ∂ ln P_s/∂r₀ is large. So are those of ∂Λ″(0)/∂θ, as that of Λ″(0) is.
 
     Args:
         solver: of the problem.
@@ -309,60 +339,119 @@ class Gradient:
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
         solver, along = held_by(self._solver, p, self._along)
-        pair = solver.pair(p)
-        finer = solver.near.finer_pair(pair, widened(pair.generator).enriched())
-        return _compared(*({key: changed_value(each, by) for key, by in along.items()} for each in (pair, finer)))
+        solution = solver.solution(p)
+        around = Bordered(solution.pair)
+        changed = _changed(around, along)
+        values = {key: each.value for key, each in changed.items()}
+        if modes_tell(solution):
+            errors = changes_of_errors(solution, around, changed)
+            return _with_errors(values, {key: float(np.sum(np.abs(each))) for key, each in errors.items()})
+        finer = solver.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
+        return _compared(values, {key: each.value for key, each in _changed(Bordered(finer), along).items()})
 
     def lyapunov_exponent(self) -> dict[str, Estimate]:
         """∂λ/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
-        return self._at_zero(changed_slope)
+        solver, along = held_by(self._solver, 0.0, self._along)
+        near = solver.near.near_zero(0.0)
+        values = {key: each.slope for key, each in self._at_zero.items()}
+        if not modes_tell(near):
+            return _compared(values, {key: each.slope for key, each in self._finer_at_zero.items()})
+        around = Bordered(near.pair)
+        errors = changes_of_errors(near, around, _changed(around, along))
+        return _with_errors(
+            values, {key: float(np.sum(np.abs(each))) / abs(near.pair.p) for key, each in errors.items()}
+        )
 
     def variance_rate(self) -> Slopes:
         """∂Λ″(0)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         self._solver.variance_rate()
-        return self._at_zero(changed_curvature)
+        coarse, fine = (
+            {key: each.curvature for key, each in at.items()} for at in (self._at_zero, self._finer_at_zero)
+        )
+        return _compared(coarse, fine)
 
     def root(self, p: float) -> Slopes:
-        """∂δ_p/∂θ, p being δ_p: that of Λ(p)/p, for small p from its derivatives at p = 0, over that by p."""
-        factor = -1 / self._solver.ratio(p)[1]
-        if abs(p) >= SMALL_P:
-            return {key: _times(factor, _times(1 / p, each)) for key, each in self.moment(p).items()}
-        slopes = self.lyapunov_exponent()
-        for key, each in (self.variance_rate() if p else {}).items():
-            slope, more = slopes[key], _times(0.5 * p, each)
-            errors = slope.error_estimate + more.error_estimate
-            slopes[key] = Estimate(slope.value + more.value, errors, max(slope.scale, more.scale))
-        return {key: _times(factor, each) for key, each in slopes.items()}
+        """∂δ_p/∂θ, p being δ_p: that of Λ(p)/p, for small p from its derivatives at p = 0, over that by p.
 
-    def _at_zero(self, changed: Callable[[Bordered, ParameterDerivative], Estimate]) -> dict[str, Estimate]:
-        pairs, along = self._pairs_at_zero
-        return _compared(*({key: changed(each, by) for key, by in along.items()} for each in pairs))
+        With its own error each has twice the relative one of δ_p.
+        """
+        _, slope_by_p, error = self._solver.ratio(p)
+        if abs(p) >= SMALL_P:
+            slopes: Slopes = {key: _times(1 / p, each) for key, each in self.moment(p).items()}
+        else:
+            slopes = dict(self.lyapunov_exponent())
+            for key, each in (self.variance_rate() if p else {}).items():
+                slope, more = slopes[key], _times(0.5 * p, each)
+                errors = slope.error_estimate + more.error_estimate
+                slopes[key] = Estimate(slope.value + more.value, errors, max(slope.scale, more.scale))
+        lost = 2 * error / abs(slope_by_p) / max(abs(p), SMALL_P)
+        found = {key: _times(-1 / slope_by_p, each) for key, each in slopes.items()}
+        return {
+            key: replace(each, error_estimate=each.error_estimate + lost * abs(each.value))
+            for key, each in found.items()
+        }
 
     @cached_property
-    def _pairs_at_zero(self) -> tuple[tuple[Bordered, Bordered], Mapping[str, ParameterDerivative]]:
+    def _at_zero(self) -> Mapping[str, Changed]:
         solver, along = held_by(self._solver, 0.0, self._along)
-        coarse, fine = solver.at_zero
-        return (Bordered(coarse), Bordered(fine)), along
+        return _changed(solver.around_zero, along)
+
+    @cached_property
+    def _finer_at_zero(self) -> Mapping[str, Changed]:
+        solver, along = held_by(self._solver, 0.0, self._along)
+        return _changed(solver.finer_around_zero, along)
 
 
-def _compared(coarse: Slopes, fine: Slopes) -> dict[str, Estimate]:
-    """The finer ones, their errors from how far both are apart.
+def _changed(around: Bordered, along: Mapping[str, ParameterDerivative]) -> dict[str, Changed]:
+    return {key: Changed(around, by) for key, by in along.items()}
+
+
+def modes_tell(solution: Solution) -> bool:
+    """Whether the error of a pair is that by its highest modes."""
+    is_whole = solution.measured is None and solution.finer is None and not isinstance(solution, SumOfSolutions)
+    return is_whole and not solution.pair.generator.chosen.noise.lines.size
+
+
+def changes_of_errors(solution: Solution, around: Bordered, changed: Mapping[str, Changed]) -> dict[str, list[float]]:
+    """∂e/∂θ along some directions, for every e of `MissingModes`; but for the change of P_s in ⟨T*, T⟩, which changes e
+    only by its own size.
+
+    T and T* change by (L − Λ)T_θ = −BT and its adjoint, of which one pair of equations takes account for all θ:
+    ∂e/∂θ ⟨T*, T⟩ = ⟨y, Bx⟩ − ⟨w, BT⟩ − ⟨T*, Bv⟩, (L − Λ)ᵀw and (L − Λ)v the derivatives of e by T and T*.
+    """
+    found: dict[str, list[float]] = {key: [] for key in changed}
+    for each in MissingModes.of(solution):
+        with one_thread():
+            w = around.solve(each.by_right, adjoint=True, refinements=1)
+            v = around.solve(each.by_left, refinements=1)
+        for key, by in changed.items():
+            own = each.left @ by.image(each.right, 0, by.value.value)
+            found[key].append(float(own - w @ by.of_right - by.of_left @ v) / around.norm)
+    return found
+
+
+def _with_errors(values: Slopes, errors: Mapping[str, float]) -> dict[str, Estimate]:
+    """Derivatives with errors of about these sizes.
 
     That of one parameter may be small by chance, or fall slowly: twice as much counts, and by the scale of each what is
     usual among all.
     """
-    apart = {key: abs(each.value - coarse[key].value) for key, each in fine.items()}
-    usual = np.median([apart[key] / each.scale for key, each in fine.items() if each.scale] or [0.0])
+    usual = np.median([abs(errors[key]) / each.scale for key, each in values.items() if each.scale] or [0.0])
     return {
-        key: Estimate(each.value, 2 * apart[key] + float(usual) * each.scale + each.error_estimate, each.scale)
-        for key, each in fine.items()
+        key: replace(each, error_estimate=each.error_estimate + 2 * abs(errors[key]) + float(usual) * each.scale)
+        for key, each in values.items()
     }
+
+
+def _compared(coarse: Slopes, fine: Slopes) -> dict[str, Estimate]:
+    """The finer ones, their errors from how far both are apart."""
+    return _with_errors(fine, {key: each.value - coarse[key].value for key, each in fine.items()})
 
 
 def _summed(parts: Sequence[Any], norm: float) -> Estimate:
     """The sum of some parts over a norm, with about what rounding may change in it."""
     size = float(np.sum(np.abs(parts))) / norm
-    return Estimate(float(np.sum(parts)) / norm, 1e3 * sys.float_info.epsilon * size, size)
+    return Estimate(float(np.sum(parts)) / norm, 1e3 * _EPS * size, size)
 
 
 def _times(factor: float, estimate: Estimate) -> Estimate:

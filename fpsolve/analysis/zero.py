@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from pydantic.dataclasses import dataclass as checked_dataclass
 
 from fpsolve.analysis.scan import Sample
-from fpsolve.analysis.sensitivity import SMALL_P, changed_curvature, changed_slope, changed_value, held_by
+from fpsolve.analysis.sensitivity import SMALL_P, Changed, held_by
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, Countdown
@@ -204,12 +204,12 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
             raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
     held, by_key = held_by(solver, p, {key: solver.problem.derivative(key) for key in keys})
     along = [by_key[key] for key in keys]
+    around = Bordered(held.near.solution(p).pair) if abs(p) >= SMALL_P else held.around_zero
+    changed = [Changed(around, by) for by in along]
     if abs(p) >= SMALL_P:
-        pair = held.near.solution(p).pair
-        return value, error, np.array([changed_value(pair, by).value / p for by in along])
-    around = Bordered(held.near.solution(0.0).pair)
-    more = [0.5 * p * changed_curvature(around, by).value if p else 0.0 for by in along]
-    return value, error, np.array([changed_slope(around, by).value for by in along]) + more
+        return value, error, np.array([each.value.value / p for each in changed])
+    more = [0.5 * p * each.curvature.value if p else 0.0 for each in changed]
+    return value, error, np.array([each.slope.value for each in changed]) + more
 
 
 class ZeroField:

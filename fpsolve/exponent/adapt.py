@@ -88,7 +88,8 @@ class Budget:
     """What one Λ(p) may cost, and a line of a chart.
 
     Args:
-        unknowns: of the largest system; memory grows with it, some 30 kB each, 1.8 GB in all for the 60,000.
+        unknowns: of the largest system; memory grows with it, up to 30 kB each, 2.4 GB in all for the 80,000, a fifth
+            of that in the plane under one noise.
         seconds: of the processor for one p; foreseen before every solve from the last one, and looked at before every
             factorisation, so that it may take a third more. The nodes of a row of a scan share it, and each may take
             half of what is left.
@@ -99,7 +100,7 @@ class Budget:
         ParameterError: a number is out of its range.
     """
 
-    unknowns: Annotated[int, parameter("number of unknowns of the largest system", "unknowns = 60000", ge=100)] = 60_000
+    unknowns: Annotated[int, parameter("number of unknowns of the largest system", "unknowns = 80000", ge=100)] = 80_000
     seconds: Annotated[float, parameter("seconds of processor time for one p", "seconds = 60.0", gt=0)] = 60.0
     line_seconds: Annotated[
         float | None, parameter("seconds of processor time for a line of a chart", "line_seconds = 600.0", gt=0)
@@ -412,9 +413,12 @@ class _Search:
         nearest = min(self.place.known, key=lambda q: abs(q - self.p), default=None)
         if nearest is None:
             return None
-        generator = self.place.known[nearest].pair.generator
-        if (chosen := self.place.trimmed(self.place.known[nearest], self.tolerance)) is not generator.chosen:
+        known = self.place.known[nearest]
+        generator = known.pair.generator
+        if (chosen := self.place.trimmed(known, self.tolerance)) is not generator.chosen:
             generator = Generator(self.place.problem, chosen)
+        elif nearest == self.p:
+            return known
         try:
             solution = self.tried(generator) if self.place.fits(generator, nearest, self.p) else None
         except NotConverged:

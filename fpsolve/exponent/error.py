@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.corners import Corner, corners, left_on_mesh, slow_shares
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.fem.axis import along
+from fpsolve.fem.axis import KroneckerSum, TensorSpace, along
 from fpsolve.fem.discretisation import ModeEffects
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.quantity import UNNAMED
@@ -218,30 +219,116 @@ class SumOfSolutions(Solution):
         return sum(each.error for each in self.parts) + self.search
 
 
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """The functions of a space by their modes along one direction.
+
+    Attributes:
+        at: the axis.
+        cells, modes: of its functions, shape (size,), see `Axis`.
+        degrees: of its cells, shape (cells,).
+        slowest: see `ModeEffects`.
+        nested: for each axis the matrix to coefficients of modes; None where they are that already.
+    """
+
+    at: int
+    cells: Any
+    modes: Any
+    degrees: Any
+    slowest: float
+    nested: tuple[Any, ...]
+
+    def highest(self, depth: int) -> Any:
+        """Which functions of the axis are of so many highest modes of their cell, shape (size,)."""
+        return (self.cells >= 0) & (self.modes > self.degrees[self.cells] - depth)
+
+    def along(self, of_functions: Any) -> Any:
+        """Numbers for the functions of the axis as a factor of tables."""
+        return of_functions.reshape([-1 if k == self.at else 1 for k in range(len(self.nested))])
+
+
+def ladders(space: TensorSpace) -> Iterator[Ladder | None]:
+    """Those of all directions; None for one that has states."""
+    for at, axis in enumerate(space.axes):
+        for cells, modes, own in axis.ladders:
+            if (count := int(cells.max()) + 1) == 0:
+                yield None
+                continue
+            degrees = np.zeros(count, dtype=int)
+            np.maximum.at(degrees, cells[cells >= 0], modes[cells >= 0])
+            nested = tuple(own if k == at else None for k in range(len(space.axes)))
+            yield Ladder(at, cells, modes, degrees, axis.slowest, nested)
+
+
+def sides(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
+    """T, T* and L − Λ; for p < −1 T*, T and the adjoint: whichever of both is the smoother one comes first.
+
+    T for p and T* for −2 − p solve the same equation but for the direction of time: that of the paths for p < −1 has
+    layers where the paths for p > −1 leave.
+    """
+    operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
+    return (pair.left, pair.right, operator.T) if pair.p < -1 else (pair.right, pair.left, operator)
+
+
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     """The effects along every direction of every axis; None along one that has states."""
     space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
-    operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
-    tables, found = (space.table(pair.right), space.table(pair.left)), list[ModeEffects | None]()
-    directions = [(at, axis, *ladder) for at, axis in enumerate(space.axes) for ladder in axis.ladders]
-    for at, axis, cells, modes, own in directions:
-        inner, count = cells >= 0, int(cells.max()) + 1
-        if count == 0:
+    smooth, rough, operator = sides(pair)
+    tables, found = (space.table(smooth), space.table(rough)), list[ModeEffects | None]()
+    for ladder in ladders(space):
+        if ladder is None:
             found.append(None)
             continue
-        degrees = np.zeros(count, dtype=int)
-        np.maximum.at(degrees, cells[inner], modes[inner])
-        nested = [own if k == at else None for k in range(len(space.axes))]
-        effects, (right, left) = [], (along(nested, table) for table in tables)
+        effects, (first, last) = [], (along(ladder.nested, table) for table in tables)
+        others = tuple(k for k in range(len(space.axes)) if k != ladder.at)
         for depth in (2, 4):
-            high = inner & (modes > degrees[cells] - depth)
-            mask = high.reshape([-1 if k == at else 1 for k in range(len(space.axes))])
-            image = space.table(operator @ np.ravel(right * mask))
-            others = tuple(k for k in range(len(space.axes)) if k != at)
-            shares = np.abs(left * mask * image).sum(axis=others)[high]
-            effects.append(np.bincount(cells[high], shares, minlength=count) / abs(norm))
-        found.append(ModeEffects(degrees, effects[0], effects[1], axis.slowest))
+            high = ladder.highest(depth)
+            mask = ladder.along(high)
+            image = space.table(operator @ np.ravel(first * mask))
+            shares = np.abs(last * mask * image).sum(axis=others)[high]
+            effects.append(np.bincount(ladder.cells[high], shares, minlength=ladder.degrees.size) / abs(norm))
+        found.append(ModeEffects(ladder.degrees, effects[0], effects[1], ladder.slowest))
     return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class MissingModes:
+    """e = ⟨y, (L − Λ)x⟩/⟨T*, T⟩, about what Λ lacks in every second cell along one direction.
+
+    x is what T has of the two highest modes, and y the same of T* in these cells, the coefficients of the rougher of
+    both times the share that is thought to be left, with the sign of the product.
+
+    Attributes:
+        right, left: x and y, shape (size,).
+        by_right, by_left: the derivatives of e ⟨T*, T⟩ by the coefficients of T and of T*, shape (size,).
+    """
+
+    right: FloatArray
+    left: FloatArray
+    by_right: FloatArray
+    by_left: FloatArray
+
+    @classmethod
+    def of(cls, solution: Solution) -> Iterator[MissingModes]:
+        """Those of a pair and its effects: of the even and of the odd cells along every direction."""
+        pair, space = solution.pair, solution.pair.space
+        smooth, rough, operator = sides(pair)
+        for ladder, effects in zip(ladders(space), solution.effects, strict=True):
+            if ladder is None or effects is None:
+                continue
+            mask, back = ladder.along(ladder.highest(2)), [None if each is None else each.T for each in ladder.nested]
+            first, last = (mask * along(ladder.nested, space.table(each)) for each in (smooth, rough))
+            image = space.table(operator @ np.ravel(first))
+            shares = effects.of_cells / np.maximum(effects.two, sys.float_info.min)
+            weights = ladder.along(shares[ladder.cells]) * np.sign(last * image)
+            for turn in range(min(2, ladder.degrees.size)):
+                own = weights * ladder.along(ladder.cells % 2 == turn)
+                of_last = space.table(operator.T @ np.ravel(own * last))
+                by_first, by_last = (np.ravel(along(back, mask * each)) for each in (of_last, own * image))
+                found = np.ravel(first), np.ravel(own * last), by_first, by_last
+                if smooth is pair.left:
+                    found = found[1], found[0], by_last, by_first
+                yield cls(*found)
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:

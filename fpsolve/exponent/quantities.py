@@ -68,8 +68,8 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
     """
     if (number := _ray(solver, jump)) is None:
         return _not_one_ray(solver)
-    value, better = (_flux(pair, number) for pair in solver.at_zero)
-    generator = solver.at_zero[1].generator
+    value, better = (_flux(each.pair, number) for each in (solver.around_zero, solver.finer_around_zero))
+    generator = solver.finer_around_zero.pair.generator
     usual = generator.unit_rate / math.pi
     rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.loss * usual
     error = abs(better - value) + (rounding if better > lost else lost)
@@ -147,7 +147,7 @@ def _flux(pair: PrincipalPair, number: int) -> float:
     """⟨T*, ∂L′(0)/∂ ln R 1⟩ of a pair at p = 0, R that of one of the jumps."""
     jumps = pair.generator.problem.system.jumps
     changes = tuple(float(i == number) for i in range(len(jumps)))
-    load = pair.generator.changed(ParameterDerivative(jumps[number].log_factor, jumps=changes), 0.0, derivative=1)
+    load = pair.generator.changed(ParameterDerivative(jumps[number].log_factor, jumps=changes), 0.0, 0.0, derivative=1)
     return float(pair.left @ (load @ pair.right) / (pair.left @ pair.space.weighed(pair.right)))
 
 

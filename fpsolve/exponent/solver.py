@@ -29,7 +29,7 @@ from fpsolve.exponent.adapt import (
     misplaced,
     widened,
 )
-from fpsolve.exponent.eigen import PrincipalPair, second_derivative, slope_rounding
+from fpsolve.exponent.eigen import Bordered, PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Solution, checked
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.joint import joint_solution
@@ -382,17 +382,22 @@ class ExponentSolver:
         if tail < HARDLY_FINITE:
             raise NoSuchExponent(Message(Code.NO_VARIANCE_RATE))
         scale = 2 * self.scales.quadratic
-        value, better = map(second_derivative, self.at_zero)
+        value, better = self.around_zero.second_derivative, self.finer_around_zero.second_derivative
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
         beyond = max(1.0, 1 / math.expm1(tail * math.log(WIDER)))  # what is left, over what the wider one has added
         error = beyond * abs(better - value) + rounding
         return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.near.refinement)
 
     @cached_property
-    def at_zero(self) -> tuple[PrincipalPair, PrincipalPair]:
-        """The pair at p = 0, and that of a finer and wider discretisation. Raises `NotConverged`."""
-        pair = self.near.solution(0.0).pair
-        return pair, self.near.finer_pair(pair, widened(pair.generator).enriched())
+    def around_zero(self) -> Bordered:
+        """The pair at p = 0 and its derivatives. Raises `NotConverged`."""
+        return Bordered(self.near.solution(0.0).pair)
+
+    @cached_property
+    def finer_around_zero(self) -> Bordered:
+        """That of a finer and wider discretisation. Raises `NotConverged`."""
+        pair = self.around_zero.pair
+        return Bordered(self.near.finer_pair(pair, widened(pair.generator).enriched()))
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""

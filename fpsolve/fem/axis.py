@@ -36,6 +36,7 @@ class Axis:
         levels: functions to be eliminated together, of which each level is coupled to its neighbours only; empty where
             the matrices tell them, None where every function can be by itself.
         slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
+        ring: its cells, a `Ring`, where only their end values couple them; None for others.
     """
 
     size: int
@@ -45,6 +46,7 @@ class Axis:
     nested: Any = None
     levels: Any = None
     unit: Any = None
+    ring: Any = None
     is_full = False
     turns, slowest = 1, 0.0
 

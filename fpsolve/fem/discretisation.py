@@ -28,6 +28,8 @@ HALVING = 2 * math.log(2)
 """By how much more the logarithm of an effect falls with each degree in half a cell."""
 MAX_POLYNOMIALS = 200
 LEAST_DEGREE, SPLIT_DEGREE, MOST_DEGREE = 4, 6, 14
+SPARE = 1.0
+"""Degrees beyond what seems to be enough that a cell keeps where none should be made coarser."""
 LITTLE = 1e-2
 """Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
 THIRDS = 3
@@ -438,8 +440,8 @@ def _split(
     at corners are left as they are.
     """
     rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
-    if not may_coarsen:
-        needed = np.maximum(needed, effects.degrees)
+    if not may_coarsen:  # but for what is far more than enough
+        needed = np.maximum(needed, np.minimum(effects.degrees, needed + SPARE))
     needed = np.where(effects.at_corners, effects.degrees - 0.2, needed)  # they are graded instead
     in_half = needed * rate / (rate + HALVING)
     is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
@@ -9,8 +10,7 @@ from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.linalg.blas import dgemm, dtrsm
-from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.linalg.blas import dgemm
 from scipy.sparse import csr_matrix, identity
 from scipy.sparse.csgraph import shortest_path
 from scipy.sparse.linalg import splu
@@ -19,10 +19,13 @@ from threadpoolctl import ThreadpoolController
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.dense import DenseFactors
+from fpsolve.fem.rings import Ring, RingFactors, ring_seconds
 
 MAX_DENSE_UNKNOWNS = 350
 """Below it one dense matrix is the fastest."""
 MAX_BLOCK, MAX_BAND = 400, 6
+"""Functions in a level, and diagonals on each side, up to which elimination by them is faster than SuperLU."""
 MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 MAX_LEVEL = 0.2
@@ -56,26 +59,30 @@ class Factors(Protocol):
         """x of A x = b, or of Aᵀx = b."""
 
 
-def factorised(operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: bool = False) -> Factors:
+def factorised(
+    operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: bool = False, ring: Ring | None = None
+) -> Factors:
     """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted.
 
     Args:
         operator: the sum.
         levels: for each axis the functions that are eliminated together, see `Axis`; nothing where none are.
         is_full: whether most functions of the first axis are coupled, so that no order of elimination spares anything.
+        ring: the cells of the first axis, where only their end values couple them.
     """
     if operator.size <= MAX_DENSE_UNKNOWNS and not operator.is_sparse:
         return DenseFactors(operator.toarray())
     m, n = operator.halves
     if is_full:
         return _of_full(operator, levels)
+    if len(operator.shape) == 2 and (not levels or levels[-1] is None):
+        return _of_plane(operator, ring)
     if operator.is_sparse:
         return SparseFactors(operator)
     if len(operator.shape) == 3 and operator.shape[1] > n:
         return SwappedFactors(operator, levels)
-    most = MAX_THICK_BLOCK if len(operator.shape) == 3 else MAX_BLOCK
     own = levels[-1] if levels else None
-    if own is None and m <= most and operator.band <= MAX_BAND < n:
+    if own is None and m <= MAX_THICK_BLOCK and operator.band <= MAX_BAND < n:
         return BlockFactors(operator)
     if own is not None and m <= MAX_BLOCK:
         own = own or levels_of(operator)
@@ -84,6 +91,18 @@ def factorised(operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: b
                 with suppress(SingularMatrix):
                     return LevelFactors(operator, along_last(operator, each))
     return SparseFactors(operator)
+
+
+def _of_plane(operator: KroneckerSum, ring: Ring | None) -> Factors:
+    """Of the phase and one noise: by blocks or cell by cell, what should take less time with four solves, or sparse."""
+    (m, n), band = operator.shape, max(operator.band, 1)
+    choices: list[tuple[float, Callable[[], Factors]]] = [(math.inf, lambda: SparseFactors(operator))]
+    if m <= MAX_BLOCK and band <= MAX_BAND and 2 * band < n:
+        seconds = 1.4 * n * (1.5e-5 + 4e-6 * band**2 + 5e-11 * (1 + band) ** 2 * m**3)
+        choices.append((seconds, lambda: BlockFactors(operator.with_dense_first())))
+    if ring is not None and len(ring.number) > 2 and band <= MAX_BAND:
+        choices.append((5e-4 + 2 * ring_seconds(operator, ring), lambda: RingFactors(operator, ring)))
+    return _cheapest(choices)
 
 
 def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
@@ -99,10 +118,16 @@ def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
         choices.append((cost, lambda: BlockFactors(operator.with_dense_first())))
     if levels and levels[0] is not None:
         choices.append(_by_levels(operator, along_first(operator, levels[0])))
-    cheapest, *others = [factorise for _, factorise in sorted(choices, key=lambda choice: choice[0])]
-    with suppress(SingularMatrix):
-        return cheapest()
-    return others[0]()
+    return _cheapest(choices)
+
+
+def _cheapest(choices: Sequence[tuple[float, Callable[[], Factors]]]) -> Factors:
+    """The factors that take least, or the next ones where those cannot be made."""
+    *others, last = [factorise for _, factorise in sorted(choices, key=lambda choice: choice[0])]
+    for factorise in others:
+        with suppress(SingularMatrix):
+            return factorise()
+    return last()
 
 
 def _by_levels(operator: KroneckerSum, levels: Sequence[Any]) -> tuple[float, Callable[[], Factors]]:
@@ -115,30 +140,6 @@ def _by_levels(operator: KroneckerSum, levels: Sequence[Any]) -> tuple[float, Ca
 def _dense_cost(size: int) -> float:
     """Operations of an LU of a dense matrix."""
     return 2 / 3 * size**3
-
-
-class DenseFactors:
-    """LAPACK's LU of an array."""
-
-    def __init__(self, matrix: FloatArray) -> None:
-        self._lu, self._pivots, info = dgetrf(matrix, overwrite_a=1)
-        if info > 0:
-            pivots = np.einsum("ii->i", self._lu)
-            pivots[pivots == 0] = np.finfo(float).eps * np.max(np.abs(pivots))
-
-    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
-        return np.asarray(dgetrs(self._lu, self._pivots, b, trans=transposed)[0])
-
-    def right_quotient(self, b: FloatArray) -> FloatArray:
-        """b A⁻¹."""
-        half = dtrsm(1.0, self._lu, b, side=1)
-        half = dtrsm(1.0, self._lu, half, side=1, lower=1, diag=1, overwrite_b=1)
-        order = list(range(self._pivots.size))
-        for i, j in enumerate(self._pivots.tolist()):
-            order[i], order[j] = order[j], order[i]
-        found = np.empty(half.T.shape)
-        found[order] = half.T
-        return found.T
 
 
 class BlockFactors:

@@ -16,6 +16,7 @@ from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.rings import Ring
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.plane import (
     Harmonics,
@@ -49,17 +50,19 @@ class Pencil:
         space: the trial and test functions.
         matrix: that of L(p), its first term with the matrices of noise that `space.mass` has.
         levels: for each axis, see `Axis`.
+        ring: the cells of φ, where only their end values couple them.
     """
 
     p: float
     space: TensorSpace
     matrix: KroneckerSum
     levels: Sequence[Any]
+    ring: Ring | None = None
 
     @staticmethod
-    def of(p: float, space: TensorSpace, matrix: KroneckerSum) -> Pencil:
+    def of(p: float, space: TensorSpace, matrix: KroneckerSum, ring: Ring | None = None) -> Pencil:
         """That of all functions."""
-        return Pencil(p, space, matrix, [axis.levels for axis in space.axes])
+        return Pencil(p, space, matrix, [axis.levels for axis in space.axes], ring)
 
     def on(self, axis: int, kept: Any) -> Pencil:
         """What it is on some functions of an axis, where a mask is true."""
@@ -70,7 +73,7 @@ class Pencil:
 
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM: dense, by blocks along an axis, or sparse."""
-        return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full)
+        return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full, ring=self.ring)
 
 
 class Generator:
@@ -120,8 +123,13 @@ class Generator:
     def at(self, p: float) -> Pencil:
         """What is solved at p; the last one is kept."""
         if self._last is None or self._last.p != p:
-            self._last = Pencil.of(p, self.space(p), self.matrix(p))
+            self._last = Pencil.of(p, self.space(p), self.matrix(p), self._ring)
         return self._last
+
+    @property
+    def _ring(self) -> Ring | None:
+        """The cells of φ, if noise without a value does not couple what lies within them."""
+        return None if self.problem.diffusions or self.problem.impulses else self.phi.ring
 
     def enriched(self) -> Generator:
         """That of the next finer discretisation."""
@@ -131,7 +139,7 @@ class Generator:
         """L(p) term by term."""
         return tuple(self._own_terms.whole())
 
-    @property
+    @cached_property
     def _own_terms(self) -> Any:
         return Terms(self.problem, self.space(0.0))
 
@@ -145,8 +153,8 @@ class Generator:
         """
         return self._sum.matrix(self.space(p), p, derivative, orders)
 
-    def changed(self, by: ParameterDerivative, p: float, *, derivative: int = 0) -> KroneckerSum:
-        """The matrix of ∂/∂θ dᵏL/dpᵏ, the functions of φ and ξ held; that of P_s, and so of `mass`, is in it."""
+    def changed(self, by: ParameterDerivative, p: float, rate: float, *, derivative: int = 0) -> KroneckerSum:
+        """The matrix of ∂/∂θ (dᵏL/dpᵏ − rate M), the functions of φ and ξ held, M = `mass`; that of P_s is in it."""
         axes = self.space(p).axes[1:]
         if by not in self._changes:
             self._changes[by] = tuple(self._own_terms.changed(by))
@@ -156,21 +164,15 @@ class Generator:
             if (phase := term.at(p, derivative)) is not None
         ]
         if by.noise is not None:
-            phases = self._sum.phases(p, derivative)
-            parts += [(phase, *self._changed(by, axes, noises)) for noises, phase in phases.items()]
+            (noises, phase), *others = self._sum.phases(p, derivative).items()  # the first is that of 1
+            moved = [(noises, phase - rate * self.phi.identity), *others]
+            parts += [(phase, *self._changed(by, axes, noises)) for noises, phase in moved]
         return KroneckerSum(parts or [(0.0 * self.phi.identity, *(axis.matrix(one) for axis in axes))])
-
-    def changed_mass(self, by: ParameterDerivative, p: float) -> KroneckerSum | None:
-        """∂/∂θ of `mass`; None where the noise does not change."""
-        if by.noise is None:
-            return None
-        axes = self.space(p).axes[1:]
-        return KroneckerSum([(self.phi.identity, *self._changed(by, axes, [one] * len(axes)))])
 
     def _changed(self, by: ParameterDerivative, axes: Sequence[Any], noises: Sequence[Any]) -> Iterator[Any]:
         """The factors of the noises of ∂/∂θ of a term, where one of them changes."""
         for k, (axis, g) in enumerate(zip(axes, noises, strict=True)):
-            yield axis.changed(by.noise, g) if k == by.part else axis.matrix(g)
+            yield axis.changed_matrix(by.noise, g) if k == by.part else axis.matrix(g)
 
     @cached_property
     def _sum(self) -> TermSum:

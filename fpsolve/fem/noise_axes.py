@@ -72,9 +72,19 @@ class NoiseAxis(Axis):
     values: Any
     measure: FloatArray
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._changes: dict[tuple[NoiseDerivative, Coefficient | None], Any] = {}
+
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Any:
         """∂/∂θ of `mass(g)`, for None of `generator()`, where the noise changes and the functions of ξ do not."""
         raise NotImplementedError
+
+    def changed_matrix(self, change: NoiseDerivative, g: Coefficient | None) -> Any:
+        """`changed(change, g)`, made once."""
+        if (change, g) not in self._changes:
+            self._changes[change, g] = self.changed(change, g)
+        return self._changes[change, g]
 
     def generator_of_one(self) -> FloatArray:
         """`generator` with v the function 1, times the factor; shape (size,)."""
@@ -200,11 +210,12 @@ class PolynomialAxis(LineAxis):
             missing = 0.0 if near < VANISHES * middle else 1.0  # 1 − b: by so much more does P_s fall at the ends
             more = min(abs(tilt) * end, 4 * tilt**2)
             points = 16 * math.ceil((2 * count + MORE_POINTS + more) / 16)  # few rules serve many spaces
-            x, weights = _gegenbauer_rule(points, noise.end_exponent - missing)
+            self._end = noise.end_exponent - missing
+            x, weights = _gegenbauer_rule(points, self._end)
             self.points, damping = end * x, (1 - x**2) ** missing
             logs = np.log(weights) + 2 * tilt * self.points
             tilted = np.exp(logs - logs.max())
-            own = gegenbauer(count, noise.end_exponent - missing)
+            own = gegenbauer(count, self._end)
             self._polynomials = stieltjes(x, tilted, count) if tilt else own
             self.values, slopes = self._polynomials.at(x)
             self.measure = tilted * damping / (tilted @ damping)
@@ -227,7 +238,7 @@ class PolynomialAxis(LineAxis):
         logs, a = change.log_density(self.unit * self.points), self.noise.end_exponent
         if change.end_exponent and a < SHARP_ENDS:  # no rule of Gauss takes its ln(1 − x²) near ±1 as it stands
             x = self.points / self._scale
-            logs = logs + change.end_exponent * (logarithm(x, a, x.size) - np.log1p(-(x**2)))
+            logs = logs + change.end_exponent * (_end_logarithm(x.size, self._end, a) - np.log1p(-(x**2)))
         logs = np.asarray(logs - self.measure @ logs)
         if g is not None:
             return form(self.values, self.measure * self.changed_weight(change, g, logs, self.points))
@@ -356,6 +367,12 @@ def _hermite_table(count: int) -> tuple[Polynomials, FloatArray, FloatArray, Flo
 @lru_cache(maxsize=64)
 def _gegenbauer_rule(count: int, exponent: float) -> tuple[FloatArray, FloatArray]:
     return gegenbauer(count, exponent).rule()
+
+
+@lru_cache(maxsize=64)
+def _end_logarithm(count: int, exponent: float, a: float) -> FloatArray:
+    """ln(1 − x²) at the points of a rule, as the polynomials of the exponent a have it."""
+    return logarithm(_gegenbauer_rule(count, exponent)[0], a, count)
 
 
 def form(values: FloatArray, measure: FloatArray) -> FloatArray:

@@ -14,6 +14,7 @@ from fpsolve.arrays import FloatArray, one
 from fpsolve.fem.axis import Axis
 from fpsolve.fem.mesh import vertices_at
 from fpsolve.fem.polynomials import gauss_legendre, legendre, orthonormal
+from fpsolve.fem.rings import Ring
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, ImpulseDerivative, changed_exponential
 
 PENALTY = 2.0
@@ -155,6 +156,13 @@ class PhaseAxis(Axis):
         sizes = np.diff(cuts)[:, None]
         middles = np.repeat(0.5 * (cuts[:-1] + cuts[1:]), local.size)
         return (cuts[:-1, None] + sizes * local).ravel(), middles, (sizes * weights).ravel()
+
+    @cached_property
+    def ring(self) -> Ring:
+        """The cells, as long as nothing but their end values couples them."""
+        kept = self._pairs[:, :, 0]
+        ends = (self._table.ends[:, None] / np.sqrt(self._sizes)[:, None]).transpose(1, 2, 0)
+        return Ring(np.where(kept, self._number, -1), np.where(kept[:, :, None], ends, 0.0))
 
     @cached_property
     def _mean_slope(self) -> Any:

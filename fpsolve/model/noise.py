@@ -215,7 +215,7 @@ class Noise(Parametrised):
         Args:
             xi: values of ξ, increasing, shape (n,).
         """
-        return 0.125 * self.squared_diffusion(xi) * np.gradient(self.log_density(xi), xi) ** 2
+        return 0.125 * self.squared_diffusion(xi) * np.gradient(self.log_density(xi), xi, edge_order=2) ** 2
 
     def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
         """Independent values of ξ from the stationary law, shape (size,)."""

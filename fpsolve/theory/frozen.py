@@ -17,6 +17,10 @@ LARGEST_P = 25.0
 """The places for larger p may lie beyond those that are looked at."""
 FURTHEST = 1e12
 """Where algebraic tails are looked at last, in standard deviations."""
+CLOSE = 0.1
+"""Standard deviations within which the centre of a tilted density is found."""
+ZOOM = 41
+"""Points between two that are farther apart."""
 
 
 def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, Any]:
@@ -48,6 +52,23 @@ def steady_places(problem: Problem, p: float) -> tuple[FloatArray, FloatArray]:
     return xi[at] / unit, rate[at]
 
 
+class _Held:
+    """Noise held at some z, increasing, shape (n,)."""
+
+    def __init__(self, problem: Problem, z: FloatArray) -> None:
+        noise, self.z = problem.coloured, z
+        xi = noise.standard_deviation * z
+        self._faster, self._slower, self.turns = eigenvalues_at(problem, xi)
+        self._holding = noise.holding_cost(xi)
+
+    def rate(self, p: float) -> FloatArray:
+        """F of `FrozenNoise`."""
+        growth = p * self._faster
+        if p < -1:
+            growth = np.where(self.turns, growth, np.maximum(growth, (p + 1) * self._slower - self._faster))
+        return growth - self._holding
+
+
 class FrozenNoise:
     """The growth rate F(z; p) of ‖x‖^p on paths that hold the noise at z, and where it is the largest.
 
@@ -76,33 +97,49 @@ class FrozenNoise:
         spread = max(np.log(end / 1e-2), 1.0)
         side = end * np.sinh(spread * np.linspace(0, 1, SAMPLES)) / np.sinh(spread)
         self.z = np.concatenate([-side[:0:-1], side])
-        self._faster, self._slower, self._turns = eigenvalues_at(problem, unit * self.z)
+        self._problem, self._held = problem, _Held(problem, self.z)
         self._slope = np.gradient(noise.log_density(unit * self.z), self.z)
-        self._holding = noise.holding_cost(unit * self.z)
+        self._known = dict[tuple[float, int], tuple[float, float]]()
 
     def rate(self, p: float) -> FloatArray:
         """F at `z`."""
-        growth = p * self._faster
-        if p < -1:
-            growth = np.where(self._turns, growth, np.maximum(growth, (p + 1) * self._slower - self._faster))
-        return growth - self._holding
+        return self._held.rate(p)
 
     def peaks(self, p: float) -> tuple[FloatArray, FloatArray]:
         """z and F of the local maxima."""
         rate = self.rate(p)
         at = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
-        return self.z[at], rate[at]
+        if self._is_heavy:
+            return self.z[at], rate[at]
+        found = np.array([self._peak(p, int(k)) for k in at]).reshape(-1, 2)
+        return found[:, 0], found[:, 1]
 
     def center(self, p: float) -> float:
         """About the mean z of the tilted density; for algebraic tails that of the place nearest to 0."""
         if self._is_heavy:
             peaks, _ = self.peaks(p)
             return float(peaks[np.argmin(np.abs(peaks))]) if peaks.size else 0.0
-        return float(self.z[np.argmax(self.rate(p))])
+        return self._peak(p, int(np.argmax(self.rate(p))))[0]
+
+    def _peak(self, p: float, number: int) -> tuple[float, float]:
+        """z and F of the maximum next to a number of `z`, looked for once."""
+        if (p, number) not in self._known:
+            self._known[p, number] = self._zoomed(p, number)
+        return self._known[p, number]
+
+    def _zoomed(self, p: float, best: int) -> tuple[float, float]:
+        held = self._held
+        while True:
+            lower, upper = held.z[[max(best - 1, 0), min(best + 1, held.z.size - 1)]]
+            if upper - lower <= CLOSE:
+                break
+            held = _Held(self._problem, np.linspace(float(lower), float(upper), ZOOM))
+            best = int(np.argmax(held.rate(p)))
+        return float(held.z[best]), float(held.rate(p)[best])
 
     def rests(self, p: float) -> bool:
         """Whether the phase does not turn at the largest F."""
-        return not self._turns[np.argmax(self.rate(p))]
+        return not self._held.turns[np.argmax(self.rate(p))]
 
     def at_the_ends(self, p: float) -> float:
         """The larger F of the outermost z."""

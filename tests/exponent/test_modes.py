@@ -175,7 +175,7 @@ def test_memory_is_foreseen():
     cells = SphereCells(coordinates, np.linspace(0, math.pi / 2, 3), 8, 14)
     chosen = Discretisation(cells, (Polynomials(9, 0.0),))
     size = 4 * 8e-9 * cells.size * chosen.size
-    with pytest.raises(NotConverged, match=f"needs some {size:.2g} GB of memory, more than the 1.8 GB that budget"):
+    with pytest.raises(NotConverged, match=f"needs some {size:.2g} GB of memory, more than the 2.4 GB that budget"):
         place._check(_Search(place, 1.0, place.tolerance, place.begun()), chosen)
 
 
