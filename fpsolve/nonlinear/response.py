@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
+AT_ONE_PHASE = 2.0
+"""By what the error estimate of the flux at the impacts is larger: it converges like n^(−3/2) or slower in φ."""
 SEEN = 1e-8
 """Of the largest density, above which its sign counts."""
 MEANS = ("amplitude", "amplitude_squared", "amplitude_fourth", "x_squared", "v_squared", "energy")
@@ -233,6 +235,7 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryRe
     found = _numbers(settled.solution)
     scales = np.append(np.abs(found[:-1]), rate)
     errors = settled.errors(_numbers, scales)
+    errors[-1] *= AT_ONE_PHASE
     *means, impacts, balance = map(Estimate, found.tolist(), errors.tolist(), scales.tolist())
     lines = settled.solution.height.lines
     return StationaryResponse(

@@ -8,11 +8,13 @@ import pytest
 from fpsolve import ExponentSolver, lyapunov_exponent, stability_index
 from fpsolve.errors import FpsolveError
 from fpsolve.fem.discretisation import Polynomials
+from fpsolve.fem.factors import one_thread
 from fpsolve.model import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.nonlinear import stationary_response
 from fpsolve.nonlinear.elimination import Tail, solved
 from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
 from tests.oracles.upwind_chain import Chain
+from tests.random_responses import distances, drawn
 
 SMOOTH = {"omega": 1.0, "epsilon": 0.5, "restitution": 1.0, "c1": 0.4, "c2": 0.5, "c3": 0.2}
 BOUNCING = {"omega": 1.0, "epsilon": 1.0, "restitution": 0.9, "c1": 0.3, "c2": 0.1, "c3": 0.1, "impact": "delta"}
@@ -89,7 +91,8 @@ def test_without_an_imposed_tail_the_density_falls_as_that_of_the_linear_system(
     problem = Problem(system, noise_of(0.3, 0.5))
     plane = Plane(Flow(problem), Circle(2, 14), Polynomials(16))
     any_inflow = Tail(1.0, plane.constant[None])
-    found = solved(plane, Height(np.linspace(-10, 1.8, 48), 8), any_inflow)
+    with one_thread():
+        found = solved(plane, Height(np.linspace(-10, 1.8, 48), 8), any_inflow)
     u = np.linspace(-5.5, -3, 101)
     logs = np.log(found.at(u) @ plane.unit @ plane.constant)
     shapes = np.stack([np.ones_like(u), u, np.exp(2 * u), np.exp(4 * u)], axis=1)
@@ -131,6 +134,14 @@ def test_what_the_noise_feeds_in_is_lost_at_impacts(seed):
     system |= {"epsilon": rng.uniform(0.4, 0.8), "c2": rng.uniform(0.05, 0.5), "c3": rng.uniform(0.05, 0.5)}
     found = response(system, rng.uniform(0.05, 0.15), rng.uniform(0.3, 0.6), 1e-3)
     assert abs(found.balance.value) <= found.balance.error_estimate
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [6, 14])
+def test_the_simulation_has_the_same_means(seed):
+    """Two of the twenty that `python -m tests.random_responses` compares."""
+    far = distances(drawn(seed), seed, rtol=1e-3, paths=4096)
+    assert max(map(abs, far.values())) < 4
 
 
 @pytest.mark.slow
