@@ -143,7 +143,10 @@ def _dense_cost(size: int) -> float:
 
 
 class BlockFactors:
-    """Block elimination over the functions of the last axis, from the last, where noise relaxes fastest, on."""
+    """Block elimination over the functions of the last axis, from the last, where noise relaxes fastest, on.
+
+    `solve` takes several right sides, too, as columns.
+    """
 
     def __init__(self, operator: KroneckerSum) -> None:
         self._shape, band = operator.halves, operator.band
@@ -160,7 +163,7 @@ class BlockFactors:
             self._steps.append((pivot, list(zip(others, right, left, strict=True))))
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
-        rest = b.reshape(self._shape).T.copy()
+        rest = b.reshape(*self._shape, *b.shape[1:]).swapaxes(0, 1).copy()
         for i, (pivot, others) in zip(range(len(rest) - 1, -1, -1), self._steps, strict=True):
             if transposed:
                 rest[i] = pivot.solve(rest[i], transposed=True)
@@ -171,7 +174,7 @@ class BlockFactors:
                 rest[i] -= left.T @ rest[j] if transposed else right @ rest[j]
             if not transposed:
                 rest[i] = pivot.solve(rest[i])
-        return rest.T.ravel()
+        return rest.swapaxes(0, 1).reshape(b.shape)
 
 
 class SwappedFactors:

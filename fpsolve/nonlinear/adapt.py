@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.stats import gamma
@@ -125,22 +126,22 @@ class Search:
         self._planes: dict[Levels, tuple[Plane, Tail]] = {}
         self.unknowns, self._reached = 0, math.inf
 
-    def settled(self) -> Settled:
-        """Raises `NotConverged`."""
+    def settled(self) -> tuple[Settled, FloatArray, FloatArray]:
+        """A density whose means are settled, these, and their error estimates. Raises `NotConverged`."""
         levels: Levels = (1,) * len(DIRECTIONS)
         top = self.base.top
         for _ in range(MOST_STAGES):
             lower = [tuple(level - (k == own) for own, level in enumerate(levels)) for k in range(len(levels))]
             found = Settled(self.solve(levels, top), tuple(self.solve(each, top) for each in lower))
-            numbers = self._numbers(found.solution)
-            scales, changes = np.abs(numbers[:-1]), found.changes(self._numbers)
-            errors = found.errors(self._numbers, np.append(scales, self.rate))
+            numbers, changes = found.compared(self._numbers)
+            scales = np.abs(numbers[:-1])
+            errors = found.errors(changes, np.append(scales, self.rate))
             self._reached = float(np.max(errors[:-1] / scales))
             if self._reached <= self.rtol:
-                return found
+                return found, numbers, errors
             worst = np.max(changes[:, :-1] / (self.rtol * scales), axis=1)
             levels = tuple(int(n) for n in np.array(levels) + (worst > min(SHARE, worst.max() / 2)) + (worst > FAR))
-            top = found.fall.top(ABOVE * self.rtol)
+            top = found.fall(4).top(ABOVE * self.rtol)
         raise NotConverged(Message(Code.RESPONSE_OPEN, size=self._reached))
 
     @cached_property
@@ -188,19 +189,19 @@ class Settled:
     solution: Solution
     lower: tuple[Solution, ...]
 
-    @cached_property
-    def fall(self) -> Fall:
-        return Fall.of(self.solution, 4)
+    def fall(self, n: int) -> Fall:
+        """Of E aⁿ above."""
+        return Fall.of(self.solution, n)
 
-    def changes(self, numbers: Callable[[Solution], FloatArray]) -> FloatArray:
-        """By how much numbers of a solution change in each direction."""
+    def compared(self, numbers: Callable[[Solution], Any]) -> tuple[Any, FloatArray]:
+        """Numbers of the solution, and by how much they change in each direction."""
         found = numbers(self.solution)
-        return np.abs([found - numbers(each) for each in self.lower])
+        return found, np.abs([found - numbers(each) for each in self.lower])
 
-    def errors(self, numbers: Callable[[Solution], FloatArray], scales: FloatArray, order: int = 4) -> FloatArray:
+    def errors(self, changes: FloatArray, scales: Any, order: int = 4) -> FloatArray:
         """Error estimates of numbers that grow with a like its power of an order at most, and have these scales."""
-        above = Fall.of(self.solution, order).share_above(float(self.solution.height.lines[-1]))
-        return np.asarray(self.changes(numbers).sum(axis=0) + (above + ROUNDING) * scales)
+        above = self.fall(order).share_above(float(self.solution.height.lines[-1]))
+        return np.asarray(changes.sum(axis=0) + (above + ROUNDING) * scales)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ interval is known up to one factor, which the normalisation gives. Above the int
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Any
@@ -19,6 +19,8 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve, solve
 
 from fpsolve.arrays import FloatArray, one
+from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.factors import BlockFactors
 from fpsolve.nonlinear.operator import Circle, Height, Plane
 
 TAIL_TERMS = 8
@@ -112,9 +114,8 @@ class Solution:
     def shares(self, n: float) -> FloatArray:
         """E aⁿ by elements of u."""
         phi = self.plane.circle.points
-        density = self.height.line.values @ (
-            self.values @ self.plane.integrals(np.exp(n * self.plane.flow.gauge(phi)), one)
-        )
+        vector = self.plane.integrals(np.exp(n * self.plane.flow.gauge(phi)), one)
+        density = self.height.line.values @ (self.values @ vector)
         inside = self.height.weights * np.exp(n * self.height.points) * density
         return np.asarray(inside.reshape(self.height.lines.size - 1, -1).sum(axis=1))
 
@@ -122,17 +123,17 @@ class Solution:
         """E e^{n u} f(φ) g(ξ), f at the points of φ."""
         return float(self.plane.integrals(f, g) @ self.moments(n))
 
-    def at(self, u: FloatArray) -> FloatArray:
-        """Coefficients of the density at some u, shape (len(u), plane.size)."""
-        inside = np.asarray(self.height.line.at(u) @ self.values)
-        inside[u > self.height.lines[-1]] = 0
+    def at(self, u: FloatArray, of: Callable[[FloatArray], FloatArray] = np.asarray) -> FloatArray:
+        """Coefficients of the density at some u, shape (len(u), plane.size), or what a linear map makes of them."""
+        found = np.asarray(self.height.line.at(u) @ of(self.values))
+        found[u > self.height.lines[-1]] = 0
         below = np.flatnonzero(u < self.left)
-        inside[below] = np.exp(np.multiply.outer(u[below], self.tail.powers)) @ self.tail.terms
-        return inside
+        found[below] = np.exp(np.multiply.outer(u[below], self.tail.powers)) @ of(self.tail.terms)
+        return found
 
 
 class Cell:
-    """The functions that live in one cell of u and φ, eliminated from the lowest functions of ξ to the highest.
+    """The functions that live in one cell of u and φ, eliminated over the functions of ξ in turn.
 
     A matrix between functions is Σ_g W_g ⊗ N_g, W_g that of u and φ, N_g that of ξ, which couples neighbours only.
 
@@ -144,50 +145,20 @@ class Cell:
 
     def __init__(self, own: Tables, into: Tables, out: Tables, noise: Tables) -> None:
         self._into, self._out, self._noise = into, out, noise
-        count = len(noise[0])
-        width = max(1, max(int(np.abs(np.subtract(*np.nonzero(each))).max(initial=0)) for each in noise))
-        self._groups = [slice(k, min(k + width, count)) for k in range(0, count, width)]
-
-        def block(rows: slice, columns: slice) -> FloatArray:
-            return _sum(np.kron(each[rows, columns], table) for each, table in zip(noise, own, strict=True))
-
-        self._below: list[FloatArray] = []
-        self._above: list[FloatArray] = []
-        self._factors: list[Any] = []
-        for k, group in enumerate(self._groups):
-            middle = block(group, group)
-            if k:
-                self._below.append(block(group, self._groups[k - 1]))
-                self._above.append(lu_solve(self._factors[-1], block(self._groups[k - 1], group), check_finite=False))
-                middle -= self._below[-1] @ self._above[-1]
-            self._factors.append(lu_factor(middle, overwrite_a=True, check_finite=False))
-
-    def solved(self, right: FloatArray) -> FloatArray:
-        """The inverse of the matrix between them, applied to columns of shape (n_ξ, n, columns)."""
-        columns, found = right.shape[-1], list[FloatArray]()
-        for k, group in enumerate(self._groups):
-            own = right[group].reshape(-1, columns)
-            if k:
-                own = own - self._below[k - 1] @ found[-1]
-            found.append(lu_solve(self._factors[k], own, check_finite=False))
-        for k in range(len(found) - 2, -1, -1):
-            found[k] -= self._above[k] @ found[k + 1]
-        return np.concatenate(found).reshape(right.shape)
+        self._factors = BlockFactors(KroneckerSum(list(zip(own, noise, strict=True))))
 
     def values(self, others: FloatArray) -> FloatArray:
         """Of these functions from those of the others, shape (m, n_ξ); shape (n, n_ξ)."""
-        right = _sum(each @ (table @ others).T for each, table in zip(self._noise, self._into, strict=True))
-        return self.solved(-right[:, :, None])[:, :, 0].T
+        right = _sum(table @ others @ each.T for table, each in zip(self._into, self._noise, strict=True))
+        return -self._factors.solve(right.ravel()).reshape(right.shape)
 
     def correction(self) -> FloatArray:
         """What eliminating them adds to the matrix between the others, shape (m, n_ξ, m, n_ξ)."""
         m, count = self._into[0].shape[1], len(self._noise[0])
-        pairs = zip(self._noise, self._into, strict=True)
-        right = _sum(each[:, None, None, :] * table[:, :, None] for each, table in pairs)
-        values = self.solved(-right.reshape(count, -1, m * count))
-        pushed = [(table @ values).reshape(count, -1) for table in self._out]
-        total = _sum(each @ rows for each, rows in zip(self._noise, pushed, strict=True))
-        return total.reshape(count, m, m, count).swapaxes(0, 1)
+        right = _sum(np.kron(table, each) for table, each in zip(self._into, self._noise, strict=True))
+        values = self._factors.solve(right).reshape(-1, count * m * count)
+        pushed = [(table @ values).reshape(m, count, -1) for table in self._out]
+        return -_sum(each @ rows for each, rows in zip(self._noise, pushed, strict=True)).reshape(m, count, m, count)
 
 
 class Element:

@@ -36,6 +36,7 @@ from fpsolve.model.quantity import (
 from fpsolve.nonlinear.adapt import Search, Settled
 from fpsolve.nonlinear.elimination import Solution
 from fpsolve.nonlinear.operator import HALF_TURN, Flow
+from fpsolve.nonlinear.rest import NearRest
 
 if TYPE_CHECKING:
     import xarray
@@ -49,7 +50,7 @@ MEANS = ("amplitude", "amplitude_squared", "amplitude_fourth", "x_squared", "v_s
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StationaryResponse(Result):
+class StationaryResponse(Result, NearRest):
     """The stationary density over amplitude, phase and noise, x = a cos φ ≥ 0 and ẋ = −aω sin φ.
 
     Attributes:
@@ -75,16 +76,6 @@ class StationaryResponse(Result):
     settled: Settled = field(repr=False)
 
     @property
-    def has_hump(self) -> bool:
-        """Whether ρ(a) vanishes at rest: δ_p < −1."""
-        return self.stability_index < -1
-
-    @property
-    def has_crater(self) -> bool:
-        """Whether ρ(x, ẋ) vanishes at rest: δ_p < −2."""
-        return self.stability_index < -2
-
-    @property
     def solution(self) -> Solution:
         """The density's coefficients."""
         return self.settled.solution
@@ -93,29 +84,16 @@ class StationaryResponse(Result):
         """E xⁿ ẋᵐ, x ≥ 0; its scale is E |xⁿ ẋᵐ|. Raises `ValueError` unless both are whole numbers >= 0."""
         if not (is_whole(n, 0) and is_whole(m, 0)):
             raise ValueError(f"got n = {shown(n)}, m = {shown(m)}; must be whole numbers >= 0")
-        scale = np.array([abs(_moment(self.solution, n, m, np.abs))])
-        [error] = self.settled.errors(lambda solution: np.array([_moment(solution, n, m)]), scale, n + m)
-        return Estimate(_moment(self.solution, n, m), float(error), float(scale[0]))
-
-    @cached_property
-    def _without_noise(self) -> tuple[FloatArray, FloatArray]:
-        """Coefficients of ∫ρ dξ over u and φ, and those of the tail."""
-        plane, solution = self.solution.plane, self.solution
-        return tuple(
-            table.reshape(len(table), *plane.shape) @ plane.xi_mean for table in (solution.values, solution.tail.terms)
-        )  # type: ignore[return-value]
+        scale = abs(_moment(self.solution, n, m, np.abs))
+        found, changes = self.settled.compared(lambda solution: _moment(solution, n, m))
+        return Estimate(float(found), float(self.settled.errors(changes, scale, n + m)), scale)
 
     def _at(self, u: FloatArray, phi: FloatArray) -> FloatArray:
         """∫ρ dξ over u and φ at some places, any common shape."""
-        shape = np.broadcast_shapes(u.shape, phi.shape)
+        shape, plane = np.broadcast_shapes(u.shape, phi.shape), self.solution.plane
         u, phi = (np.ravel(np.broadcast_to(each, shape)) for each in (u, phi))
-        inside, tail = self._without_noise
-        solution = self.solution
-        table = np.asarray(solution.height.line.at(u) @ inside)
-        table[u > solution.height.lines[-1]] = 0
-        below = u < solution.left
-        table[below] = np.exp(np.multiply.outer(u[below], solution.tail.powers)) @ tail
-        return np.sum(table * solution.plane.circle.at(phi), axis=1).reshape(shape)
+        table = self.solution.at(u, lambda values: values.reshape(-1, *plane.shape) @ plane.xi_mean)
+        return np.sum(table * plane.circle.at(phi), axis=1).reshape(shape)
 
     def amplitude_density(self, a: ArrayLike) -> FloatArray:
         """ρ(a), a > 0, per length; the shape of `a`."""
@@ -231,10 +209,8 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryRe
         raise ValueError(f"got rtol = {rtol!r}; must be from 1e-10 to 0.1")
     rate, index = _linear(problem)
     search = Search(Flow(problem), -index, rate, _numbers, rtol)
-    settled = search.settled()
-    found = _numbers(settled.solution)
+    settled, found, errors = search.settled()
     scales = np.append(np.abs(found[:-1]), rate)
-    errors = settled.errors(_numbers, scales)
     errors[-1] *= AT_ONE_PHASE
     *means, impacts, balance = map(Estimate, found.tolist(), errors.tolist(), scales.tolist())
     lines = settled.solution.height.lines

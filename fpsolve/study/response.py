@@ -13,6 +13,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.exponent.error import Estimate
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
+from fpsolve.nonlinear.rest import NearRest
 
 if TYPE_CHECKING:
     from fpsolve.nonlinear.response import StationaryResponse
@@ -44,7 +45,7 @@ class ResponseDensity:
 
 
 @dataclass(frozen=True, eq=False)
-class CurveResponse:
+class CurveResponse(NearRest):
     """The stationary response of one parameter set.
 
     Attributes:
@@ -69,16 +70,6 @@ class CurveResponse:
     def numbers(self) -> dict[str, Estimate]:
         """The means and the impact rate by their names."""
         return {**self.means, "impact_rate": self.impact_rate}
-
-    @property
-    def has_hump(self) -> bool:
-        """Whether ρ(a) vanishes at rest: δ_p < −1."""
-        return self.stability_index < -1
-
-    @property
-    def has_crater(self) -> bool:
-        """Whether ρ(x, ẋ) vanishes at rest: δ_p < −2."""
-        return self.stability_index < -2
 
 
 def solve_response(problem: Problem, rtol: float, grid: Grid | None) -> CurveResponse:
