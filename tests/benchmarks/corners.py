@@ -9,24 +9,18 @@ from __future__ import annotations
 import itertools
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
-from threadpoolctl import threadpool_limits
 
 from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator
 from fpsolve.analysis.sensitivity import solve_sensitivities
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.proofs import prove
-from fpsolve.theory.perturbation import scale_of
 from tests.benchmarks.cpu import race
 from tests.benchmarks.problem import CASES
-from tests.random_proofs import SHARES, drawn
+from tests.benchmarks.rows import Row, print_rows
 
 ROUNDS = 5
 PROOFS = 100
@@ -37,21 +31,6 @@ LAYERED = (100.0, 2.0)
 """Their slowest and strongest noise."""
 TAILS = (1.05, 1.2, 1.4)
 """r₀ of algebraic tails."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """A line of the table.
-
-    Attributes:
-        name: what is solved.
-        asked: what it should take.
-        measure: seconds of the processor by what they are for; negative where nothing was found in them.
-    """
-
-    name: str
-    asked: str
-    measure: Callable[[], Mapping[str, float]]
 
 
 def seconds(solve: Callable[[], Any], rounds: int = 1) -> float:
@@ -141,17 +120,6 @@ def strong() -> dict[str, float]:
     return found | {"to tuned": found["fpsolve"] / found["tuned"]}
 
 
-def proofs() -> dict[str, float]:
-    """Of random problems."""
-    found = []
-    for seed in range(PROOFS):
-        problem, p = drawn(seed)
-        solver = ExponentSolver(problem)
-        scale = max(abs(solver.moments([p]).value[0]), float(scale_of(problem).moment(p)))
-        found.append(seconds(lambda problem=problem, p=p, width=SHARES[0] * scale: prove(problem, p, width=width)))
-    return {"median": float(np.median(np.abs(found))), "at most": max(found, key=abs)}
-
-
 ROWS: Sequence[Row] = (
     Row("one set: ε = 0.6, ω = 1.7, r = 0.9, exact noise", "sensitivities as the values", derivatives),
     Row("reduced noise, τ₀ = 10, standard deviation 0.3", "1", resonance),
@@ -160,22 +128,8 @@ ROWS: Sequence[Row] = (
     Row("54 problems of slow noise, the longest", "1", all_slow),
     Row("heavy tails", "a tenth", heavy_tails),
     Row("strong noise, 33 p, rtol 1e-6", "1.0 of the tuned code", strong),
-    Row("prove, 100 random problems", "0.3", proofs),
 )
 
 
-def main(words: Sequence[str]) -> None:
-    """Print the table, each row as it is measured."""
-    console = Console(width=120)
-    for row in ROWS:
-        if words and not any(word in row.name for word in words):
-            continue
-        table = Table(row.name, "seconds", caption=f"asked: {row.asked}", min_width=70)
-        with threadpool_limits(1):
-            for name, each in row.measure().items():
-                table.add_row(name, f"{each:.3g}" if each >= 0 else f"not converged after {-each:.3g}")
-        console.print(table)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    print_rows(ROWS, sys.argv[1:])

@@ -12,15 +12,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
-from threadpoolctl import threadpool_limits
 
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, load_case
 from fpsolve.analysis import boundary
@@ -29,6 +25,7 @@ from fpsolve.pool import parallel
 from fpsolve.proofs import prove
 from fpsolve.theory.perturbation import scale_of
 from fpsolve.workflow.cases import run_case
+from tests.benchmarks.rows import Row, print_rows
 from tests.random_proofs import SHARES, drawn
 from tests.solving import case_text
 
@@ -49,21 +46,6 @@ quantities = ["moment"]
 """
 SIZES = 30, 60
 """Values of each key of a sweep; the difference of two sweeps is what a set costs in a long one."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """A line of the table.
-
-    Attributes:
-        name: what is measured.
-        asked: what it should be.
-        measure: numbers by what they are.
-    """
-
-    name: str
-    asked: str
-    measure: Callable[[], Mapping[str, float]]
 
 
 def used(whose: int) -> float:
@@ -147,18 +129,5 @@ ROWS: Sequence[Row] = (
 )
 
 
-def main(words: Sequence[str]) -> None:
-    """Print the table, each row as it is measured."""
-    console = Console(width=110)
-    for row in ROWS:
-        if words and not any(word in row.name for word in words):
-            continue
-        table = Table(row.name, "", caption=f"asked: {row.asked}", min_width=70)
-        with threadpool_limits(1):
-            for name, each in row.measure().items():
-                table.add_row(name, f"{each:.3g}")
-        console.print(table)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    print_rows(ROWS, sys.argv[1:])
