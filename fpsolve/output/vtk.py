@@ -207,7 +207,7 @@ def write_curves(case: Case, folder: Path) -> Path | None:
     return folder / CURVES
 
 
-def write_response(simulated: SimulatedCurve, folder: Path) -> None:
+def write_simulated_response(simulated: SimulatedCurve, folder: Path) -> None:
     """Write the joint density of x and ẋ, if there is one, as cell data `density` of monte_carlo_response.vti.
 
     Field data: `lyapunov_exponent` and its standard error, `lyapunov_exponent_error`, and the parameters as in

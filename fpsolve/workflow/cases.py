@@ -22,7 +22,7 @@ from fpsolve.output.designs import write_design
 from fpsolve.output.directions import draw_densities
 from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities, draw_stationary_responses
 from fpsolve.output.tables import write_samples, write_simulation
-from fpsolve.output.vtk import write_response
+from fpsolve.output.vtk import write_simulated_response
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
@@ -384,7 +384,7 @@ def _simulate(simulations: Simulations, watch: Watch, simulated: list[SimulatedC
         for each in simulations.curves(progress, pool):
             simulated.append(each)
             write_simulation(case, each, folder)
-            write_response(each, folder)
+            write_simulated_response(each, folder)
             draw_response(case, each, folder)
     whole = len(simulated) - simulated[-1].interrupted
     if whole == case.planned:

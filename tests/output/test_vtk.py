@@ -19,7 +19,7 @@ from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.output.vtk import write_density, write_eigenfunctions, write_response
+from fpsolve.output.vtk import write_density, write_eigenfunctions, write_simulated_response
 from fpsolve.study import solve
 from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE, sampled
@@ -328,7 +328,7 @@ def simulated():
 
 
 def test_response_file(tmp_path, simulated):
-    write_response(simulated, tmp_path)
+    write_simulated_response(simulated, tmp_path)
     grid = pyvista.read(tmp_path / "monte_carlo_response-2.vti")
     assert grid.bounds == pytest.approx((0, 3, -2, 2, 0, 0))
     np.testing.assert_array_equal(grid.cell_data["density"].reshape(80, 100).T, simulated.response.density)
@@ -346,7 +346,7 @@ def test_a_response_that_does_not_fit_on_the_disk_is_not_left_in_part(tmp_path, 
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
     try:
         with pytest.raises(OSError, match=r"monte_carlo_response-2\.vti"):
-            write_response(simulated, tmp_path)
+            write_simulated_response(simulated, tmp_path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert list(tmp_path.iterdir()) == []
