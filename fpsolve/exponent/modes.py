@@ -301,7 +301,7 @@ class SpherePlace(NearPlace):
     def _check(self, search: _Search, chosen: Discretisation) -> None:
         """Refuse a stage beyond the budget; memory is that of elimination, over the noise or over elements in η."""
         directions, noises = chosen.phase.size, chosen.size // chosen.phase.size
-        numbers = min(4 * directions**2 * noises, 2.5 * chosen.size**2 / chosen.phase.elements)
+        numbers = min(directions**2 * noises, chosen.size**2 / chosen.phase.elements)
         limits = {"most": GIGABYTES * self.budget.unknowns, "unknowns": self.budget.unknowns}
         if (size := 8e-9 * numbers) > limits["most"]:
             search.stop(Message(Code.MEMORY_SPENT, size=size, **limits))

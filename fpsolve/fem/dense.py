@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
+from typing import Any, Protocol
+
 import numpy as np
 from scipy.linalg.blas import dtrsm
-from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.linalg.lapack import dgetrf, dgetrs, sgetrf, sgetrs
 
 from fpsolve.arrays import FloatArray
 
 
-class DenseFactors:
-    """LAPACK's LU of an array."""
-
-    def __init__(self, matrix: FloatArray) -> None:
-        self._lu, self._pivots, info = dgetrf(matrix, overwrite_a=1)
-        if info > 0:
-            pivots = np.einsum("ii->i", self._lu)
-            pivots[pivots == 0] = np.finfo(float).eps * np.max(np.abs(pivots))
+class Factors(Protocol):
+    """Of a matrix A."""
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
-        return np.asarray(dgetrs(self._lu, self._pivots, b, trans=transposed)[0])
+        """x of A x = b, or of Aᵀx = b."""
+
+
+class DenseFactors:
+    """LAPACK's LU of an array, in the precision of its numbers."""
+
+    def __init__(self, matrix: Any) -> None:
+        factorise, self._solve = (sgetrf, sgetrs) if matrix.dtype == np.float32 else (dgetrf, dgetrs)
+        self._lu, self._pivots, info = factorise(matrix, overwrite_a=1)
+        if info > 0:
+            pivots = np.einsum("ii->i", self._lu)
+            pivots[pivots == 0] = np.finfo(matrix.dtype).eps * np.max(np.abs(pivots))
+
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        return np.asarray(self._solve(self._lu, self._pivots, b, trans=transposed)[0])
 
     def right_quotient(self, b: FloatArray) -> FloatArray:
         """b A⁻¹."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.linalg.blas import dgemm
@@ -19,7 +19,8 @@ from threadpoolctl import ThreadpoolController
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.dense import DenseFactors
+from fpsolve.fem.dense import DenseFactors, Factors
+from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import Ring, RingFactors, ring_seconds
 
 MAX_DENSE_UNKNOWNS = 350
@@ -30,6 +31,8 @@ MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 MAX_LEVEL = 0.2
 """Share of the functions of the last axis that one level may have."""
+ROUGH_COST = 1e9
+"""Operations from which on single precision, with its refinements, is faster."""
 LARGEST_GROWTH = 1e3
 """Of the entries, by the norm of all, in an elimination that does not exchange rows of different levels."""
 
@@ -50,13 +53,6 @@ def sparse_lu(matrix: Any, **options: Any) -> Any:
         return splu(matrix, permc_spec="MMD_AT_PLUS_A", **options)
     except RuntimeError as failure:
         raise SingularMatrix(*failure.args) from failure
-
-
-class Factors(Protocol):
-    """Of a matrix A."""
-
-    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """x of A x = b, or of Aᵀx = b."""
 
 
 def factorised(
@@ -101,7 +97,7 @@ def _of_plane(operator: KroneckerSum, ring: Ring | None) -> Factors:
         seconds = 1.4 * n * (1.5e-5 + 4e-6 * band**2 + 5e-11 * (1 + band) ** 2 * m**3)
         choices.append((seconds, lambda: BlockFactors(operator.with_dense_first())))
     if ring is not None and len(ring.number) > 2 and band <= MAX_BAND:
-        choices.append((5e-4 + 2 * ring_seconds(operator, ring), lambda: RingFactors(operator, ring)))
+        choices.append((5e-4 + 2 * ring_seconds(operator, ring), lambda: RefinedFactors(operator, RingFactors(operator, ring))))
     return _cheapest(choices)
 
 
@@ -114,8 +110,8 @@ def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
     if n > 2 and levels and levels[-1] is not None:
         choices.append(_by_levels(operator, along_last(operator, levels[-1] or levels_of(operator))))
     elif 2 * band < n:
-        cost = n * (_dense_cost(m) + 2 * band * (1 + band) * m**3)
-        choices.append((cost, lambda: BlockFactors(operator.with_dense_first())))
+        levels_of_last = np.split(np.arange(n), range(max(band, 1), n, max(band, 1)))
+        choices.append(_by_levels(operator, along_last(operator, levels_of_last)))
     if levels and levels[0] is not None:
         choices.append(_by_levels(operator, along_first(operator, levels[0])))
     return _cheapest(choices)
@@ -134,7 +130,9 @@ def _by_levels(operator: KroneckerSum, levels: Sequence[Any]) -> tuple[float, Ca
     """Operations of an elimination by levels, and what does it."""
     sizes = [level.size for level in levels]
     cost = sum(_dense_cost(size) for size in sizes) + sum(2 * a**2 * b for a, b in pairwise(reversed(sizes)))
-    return cost, lambda: LevelFactors(operator, levels)
+    if cost < ROUGH_COST:
+        return cost, lambda: LevelFactors(operator, levels)
+    return cost, lambda: RefinedFactors(operator, LevelFactors(operator, levels, np.float32))
 
 
 def _dense_cost(size: int) -> float:
@@ -198,12 +196,13 @@ class LevelFactors:
     Args:
         operator: the sum.
         levels: the unknowns of each level.
+        precision: of the factors.
 
     Raises:
         SingularMatrix: that of one level alone is: functions of what noise moves only by way of others.
     """
 
-    def __init__(self, operator: KroneckerSum, levels: Sequence[Any]) -> None:
+    def __init__(self, operator: KroneckerSum, levels: Sequence[Any], precision: type = float) -> None:
         self._order = np.concatenate(levels)
         ends = np.cumsum([0, *(level.size for level in levels)])
         self._parts = [slice(*pair) for pair in pairwise(ends.tolist())]
@@ -213,11 +212,11 @@ class LevelFactors:
         self._down = [row[:, part] for row, part in zip(rows[1:], self._parts, strict=False)]
         self._pivots: list[DenseFactors] = []
         for i in range(len(rows) - 1, -1, -1):
-            rest = rows[i][:, self._parts[i]].toarray(order="F")
+            rest = rows[i][:, self._parts[i]].astype(precision).toarray(order="F")
             if self._pivots:
                 touched = np.unique(self._down[i].indices)
-                below = self._down[i][:, touched].toarray(order="F")
-                rest[:, touched] -= self._up[i] @ self._pivots[-1].solve(below)
+                below = self._down[i][:, touched].astype(precision).toarray(order="F")
+                rest[:, touched] -= self._up[i].astype(precision).toarray() @ self._pivots[-1].solve(below)
             if not np.abs(rest).max() < LARGEST_GROWTH * operator.norm:
                 raise SingularMatrix("the pivot of a level is singular")
             self._pivots.append(DenseFactors(rest))

@@ -27,12 +27,6 @@ from fpsolve.fem.dense import DenseFactors
 
 LARGEST_GROWTH = 1e10
 """Of an inverse, over one over the norm of all, in an elimination that does not exchange rows of different cells."""
-REFINEMENTS, ROUNDING = 5, 1e-16
-"""Of a solution, at most, and the backward error below which there are no more."""
-LEAST_GAIN = 0.1
-"""Of the backward error by each of them."""
-LEAST_SHARE = 1e-8
-"""Of a load, that of the vector of an eigenvalue close by in its solution."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +80,6 @@ class RingFactors:
 
     def __init__(self, operator: KroneckerSum, ring: Ring) -> None:
         self._operator, self._ring, (_, self._n) = operator, ring, operator.shape
-        self._vectors = dict[bool, FloatArray]()  # right and left, of an eigenvalue close by
         self._group = max(operator.band, 1)
         self._levels = -(-self._n // self._group)
         size, most = self._levels * self._group, LARGEST_GROWTH / operator.norm
@@ -189,32 +182,7 @@ class RingFactors:
         self._closed = DenseFactors(np.eye(2 * self._n) - whole)
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """x of A x = b, or of Aᵀx = b, refined until only rounding is left.
-
-        Next to an eigenvalue x has its vector so often that errors in it hide all others. Then what is refined is x of
-        A x = γ b, such that ⟨v, A x − γ b⟩ = 0, v the left vector, and x/γ is the solution.
-        """
-        operator, x = self._operator.T if transposed else self._operator, self._solved(b, transposed)
-        gamma, last, left = 1.0, math.inf, self._vectors.get(not transposed)
-        for _ in range(REFINEMENTS):
-            image = operator @ x
-            if left is not None and abs(left @ b) > LEAST_SHARE * float(np.linalg.norm(left) * np.linalg.norm(b)):
-                gamma = float(left @ image / (left @ b))
-            rest = gamma * b - image
-            error = float(np.linalg.norm(rest)) / (self._operator.norm * float(np.linalg.norm(x)))
-            if error < ROUNDING:
-                break
-            if error < LEAST_GAIN * last:
-                x, last = x + self._solved(rest, transposed), error
-            elif left is None:
-                left, last = self._solved(b, not transposed), math.inf
-            else:
-                break
-        if left is not None:
-            self._vectors[transposed] = x
-        return x / gamma
-
-    def _solved(self, b: FloatArray, transposed: bool) -> FloatArray:
+        """x of A x = b, or of Aᵀx = b, as far as an elimination that does not exchange rows of cells rounds it."""
         table = self._spread(b.reshape(-1, self._n))
         inside = self._within(table, transposed)
         values = np.einsum("cke,ckn->cen", self._ring.ends, inside)

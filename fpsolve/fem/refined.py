@@ -1,0 +1,52 @@
+"""Solutions by factors that round too much, refined until only the rounding of the matrix itself is left."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.dense import Factors
+
+REFINEMENTS, ROUNDING = 5, 1e-16
+"""Of a solution, at most, and the backward error below which there are no more."""
+LEAST_GAIN = 0.1
+"""Of the backward error by each of them."""
+LEAST_SHARE = 1e-8
+"""Of a load, that of the vector of an eigenvalue close by in its solution."""
+
+
+class RefinedFactors:
+    """Factors of a sum, and the sum itself, by which their solutions are corrected."""
+
+    def __init__(self, operator: KroneckerSum, factors: Factors) -> None:
+        self._operator, self._factors = operator, factors
+        self._vectors = dict[bool, FloatArray]()  # right and left, of an eigenvalue close by
+
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """x of A x = b, or of Aᵀx = b, refined until only rounding is left.
+
+        Next to an eigenvalue x has its vector so often that errors in it hide all others. Then what is refined is x of
+        A x = γ b, such that ⟨v, A x − γ b⟩ = 0, v the left vector, and x/γ is the solution.
+        """
+        operator, x = self._operator.T if transposed else self._operator, self._factors.solve(b, transposed=transposed)
+        gamma, last, left = 1.0, math.inf, self._vectors.get(not transposed)
+        for _ in range(REFINEMENTS):
+            image = operator @ x
+            if left is not None and abs(left @ b) > LEAST_SHARE * float(np.linalg.norm(left) * np.linalg.norm(b)):
+                gamma = float(left @ image / (left @ b))
+            rest = gamma * b - image
+            error = float(np.linalg.norm(rest)) / (self._operator.norm * float(np.linalg.norm(x)))
+            if error < ROUNDING:
+                break
+            if error < LEAST_GAIN * last:
+                x, last = x + self._factors.solve(rest, transposed=transposed), error
+            elif left is None:
+                left, last = self._factors.solve(b, transposed=not transposed), math.inf
+            else:
+                break
+        if left is not None:
+            self._vectors[transposed] = x
+        return x / gamma
