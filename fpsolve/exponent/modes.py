@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse import issparse
 
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.errors import MeshError, NotConverged, SingularMatrix
@@ -52,6 +53,8 @@ LEFT = 0.5
 MEASURED = 3.0
 """What is left after elements or polynomials of the noise, over what two degrees more of them change."""
 DIGITS = 10.0
+GIGABYTES_OF_ENTRY = 3e-7
+"""For an entry of the sparse matrices of a stage, with those of coarser stages and of the next one."""
 
 
 def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
@@ -226,7 +229,7 @@ class SpherePlace(NearPlace):
         level = 0
         while True:
             chosen = self._chosen(level)
-            self._check(search, chosen)
+            self._check(search, level, chosen)
             try:
                 pair = self._pair(level, search, pair)
             except (NotConverged, SingularMatrix, MeshError) as failure:
@@ -298,12 +301,19 @@ class SpherePlace(NearPlace):
         first = self._levels[0].chosen
         return replace(first, phase=replace(first.phase, waves=first.phase.waves + 2 * level))
 
-    def _check(self, search: _Search, chosen: Discretisation) -> None:
-        """Refuse a stage beyond the budget; memory is that of elimination, over the noise or over elements in η."""
+    def _check(self, search: _Search, level: int, chosen: Discretisation) -> None:
+        """Refuse a stage beyond the budget.
+
+        Its memory is that of elimination, over the noise or over elements in η, and that of the matrices.
+        """
         directions, noises = chosen.phase.size, chosen.size // chosen.phase.size
-        numbers = min(directions**2 * noises, chosen.size**2 / chosen.phase.elements)
+        numbers = min(directions**2 * (noises + 4), 2.5 * chosen.size**2 / chosen.phase.elements)
+        entries = 0
+        if level < len(self._levels):
+            terms = self._levels[level].at(search.p).matrix.terms
+            entries = sum(int(phase.nnz) for phase, *_ in terms if issparse(phase))
         limits = {"most": GIGABYTES * self.budget.unknowns, "unknowns": self.budget.unknowns}
-        if (size := 8e-9 * numbers) > limits["most"]:
+        if (size := 8e-9 * numbers + GIGABYTES_OF_ENTRY * entries) > limits["most"]:
             search.stop(Message(Code.MEMORY_SPENT, size=size, **limits))
         search.check(chosen)
 

@@ -31,8 +31,8 @@ MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 MAX_LEVEL = 0.2
 """Share of the functions of the last axis that one level may have."""
-ROUGH_COST = 1e9
-"""Operations from which on single precision, with its refinements, is faster."""
+ROUGH_COST = 5e9
+"""Operations of an elimination from which on single precision, with its refinements, is faster."""
 LARGEST_GROWTH = 1e3
 """Of the entries, by the norm of all, in an elimination that does not exchange rows of different levels."""
 
@@ -97,7 +97,9 @@ def _of_plane(operator: KroneckerSum, ring: Ring | None) -> Factors:
         seconds = 1.4 * n * (1.5e-5 + 4e-6 * band**2 + 5e-11 * (1 + band) ** 2 * m**3)
         choices.append((seconds, lambda: BlockFactors(operator.with_dense_first())))
     if ring is not None and len(ring.number) > 2 and band <= MAX_BAND:
-        choices.append((5e-4 + 2 * ring_seconds(operator, ring), lambda: RefinedFactors(operator, RingFactors(operator, ring))))
+        choices.append(
+            (5e-4 + 2 * ring_seconds(operator, ring), lambda: RefinedFactors(operator, RingFactors(operator, ring)))
+        )
     return _cheapest(choices)
 
 
@@ -110,8 +112,12 @@ def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
     if n > 2 and levels and levels[-1] is not None:
         choices.append(_by_levels(operator, along_last(operator, levels[-1] or levels_of(operator))))
     elif 2 * band < n:
-        levels_of_last = np.split(np.arange(n), range(max(band, 1), n, max(band, 1)))
-        choices.append(_by_levels(operator, along_last(operator, levels_of_last)))
+        cost = n * (_dense_cost(m) + 2 * band * (1 + band) * m**3)
+        if cost > ROUGH_COST:
+            groups = np.split(np.arange(n), range(max(band, 1), n, max(band, 1)))
+            choices.append(_by_levels(operator, along_last(operator, groups)))
+        else:
+            choices.append((cost, lambda: BlockFactors(operator.with_dense_first())))
     if levels and levels[0] is not None:
         choices.append(_by_levels(operator, along_first(operator, levels[0])))
     return _cheapest(choices)

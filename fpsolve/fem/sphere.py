@@ -25,9 +25,10 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 from scipy.sparse import csr_matrix, diags
+from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import FloatArray, one
-from fpsolve.fem.axis import Axis, KroneckerSum, TensorSpace
+from fpsolve.fem.axis import Axis, KroneckerSum, TensorSpace, along
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.terms import NoiseTerms, OfMoment, Term
@@ -280,7 +281,7 @@ class SphereAxis(DirectionAxis):
 
     Attributes:
         identity: ∫ u v, which is no identity, shape (size, size).
-        inner_values: values at points of the sphere, shape (points, size).
+        inner_values: what takes coefficients to values at points of the sphere, shape (points, size).
         ladders: of the elements alone; that of the waves is told by what two degrees more change.
     """
 
@@ -325,11 +326,18 @@ class SphereAxis(DirectionAxis):
         whole = scipy.sparse.kron(of_line, scipy.sparse.identity(self.waves.own.size), format="csr")
         return whole[self._kept][:, self._kept]
 
-    @cached_property
-    def inner_values(self) -> Any:
-        own = self.waves.samples[:, self.waves.own]
-        points = self.line.values[:: max(1, self.chosen.degree // 4)]
-        return scipy.sparse.kron(points, csr_matrix(own), format="csc")[:, self._kept]
+    @property
+    def inner_values(self) -> LinearOperator:
+        samples, points = self.waves.samples[:, self.waves.own], self.line.values[:: max(1, self.chosen.degree // 4)]
+
+        def of_columns(columns: FloatArray) -> FloatArray:
+            table = np.zeros((self.line.size * self.waves.own.size, columns.shape[1]))
+            table[self._kept] = columns
+            found = along((points, samples, None), table.reshape(self.line.size, self.waves.own.size, -1))
+            return found.reshape(-1, columns.shape[1])
+
+        shape = points.shape[0] * len(samples), self.size
+        return LinearOperator(shape, matvec=lambda v: of_columns(v.reshape(-1, 1)), matmat=of_columns, dtype=float)
 
     def mass(self, g: Any = one) -> Any:
         """∫ u v."""

@@ -22,6 +22,7 @@ from fpsolve.fem.factors import (
     factorised,
 )
 from fpsolve.fem.generator import Generator
+from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import RingFactors
 from fpsolve.model import Telegraph, White
 
@@ -106,6 +107,29 @@ def test_levels_that_are_singular_alone_go_in_pairs(rng):
     np.testing.assert_allclose(found.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-9, atol=1e-11)
 
 
+def test_single_precision_is_refined(rng):
+    """Of levels of a noise: the solution is that of the matrix, also next to an eigenvalue, for which x is its vector."""
+    noise = banded(rng, 7, 1)
+    phase = csr_matrix(rng.standard_normal((60, 60)))
+    operator = KroneckerSum(
+        [(phase - 30 * identity(60), np.eye(7)), (csr_matrix(rng.standard_normal((60, 60))), noise)]
+    )
+    value = np.max(np.linalg.eigvals(operator.toarray()).real)
+    levels = [np.arange(k, operator.size, 7) for k in range(7)]
+    b = rng.standard_normal(operator.size)
+    for shift in (0.0, value + 1e-3, value + 1e-9):
+        shifted = operator.shifted(shift)
+        matrix = shifted.toarray()
+        rough = LevelFactors(shifted, levels, np.float32)
+        factors = RefinedFactors(shifted, rough)
+        for transposed, expected in ((False, matrix), (True, matrix.T)):
+            x = factors.solve(b, transposed=transposed)
+            error = np.linalg.norm(expected @ x - b) / (np.linalg.norm(expected) * np.linalg.norm(x))
+            assert error < 1e-15
+            plain = rough.solve(b, transposed=transposed)
+            assert np.linalg.norm(expected @ plain - b) > 1e4 * error * np.linalg.norm(expected) * np.linalg.norm(plain)
+
+
 def test_levels_of_the_first_axis(rng):
     """Taken where they are many: a thin band of the first axis, each of its functions with all of the noise's."""
     first = [banded(rng, 90, 3) + 9 * np.eye(90) for _ in range(2)]
@@ -136,7 +160,7 @@ def test_cells_of_a_ring_one_after_the_other(noise, degrees, rng):
     part = States(2) if noise.has_states else Polynomials(9, 0.2)
     pencil = Generator(problem, Discretisation(PhaseCells(lines, np.array(degrees)), (part,))).at(1.3)
     operator, b = pencil.matrix.shifted(0.7), rng.standard_normal(pencil.space.size)
-    factors, matrix = RingFactors(operator, pencil.ring), operator.toarray()
+    factors, matrix = RefinedFactors(operator, RingFactors(operator, pencil.ring)), operator.toarray()
     for transposed, expected in ((False, matrix), (True, matrix.T)):
         np.testing.assert_allclose(factors.solve(b, transposed=transposed), np.linalg.solve(expected, b), rtol=1e-9)
 
@@ -149,7 +173,8 @@ def test_a_ring_next_to_an_eigenvalue():
     pencil = pair.generator.at(-3.0)
     for off, (b, transposed) in product((0.0, 1e-9), ((pair.right, False), (pair.left, True))):
         operator = pencil.matrix.shifted(pair.eigenvalue * (1 + off))
-        x = RingFactors(operator, pencil.ring).solve(pair.space.weighed(b), transposed=transposed)
+        factors = RefinedFactors(operator, RingFactors(operator, pencil.ring))
+        x = factors.solve(pair.space.weighed(b), transposed=transposed)
         rest = (operator.T if transposed else operator) @ x - pair.space.weighed(b)
         assert np.linalg.norm(rest) < 1e-15 * operator.norm * np.linalg.norm(x)
         assert abs(x @ b) == pytest.approx(np.linalg.norm(x) * np.linalg.norm(b), rel=1e-9)
