@@ -26,7 +26,8 @@ from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
 from fpsolve.exponent.fields import EigenfunctionPlot
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
-from fpsolve.fem.factors import Factors, one_thread
+from fpsolve.fem.dense import Factors
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem

@@ -13,8 +13,9 @@ import scipy.linalg
 
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
+from fpsolve.fem.dense import Factors
 from fpsolve.fem.discretisation import Discretisation
-from fpsolve.fem.factors import Factors, factorised
+from fpsolve.fem.factors import factorised
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.rings import Ring
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon

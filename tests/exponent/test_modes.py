@@ -168,15 +168,15 @@ def test_what_is_left_of_an_algebraic_series(power):
 
 
 def test_memory_is_foreseen():
-    """A block of all functions of directions for each of the noise, and four numbers for each of its entries."""
+    """A block of all functions of directions for each of the noise, and four more, and what sparse matrices take."""
     given = problem(OU)
     place = SpherePlace(given, rtol=1e-6, budget=Budget(), tolerance=lambda p, value: 1e-6)
     coordinates, *_ = modal_coordinates(given)
     cells = SphereCells(coordinates, np.linspace(0, math.pi / 2, 3), 8, 14)
     chosen = Discretisation(cells, (Polynomials(9, 0.0),))
-    size = 4 * 8e-9 * cells.size * chosen.size
+    size = 8e-9 * cells.size**2 * (9 + 4)
     with pytest.raises(NotConverged, match=f"needs some {size:.2g} GB of memory, more than the 2.4 GB that budget"):
-        place._check(_Search(place, 1.0, place.tolerance, place.begun()), chosen)
+        place._check(_Search(place, 1.0, place.tolerance, place.begun()), 0, chosen)
 
 
 # by elements and by harmonics of the sphere of another code, to the last digit written

@@ -108,7 +108,7 @@ def test_levels_that_are_singular_alone_go_in_pairs(rng):
 
 
 def test_single_precision_is_refined(rng):
-    """Of levels of a noise: the solution is that of the matrix, also next to an eigenvalue, for which x is its vector."""
+    """The solution by levels of a noise is that of the matrix, also next to an eigenvalue, whose vector it is."""
     noise = banded(rng, 7, 1)
     phase = csr_matrix(rng.standard_normal((60, 60)))
     operator = KroneckerSum(
