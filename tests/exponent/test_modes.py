@@ -172,7 +172,7 @@ def test_memory_is_foreseen():
     given = problem(OU)
     place = SpherePlace(given, rtol=1e-6, budget=Budget(), tolerance=lambda p, value: 1e-6)
     coordinates, *_ = modal_coordinates(given)
-    cells = SphereCells(coordinates, np.linspace(0, math.pi / 2, 3), 8, 14)
+    cells = SphereCells(coordinates, np.linspace(0, math.pi / 2, 3), 8, 20)
     chosen = Discretisation(cells, (Polynomials(9, 0.0),))
     size = 8e-9 * cells.size**2 * (9 + 4)
     with pytest.raises(NotConverged, match=f"needs some {size:.2g} GB of memory, more than the 2.4 GB that budget"):
