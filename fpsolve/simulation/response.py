@@ -15,15 +15,7 @@ from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import (
-    AMPLITUDE,
-    AMPLITUDE_DENSITY,
-    DISPLACEMENT,
-    IMPACT_RATE,
-    JOINT_DENSITY,
-    STATIONARY_MEANS,
-    VELOCITY,
-)
+from fpsolve.model.quantity import IMPACT_RATE, OSCILLATOR_RESPONSE, ResponseQuantities
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.bounces import advance_and_count
 from fpsolve.simulation.setup import BATCHES, simulated_parts, starting_state
@@ -55,6 +47,7 @@ class Response(Result):
         time: over which the paths were averaged.
         interrupted: whether the simulation was stopped early.
         parameters: of the problem, by keys such as "noise.D0".
+        about: what the variables and means are called.
     """
 
     means: dict[str, tuple[float, float]]
@@ -69,6 +62,7 @@ class Response(Result):
     time: float
     interrupted: bool = False
     parameters: Mapping[str, float | str] = field(default_factory=dict)
+    about: ResponseQuantities = OSCILLATOR_RESPONSE
 
     @property
     def reach(self) -> float:
@@ -78,18 +72,19 @@ class Response(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The densities over the middles of their cells, and the means."""
-        kind = "standard error"
+        kind, about = "standard error", self.about
         numbers: dict[Quantity, Any] = {
-            JOINT_DENSITY: self.density,
-            AMPLITUDE_DENSITY: self.amplitude_density,
-            AMPLITUDE_DENSITY.error(kind): self.amplitude_error,
+            about.density: self.density,
+            about.amplitude_density: self.amplitude_density,
+            about.amplitude_density.error(kind): self.amplitude_error,
         }
         for name, (value, deviation) in self.means.items():
-            mean = STATIONARY_MEANS[name]
+            mean = about.means[name]
             numbers |= {mean: value, mean.error(kind): deviation}
         numbers |= {replace(IMPACT_RATE, latex="", equation=""): self.impact_rate, OUTSIDE: self.outside}
         coordinates: dict[Quantity, FloatArray] = {}
-        for side, edges in ((DISPLACEMENT, self.x_edges), (VELOCITY, self.v_edges), (AMPLITUDE, self.amplitude_edges)):
+        sides = (about.first, self.x_edges), (about.second, self.v_edges), (about.amplitude, self.amplitude_edges)
+        for side, edges in sides:
             name, words = f"{side.name}_edges", f"edges of the cells of {side.name}"
             ends = Quantity(name, name, words, unit=side.unit, dims=(name,))
             coordinates |= {side: (edges[1:] + edges[:-1]) / 2, ends: edges}

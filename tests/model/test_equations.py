@@ -219,7 +219,7 @@ def test_it_pickles_and_is_a_key():
         ({"variables": ("x",)}, "variables: got "),
         ({"variables": ("x", 3)}, "variables: got "),
         ({"drift": "v, -x"}, "drift: got "),
-        ({"drift": ("v", "-x*x - xi*x")}, "drift[1]: the term -x*x of v's rate is not linear in x, v"),
+        ({"drift": ("v", "-x*x - xi*x")}, "drift[1]: the term -x*x of v's rate is of degree 2 in x, v"),
         ({"parameters": {"a": True}}, "parameters.a: got True; must be a finite number"),
         ({"parameters": {3: 1.0}}, "parameters.3: got the name 3; it must be a text"),
         ({"parameters": {"a": math.inf}}, "parameters.a: got inf; must be a finite number"),

@@ -19,7 +19,8 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.exact import ExactJump, ExactMotion
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
-from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
+from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
+from fpsolve.model.quantity import OSCILLATOR_RESPONSE, ResponseQuantities
 
 
 class ImpactLaw(StrEnum):
@@ -142,10 +143,21 @@ class VibroImpactOscillator(System):
         left = 1 - self._loss
         return () if left > 0 else (Message(Code.IMPOSSIBLE_BOUNCE, left=left, factor=self.impact_factor()),)
 
+    @cached_property
+    def cubic(self) -> CubicTerms | None:  # type: ignore[override]
+        """The damping −ε²(c₂x² + c₃ẋ²) of ẋ, in (x, ẋ/ω); None for c₂ = c₃ = 0."""
+        square = self.epsilon**2
+        damping = (0.0, -square * self.c2, 0.0, -square * self.c3 * self.omega**2)
+        return CubicTerms(((0.0, 0.0, 0.0, 0.0), damping)) if any(damping) else None
+
     @property
-    def is_nonlinear(self) -> bool:
-        """Whether c₂ or c₃ is not 0."""
-        return self.c2 > 0 or self.c3 > 0
+    def response(self) -> ResponseQuantities:
+        return OSCILLATOR_RESPONSE
+
+    @property
+    def second_unit(self) -> float:  # type: ignore[override]
+        """ω: the terms are those of (x, ẋ/ω)."""
+        return self.omega
 
     def motion(self, *, smooth: bool = False) -> Motion:
         """The coefficients of the system (3), or with `smooth` of Eq. (6) in y, whose modulus is x by Eq. (4)."""
