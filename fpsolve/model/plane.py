@@ -410,7 +410,7 @@ class System(Parametrised):
     @property
     def response(self) -> ResponseQuantities:
         """What a stationary response of it is of."""
-        x, v = self.states
+        x, v = self.states[:2]
         return response_quantities(x, v, has_wall=bool(self.jumps))
 
     @property

@@ -79,7 +79,7 @@ def simulate_curves(
 def simulate_curve(
     curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = lambda: None
 ) -> SimulatedCurve:
-    """Simulate one curve, and with c₂ or c₃ > 0 its stationary response; a task that pickles small.
+    """Simulate one curve, and with terms of degree 3 its stationary response; a task that pickles small.
 
     Args:
         curve: the parameters.
@@ -99,7 +99,7 @@ def simulate_curve(
     )  # fmt: skip
     note = simulated_tail_note(curve.problem) if any(each.p for each in result.estimates) else None
     noted = result.warnings if note is None else (*result.warnings, note)
-    if not curve.problem.system.is_nonlinear or result.interrupted:
+    if not curve.problem.system.motion() or result.interrupted:
         return SimulatedCurve(curve, result, None, noted, result.interrupted)
     value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
     try:

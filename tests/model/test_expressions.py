@@ -115,7 +115,7 @@ def test_what_is_no_arithmetic(text, words):
 
 
 def test_long_sums_are_one_level():
-    assert evaluate(" + ".join(["x"] * 200), NAMES, "it").parts == {("x", "", 0): (200.0,)}
+    assert evaluate(" + ".join(["x"] * 200), NAMES, "it").parts == {(("x",), "", 0): (200.0,)}
     assert evaluate("(" * 150 + "x" + ")" * 150, NAMES, "it") == NAMES["x"]
 
 

@@ -464,6 +464,8 @@ class EquationSystem(System):
         return tuple(name for name, value in self.named if name in used and self._is_linear_same(name, value))
 
     def _is_linear_same(self, name: str, value: float) -> bool:
+        if name == EPSILON:
+            return not any(term.order for term in self.terms)
         try:
             return replace(self, named=tuple({**self.values, name: abs(value) + OTHER}.items())).terms == self.terms  # type: ignore[arg-type]
         except ValueError:
