@@ -420,8 +420,8 @@ class Code(Enum):
         "direction; leave out the others"
     )
     RESPONSE_NOISE = (
-        "note: no stationary density by finite elements: it is for one noise with a density, and no white noise, "
-        "impulses or chains; simulate the response instead"
+        "note: no stationary response is computed: it is for one noise with a density, and no white noise, impulses or "
+        "chains; take coloured noise with a short memory for white noise"
     )
     RESPONSE_TAILS = (
         "note: no stationary density by finite elements: for r0 > 1 the noise has algebraic tails and there is no δ_p, "

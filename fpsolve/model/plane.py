@@ -422,10 +422,6 @@ class System(Parametrised):
         (_, b), (c, _) = matrix_at(self, 0.0).tolist()
         return self.second_unit * (math.sqrt(-c / b) if b * c < 0 else 1.0)
 
-    def motion(self, *, smooth: bool = False) -> Any:
-        """The numbers of its nonlinear motion, see `Motion`; None for kinds that have none."""
-        return None
-
     @property
     def noise_sections(self) -> Sequence[str]:
         return ("noise",)

@@ -153,7 +153,7 @@ class ResponseQuantities:
         first, second: the variables of the system.
         amplitude: √(x₁² + x₂²/s²).
         density, amplitude_density: of the variables, and of the amplitude.
-        means: by their names in files, that of the first variable first.
+        means: by their names in files.
         has_wall: whether there are impacts.
         joint_symbol: of the density of the variables, in sentences.
     """
@@ -170,7 +170,7 @@ class ResponseQuantities:
     @property
     def numbers(self) -> Mapping[str, Quantity]:
         """What finite elements give of it; the names are those beside the numbers of the linear system."""
-        known = {name: each for name, each in self.means.items() if name != self.first.name}
+        known = {name: each for name, each in self.means.items() if name not in (self.first.name, self.second.name)}
         return {
             name: replace(
                 each, name=f"response_{name}", words=f"stationary {each.words}", latex="", equation="", closed_form=""
@@ -203,6 +203,7 @@ def response_quantities(x: str, v: str, *, has_wall: bool) -> ResponseQuantities
     unit = "unknown"
     means = _means(
         (x, f"⟨{x}⟩", f"mean of {x}", unit),
+        (v, f"⟨{v}⟩", f"mean of {v}", unit),
         ("amplitude", "⟨A⟩", "mean of the amplitude", unit),
         ("amplitude_squared", "⟨A²⟩", "mean of the squared amplitude", unit),
         ("amplitude_fourth", "⟨A⁴⟩", "mean of the fourth power of the amplitude", unit),

@@ -23,12 +23,12 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import lyapunov_exponent, stability_index
 from fpsolve.messages import Code, Message
+from fpsolve.model.limit import comes_down
 from fpsolve.model.plane import is_steady
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import IMPACT_RATE
 from fpsolve.nonlinear.adapt import Search, Settled
 from fpsolve.nonlinear.elimination import Solution
-from fpsolve.nonlinear.limit import comes_down
 from fpsolve.nonlinear.operator import Flow
 from fpsolve.nonlinear.rest import NearRest
 
@@ -223,9 +223,7 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryRe
     if not 1e-10 <= rtol <= 0.1:
         raise ValueError(f"got rtol = {rtol!r}; must be from 1e-10 to 0.1")
     rate, index = _linear(problem)
-    if not comes_down(flow := Flow(problem)):
-        raise FpsolveError(Message(Code.RESPONSE_GROWS))
-    search = Search(flow, -index, rate, _numbers, rtol)
+    search = Search(Flow(problem), -index, rate, _numbers, rtol)
     settled, found, errors = search.settled()
     scales = np.append(np.abs(found[:-1]), rate)
     errors[-1] *= AT_ONE_PHASE
@@ -263,6 +261,8 @@ def _linear(problem: Problem) -> tuple[float, float]:
     rate = lyapunov_exponent(problem)
     if not rate.value > rate.error_estimate:
         raise FpsolveError(Message(Code.RESPONSE_DIES, value=rate.value, error=rate.error_estimate))
+    if not comes_down(problem):
+        raise FpsolveError(Message(Code.RESPONSE_GROWS))
     index = stability_index(problem)
     if not index:
         raise FpsolveError(Message(Code.RESPONSE_NO_INDEX, reason=index.reason))

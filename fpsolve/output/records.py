@@ -364,7 +364,7 @@ def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
     if response is not None:
         edges = response.x_edges, response.v_edges, response.amplitude_edges
         *cells, count = [each.size - 1 for each in edges]
-        numbers += [response.outside, response.impact_rate, response.time, *sum(response.means.values(), ())]
+        numbers += [response.outside, response.impact_rate or 0.0, response.time, *sum(response.means.values(), ())]
         is_whole &= (
             all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in edges)
             and response.density.shape == tuple(cells)

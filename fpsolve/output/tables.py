@@ -225,7 +225,8 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> Non
         "response": response
         and {
             "means": _with_errors(response.means),
-            **{name: getattr(response, name) for name in ("impact_rate", "outside", "time")},
+            **({} if response.impact_rate is None else {"impact_rate": response.impact_rate}),
+            **{name: getattr(response, name) for name in ("outside", "time")},
         },
         "warnings": in_case_words(simulated.warnings),
     }

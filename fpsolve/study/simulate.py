@@ -99,7 +99,7 @@ def simulate_curve(
     )  # fmt: skip
     note = simulated_tail_note(curve.problem) if any(each.p for each in result.estimates) else None
     noted = result.warnings if note is None else (*result.warnings, note)
-    if not curve.problem.system.motion() or result.interrupted:
+    if not curve.problem.system.is_nonlinear or result.interrupted:
         return SimulatedCurve(curve, result, None, noted, result.interrupted)
     value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
     try:
@@ -108,8 +108,12 @@ def simulate_curve(
                 progress()
             at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
             return SimulatedCurve(curve, result, None, (*noted, at_rest))
-        from fpsolve.simulation.response import simulated_response
+        from fpsolve.simulation.response import no_simulation, simulated_response
 
+        if reason := no_simulation(curve.problem):
+            for _ in range(2 * PROGRESS_STEPS):
+                progress()
+            return SimulatedCurve(curve, result, None, (*noted, reason))
         response = simulated_response(
             curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
             time=result.time, step=result.step, seed=result.seed, progress=progress,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from fractions import Fraction
 from functools import cached_property
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,20 +32,6 @@ class ImpactLaw(StrEnum):
 
     DELTA = "delta"
     RESTITUTION = "restitution"
-
-
-class Motion(NamedTuple):
-    """The numbers of Eq. (3): ω, ε, ε²c₁, ε²c₂, ε²c₃ω², and the factor of u at an impact.
-
-    The factor is −R for the mass at its wall, Eq. (3), and R for the smooth coordinate y of Eq. (6).
-    """
-
-    omega: float
-    strength: float
-    linear: float
-    cubic: float
-    rayleigh: float
-    bounce: float
 
 
 DAMPING = ((0.0, 0.0), (0.0, 1.0))
@@ -158,18 +144,6 @@ class VibroImpactOscillator(System):
     def second_unit(self) -> float:  # type: ignore[override]
         """ω: the terms are those of (x, ẋ/ω)."""
         return self.omega
-
-    def motion(self, *, smooth: bool = False) -> Motion:
-        """The coefficients of the system (3), or with `smooth` of Eq. (6) in y, whose modulus is x by Eq. (4)."""
-        square, R = self.epsilon**2, self.impact_factor()
-        return Motion(
-            omega=self.omega,
-            strength=self.epsilon,
-            linear=square * self.c1,
-            cubic=square * self.c2,
-            rayleigh=square * self.c3 * self.omega**2,
-            bounce=R if smooth else -R,
-        )
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂θ of the terms and of ln R, θ = ω, r, c₁ or ε."""
