@@ -88,7 +88,7 @@ def sides():
     systems = [
         PlaneSystem.of_equations(names, [rates[each] for each in names], {}) for names in (("x", "v"), ("v", "x"))
     ]
-    setting = {"exponent": 0.2, "variance_rate": 0.1, "paths": 64, "time": 200.0, "step": 0.05, "seed": 1}
+    setting = {"exponent": 0.2, "variance_rate": 0.1, "paths": 32, "time": 100.0, "step": 0.05, "seed": 1}
     return [simulated_response(Problem(system, NOISE), **setting) for system in systems]
 
 
