@@ -404,12 +404,24 @@ class Code(Enum):
         "0¦is not positive}, and if λ < 0 almost every path comes to rest"
     )
     RESPONSE_LINEAR = (
-        "note: no stationary response: it is that of a vibro-impact oscillator with c2 or c3 > 0; in a linear system "
-        "nothing limits the amplitude"
+        "note: no stationary response: it is that of an oscillator with c2 or c3 > 0, or of equations with terms of "
+        "degree 3; in a linear system nothing limits the amplitude"
+    )
+    RESPONSE_GROWS = (
+        "note: no stationary response: without noise the terms of degree 3 do not bring large amplitudes down; add "
+        "damping of degree 3, or change their signs"
+    )
+    RESPONSE_RAYS = (
+        "note: no stationary density by finite elements: the phase never leaves φ = {phase:.6g}, whatever the noise "
+        "does; simulate the response instead"
+    )
+    RESPONSE_WALLS = (
+        "note: no stationary density by finite elements: it is for one wall at most, which is always passed in one "
+        "direction; leave out the others"
     )
     RESPONSE_NOISE = (
-        "note: no stationary density by finite elements: it is for one noise with a density, and no white noise, "
-        "impulses or chains; simulate the response instead"
+        "note: no stationary response is computed: it is for one noise with a density, and no white noise, impulses or "
+        "chains; take coloured noise with a short memory for white noise"
     )
     RESPONSE_TAILS = (
         "note: no stationary density by finite elements: for r0 > 1 the noise has algebraic tails and there is no δ_p, "

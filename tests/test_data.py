@@ -28,7 +28,6 @@ from fpsolve.model.systems import ParametricOscillator
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.nonlinear import stationary_response
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
-from fpsolve.simulation.response import MEANS
 from fpsolve.study.solve import Numerics, Wanted, solve_curve
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 from tests.solving import case_text
@@ -44,6 +43,7 @@ TURNING = Problem(
     ),
     White(s=1.0),
 )
+MEANS = "x", "x_squared", "v_squared", "amplitude", "energy"
 SETTLING = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.4, epsilon=0.5, c2=0.5, c3=0.2)
 FRAME = Axis("oscillator.omega", 0.5, 2.0, "log"), Axis("noise.D0", 0.01, 2.0, "log")
 MAIN = {

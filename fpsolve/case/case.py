@@ -161,9 +161,9 @@ class Case(Section):
     excursions: Annotated[ExcursionSection, parameter("how far ‖x‖ may rise, and its start", "[excursions]")] = (
         ExcursionSection()
     )
-    response: Annotated[ResponseSection, parameter("the stationary response for c2 or c3 > 0", "[response]")] = (
-        ResponseSection()
-    )
+    response: Annotated[
+        ResponseSection, parameter("the stationary response of a system with terms of degree 3", "[response]")
+    ] = ResponseSection()
     chart: Annotated[ChartSection | None, parameter("the lines of a chart, on which stability ends", "[chart]")] = None
     design: Annotated[DesignSection | None, parameter("what parameters shall be changed for", "[design]")] = None
     uncertain: Annotated[

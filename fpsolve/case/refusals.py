@@ -22,7 +22,7 @@ from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.zero import axis_faults, said
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of, varying
-from fpsolve.case.messages import Refusal, faults_in, nearest, shown
+from fpsolve.case.messages import Refusal, faults_in, nearest, quoted, shown
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
     EXCURSIONS,
@@ -224,6 +224,13 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
     """Each p that is not among the moments, and each key of a `where` that is not varied, or not with that value."""
     orders = (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None)
     yield from _of_orders(valid, orders, f"choose one of them, {_without('expect')}")
+    problem = problem_of(valid)
+    numbers = problem.system.response.numbers if problem else {}
+    for i, name in ((i, each.of_response) for i, each in enumerate(expect) if each.of_response and problem):
+        if name not in numbers:
+            names = quoted(f"{RESPONSE}.{each}" for each in numbers)
+            text = f'got "{RESPONSE}.{name}"; must be one of {names} for this system; choose one of these'
+            yield (i, "quantity"), name, text
     vary: Vary | None = valid.get("vary")
     if vary is None:
         return

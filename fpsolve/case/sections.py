@@ -23,6 +23,8 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
     model_validator,
 )
 
@@ -72,7 +74,7 @@ NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MO
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
 Scale = Literal["linear", "log"]
-ExpectedName = Literal[
+KnownName = Literal[
     QuantityName,
     "response.amplitude",
     "response.amplitude_squared",
@@ -83,6 +85,18 @@ ExpectedName = Literal[
     "response.impact_rate",
 ]
 """What an expectation may be of; the numbers of the response have its name before them."""
+OF_VARIABLE = r"^response\.[A-Za-z_][A-Za-z0-9_]*_squared$"
+"""The mean square of a variable of [system]."""
+
+
+def _expected(value: Any, known: ValidatorFunctionWrapHandler) -> Any:
+    """The name of a quantity; which variables there are is not known here."""
+    return value if type(value) is str and re.match(OF_VARIABLE, value) else known(value)
+
+
+ExpectedName = Annotated[
+    KnownName, WrapValidator(_expected, json_schema_input_type=KnownName | Annotated[str, Field(pattern=OF_VARIABLE)])
+]
 MarkedName = Literal["stability_index", "lyapunov_exponent"]
 
 
@@ -517,7 +531,7 @@ class ResponseGrid(Section):
 
 
 class ResponseSection(Section):
-    """[response]: the stationary response of the oscillator with c₂ or c₃ > 0, and where its density is written."""
+    """[response]: the stationary response of a system with terms of degree 3, and where its density is written."""
 
     rtol: Annotated[float, parameter("wanted relative error of its means", "rtol = 1e-6", ge=1e-10, le=0.1)] = 1e-6
     off: Annotated[bool, parameter("whether it is left out", "off = true")] = False

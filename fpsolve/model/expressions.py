@@ -1,8 +1,8 @@
 """Arithmetic in texts: numbers, names, + − * / **, pi, exp and sqrt.
 
 A text is parsed, and each node of its tree becomes a function here: nothing in it is ever run. A value is a polynomial
-in what the names stand for, at most of degree 1 in the state and in the noise, whose coefficients are Taylor series in
-one parameter. So the matrices, their orders in ε and their derivatives are all exact.
+in what the names stand for, at most of degree 3 in the state and 1 in the noise, whose coefficients are Taylor series
+in one parameter. So the matrices, their orders in ε and their derivatives are all exact.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ from typing import Any, cast
 
 Series = tuple[float, ...]
 """Taylor coefficients in one parameter, the value first; all in one calculation have one length."""
-Monomial = tuple[str, str, int]
-"""A variable of the state or "", a noise or "", and the power of ε."""
+Monomial = tuple[tuple[str, ...], str, int]
+"""The variables of the state that are multiplied, in order, a noise or "", and the power of ε."""
+NUMBER: Monomial = (), "", 0
+HIGHEST_DEGREE = 3
+"""In the state."""
 MOST_LETTERS, MOST_LEVELS, LARGEST_POWER = 1000, 50, 10
 CONSTANTS = {"pi": math.pi}
 _LETTERS = re.compile(r"[A-Za-z0-9_+\-*/().\s]")
@@ -40,6 +43,10 @@ class _Unsuitable(Exception):
 
 
 NOT_LINEAR = "is not linear in {states}", "write sums of terms with one of these in each"
+TOO_STEEP = (
+    f"is of a degree above {HIGHEST_DEGREE} in {{states}}",
+    f"write terms of degree 1, or of degree {HIGHEST_DEGREE} in two variables without the noise",
+)
 NOT_AFFINE = "is not affine in {noises}", "a noise may only be multiplied by numbers, parameters and a variable"
 NO_POLYNOMIAL = "is no polynomial in epsilon", "write powers of epsilon only, or give the parameter another name"
 TOO_HIGH = f"has a power of epsilon above {LARGEST_POWER}", "leave it out"
@@ -60,7 +67,7 @@ def name_fault(name: str) -> str:
 
 @dataclass(frozen=True)
 class Form:
-    """Σ c x^i ξ^j ε^n, i and j 0 or 1: what an expression is worth.
+    """Σ c x^i ξ^j ε^n, i up to 3 in all variables and j 0 or 1: what an expression is worth.
 
     Attributes:
         parts: c by its monomial.
@@ -71,7 +78,7 @@ class Form:
     @property
     def scalar(self) -> Series | None:
         """The number that it is; None where a variable, a noise or ε is in it."""
-        return self.parts.get(("", "", 0)) if set(self.parts) == {("", "", 0)} else None
+        return self.parts.get(NUMBER) if set(self.parts) == {NUMBER} else None
 
     def plus(self, other: Form, sign: float = 1.0) -> Form:
         """The sum."""
@@ -87,27 +94,27 @@ class Form:
         for (x, xi, n), a in self.parts.items():
             for (y, eta, m), b in other.parts.items():
                 for is_wrong, reason in (
-                    (x and y, NOT_LINEAR),
+                    (len(x + y) > HIGHEST_DEGREE, TOO_STEEP),
                     (xi and eta, NOT_AFFINE),
                     (n + m > LARGEST_POWER, TOO_HIGH),
                 ):
                     if is_wrong:
                         raise _Unsuitable(*reason)
-                key, series = (x or y, xi or eta, n + m), _product(a, b)
+                key, series = (tuple(sorted(x + y)), xi or eta, n + m), _product(a, b)
                 total[key] = tuple(map(add, total[key], series)) if key in total else series
         return Form(total)
 
     def of(self, function: Callable[[Series], Series]) -> Form:
         """A function of it. Raises `_Unsuitable` where it is no number."""
         if (scalar := self.scalar) is not None:
-            return Form({("", "", 0): function(scalar)})
+            return Form({NUMBER: function(scalar)})
         has_state, has_noise = (any(key[i] for key in self.parts) for i in (0, 1))
         raise _Unsuitable(*(NOT_LINEAR if has_state else NOT_AFFINE if has_noise else NO_POLYNOMIAL))
 
 
 def constant(*series: float) -> Form:
     """A number, with its further Taylor coefficients."""
-    return Form({("", "", 0): series})
+    return Form({NUMBER: series})
 
 
 def _product(a: Series, b: Series) -> Series:
@@ -314,7 +321,7 @@ def evaluate(text: str, names: Mapping[str, Form], place: str) -> Form:
         place: what it is, for messages: "v's rate".
 
     Raises:
-        ExpressionError: it is no arithmetic, has other names, is not finite, or of a degree above 1.
+        ExpressionError: it is no arithmetic, has other names, is not finite, or of too high a degree.
     """
     return _Walk(names, place).value(_parsed(text)[0])
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,6 +20,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import (
     CoefficientMatrix,
+    CubicTerms,
     Impulse,
     ImpulseDerivative,
     LinearMotion,
@@ -55,6 +56,12 @@ class Frame:
         """The same term for y, S⁻¹AS."""
         return replace(term, matrix=(self._inverse @ np.array(term.matrix) @ self._array).tolist())
 
+    def cubic(self, terms: CubicTerms) -> CubicTerms:
+        """The same cubic terms for y: S⁻¹ C of the products of Sy."""
+        first, second = self._array
+        products = [reduce(np.convolve, [first] * (3 - k) + [second] * k) for k in range(4)]
+        return CubicTerms((self._inverse @ np.array(terms.matrix) @ np.array(products)).tolist())
+
     def exponent(self, of: T) -> T:
         """An impulse, or its derivative, for y."""
         return replace(of, exponent=(self._inverse @ np.array(of.exponent) @ self._array).tolist())
@@ -88,6 +95,11 @@ class Frame:
     def density(self, phi: FloatArray) -> FloatArray:
         """dψ/dφ."""
         return np.asarray(np.linalg.det(self._inverse) / self.length(phi) ** 2)
+
+
+def amplitude_frame(system: System) -> Frame:
+    """The frame in which ‖y‖ is the amplitude of a system with cubic terms, see `System.aspect`."""
+    return Frame(((1.0, 0.0), (0.0, system.aspect / system.second_unit)))
 
 
 def is_free(term: CoefficientMatrix) -> bool:

@@ -1,4 +1,4 @@
-"""Linear motion in the plane, driven by noise and stretched at rays; the paper's oscillator is one instance.
+"""Motion in the plane, linear but for cubic terms, driven by noise and stretched at rays, as the paper's oscillator.
 
     ẋ = Σ_k ε^n_k g_k(ξ) A_k x,      x⁺ = R x⁻ where the phase passes a ray
 
@@ -24,6 +24,7 @@ from scipy.linalg import expm, expm_frechet
 from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, is_whole, one, real_array, real_number, shown
 from fpsolve.model.exact import ExactMotion
 from fpsolve.model.parameters import Parametrised
+from fpsolve.model.quantity import ResponseQuantities, response_quantities
 
 Matrix = Sequence[Sequence[float]]
 Xi = ArrayLike | Mapping[str, ArrayLike]
@@ -216,6 +217,43 @@ class CoefficientMatrix:
 
 
 @dataclass(frozen=True)
+class CubicTerms:
+    """What is of degree 3 in the rates: ẋᵢ = … + Σ_k C_ik x₁^(3−k) x₂^k, which no noise drives.
+
+    In polar coordinates dφ = a²h dt and d ln a = a²q dt, of one sign for φ and φ + π.
+
+    Args:
+        matrix: C with all powers of ε, two rows of four numbers.
+
+    Raises:
+        ValueError: it is not of this shape and finite.
+    """
+
+    matrix: Matrix
+
+    def __post_init__(self) -> None:
+        entries = real_array(self.matrix, "matrix")
+        if entries.shape != (2, 4):
+            raise ValueError(f"got matrix = {shown(self.matrix)}; must be two rows of four finite numbers")
+        object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
+
+    def h(self, phi: ArrayLike) -> FloatArray:
+        """e′ᵀ C m(e), m the products of degree 3."""
+        first, second = self._rates(phi)
+        return np.asarray(-np.sin(phi) * first - np.cos(phi) * second)
+
+    def q(self, phi: ArrayLike) -> FloatArray:
+        """eᵀ C m(e)."""
+        first, second = self._rates(phi)
+        return np.asarray(np.cos(phi) * first - np.sin(phi) * second)
+
+    def _rates(self, phi: ArrayLike) -> FloatArray:
+        """C m(e), shape (2, *φ.shape)."""
+        x, u = np.cos(phi), -np.sin(phi)
+        return np.tensordot(np.array(self.matrix), np.stack([x**3, x * x * u, x * u * u, u**3]), 1)
+
+
+@dataclass(frozen=True)
 class Impulse:
     """x⁺ = exp(B) x⁻ at the times of a Poisson process.
 
@@ -316,10 +354,14 @@ class System(Parametrised):
         noise_sections: the sections of a case file that state the noises, with which the keys of their parameters
             begin: "noise", or, for one that terms call axial, "noise.axial".
         impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
+        cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
+        second_unit: its second variable over the second coordinate of the terms.
     """
 
     section: ClassVar[str] = "system"
     noise_unit: ClassVar[str] = "unknown"
+    cubic: CubicTerms | None = None
+    second_unit: float = 1.0
     epsilon: float
     terms: Sequence[CoefficientMatrix]
     jumps: Sequence[Jump]
@@ -362,12 +404,23 @@ class System(Parametrised):
 
     @property
     def is_nonlinear(self) -> bool:
-        """Whether there is more to it than its terms, see `motion`."""
-        return False
+        """Whether there is more to it than its terms."""
+        return self.cubic is not None
 
-    def motion(self, *, smooth: bool = False) -> Any:
-        """The numbers of its nonlinear motion, see `Motion`; None for kinds that have none."""
-        return None
+    @property
+    def response(self) -> ResponseQuantities:
+        """What a stationary response of it is of."""
+        x, v = self.states[:2]
+        return response_quantities(x, v, has_wall=bool(self.jumps))
+
+    @property
+    def aspect(self) -> float:
+        """s in the amplitude a = √(x₁² + x₂²/s²) of its response: x₁ = a cos φ and x₂ = −s a sin φ.
+
+        Where the matrix A of its terms at ξ = 0 has A₁₂A₂₁ < 0, s² = −A₂₁/A₁₂, ω² for ẋ = v, v̇ = −ω²x + …, and else 1.
+        """
+        (_, b), (c, _) = matrix_at(self, 0.0).tolist()
+        return self.second_unit * (math.sqrt(-c / b) if b * c < 0 else 1.0)
 
     @property
     def noise_sections(self) -> Sequence[str]:

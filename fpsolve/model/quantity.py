@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from fpsolve.data import Quantity as Quantity
 
@@ -143,9 +143,49 @@ VELOCITY = Quantity("v", "v", "velocity", r"$\dot{x}$", "length/time", ("v",))
 AMPLITUDE = Quantity("amplitude", "A", "amplitude", r"$A = \sqrt{x^2 + \dot{x}^2/\omega^2}$", "length", ("amplitude",))
 JOINT_DENSITY = Quantity("density", "ρ", "density", r"of $(x, \dot{x})$", "time/length²", ("x", "v"))
 AMPLITUDE_DENSITY = Quantity("amplitude_density", "ρ(A)", "density of the amplitude", "$A$", "1/length", ("amplitude",))
-STATIONARY_MEANS: Mapping[str, Quantity] = {
-    name: Quantity(f"mean_{name}", symbol, words, unit=unit)
-    for name, symbol, words, unit in (
+
+
+@dataclass(frozen=True)
+class ResponseQuantities:
+    """What a stationary response is of.
+
+    Attributes:
+        first, second: the variables of the system.
+        amplitude: √(x₁² + x₂²/s²).
+        density, amplitude_density: of the variables, and of the amplitude.
+        means: by their names in files.
+        has_wall: whether there are impacts.
+        joint_symbol: of the density of the variables, in sentences.
+    """
+
+    first: Quantity
+    second: Quantity
+    amplitude: Quantity
+    density: Quantity
+    amplitude_density: Quantity
+    means: Mapping[str, Quantity]
+    has_wall: bool = True
+    joint_symbol: str = "ρ(x, ẋ)"
+
+    @property
+    def numbers(self) -> Mapping[str, Quantity]:
+        """What finite elements give of it; the names are those beside the numbers of the linear system."""
+        known = {name: each for name, each in self.means.items() if name not in (self.first.name, self.second.name)}
+        return {
+            name: replace(
+                each, name=f"response_{name}", words=f"stationary {each.words}", latex="", equation="", closed_form=""
+            )
+            for name, each in {**known, **({"impact_rate": IMPACT_RATE} if self.has_wall else {})}.items()
+        }
+
+
+def _means(*each: tuple[str, str, str, str]) -> Mapping[str, Quantity]:
+    return {name: Quantity(f"mean_{name}", symbol, words, unit=unit) for name, symbol, words, unit in each}
+
+
+OSCILLATOR_RESPONSE = ResponseQuantities(
+    DISPLACEMENT, VELOCITY, AMPLITUDE, JOINT_DENSITY, AMPLITUDE_DENSITY,
+    _means(
         ("x", "⟨x⟩", "mean of x", "length"),
         ("amplitude", "⟨A⟩", "mean of the amplitude", "length"),
         ("amplitude_squared", "⟨A²⟩", "mean of the squared amplitude", "length²"),
@@ -153,17 +193,35 @@ STATIONARY_MEANS: Mapping[str, Quantity] = {
         ("x_squared", "⟨x²⟩", "mean of x²", "length²"),
         ("v_squared", "⟨ẋ²⟩", "mean of ẋ²", "length²/time²"),
         ("energy", "⟨E⟩", "mean of the energy ½ẋ² + ½ω²x²", "length²/time²"),
+    ),
+)  # fmt: skip
+"""Of the nonlinear oscillator."""
+
+
+def response_quantities(x: str, v: str, *, has_wall: bool) -> ResponseQuantities:
+    """Of a system with two variables of which no more than the names are known."""
+    unit = "unknown"
+    means = _means(
+        (x, f"⟨{x}⟩", f"mean of {x}", unit),
+        (v, f"⟨{v}⟩", f"mean of {v}", unit),
+        ("amplitude", "⟨A⟩", "mean of the amplitude", unit),
+        ("amplitude_squared", "⟨A²⟩", "mean of the squared amplitude", unit),
+        ("amplitude_fourth", "⟨A⁴⟩", "mean of the fourth power of the amplitude", unit),
+        (f"{x}_squared", f"⟨{x}²⟩", f"mean of {x}²", unit),
+        (f"{v}_squared", f"⟨{v}²⟩", f"mean of {v}²", unit),
     )
-}
-"""Of the stationary response of the nonlinear oscillator, by their names in files."""
-RESPONSE_NUMBERS: Mapping[str, Quantity] = {
-    name: replace(
-        each, name=f"response_{name}", words=f"stationary {each.words}", latex="", equation="", closed_form=""
+    return ResponseQuantities(
+        Quantity(x, x, x, unit=unit, dims=(x,)),
+        Quantity(v, v, v, unit=unit, dims=(v,)),
+        replace(AMPLITUDE, latex="$A$", unit=unit),
+        replace(JOINT_DENSITY, latex="", words=f"density of ({x}, {v})", unit=unit, dims=(x, v)),
+        replace(AMPLITUDE_DENSITY, unit=unit),
+        means,
+        has_wall,
+        f"ρ({x}, {v})",
     )
-    for name, each in {**STATIONARY_MEANS, "impact_rate": IMPACT_RATE}.items()
-    if name != "x"
-}
-"""What finite elements give of it; the names are those beside the numbers of the linear system."""
+
+
 THETA = Quantity("theta", "θ", "parameter", r"$\theta$", "theta_unit", ("parameter",))
 """Any parameter; its unit is a variable beside it."""
 POINTS = {

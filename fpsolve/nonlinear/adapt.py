@@ -22,7 +22,7 @@ from fpsolve.errors import NotConverged
 from fpsolve.fem.discretisation import NoisePart, first_part
 from fpsolve.fem.factors import one_thread
 from fpsolve.messages import Code, Message
-from fpsolve.nonlinear.elimination import Solution, Tail, solved, solved_tail
+from fpsolve.nonlinear.elimination import Solution, Tail, mean_damping, solved, solved_tail
 from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
 
 SHARE = 0.2
@@ -43,6 +43,8 @@ FEWEST, HIGHEST_DEGREE = 4, 8
 """Elements in u, and their degree; beyond it they are halved."""
 QUANTILE = 1e-2
 """Of the tolerance that the first interval leaves out below, in weak noise; above it is the tolerance itself."""
+LEAST_DAMPING = 0.01
+"""The least κ with which it begins, over the largest damping at a phase."""
 FURTHER = 0.5
 """How far the lower end of u moves in a step."""
 MOST_HIGHER = 2
@@ -147,17 +149,19 @@ class Search:
     @cached_property
     def base(self) -> Choice:
         """One that serves weak noise, where a² has a law of the shape −δ_p/2 and the mean λ/κ."""
-        motion = self.flow.problem.system.motion()
         shape, digits = self.index / 2, -math.log10(self.rtol)
-        damping = (motion.cubic + 3 * motion.rayleigh) / 8
-        law = gamma(shape, scale=self.rate / damping / shape)
-        bottom, top = (0.5 * math.log(max(law.ppf(q), 1e-300)) for q in (QUANTILE * self.rtol, 1 - self.rtol))
         degree = round(4 + digits / 2)
-        part = first_part(self.flow.problem.coloured, digits)
-        tail = solved_tail(Plane(self.flow, Circle(CELLS, degree), part), self.index)
+        plane = Plane(self.flow, self._circle(degree), first_part(self.flow.problem.coloured, digits))
+        most = float(np.max(np.abs(self.flow.rise(self.flow.cubic, plane.circle.points))))
+        law = gamma(shape, scale=self.rate / max(mean_damping(plane), LEAST_DAMPING * most) / shape)
+        bottom, top = (0.5 * math.log(max(law.ppf(q), 1e-300)) for q in (QUANTILE * self.rtol, 1 - self.rtol))
+        tail = solved_tail(plane, self.index)
         bottom = min(max(bottom, tail.reach(QUANTILE * self.rtol)), top - 1.0)
         step = min(SPACING * 0.5 / math.sqrt(shape), WIDEST, (top - bottom) / FEWEST)
-        return Choice(CELLS, degree, part, bottom, top, step, 4)
+        return Choice(CELLS, degree, plane.part, bottom, top, step, 4)
+
+    def _circle(self, degree: int) -> Circle:
+        return Circle(CELLS, degree, self.flow.half_turn)
 
     def solve(self, levels: Levels, top: float) -> Solution:
         """The density on one discretisation. Raises `NotConverged` where it is too large."""
@@ -171,7 +175,7 @@ class Search:
         self.unknowns = max(self.unknowns, choice.size)
         with one_thread():
             if levels[:2] not in self._planes:
-                plane = Plane(self.flow, Circle(choice.cells, choice.phi_degree), choice.part)
+                plane = Plane(self.flow, self._circle(choice.phi_degree), choice.part)
                 self._planes[levels[:2]] = plane, solved_tail(plane, self.index)
             plane, tail = self._planes[levels[:2]]
             return solved(plane, Height(choice.lines, choice.degree), tail)

@@ -87,6 +87,13 @@ def solved_tail(plane: Plane, guess: float) -> Tail:
     return Tail(kappa, np.array(terms))
 
 
+def mean_damping(plane: Plane) -> float:
+    """κ: the mean of −u̇ over e^{2u} by the cubic terms, under the stationary law of φ and ξ near rest."""
+    turn, steep, mass = plane.whole(plane.turn), plane.whole(plane.steep), plane.unit @ plane.constant
+    law = np.linalg.solve(turn + np.outer(mass, mass), mass)  # turn Ψ = 0 and ∫P_sΨ = 1, as no flow is into 1
+    return -float(plane.constant @ (steep @ law)) / float(mass @ law)
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A density, normalised.

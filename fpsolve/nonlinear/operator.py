@@ -1,15 +1,18 @@
-"""The Fokker-Planck operator of the nonlinear oscillator, in log-amplitude, phase and noise.
+"""The Fokker-Planck operator of a system with cubic terms, in log-amplitude, phase and noise.
 
-With a = √(x² + ẋ²/ω²) and x = a cos φ, ẋ = −aω sin φ, every term of Eq. (3) gives dφ = h dt and d ln a = q dt:
+With a = √(x₁² + x₂²/s²), s the system's `aspect`, and x₁ = a cos φ, x₂ = −s a sin φ, all terms together give dφ = h dt
+and d ln a = q dt with
 
-    h = Σ εⁿ g(ξ) h_n(φ) + a² h₃(φ),    q = Σ εⁿ g(ξ) q_n(φ) + a² q₃(φ),
-    h₃ = −N sin φ cos φ,    q₃ = −N sin²φ,    N = ε²(c₂ cos²φ + c₃ ω² sin²φ),
+    h = Σ εⁿ g(ξ) h_n(φ) + a² h₃(φ),    q = Σ εⁿ g(ξ) q_n(φ) + a² q₃(φ);
 
-and ln a jumps by ln R at an impact, φ = π/2. The gauge ln a = u + γ(φ), γ = −(ln R/π) φ on (−π/2, π/2), makes u
-continuous there, and a² = e^{2u} e^{2γ}, so that with du/dt = q − γ′h every term is a product of functions of u, φ
-and ξ. A density ρ = P_s(ξ) Σ c w over (u, φ, ξ) is stationary where
+for the oscillator of Eq. (3) h₃ = −N sin φ cos φ, q₃ = −N sin²φ, N = ε²(c₂ cos²φ + c₃ ω² sin²φ). At a wall, on the ray
+φ_w, ln a jumps by ln R. The gauge ln a = u + γ(φ), γ = ∓(ln R/π)(φ − φ_w + π/2) on the half-turn that ends at φ_w, with
+the upper sign where φ grows there, makes u continuous, and a² = e^{2u} e^{2γ}, so that with du/dt = q − γ′h every term
+is a product of functions of u, φ and ξ. A density ρ = P_s(ξ) Σ c w over (u, φ, ξ) is stationary where
 
     ∫ ρ (u̇ ∂w/∂u + φ̇ ∂w/∂φ + L_ξ w) = what flows over the ends of the interval of u,    for every test function w.
+
+Without a wall (x₁, x₂) and (−x₁, −x₂) are one state here; both have half of the density, as every term is odd.
 """
 
 from __future__ import annotations
@@ -26,11 +29,12 @@ from scipy.sparse import csr_matrix, diags
 from fpsolve.arrays import Coefficient, FloatArray, dense, identity, one
 from fpsolve.fem.discretisation import NoisePart
 from fpsolve.fem.line import LineSpace
+from fpsolve.model.frame import Frame, amplitude_frame
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
 
 HALF_TURN = np.array([-0.5, 0.5]) * math.pi
-"""The phases between two impacts; x is not negative there."""
+"""The phases where x₁ is not negative."""
 
 
 class Rate(NamedTuple):
@@ -50,38 +54,69 @@ class Flow:
     """The terms of the motion in the gauge u.
 
     Attributes:
-        problem: with c₂ or c₃ > 0, and one noise with a density.
+        problem: of a system with cubic terms and at most one wall, and one noise with a density.
     """
 
     problem: Problem
 
     @cached_property
+    def frame(self) -> Frame:
+        """The coordinates whose length is a."""
+        return amplitude_frame(self.problem.system)
+
+    @cached_property
+    def half_turn(self) -> FloatArray:
+        """The first and last φ of the half-turn that is solved for; it ends at the wall, if there is one."""
+        walls = self.problem.system.jumps
+        return HALF_TURN if not walls else self.frame.phase(np.array(walls[0].phase)) + np.array([-math.pi, 0.0])
+
+    def phases(self, count: int) -> FloatArray:
+        """So many from the first to the last."""
+        return np.linspace(self.half_turn[0], self.half_turn[1], count)
+
+    @property
+    def has_wall(self) -> bool:
+        return bool(self.problem.system.jumps)
+
+    def is_positive(self, k: int) -> bool:
+        """Whether a variable is nowhere negative, as the wall is where it is 0."""
+        first, last = self.half_turn
+        ends = np.abs([math.cos(first), math.sin(first)])
+        middle = (math.cos, lambda phi: -math.sin(phi))[k](0.5 * (first + last))
+        return self.has_wall and ends[k] < 1e-12 and middle > 0
+
+    @cached_property
+    def sense(self) -> float:
+        """1 where the phase grows at the wall, −1 where it falls; 1 without a wall."""
+        speed = sum(float(rate.g(0.0)) * float(rate.h(self.half_turn[1])) for rate in self.linear)
+        return -1.0 if self.has_wall and speed < 0 else 1.0
+
+    @cached_property
     def log_factor(self) -> float:
-        """ln R."""
-        return float(sum(jump.log_factor for jump in self.problem.motion.jumps))
+        """By what ln a jumps at the wall from below φ_w to above: ±ln R."""
+        return self.sense * float(sum(jump.log_factor for jump in self.problem.system.jumps))
 
     def gauge(self, phi: FloatArray) -> FloatArray:
-        """γ(φ), for φ from −π/2 to π/2."""
-        return -self.log_factor / math.pi * phi
+        """γ(φ), for φ in the half-turn."""
+        return -self.log_factor / math.pi * (phi - self.half_turn.mean())
 
     @cached_property
     def linear(self) -> Sequence[Rate]:
         """Of the terms that do not depend on a."""
-        system = self.problem.motion
-        return [_scaled(term, system.epsilon**term.order) for term in system.terms]
+        system = self.problem.system
+        return [_scaled(self.frame.term(term), system.epsilon**term.order) for term in system.terms]
 
     @cached_property
     def cubic(self) -> Rate:
         """h₃ and q₃ with e^{2γ}: what e^{2u} multiplies."""
-        motion: Any = self.problem.system.motion()
+        cubic = self.problem.system.cubic
+        assert cubic is not None
+        terms = self.frame.cubic(cubic)
 
-        def damping(phi: FloatArray) -> FloatArray:
-            squares = motion.cubic * np.cos(phi) ** 2 + motion.rayleigh * np.sin(phi) ** 2
-            return np.asarray(squares * np.exp(2 * self.gauge(phi)))
+        def size(phi: FloatArray) -> FloatArray:
+            return np.asarray(np.exp(2 * self.gauge(phi)))
 
-        return Rate(
-            lambda phi: -damping(phi) * np.sin(phi) * np.cos(phi), lambda phi: -damping(phi) * np.sin(phi) ** 2, one
-        )
+        return Rate(lambda phi: terms.h(phi) * size(phi), lambda phi: terms.q(phi) * size(phi), one)
 
     def rise(self, rate: Rate, phi: FloatArray) -> FloatArray:
         """What a term gives to du/dt: q − γ′h."""
@@ -93,23 +128,24 @@ Factors = dict[Coefficient | None, Any]
 
 
 class Circle:
-    """Continuous elements in φ from impact to impact, whose ends are one.
+    """Continuous elements in φ over a half-turn, whose ends are one.
 
     Args:
         cells: their number.
         degree: of the elements.
+        half_turn: the first and the last φ.
 
     Attributes:
         size: number of unknowns.
         points, weights: a quadrature rule.
         values, slopes: the functions there, shape (n, size).
-        seam: their values at φ = ±π/2, shape (size,).
+        seam: their values at both ends, shape (size,).
         bubbles: the functions of each cell that vanish at its ends.
         constant: coefficients of 1.
     """
 
-    def __init__(self, cells: int, degree: int) -> None:
-        self._line = LineSpace(np.linspace(HALF_TURN[0], HALF_TURN[1], cells + 1), degree)
+    def __init__(self, cells: int, degree: int, half_turn: FloatArray = HALF_TURN) -> None:
+        self._line = LineSpace(np.linspace(half_turn[0], half_turn[1], cells + 1), degree)
         first, last = self._line.ends
         kept = np.delete(np.arange(self._line.size), last)
         columns = np.where(np.arange(self._line.size) == last, first, np.arange(self._line.size))
@@ -118,7 +154,7 @@ class Circle:
         self.size, self.points, self.weights = kept.size, self._line.points, self._line.measure
         self.values, self.slopes = dense(self._line.values @ self._merge), dense(self._line.slopes @ self._merge)
         self.constant = self._line.constant()[kept]
-        self.seam = self.at(HALF_TURN[:1])[0]
+        self.seam = self.at(half_turn[:1])[0]
         inner = self._line.modes[kept] > 1
         self.bubbles = [np.flatnonzero(inner & (self._line.cells[kept] == j)) for j in range(cells)]
 
@@ -184,7 +220,7 @@ class Plane:
     """
 
     def __init__(self, flow: Flow, circle: Circle, part: NoisePart) -> None:
-        self.flow, self.circle = flow, circle
+        self.flow, self.circle, self.part = flow, circle, part
         self.axis = axis = part.axis(flow.problem.coloured, 0.0)
         phi = circle.points
         self.shape = circle.size, axis.size
@@ -224,6 +260,12 @@ class Plane:
         for rate in flow.linear:
             speed = speed + flow.rise(rate, phi)[:, None] * np.asarray(rate.g(xi))
         return np.asarray(speed)
+
+    def flux(self, values: FloatArray) -> float:
+        """∫P_s φ̇ρ at the wall, where no noise changes φ̇, of coefficients of φ and ξ."""
+        end, mean = self.flow.half_turn[1:], self.flow.problem.coloured.mean
+        speed = sum(float(rate.g(mean)) * float(rate.h(end)[0]) for rate in self.flow.linear)
+        return float(speed * (np.kron(self.circle.seam, self.xi_mean) @ values))
 
     def integrals(self, f: FloatArray, g: Coefficient = identity) -> FloatArray:
         """∫ f(φ) P_s g(ξ) ρ as a vector over the functions, f at the points of φ."""

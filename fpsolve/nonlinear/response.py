@@ -1,8 +1,8 @@
-"""The stationary response of the nonlinear oscillator, Eq. (3) with c₂ or c₃ > 0: its density, means and impacts.
+"""The stationary response of a system with cubic terms, as Eq. (3) with c₂ or c₃ > 0: its density, means and impacts.
 
-Near rest ρ(a) ~ a^(−δ_p − 1) and ρ(x, ẋ) ~ a^(−δ_p − 2), δ_p < 0 the stability index of the linear system: the density
-of the amplitude has a hump away from 0 for δ_p < −1, and that of (x, ẋ) a crater around rest for δ_p < −2. These are
-the P-bifurcations.
+Near rest ρ(a) ~ a^(−δ_p − 1) and ρ(x₁, x₂) ~ a^(−δ_p − 2), δ_p < 0 the stability index of the linear system: the
+density of the amplitude has a hump away from 0 for δ_p < −1, and that of (x₁, x₂) a crater around rest for δ_p < −2.
+These are the P-bifurcations.
 """
 
 from __future__ import annotations
@@ -23,19 +23,13 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import lyapunov_exponent, stability_index
 from fpsolve.messages import Code, Message
+from fpsolve.model.limit import comes_down
+from fpsolve.model.plane import is_steady
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import (
-    AMPLITUDE,
-    AMPLITUDE_DENSITY,
-    DISPLACEMENT,
-    IMPACT_RATE,
-    JOINT_DENSITY,
-    STATIONARY_MEANS,
-    VELOCITY,
-)
+from fpsolve.model.quantity import IMPACT_RATE
 from fpsolve.nonlinear.adapt import Search, Settled
 from fpsolve.nonlinear.elimination import Solution
-from fpsolve.nonlinear.operator import HALF_TURN, Flow
+from fpsolve.nonlinear.operator import Flow
 from fpsolve.nonlinear.rest import NearRest
 
 if TYPE_CHECKING:
@@ -46,18 +40,20 @@ AT_ONE_PHASE = 2.0
 """By what the error estimate of the flux at the impacts is larger: it converges like n^(−3/2) or slower in φ."""
 SEEN = 1e-8
 """Of the largest density, above which its sign counts."""
-MEANS = ("amplitude", "amplitude_squared", "amplitude_fourth", "x_squared", "v_squared", "energy")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StationaryResponse(Result, NearRest):
-    """The stationary density over amplitude, phase and noise, x = a cos φ ≥ 0 and ẋ = −aω sin φ.
+    """The stationary density over amplitude, phase and noise, x₁ = a cos φ and x₂ = −s a sin φ.
+
+    s is the `aspect` of the system, ω for an oscillator, and φ is in the half-turn before the wall, where x₁ ≥ 0 if
+    that is at x₁ = 0. Without a wall (x₁, x₂) and (−x₁, −x₂) are alike, and densities of a, φ and ξ are of both.
 
     Attributes:
         problem: what it is of.
         rtol: what was asked for.
-        means: of `MEANS`, with error estimates.
-        impact_rate: impacts in unit time.
+        means: by their names in files, with error estimates.
+        impact_rate: impacts in unit time; None without a wall.
         balance: E[q] + ln R times the flux of ρ at the impacts, q the growth rate of ln a: 0 but for its error.
         stability_index: δ_p of the linear system.
         unknowns: of the largest system solved.
@@ -68,7 +64,7 @@ class StationaryResponse(Result, NearRest):
     problem: Problem
     rtol: float
     means: Mapping[str, Estimate]
-    impact_rate: Estimate
+    impact_rate: Estimate | None
     balance: Estimate
     stability_index: float
     unknowns: int
@@ -80,11 +76,21 @@ class StationaryResponse(Result, NearRest):
         """The density's coefficients."""
         return self.settled.solution
 
+    @property
+    def flow(self) -> Flow:
+        """The motion."""
+        return self.solution.plane.flow
+
     def moment(self, n: int, m: int) -> Estimate:
-        """E xⁿ ẋᵐ, x ≥ 0; its scale is E |xⁿ ẋᵐ|. Raises `ValueError` unless both are whole numbers >= 0."""
+        """E x₁ⁿ x₂ᵐ; its scale is E |x₁ⁿ x₂ᵐ|. Without a wall it is 0 for odd n + m.
+
+        Raises `ValueError` unless both are whole numbers >= 0.
+        """
         if not (is_whole(n, 0) and is_whole(m, 0)):
             raise ValueError(f"got n = {shown(n)}, m = {shown(m)}; must be whole numbers >= 0")
         scale = abs(_moment(self.solution, n, m, np.abs))
+        if (n + m) % 2 and not self.flow.has_wall:
+            return Estimate(0.0, 0.0, scale)
         found, changes = self.settled.compared(lambda solution: _moment(solution, n, m))
         return Estimate(float(found), float(self.settled.errors(changes, scale, n + m)), scale)
 
@@ -104,24 +110,31 @@ class StationaryResponse(Result, NearRest):
         return np.asarray(self._at(u, circle.points) @ circle.weights / a)
 
     def energy_density(self, e: ArrayLike) -> FloatArray:
-        """The density of ½ẋ² + ½ω²x² at e > 0; the shape of `e`."""
-        e, omega = np.asarray(e, dtype=float), self.problem.system.omega  # type: ignore[attr-defined]
+        """The density of ½ẋ² + ½ω²x² of an oscillator at e > 0; the shape of `e`. Raises `ValueError` for others."""
+        if "energy" not in self.means:
+            raise ValueError("the energy is that of a VibroImpactOscillator; take amplitude_density")
+        e, omega = np.asarray(e, dtype=float), self.problem.system.aspect
         a = np.sqrt(2 * e) / omega
         return self.amplitude_density(a) / (omega**2 * a)
 
     def joint_density(self, x: ArrayLike, v: ArrayLike) -> FloatArray:
-        """ρ(x, ẋ), 0 for x < 0, as the mass does not pass its wall; x and v broadcast."""
-        omega = self.problem.system.omega  # type: ignore[attr-defined]
-        x, v = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(v, dtype=float))
-        square = x**2 + (v / omega) ** 2
-        phi = np.clip(np.arctan2(-v / omega, np.abs(x)), *HALF_TURN)
+        """ρ(x₁, x₂), 0 beyond a wall; x and v broadcast."""
+        x, v = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(v, dtype=float) / self.problem.system.aspect)
+        first = self.flow.half_turn[0]
+        turns = (np.arctan2(-v, x) - first) / math.pi
+        beyond = np.where(turns == 0, 0, np.ceil(turns) - 1)  # both ends are in the half-turn
+        found = self.polar_density(np.hypot(x, v), first + math.pi * (turns - beyond))
+        return np.where(beyond % 2 != 0, 0.0, found) if self.flow.has_wall else found
+
+    def polar_density(self, a: ArrayLike, phi: ArrayLike) -> FloatArray:
+        """ρ(x₁, x₂) at x₁ = a cos φ and x₂ = −s a sin φ, φ in the half-turn; a and phi broadcast."""
+        a, phi = np.asarray(a, dtype=float), np.asarray(phi, dtype=float)
         with np.errstate(divide="ignore", invalid="ignore"):
-            u = 0.5 * np.log(square) - self.solution.plane.flow.gauge(phi)
-            found = self._at(np.maximum(u, -300.0), phi) / (omega * square)
-        return np.where(x < 0, 0.0, found)
+            found = self._at(np.maximum(np.log(a) - self.flow.gauge(phi), -300.0), phi)
+            return np.asarray(found / ((1 if self.flow.has_wall else 2) * self.problem.system.aspect * a**2))
 
     def density(self, a: ArrayLike, phi: ArrayLike, xi: ArrayLike) -> FloatArray:
-        """ρ(a, φ, ξ) on the grid of three lists, φ from −π/2 to π/2, shape (len(a), len(phi), len(xi)).
+        """ρ(a, φ, ξ) on the grid of three lists, φ in the half-turn, shape (len(a), len(phi), len(xi)).
 
         For a noise with one state, a number, and a density.
         """
@@ -138,7 +151,7 @@ class StationaryResponse(Result, NearRest):
     def minimum_over_maximum(self) -> float:
         """The least density of (u, φ) over the largest, at the points of a grid; negative where it is not resolved."""
         lines = self.solution.height.lines
-        u, phi = np.linspace(lines[0], lines[-1], 400)[:, None], np.linspace(HALF_TURN[0], HALF_TURN[1], 80)
+        u, phi = np.linspace(lines[0], lines[-1], 400)[:, None], self.flow.phases(80)
         values = self._at(u, phi)
         return float(values.min() / values.max())
 
@@ -151,20 +164,22 @@ class StationaryResponse(Result, NearRest):
         return float(a[np.searchsorted(-above, -5e-4)])
 
     def to_xarray(self, *, points: int = 100) -> xarray.Dataset:
-        """The densities of (x, ẋ) and of the amplitude on grids of so many points, and the means."""
-        omega = self.problem.system.omega  # type: ignore[attr-defined]
+        """The densities of both variables and of the amplitude on grids of so many points, and the means."""
+        about, aspect = self.problem.system.response, self.problem.system.aspect
         a = (np.arange(points) + 0.5) * self.reach / points
-        v = (np.arange(2 * points) + 0.5 - points) * self.reach * omega / points
+        both = (np.arange(2 * points) + 0.5 - points) * self.reach / points
+        x, v = (a if self.flow.is_positive(k) else both for k in (0, 1))
         numbers: dict[Quantity, Any] = {
-            JOINT_DENSITY: self.joint_density(a[:, None], v),
-            AMPLITUDE_DENSITY: self.amplitude_density(a),
+            about.density: self.joint_density(x[:, None], aspect * v),
+            about.amplitude_density: self.amplitude_density(a),
         }
         for name, found in self.means.items():
-            mean = STATIONARY_MEANS[name]
+            mean = about.means[name]
             numbers |= {mean: found.value, mean.error(): found.error_estimate}
-        rate = replace(IMPACT_RATE, latex="", equation="")
-        numbers |= {rate: self.impact_rate.value, rate.error(): self.impact_rate.error_estimate}
-        coordinates = {DISPLACEMENT: a, VELOCITY: v, AMPLITUDE: a}
+        if self.impact_rate is not None:
+            rate = replace(IMPACT_RATE, latex="", equation="")
+            numbers |= {rate: self.impact_rate.value, rate.error(): self.impact_rate.error_estimate}
+        coordinates = {about.first: x, about.second: aspect * v, about.amplitude: a}
         return dataset("stationary response", "finite elements", numbers, coordinates, self.problem.values)
 
     def _table(self) -> xarray.Dataset:
@@ -194,10 +209,10 @@ class StationaryResponse(Result, NearRest):
 
 @of_problem
 def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryResponse:
-    """Solve the Fokker-Planck equation of the vibro-impact oscillator with c₂ or c₃ > 0 and λ > 0.
+    """Solve the Fokker-Planck equation of a system with cubic terms, as of an oscillator with c₂ or c₃ > 0, and λ > 0.
 
     Args:
-        oscillator, noise: the oscillator and its noise; or one `Problem` of both, in their place or as `problem`.
+        oscillator, noise: the system and its noise; or one `Problem` of both, in their place or as `problem`.
         rtol: how large the error estimate of every mean may be, relative to the mean, 1e-10 to 0.1.
 
     Raises:
@@ -212,22 +227,30 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryRe
     settled, found, errors = search.settled()
     scales = np.append(np.abs(found[:-1]), rate)
     errors[-1] *= AT_ONE_PHASE
-    *means, impacts, balance = map(Estimate, found.tolist(), errors.tolist(), scales.tolist())
+    estimates = list(map(Estimate, found.tolist(), errors.tolist(), scales.tolist()))
+    numbers = dict(zip(problem.system.response.numbers, estimates, strict=False))
     lines = settled.solution.height.lines
     return StationaryResponse(
-        problem, rtol, dict(zip(MEANS, means, strict=True)), impacts, balance, index, search.unknowns,
+        problem, rtol, numbers, numbers.pop("impact_rate", None), estimates[-1], index, search.unknowns,
         (float(lines[0]), float(lines[-1])), settled,
     )  # fmt: skip
 
 
 def no_response(problem: Problem) -> Message | None:
     """Why there is no stationary response that is computed here, as far as it is known without solving."""
-    if not problem.system.is_nonlinear or not hasattr(problem.system, "motion"):
+    system = problem.system
+    if system.cubic is None:
         return Message(Code.RESPONSE_LINEAR)
     if len(problem.coloured.parts) > 1 or problem.diffusions or problem.impulses or problem.coloured.has_states:
         return Message(Code.RESPONSE_NOISE)
     if problem.coloured.has_algebraic_tails:
         return Message(Code.RESPONSE_TAILS)
+    if rays := problem.invariant_rays:
+        return Message(Code.RESPONSE_RAYS, phase=rays[0])
+    size = 1e-12 * float(np.max(np.abs(system.cubic.matrix)))
+    is_passed = [is_steady(system, each) and abs(float(system.cubic.h(each.phase))) <= size for each in system.jumps]
+    if len(is_passed) > 1 or not all(is_passed):
+        return Message(Code.RESPONSE_WALLS)
     return None
 
 
@@ -238,6 +261,8 @@ def _linear(problem: Problem) -> tuple[float, float]:
     rate = lyapunov_exponent(problem)
     if not rate.value > rate.error_estimate:
         raise FpsolveError(Message(Code.RESPONSE_DIES, value=rate.value, error=rate.error_estimate))
+    if not comes_down(problem):
+        raise FpsolveError(Message(Code.RESPONSE_GROWS))
     index = stability_index(problem)
     if not index:
         raise FpsolveError(Message(Code.RESPONSE_NO_INDEX, reason=index.reason))
@@ -245,10 +270,10 @@ def _linear(problem: Problem) -> tuple[float, float]:
 
 
 def _moment(solution: Solution, n: int, m: int, of: Callable[[FloatArray], FloatArray] = np.asarray) -> float:
-    """E xⁿ ẋᵐ, or that of a function of cosⁿφ sinᵐφ in place of it."""
+    """E x₁ⁿ x₂ᵐ, or that of a function of cosⁿφ sinᵐφ in place of it."""
     plane, phi = solution.plane, solution.plane.circle.points
-    omega = plane.flow.problem.system.omega  # type: ignore[attr-defined]
-    return solution.mean(n + m, _scaled(solution, n + m) * of(np.cos(phi) ** n * (-omega * np.sin(phi)) ** m), one)
+    aspect = plane.flow.problem.system.aspect
+    return solution.mean(n + m, _scaled(solution, n + m) * of(np.cos(phi) ** n * (-aspect * np.sin(phi)) ** m), one)
 
 
 def _scaled(solution: Solution, n: int) -> FloatArray:
@@ -257,17 +282,21 @@ def _scaled(solution: Solution, n: int) -> FloatArray:
 
 
 def _numbers(solution: Solution) -> FloatArray:
-    """The means in the order of `MEANS`, the impacts in unit time, and E q + ln R times the flux of ρ there."""
-    plane = solution.plane
-    omega = plane.flow.problem.system.omega  # type: ignore[attr-defined]
-    amplitudes = [solution.mean(n, _scaled(solution, n), one) for n in (1, 2, 4)]
+    """The numbers of the response in the order of their names, and E q + ln R times the flux of ρ at the wall."""
+    flow, phi = solution.plane.flow, solution.plane.circle.points
+    system = flow.problem.system
+    found = [solution.mean(n, _scaled(solution, n), one) for n in (1, 2, 4)]
     squares = [_moment(solution, 2, 0), _moment(solution, 0, 2)]
-    energy = 0.5 * (squares[1] + omega**2 * squares[0])
-    flow, phi = plane.flow, plane.circle.points
-    turns = [solution.mean(0, each.h(phi), each.g) for each in flow.linear]
-    impacts = math.fsum([*turns, solution.mean(2, flow.cubic.h(phi), one)]) / math.pi  # each is half a turn
-    flux = omega * float(np.kron(plane.circle.seam, plane.xi_mean) @ solution.moments(0))
-    return np.array([*amplitudes, *squares, energy, impacts, _growth(solution) + flow.log_factor * flux])
+    found += squares
+    if "energy" in system.response.means:
+        found.append(0.5 * (squares[1] + system.aspect**2 * squares[0]))
+    flux = 0.0
+    if flow.has_wall:
+        turns = [solution.mean(0, each.h(phi), each.g) for each in flow.linear]
+        turn = math.fsum([*turns, solution.mean(2, flow.cubic.h(phi), one)])
+        found.append(flow.sense * turn / math.pi)  # each is half a turn
+        flux = solution.plane.flux(solution.moments(0))
+    return np.array([*found, _growth(solution) + flow.log_factor * flux])
 
 
 def _growth(solution: Solution) -> float:

@@ -24,7 +24,6 @@ from fpsolve.files import atomic
 from fpsolve.model.quantity import (
     OF_RATE,
     RATE_FUNCTION,
-    RESPONSE_NUMBERS,
     SECONDS,
     STATUS,
     STORED_MOMENTS,
@@ -121,7 +120,8 @@ def _variables(case: Case, results: Iterable[CurveResult]) -> dict[str, Variable
     for index, three in indices.items():
         columns += zip((index, index.error(), index.perturbation), three, strict=True)
     for name, two in settled.items():
-        columns += zip((RESPONSE_NUMBERS[name], RESPONSE_NUMBERS[name].error()), two, strict=True)
+        number = response_columns(case)[name]
+        columns += zip((number, number.error()), two, strict=True)
     columns += [(STATUS, status), (SECONDS, seconds)]
     flags = {
         "flag_values": np.array([int(each) for each in Status], dtype=np.int8),

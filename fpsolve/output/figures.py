@@ -37,17 +37,14 @@ from fpsolve.drawing import (
 )
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
+from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import (
-    AMPLITUDE,
-    AMPLITUDE_DENSITY,
-    DISPLACEMENT,
     GROWTH,
-    JOINT_DENSITY,
     MOMENT,
     RATE_FUNCTION,
-    VELOCITY,
     P,
+    ResponseQuantities,
 )
 from fpsolve.output.charts import held_in_words, read_line
 from fpsolve.study.response import CurveResponse, ResponseDensity
@@ -234,7 +231,7 @@ def draw_stationary_responses(
     *,
     into: Path | None = None,
 ) -> None:
-    """Draw response.png and .pdf of every curve with a stationary density: of (x, ẋ), and of the amplitude.
+    """Draw response.png and .pdf of every curve with a stationary density: of both variables, and of the amplitude.
 
     Beside that of the amplitude stands a simulated one, where there is one; above both, what they do at rest.
     """
@@ -248,8 +245,8 @@ def draw_stationary_responses(
         with figure_for(*headed(folder, name, into, case.headline), held, Format(width=10.5)) as figure:
             plane, radial = figure.subplots(1, 2)
             figure.get_layout_engine().set(wspace=0.1)
-            _draw_joint_density(plane, found, found.density, case, result.curve.oscillator.omega)
-            _draw_amplitudes(radial, found, found.density, case)
+            _draw_joint_density(plane, found, found.density, result.curve.problem.system, case)
+            _draw_amplitudes(radial, found, found.density, result.curve.problem.system.response, case)
             if sample := samples.get(result.curve.key):
                 x = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
                 look: dict[str, Any] = {"marker": ".", "color": "black", "markersize": points(4), "capsize": points(2)}
@@ -257,22 +254,25 @@ def draw_stationary_responses(
                 draw_dots(radial, x, sample.amplitude_density, sample.amplitude_error, label=words, **look)
 
 
-def _draw_joint_density(axes: Any, found: CurveResponse, density: ResponseDensity, case: Case, omega: float) -> None:
-    """ρ(x, ẋ) in colours over four decades; what is below has the colour of the lowest."""
+def _draw_joint_density(axes: Any, found: CurveResponse, density: ResponseDensity, system: System, case: Case) -> None:
+    """ρ of both variables in colours over four decades; what is below has the colour of the lowest."""
     from matplotlib.colors import LogNorm
 
-    about, x, v = (each.timed(case.units.time).attributes for each in (JOINT_DENSITY, DISPLACEMENT, VELOCITY))
-    a, phi, most = density.amplitude[:, None], density.phi, float(density.of_plane.max())
-    shown, look = np.maximum(density.of_plane, 1e-4 * most), {"norm": LogNorm(1e-4 * most, most), "shading": "gouraud"}
-    draw_colours(axes, a * np.cos(phi), -omega * a * np.sin(phi), shown, about, **look)
+    of = system.response
+    about, x, v = (each.timed(case.units.time).attributes for each in (of.density, of.first, of.second))
+    a, (phi, of_plane), most = density.amplitude[:, None], density.plane(of.has_wall), float(density.of_plane.max())
+    shown, look = np.maximum(of_plane, 1e-4 * most), {"norm": LogNorm(1e-4 * most, most), "shading": "gouraud"}
+    draw_colours(axes, a * np.cos(phi), -system.aspect * a * np.sin(phi), shown, about, **look)
     label_axes(axes, x, v)
     axes.set_title(_at_rest("a crater around rest", found.stability_index, -2))
 
 
-def _draw_amplitudes(axes: Any, found: CurveResponse, density: ResponseDensity, case: Case) -> None:
+def _draw_amplitudes(
+    axes: Any, found: CurveResponse, density: ResponseDensity, about: ResponseQuantities, case: Case
+) -> None:
     """ρ(a) as a line."""
     axes.plot(density.amplitude, density.of_amplitude, color=COLOURS[0], label="finite elements")
-    label_axes(axes, *(each.timed(case.units.time).attributes for each in (AMPLITUDE, AMPLITUDE_DENSITY)))
+    label_axes(axes, *(each.timed(case.units.time).attributes for each in (about.amplitude, about.amplitude_density)))
     end = density.amplitude[0] + density.amplitude[-1]
     axes.set(xlim=(0, end), ylim=(0, 1.1 * float(density.of_amplitude.max())))
     axes.set_title(_at_rest("a hump away from rest", found.stability_index, -1))

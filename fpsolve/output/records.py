@@ -40,7 +40,7 @@ from fpsolve.exponent.solver import InvariantClass
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Message, message_of
 from fpsolve.model.kinds import source_of, version_of
-from fpsolve.model.quantity import STATIONARY_MEANS
+from fpsolve.model.quantity import ResponseQuantities
 from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Numerics, Wanted, everything
@@ -309,7 +309,7 @@ def fits(result: CurveResult, asked: Sequence[float]) -> bool:
         and len(result.jumps) in (0, len(result.curve.problem.system.jumps))
         and all(each.keys() <= BY_JUMP.keys() for each in result.jumps)
         and all(np.array_equal(each.p, found.p) and _is_finite(each, found.p.shape) for each in result.classes)
-        and (response is None or _can_be_drawn(response))
+        and (response is None or _can_be_drawn(response, result.curve.problem.system.response))
         and 0 <= result.seconds < math.inf
     )
     if is_whole and slopes is not None:
@@ -336,11 +336,11 @@ def _is_finite(each: InvariantClass, shape: tuple[int, ...]) -> bool:
     return is_whole and all(map(math.isfinite, (each.phase or 0.0, exponent.value, exponent.error_estimate)))
 
 
-def _can_be_drawn(response: CurveResponse) -> bool:
+def _can_be_drawn(response: CurveResponse, about: ResponseQuantities) -> bool:
     """Whether the numbers of a response are all there, and its density is one over a grid."""
     density = response.density
     numbers = response.stability_index, response.least
-    is_whole = response.means.keys() <= STATIONARY_MEANS.keys() and all(map(math.isfinite, numbers))
+    is_whole = response.numbers.keys() <= about.numbers.keys() and all(map(math.isfinite, numbers))
     if density is None or not is_whole:
         return is_whole
     places = density.amplitude, density.phi, density.xi
@@ -364,7 +364,7 @@ def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
     if response is not None:
         edges = response.x_edges, response.v_edges, response.amplitude_edges
         *cells, count = [each.size - 1 for each in edges]
-        numbers += [response.outside, response.impact_rate, response.time, *sum(response.means.values(), ())]
+        numbers += [response.outside, response.impact_rate or 0.0, response.time, *sum(response.means.values(), ())]
         is_whole &= (
             all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in edges)
             and response.density.shape == tuple(cells)

@@ -25,7 +25,7 @@ from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.files import parsed_json, plain_text, write_text
 from fpsolve.messages import Code, Message, Severity, message_of
-from fpsolve.model.quantity import RATE_FUNCTION, RESPONSE_NUMBERS
+from fpsolve.model.quantity import RATE_FUNCTION
 from fpsolve.output.charts import draw_chart
 from fpsolve.output.directions import directions_file, draw_densities
 from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities, draw_stationary_responses
@@ -153,7 +153,7 @@ class Reporter:
 def _about(case: Case, found: Found, curve: Curve) -> Iterator[str]:
     yield from noises_of(curve.problem)
     if case.system.is_nonlinear:
-        yield "The nonlinear damping acts on the stationary response only: Λ(p), λ and δ_p are of the linear system."
+        yield "Terms of degree 3 act on the stationary response only: Λ(p), λ and δ_p are of the linear system."
     if found.chart is not None:
         keys = f"{charted(case).x.key} and {charted(case).y.key}"
         yield f"The chart is over {keys}; the equation above has the values of the case."
@@ -190,7 +190,7 @@ def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str
             parameters = frozenset(result.curve.parameters.items())
             sure = [f"{each}, as parameters are uncertain." for each in verdicts(spreads_of(case, result))]
             rare = [text] if (text := excursions(case, result)) else []
-            rare += [shape_of_response(result.response)] if result.response else []
+            rare += [shape_of_response(result.response, case.system.response)] if result.response else []
             if told := [*meanings(result, time_unit), *rare, *sure, *proven.get(parameters, [])]:
                 yield result.curve.label, told
     if not found.results and len(found.simulated) <= MOST_DRAWN:
@@ -339,7 +339,7 @@ def _response_grid(case: Case, result: CurveResult) -> Grid:
     columns = [Column("symbol"), Column("value"), Column("± error"), Column("unit")]
     grid = Grid(case.heading(result.curve), [Column("quantity", is_text=True), *columns])
     for name, each in result.response.numbers.items() if result.response else ():
-        about = RESPONSE_NUMBERS[name].timed(case.units.time)
+        about = case.system.response.numbers[name].timed(case.units.time)
         value = digits(each.value, each.error_estimate)
         grid.rows.append([about.words, about.symbol, value, f"{each.error_estimate:.0e}", about.unit])
     return grid

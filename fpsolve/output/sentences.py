@@ -7,6 +7,7 @@ import math
 from fpsolve.analysis.excursions import SYMBOL, Excursion
 from fpsolve.case.case import Case
 from fpsolve.exponent.error import digits
+from fpsolve.model.quantity import ResponseQuantities
 from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult
 
@@ -47,12 +48,13 @@ def sentence(case: Case, result: CurveResult) -> str:
     return f"{text}."
 
 
-def shape_of_response(found: CurveResponse) -> str:
+def shape_of_response(found: CurveResponse, about: ResponseQuantities) -> str:
     """Where the densities of a response are largest: what changes at δ_p = −1 and −2, the P-bifurcations."""
+    both = about.joint_symbol
     if not found.has_hump:
-        return "ρ(A) and ρ(x, ẋ) are infinite at rest, as δ_p > -1."
+        return f"ρ(A) and {both} are infinite at rest, as δ_p > -1."
     plane = "a crater around rest, as δ_p < -2" if found.has_crater else "is infinite there, as δ_p > -2"
-    return f"ρ(A) has a hump away from rest, as δ_p < -1, and ρ(x, ẋ) {plane}."
+    return f"ρ(A) has a hump away from rest, as δ_p < -1, and {both} {plane}."
 
 
 def excursions(case: Case, result: CurveResult) -> str:

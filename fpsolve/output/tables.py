@@ -32,7 +32,7 @@ from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
-from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION, RESPONSE_NUMBERS, Quantity
+from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION, Quantity
 from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.uncertain import SAMPLE, Samples, spreads_of
@@ -202,7 +202,7 @@ def asked(case: Case) -> list[Index]:
 
 def response_columns(case: Case) -> Mapping[str, Quantity]:
     """The numbers of the stationary response by their names, if a case asks for them."""
-    return RESPONSE_NUMBERS if case.has_response else {}
+    return case.system.response.numbers if case.has_response else {}
 
 
 def write_response(result: CurveResult, folder: Path) -> None:
@@ -225,7 +225,8 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> Non
         "response": response
         and {
             "means": _with_errors(response.means),
-            **{name: getattr(response, name) for name in ("impact_rate", "outside", "time")},
+            **({} if response.impact_rate is None else {"impact_rate": response.impact_rate}),
+            **{name: getattr(response, name) for name in ("outside", "time")},
         },
         "warnings": in_case_words(simulated.warnings),
     }
@@ -336,7 +337,7 @@ def _response(found: CurveResponse) -> dict[str, Any]:
     """The means and impacts with their errors, what the density does near rest, and how far these are to be trusted."""
     return {
         "means": {name: _number(each) for name, each in found.means.items()},
-        "impact_rate": _number(found.impact_rate),
+        **({} if found.impact_rate is None else {"impact_rate": _number(found.impact_rate)}),
         "has_hump": found.has_hump,
         "has_crater": found.has_crater,
         "balance": _number(found.balance),

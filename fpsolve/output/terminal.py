@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from fpsolve.exponent.quantities import (
     Index,
 )
 from fpsolve.messages import Code, Message, Severity, message_of
-from fpsolve.model.quantity import RESPONSE_NUMBERS, STATIONARY_MEANS, moment_at
+from fpsolve.model.quantity import OSCILLATOR_RESPONSE, moment_at
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.sentences import bounds_text, excursions, sentence, shape_of_response
 from fpsolve.output.tables import asked, in_case_words
@@ -204,7 +204,7 @@ def _mean_square() -> _Shown:
         found = result.response and result.response.means["amplitude_squared"]
         return digits(found.value, found.error_estimate, DIGITS) if found else ""
 
-    return _Shown(STATIONARY_MEANS["amplitude_squared"].symbol, 1, text=text)
+    return _Shown(OSCILLATOR_RESPONSE.means["amplitude_squared"].symbol, 1, text=text)
 
 
 def _moment(p: float, rank: int) -> _Shown:
@@ -279,10 +279,10 @@ def print_results(case: Case, results: Sequence[CurveResult]) -> None:
                 screen.packed([f"φ = {ray.phase:.6g}:", *numbers])
             screen.packed(list(verdicts(spreads)))
             if result.response:
-                stationary = result.response.numbers.items()
+                stationary, about = result.response.numbers.items(), result.curve.problem.system.response
                 screen.say("Stationary response:")
-                screen.packed([f"{RESPONSE_NUMBERS[name].symbol} = {each}" for name, each in stationary], "  ")
-                screen.say(shape_of_response(result.response))
+                screen.packed([f"{about.numbers[name].symbol} = {each}" for name, each in stationary], "  ")
+                screen.say(shape_of_response(result.response, about))
             for text in filter(None, (excursions(case, result), sentence(case, result))):
                 screen.say(text)
             screen.lines([""])
@@ -407,7 +407,8 @@ def print_simulation(case: Case, simulated: Sequence[SimulatedCurve], results: S
     for each, result in pairs if is_short else ():
         if each.response:
             solved_means = result.response.means if result and result.response else {}
-            told = [simulated_mean(name, *mean, solved_means) for name, mean in each.response.means.items()]
+            means, about = each.response.means.items(), each.response.about.means
+            told = [simulated_mean(about[name], *mean, solved_means.get(name)) for name, mean in means]
             screen.say(f"{case.place(each.curve)}: stationary means")
             screen.packed(told, "  ")
             screen.lines([""])
@@ -469,12 +470,12 @@ def sampled(value: float, error: float) -> str:
     return f"{value:.{decimals}f}" if 0 <= decimals <= 9 else f"{value:.3g}"
 
 
-def simulated_mean(name: str, value: float, error: float, exact: Mapping[str, Estimate]) -> str:
+def simulated_mean(mean: Quantity, value: float, error: float, exact: Estimate | None) -> str:
     """A mean of a simulated response, and how far that by finite elements is away, where there is one."""
-    text = f"{STATIONARY_MEANS[name].symbol} = {_with_error(value, error)}"
-    if name not in exact or not error:
+    text = f"{mean.symbol} = {_with_error(value, error)}"
+    if exact is None or not error:
         return text
-    return f"{text} (finite elements {exact[name].value:.6g}, {_deviation(value, error, exact[name].value)} s.e. away)"
+    return f"{text} (finite elements {exact.value:.6g}, {_deviation(value, error, exact.value)} s.e. away)"
 
 
 def _deviation(value: float, error: float, exact: float) -> str:

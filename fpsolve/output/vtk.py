@@ -25,7 +25,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import FIELDS, Nodes, xi_marginal
 from fpsolve.files import write_text
 from fpsolve.model.problem import Problem, parameter_lines, parameter_words
-from fpsolve.model.quantity import RESPONSE_NUMBERS, Quantity
+from fpsolve.model.quantity import Quantity
 from fpsolve.output.directions import on_one_grid, write_densities
 from fpsolve.signals import signals_held
 from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
@@ -228,24 +228,26 @@ def write_simulated_response(simulated: SimulatedCurve, folder: Path) -> None:
 def write_stationary_response(result: CurveResult, folder: Path) -> None:
     """Write the stationary density of a curve, if it has one, as response.vtu and response_3d.vtu.
 
-    The first shows (x, ẋ) as x and y, with the `density` of these, and `amplitude` and `phi`; the second shows
+    The first shows both variables as x and y, with the `density` of these, and `amplitude` and `phi`; the second shows
     (a, φ, ξ) as x, y and z, with the `density` of these. Field data: the numbers of the response, `stability_index`,
     and the parameters as in `write_eigenfunctions`.
     """
     found, curve = result.response, result.curve
     if found is None or found.density is None:
         return
-    density, omega = found.density, curve.oscillator.omega
-    known = {RESPONSE_NUMBERS[name].name: each.value for name, each in found.numbers.items()}
+    density, system = found.density, curve.problem.system
+    about = system.response.numbers
+    known = {about[name].name: each.value for name, each in found.numbers.items()}
     facts = {
         **known,
         "stability_index": found.stability_index,
         "curve": float(curve.number),
         **_facts(curve.parameters, curve.varied, curve.problem),
     }
-    a, phi = np.meshgrid(density.amplitude, density.phi, indexing="ij")
-    plane = {"density": density.of_plane, "amplitude": a, "phi": phi}
-    places = [a * np.cos(phi), -a * omega * np.sin(phi), 0 * a]
+    phases, of_plane = density.plane(system.response.has_wall)
+    a, phi = np.meshgrid(density.amplitude, phases, indexing="ij")
+    plane = {"density": of_plane, "amplitude": a, "phi": phi}
+    places = [a * np.cos(phi), -a * system.aspect * np.sin(phi), 0 * a]
     _write_between(folder / f"response{curve.suffix}.vtu", places, plane, facts)
     places = [*np.meshgrid(density.amplitude, density.phi, density.xi, indexing="ij")]
     whole = {"density": density.whole.astype(np.float32)}

@@ -1,6 +1,6 @@
 """Moment Lyapunov exponents by Monte Carlo simulation of the system (3), with errors from independent batches.
 
-All estimates start in the stationary law of phase and noise. The linear system is simulated, c₂ = c₃ = 0.
+All estimates start in the stationary law of phase and noise. The linear system is simulated, without terms of degree 3.
 
 Direct (W.-C. Xie, J. Appl. Mech. 72, 2005): M(t) = E‖x(t)‖^p over paths that are normalised again and again, and
 Λ(p) = (ln M(2t) − ln M(t))/t. One set of paths serves all p and all t = 2ʲ × transient; each p takes the longest t

@@ -1,4 +1,4 @@
-"""The stationary response of the nonlinear system, c₂ or c₃ > 0, by simulation: histograms and means."""
+"""The stationary response of a system with cubic terms by simulation: histograms and means."""
 
 from __future__ import annotations
 
@@ -14,18 +14,14 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
+from fpsolve.messages import Code, Message
+from fpsolve.model.frame import amplitude_frame
+from fpsolve.model.limit import comes_down
+from fpsolve.model.plane import System, angular_frequency
 from fpsolve.model.problem import Problem, of_problem
-from fpsolve.model.quantity import (
-    AMPLITUDE,
-    AMPLITUDE_DENSITY,
-    DISPLACEMENT,
-    IMPACT_RATE,
-    JOINT_DENSITY,
-    STATIONARY_MEANS,
-    VELOCITY,
-)
+from fpsolve.model.quantity import IMPACT_RATE, OSCILLATOR_RESPONSE, ResponseQuantities
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
-from fpsolve.simulation.bounces import advance_and_count
+from fpsolve.simulation.bounces import advance_and_count, motion_of
 from fpsolve.simulation.setup import BATCHES, simulated_parts, starting_state
 
 if TYPE_CHECKING:
@@ -33,10 +29,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BINS = 100
-MEANS = ("x", "x_squared", "v_squared", "amplitude", "energy")
+SUMS = 5
+"""x, x², u² and the amplitude of the counted states, and how many they are."""
 OUTSIDE = Quantity("outside", "outside", "share of the counts outside of the cells")
 _MARGIN = 1.5
 """Range of the histograms over the largest amplitude after the transient; what lies outside is counted apart."""
+PHASES = 64
+"""Over which the damping is averaged."""
+LEAST_DAMPING = 0.01
+"""The least damping with which paths start, over the largest one at a phase."""
 _LOOKS = 8
 """How often in a half-turn π/ω the state is counted."""
 
@@ -46,15 +47,17 @@ class Response(Result):
     """Stationary response to the noise.
 
     Attributes:
-        means: stationary means and their standard errors: x, x², v², the amplitude A = √(x² + v²/ω²) and the energy
-            ½v² + ½ω²x², v = ẋ.
+        means: stationary means and their standard errors: the variable of the wall, if there is one, the squares of x
+            and v, the first and the second variable, the amplitude A = √(x² + v²/s²), s the system's `aspect`, and of
+            the oscillator the energy ½v² + ½ω²x².
         x_edges, v_edges, density: joint density of x and v on a grid of cells, shapes (n + 1,), (m + 1,) and (n, m).
         amplitude_edges, amplitude_density, amplitude_error: density of A on cells, and its standard error.
         outside: the share of the counts that lies outside the histograms.
-        impact_rate: impacts in unit time.
+        impact_rate: impacts in unit time; None without a wall.
         time: over which the paths were averaged.
         interrupted: whether the simulation was stopped early.
         parameters: of the problem, by keys such as "noise.D0".
+        about: what the variables and means are called.
     """
 
     means: dict[str, tuple[float, float]]
@@ -65,10 +68,11 @@ class Response(Result):
     amplitude_density: FloatArray
     amplitude_error: FloatArray
     outside: float
-    impact_rate: float
+    impact_rate: float | None
     time: float
     interrupted: bool = False
     parameters: Mapping[str, float | str] = field(default_factory=dict)
+    about: ResponseQuantities = OSCILLATOR_RESPONSE
 
     @property
     def reach(self) -> float:
@@ -78,18 +82,21 @@ class Response(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The densities over the middles of their cells, and the means."""
-        kind = "standard error"
+        kind, about = "standard error", self.about
         numbers: dict[Quantity, Any] = {
-            JOINT_DENSITY: self.density,
-            AMPLITUDE_DENSITY: self.amplitude_density,
-            AMPLITUDE_DENSITY.error(kind): self.amplitude_error,
+            about.density: self.density,
+            about.amplitude_density: self.amplitude_density,
+            about.amplitude_density.error(kind): self.amplitude_error,
         }
         for name, (value, deviation) in self.means.items():
-            mean = STATIONARY_MEANS[name]
+            mean = about.means[name]
             numbers |= {mean: value, mean.error(kind): deviation}
-        numbers |= {replace(IMPACT_RATE, latex="", equation=""): self.impact_rate, OUTSIDE: self.outside}
+        if self.impact_rate is not None:
+            numbers[replace(IMPACT_RATE, latex="", equation="")] = self.impact_rate
+        numbers[OUTSIDE] = self.outside
         coordinates: dict[Quantity, FloatArray] = {}
-        for side, edges in ((DISPLACEMENT, self.x_edges), (VELOCITY, self.v_edges), (AMPLITUDE, self.amplitude_edges)):
+        sides = (about.first, self.x_edges), (about.second, self.v_edges), (about.amplitude, self.amplitude_edges)
+        for side, edges in sides:
             name, words = f"{side.name}_edges", f"edges of the cells of {side.name}"
             ends = Quantity(name, name, words, unit=side.unit, dims=(name,))
             coordinates |= {side: (edges[1:] + edges[:-1]) / 2, ends: edges}
@@ -118,8 +125,8 @@ class Response(Result):
         most = self.density.max()
         scale = LogNorm(max(self.density[self.density > 0].min(), most * 1e-4), most)
         draw_plane(axes, found.density.where(found.density > 0), **{"norm": scale, **kwargs})
-        velocity = self.reach * self.v_edges[-1] / self.x_edges[-1]
-        axes.set(xlim=(0, self.reach), ylim=(-velocity, velocity))
+        scale = self.reach / self.amplitude_edges[-1]
+        axes.set(xlim=scale * self.x_edges[[0, -1]], ylim=scale * self.v_edges[[0, -1]])
 
     def _said(self) -> str:
         mean, error = self.means["amplitude"]
@@ -136,7 +143,7 @@ class _Batch:
         self.x, self.u, self.xi = state
         self.push = np.zeros(self.x.size)
         self.plane, self.radial = np.zeros((BINS, 2 * BINS)), np.zeros(BINS)
-        self.sums = np.zeros(len(MEANS))
+        self.sums = np.zeros(SUMS)
         self.impacts, self.reach = 0, 0.0
 
     def advance(self, looks: int, stop: Event) -> None:
@@ -161,34 +168,29 @@ def simulated_response(
     seed: int,
     progress: Callable[[], None] = lambda: None,
 ) -> Response:
-    """Simulate the nonlinear system of Eq. (3) until it is stationary, and then for `time` at least.
+    """Simulate a system with cubic terms, as of an oscillator with c₂ or c₃ > 0, until it is stationary, and then on.
 
     Args:
-        oscillator, noise: the motion, with c₂ or c₃ > 0, and its noise; or one `Problem` of both, in their place or as
-            `problem`.
+        oscillator, noise: the system and its noise; or one `Problem` of both, in their place or as `problem`.
         exponent, variance_rate: λ > 0 and Λ″(0) of the linear system. ln A forgets its start in 1/λ, or, where it
             wanders more than it drifts, in 2Λ″(0)/λ².
         paths, time, step, seed: as for `simulate`; the time is at least 20 times that.
         progress: called 200 times in all.
 
     Raises:
-        FpsolveError: as `simulate`.
+        FpsolveError: as `simulate`, or there is no such response, or none that is simulated.
         KeyboardInterrupt: before the response was stationary.
     """
-    oscillator: Any
-    oscillator, noise = simulated_parts(problem)
-    if (motion := oscillator.motion()) is None or noise.has_states:
-        raise FpsolveError(
-            "the nonlinear response is that of a VibroImpactOscillator under coloured noise, but this is a "
-            f"{type(oscillator).__name__} under {type(noise).__name__}; simulate its moments"
-        )
-    steps = max(1, round(math.pi / (oscillator.omega * step * _LOOKS)))
-    damping = oscillator.epsilon**2 * (oscillator.c2 + 3 * oscillator.omega**2 * oscillator.c3) / 8
+    system, noise = simulated_parts(problem)
+    if reason := no_simulation(problem):
+        raise FpsolveError(reason)
+    motion, first = motion_of(system)
+    steps = max(1, round(math.pi / (angular_frequency(system) * step * _LOOKS)))
     between = steps * step
     memory = max(1 / exponent, 2 * variance_rate / exponent**2)
     settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
     laws, size = (motion, noise.step(step), step), math.ceil(paths / BATCHES)
-    amplitude = math.sqrt(exponent / damping)
+    amplitude = math.sqrt(exponent / _damping(system))
     rngs = [np.random.default_rng(each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
     batches = [_Batch(laws, steps, starting_state(noise, size, rng, amplitude), rng) for rng in rngs]
     seconds = STEP_SECONDS * size * steps
@@ -203,23 +205,64 @@ def simulated_response(
     if count.min() == 0:
         raise KeyboardInterrupt
     duration = float(count.mean() / size * between)
-    x, xx, uu, mean_amplitude = (np.array([batch.sums[:-1] for batch in batches]) / count[:, None]).T
-    square = oscillator.omega**2
-    values = dict(zip(MEANS, (x, xx, square * uu, mean_amplitude, square * (xx + uu) / 2), strict=True))
-    edges = np.linspace(0, reach, BINS + 1)
+    sums = (np.array([batch.sums[:-1] for batch in batches]) / count[:, None]).T
     radial = np.array([batch.radial for batch in batches]) / count[:, None] / (reach / BINS)
-    cell = (reach / BINS) ** 2 * oscillator.omega
+    cells = sum(batch.plane for batch in batches) / count.sum() / (reach / BINS) ** 2
+    x_edges, v_edges, density = _in_variables(system, first, reach, cells)
+    impacts = sum(batch.impacts for batch in batches) / (size * len(batches) * duration)
     return Response(
-        means={name: (float(each.mean()), standard_error(each)) for name, each in values.items()},
-        x_edges=edges,
-        v_edges=oscillator.omega * np.linspace(-reach, reach, 2 * BINS + 1),
-        density=sum(batch.plane for batch in batches) / count.sum() / cell,
-        amplitude_edges=edges,
+        means={name: (float(each.mean()), standard_error(each)) for name, each in _means(system, first, sums).items()},
+        x_edges=x_edges,
+        v_edges=v_edges,
+        density=density,
+        amplitude_edges=np.linspace(0, reach, BINS + 1),
         amplitude_density=radial.mean(axis=0),
         amplitude_error=np.std(radial, axis=0, ddof=1) / math.sqrt(len(batches)),
         outside=1 - float(sum(batch.radial.sum() for batch in batches) / count.sum()),
-        impact_rate=sum(batch.impacts for batch in batches) / (size * len(batches) * duration),
+        impact_rate=impacts if system.jumps else None,
         time=duration,
         interrupted=interrupted,
         parameters=problem.values,
+        about=system.response,
     )
+
+
+def no_simulation(problem: Problem) -> Message | None:
+    """Why the response of a problem is not simulated, or there is none."""
+    system = problem.system
+    if system.cubic is None:
+        return Message(Code.RESPONSE_LINEAR)
+    if len(problem.coloured.parts) > 1 or problem.diffusions or problem.impulses or problem.coloured.has_states:
+        return Message(Code.RESPONSE_NOISE)
+    if not comes_down(problem):
+        return Message(Code.RESPONSE_GROWS)
+    return None
+
+
+def _damping(system: System) -> float:
+    """κ of the averaged equation (ln A)˙ = λ − κA² of a uniform phase; at least a share of the largest damping."""
+    assert system.cubic is not None
+    rates = amplitude_frame(system).cubic(system.cubic).q(2 * math.pi * np.arange(PHASES) / PHASES)
+    return max(-float(rates.mean()), LEAST_DAMPING * float(np.max(np.abs(rates))))
+
+
+def _means(system: System, first: int, sums: FloatArray) -> dict[str, FloatArray]:
+    """The means by their names, for each batch."""
+    about, scales = system.response, (1.0, system.aspect)
+    x, xx, uu, amplitude = sums
+    names = [f"{each.name}_squared" for each in (about.first, about.second)]
+    squares = {name: s**2 * each for name, s, each in zip(names, scales, ((xx, uu), (uu, xx))[first], strict=True)}
+    of_wall = {(about.first, about.second)[first].name: scales[first] * x} if system.jumps else {}
+    energy = {"energy": system.aspect**2 * (xx + uu) / 2} if "energy" in about.means else {}
+    return {**of_wall, **squares, "amplitude": amplitude, **energy}
+
+
+def _in_variables(
+    system: System, first: int, reach: float, cells: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The edges of the variables, and their density, from that of x ≥ 0 and u; without a wall both sides have half."""
+    sides = [np.linspace(0, reach, BINS + 1), np.linspace(-reach, reach, 2 * BINS + 1)]
+    if not system.jumps:
+        sides, cells = [sides[1]] * 2, np.concatenate([cells[::-1, ::-1], cells]) / 2
+    x, v = sides[first], sides[1 - first]
+    return x, system.aspect * v, (cells.T if first else cells) / system.aspect

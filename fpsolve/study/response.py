@@ -1,4 +1,4 @@
-"""The stationary response of a curve, c₂ or c₃ > 0: what is kept of it, and how it is found."""
+"""The stationary response of a curve with cubic terms: what is kept of it, and how it is found."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ResponseDensity:
     Attributes:
         amplitude, phi, xi: the places, shapes (n,), (m,) and (k,).
         of_amplitude: ρ(a), shape (n,).
-        of_plane: that of (x, ẋ) at x = a cos φ, ẋ = −aω sin φ, shape (n, m).
+        of_plane: that of both variables at x₁ = a cos φ, x₂ = −s a sin φ, see `System.aspect`, shape (n, m).
         whole: ρ(a, φ, ξ), shape (n, m, k), to the seven digits of a number of four bytes, which are what records and
             files hold of it.
     """
@@ -43,14 +43,21 @@ class ResponseDensity:
     of_plane: FloatArray
     whole: FloatArray
 
+    def plane(self, has_wall: bool) -> tuple[FloatArray, FloatArray]:
+        """φ and the density of both variables over the half-turn; without a wall over a turn, its halves alike."""
+        if has_wall:
+            return self.phi, self.of_plane
+        beyond = self.phi[1:] + math.pi
+        return np.concatenate([self.phi, beyond]), np.concatenate([self.of_plane, self.of_plane[:, 1:]], axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class CurveResponse(NearRest):
     """The stationary response of one parameter set.
 
     Attributes:
-        means: by the names of `STATIONARY_MEANS`.
-        impact_rate: impacts in unit time.
+        means: by their names in files.
+        impact_rate: impacts in unit time; None without a wall.
         balance: what noise feeds into ln a less what impacts take, in unit time; 0 but for its error.
         stability_index: δ_p of the linear system.
         least: the least density over the largest, negative where it is not resolved.
@@ -59,7 +66,7 @@ class CurveResponse(NearRest):
     """
 
     means: Mapping[str, Estimate]
-    impact_rate: Estimate
+    impact_rate: Estimate | None
     balance: Estimate
     stability_index: float
     least: float
@@ -68,8 +75,8 @@ class CurveResponse(NearRest):
 
     @property
     def numbers(self) -> dict[str, Estimate]:
-        """The means and the impact rate by their names."""
-        return {**self.means, "impact_rate": self.impact_rate}
+        """The means and the impact rate, if there is one, by their names."""
+        return {**self.means, **({} if self.impact_rate is None else {"impact_rate": self.impact_rate})}
 
 
 def solve_response(problem: Problem, rtol: float, grid: Grid | None) -> CurveResponse:
@@ -92,13 +99,11 @@ def _density(found: StationaryResponse, grid: Grid) -> ResponseDensity:
     amplitudes, phases, values = grid
     problem = found.problem
     a = (np.arange(amplitudes) + 0.5) * found.reach / amplitudes
-    phi = np.linspace(-0.5, 0.5, phases) * math.pi
+    phi = found.flow.phases(phases)
     xi = _values_of(problem.coloured, values)
-    x, v = a[:, None] * np.cos(phi), -a[:, None] * problem.system.omega * np.sin(phi)  # type: ignore[attr-defined]
     whole = [found.density([each], phi, xi)[0] for each in a]  # one by one, which takes little memory
-    return ResponseDensity(
-        a, phi, xi, found.amplitude_density(a), found.joint_density(np.maximum(x, 0.0), v), _short(np.array(whole))
-    )
+    of_plane = found.polar_density(a[:, None], phi)
+    return ResponseDensity(a, phi, xi, found.amplitude_density(a), of_plane, _short(np.array(whole)))
 
 
 def _values_of(noise: Noise, count: int) -> FloatArray:

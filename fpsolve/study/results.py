@@ -92,7 +92,7 @@ class CurveResult(Result):
         classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
         sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
         excursion: the probability that ‖x‖ ever exceeds a level; None where it is not wanted, or did not converge.
-        response: the stationary response for c₂ or c₃ > 0; None where it is not wanted, or there is none.
+        response: that of a system with terms of degree 3; None where it is not wanted, or there is none.
         seconds: how long the processor took.
     """
 
@@ -192,7 +192,7 @@ class SimulatedCurve:
     Attributes:
         curve: the parameter set.
         result: λ and Λ(p) of the linear system.
-        response: the stationary response of the nonlinear system; None where c₂ = c₃ = 0 or there is none.
+        response: the stationary response of the nonlinear system; None where there is none.
         warnings: what limits these numbers.
         interrupted: whether the simulation was stopped early.
     """

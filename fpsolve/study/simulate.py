@@ -79,7 +79,7 @@ def simulate_curves(
 def simulate_curve(
     curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = lambda: None
 ) -> SimulatedCurve:
-    """Simulate one curve, and with c₂ or c₃ > 0 its stationary response; a task that pickles small.
+    """Simulate one curve, and with terms of degree 3 its stationary response; a task that pickles small.
 
     Args:
         curve: the parameters.
@@ -108,8 +108,12 @@ def simulate_curve(
                 progress()
             at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
             return SimulatedCurve(curve, result, None, (*noted, at_rest))
-        from fpsolve.simulation.response import simulated_response
+        from fpsolve.simulation.response import no_simulation, simulated_response
 
+        if reason := no_simulation(curve.problem):
+            for _ in range(2 * PROGRESS_STEPS):
+                progress()
+            return SimulatedCurve(curve, result, None, (*noted, reason))
         response = simulated_response(
             curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
             time=result.time, step=result.step, seed=result.seed, progress=progress,

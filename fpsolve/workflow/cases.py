@@ -212,9 +212,9 @@ def simulate_case(
 ) -> Outcome:
     """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further curves monte_carlo-2.json, ….
 
-    With c₂ or c₃ > 0 the stationary response is written too. What an earlier simulation wrote there is removed first,
-    and a run with other parameters. An interrupt (Ctrl-C) ends the simulation; what is done is estimated and written,
-    and curves that are finished are not simulated again the next time.
+    Of a system with terms of degree 3 the stationary response is written too. What an earlier simulation wrote there is
+    removed first, and a run with other parameters. An interrupt (Ctrl-C) ends the simulation; what is done is estimated
+    and written, and curves that are finished are not simulated again the next time.
 
     Args:
         pool: who simulates, such as a `cluster`; None for all processors of this machine.

@@ -22,6 +22,8 @@ from fpsolve.arrays import identity
 from fpsolve.exponent import ExponentSolver, critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain
 from fpsolve.model.faults import TableError
+from fpsolve.model.frame import Frame
+from fpsolve.model.plane import CubicTerms
 from fpsolve.model.systems import EquationSystem, ImpactLaw
 from fpsolve.theory.perturbation import second_order
 
@@ -175,6 +177,49 @@ def test_wall_where_the_second_variable_is_zero():
     assert values[0] == pytest.approx(values[1], rel=1e-9)
 
 
+CUBIC = "v", "-omega**2*x + 2*zeta*v - epsilon*k*(x + v/2)**3 - v*(c*x**2 + zeta*v**2) - xi*x"
+OF_CUBIC = {"omega": 2.0, "zeta": 0.1, "k": 0.3, "c": 0.2, "epsilon": 0.5}
+
+
+def test_terms_of_degree_three():
+    """Their polar form from the rates themselves; what else is computed does not see them."""
+    system = PlaneSystem.of_equations(("x", "v"), CUBIC, OF_CUBIC)
+    linear = PlaneSystem.of_equations(("x", "v"), ("v", "-omega**2*x + 2*zeta*v - xi*x"), {"omega": 2.0, "zeta": 0.1})
+    assert (system.is_nonlinear, linear.is_nonlinear) == (True, False)
+    phi = np.linspace(0, 6, 7)
+    x, v = np.cos(phi), -np.sin(phi)
+    force = -0.5 * 0.3 * (x + v / 2) ** 3 - v * (0.2 * x**2 + 0.1 * v**2)
+    np.testing.assert_allclose(system.cubic.h(phi), -np.cos(phi) * force, atol=1e-15)
+    np.testing.assert_allclose(system.cubic.q(phi), -np.sin(phi) * force, atol=1e-15)
+    assert system.aspect == 2
+    matrices = [{term.matrix for term in each.terms} for each in (system, linear)]
+    assert matrices[0] == matrices[1]
+    assert (system.inert, system.differentiable) == (("k", "c", "epsilon"), ("omega", "zeta"))
+    assert PlaneSystem.of_equations(("x", "v"), CUBIC, {**OF_CUBIC, "c": 0.0}).inert == system.inert
+    driven = "v", f"{CUBIC[1]} + epsilon**2*c*v"
+    assert PlaneSystem.of_equations(("x", "v"), driven, {**OF_CUBIC, "c": 0.0}).inert == ("k",)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_terms_of_degree_three_in_other_coordinates(seed):
+    """ẏ = S⁻¹ C m(Sy) at a point."""
+    rng = np.random.default_rng(seed)
+    s = np.array([[rng.uniform(0.5, 2), 0.0], [rng.normal(), rng.uniform(0.5, 2)]])
+    c, y = rng.normal(size=(2, 4)), rng.normal(size=2)
+
+    def products(x):
+        return np.array([x[0] ** 3, x[0] ** 2 * x[1], x[0] * x[1] ** 2, x[1] ** 3])
+
+    turned = np.array(Frame(s.tolist()).cubic(CubicTerms(c)).matrix)
+    np.testing.assert_allclose(turned @ products(y), np.linalg.solve(s, c @ products(s @ y)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("matrix", [((1.0, 0.0),), "x", ((math.nan,) * 4,) * 2])
+def test_what_are_no_terms_of_degree_three(matrix):
+    with pytest.raises(ValueError, match="must be"):
+        CubicTerms(matrix)
+
+
 def test_named_noise_and_other_values():
     system = PlaneSystem.of_equations(
         ("x", "v"), ("v", "-omega**2*x - load*x"), {"omega": 1.0}, noises={"load": "noise.axial"}
@@ -219,7 +264,7 @@ def test_it_pickles_and_is_a_key():
         ({"variables": ("x",)}, "variables: got "),
         ({"variables": ("x", 3)}, "variables: got "),
         ({"drift": "v, -x"}, "drift: got "),
-        ({"drift": ("v", "-x*x - xi*x")}, "drift[1]: the term -x*x of v's rate is not linear in x, v"),
+        ({"drift": ("v", "-x*x - xi*x")}, "drift[1]: the term -x*x of v's rate is of degree 2 in x, v"),
         ({"parameters": {"a": True}}, "parameters.a: got True; must be a finite number"),
         ({"parameters": {3: 1.0}}, "parameters.3: got the name 3; it must be a text"),
         ({"parameters": {"a": math.inf}}, "parameters.a: got inf; must be a finite number"),

@@ -11,10 +11,11 @@ from matplotlib.colors import to_hex
 from fpsolve.case.case import load_case
 from fpsolve.drawing import figure_for
 from fpsolve.output.figures import Series, draw, draw_response, draw_series
-from fpsolve.simulation.response import MEANS, Response
+from fpsolve.simulation.response import Response
 from tests.solving import solve_case
 
 pytestmark = pytest.mark.usefixtures("pictures")
+MEANS = "x", "x_squared", "v_squared", "amplitude", "energy"
 CASE = load_case(Path(__file__).parents[2] / "cases/minimal.toml")
 
 

@@ -11,7 +11,7 @@ from fpsolve.case.sections import Expectation
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message
-from fpsolve.model.quantity import STATIONARY_MEANS
+from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 from fpsolve.output.letters import spelt
 from fpsolve.output.screen import Column, Grid, Screen
 from fpsolve.output.terminal import (
@@ -32,7 +32,7 @@ from tests.test_workflow import TEXT
 
 NONLINEAR = ["vary={}", "oscillator.c1=0.8", "oscillator.c2=0.5", "response.rtol=0.01"]
 NONLINEAR += ["monte_carlo={ paths = 64, time = 100.0 }"]
-MEANS = {each.symbol for each in STATIONARY_MEANS.values()}
+MEANS = {each.symbol for each in OSCILLATOR_RESPONSE.means.values()}
 QUANTITY = re.compile(r"(\S+) = \S+ ± \S+")
 
 

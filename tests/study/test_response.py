@@ -14,6 +14,7 @@ from scipy.integrate import simpson
 import fpsolve
 from fpsolve.errors import CaseError, NotConverged
 from fpsolve.messages import Code, Message
+from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 from fpsolve.output.figures import draw_stationary_responses
 from fpsolve.output.records import fits, record_of, result_of
 from fpsolve.output.sentences import sentence, shape_of_response
@@ -230,7 +231,7 @@ def test_p_bifurcations_are_told(result, case, index, words, titles, tmp_path, m
     monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
     monkeypatch.setattr(case.output, "__dict__", {**vars(case.output), "figure": True})
     other = SimpleNamespace(**{**vars(result), "response": with_index(result.response, index)})
-    assert words in shape_of_response(other.response)
+    assert words in shape_of_response(other.response, OSCILLATOR_RESPONSE)
     edges = np.linspace(0, 3, 31)
     sample = SimpleNamespace(amplitude_edges=edges, amplitude_density=edges[1:], amplitude_error=0.1 * edges[1:])
     simulated = SimpleNamespace(curve=result.curve, response=sample)
@@ -248,9 +249,10 @@ def with_index(response, index):
 
 
 def test_a_simulated_mean_stands_beside_that_of_finite_elements(result):
-    means = {"energy": replace(result.response.means["energy"], value=0.7)}
-    assert simulated_mean("energy", 0.75, 0.02, means) == "⟨E⟩ = 0.750 ± 2.0e-02 (finite elements 0.7, +2.5 s.e. away)"
-    assert simulated_mean("x", 0.75, 0.02, means) == "⟨x⟩ = 0.750 ± 2.0e-02"
+    about, mean = OSCILLATOR_RESPONSE.means, replace(result.response.means["energy"], value=0.7)
+    told = simulated_mean(about["energy"], 0.75, 0.02, mean)
+    assert told == "⟨E⟩ = 0.750 ± 2.0e-02 (finite elements 0.7, +2.5 s.e. away)"
+    assert simulated_mean(about["x"], 0.75, 0.02, None) == "⟨x⟩ = 0.750 ± 2.0e-02"
 
 
 def test_the_sentence_tells_where_paths_end(result, case):

@@ -10,7 +10,7 @@ import pytest
 
 from fpsolve.output.records import record_of, simulated_of, simulation_fits
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
-from fpsolve.simulation.response import BINS, MEANS, Response
+from fpsolve.simulation.response import BINS, Response
 from fpsolve.study.results import SimulatedCurve
 from fpsolve.study.simulate import simulate_curve, simulate_curves
 from tests.solving import case_in, case_text
@@ -42,6 +42,8 @@ FINITE = replace(
     estimates=tuple(replace(each, value=None, standard_error=0.1, effective_paths=9.0) for each in RESULT.estimates),
     **{key: 1.0 for key, value in vars(RESULT).items() if isinstance(value, float)},
 )
+
+MEANS = "x", "x_squared", "v_squared", "amplitude", "energy"
 
 
 def response(rng):

@@ -1,4 +1,4 @@
-"""A linear system of two to four variables written as equations: ẋ = v, v̇ = −ω²x − 2ζωv − ξx, with walls."""
+"""A system of two to four variables written as equations: ẋ = v, v̇ = −ω²x − 2ζωv − kx³ − ξx, with walls."""
 
 from __future__ import annotations
 
@@ -15,17 +15,29 @@ from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray, identity, one, real_number, shown
 from fpsolve.messages import Code, Message, is_control
-from fpsolve.model.expressions import ExpressionError, Form, constant, log_of, name_fault, names_in, summands
+from fpsolve.model.expressions import (
+    HIGHEST_DEGREE,
+    ExpressionError,
+    Form,
+    Monomial,
+    constant,
+    log_of,
+    name_fault,
+    names_in,
+    summands,
+)
 from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
-from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
-from fpsolve.model.quantity import Quantity
+from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
+from fpsolve.model.quantity import AMPLITUDE, JOINT_DENSITY, Quantity
 
 EPSILON = "epsilon"
 MOST_VARIABLES = 4
 _LAW = 1e-12
 """How near to 1 a wall's R is for a coefficient of restitution of 1."""
 _NEWTON = 60
+OTHER = 0.7310585786300049
+"""By how much another value of a parameter is more, to see what depends on it: no round number."""
 
 
 def _printed(text: str) -> str:
@@ -93,7 +105,8 @@ class EquationSystem(System):
     """Rates, each linear in two to four variables and affine in the noise, as text; see `PlaneSystem.of_equations`.
 
     Σ εⁿ (A + ξ B) x has one matrix for each power n of a parameter called epsilon, constant and with the noise. Without
-    such a parameter ε = 1, what is constant has the order 0 and the noise the order 1.
+    such a parameter ε = 1, what is constant has the order 0 and the noise the order 1. Of two variables there may be
+    terms of degree 3 without the noise.
 
     Args:
         variables: their names, two to four.
@@ -197,6 +210,10 @@ class EquationSystem(System):
                 raise TableError(f"{name} is in no rate; write it into drift{named}", "noises", name)
         if not self.terms:
             raise TableError("no rate has a term; write terms with the variables", "drift")
+        for i, name in enumerate(self.variables if self.cubic is not None else ()):
+            if name.startswith(AMPLITUDE.name) or name == JOINT_DENSITY.name:
+                what = "which has another meaning in the stationary response of terms of degree 3; rename it"
+                raise TableError(f"got the name {name}, {what}", "variables", i)
         if self.walls and len(self.variables) > 2:
             why = "a wall is for two variables only"
             raise TableError(f"got a wall for {len(self.variables)} variables; {why}; leave walls out", "walls")
@@ -304,10 +321,10 @@ class EquationSystem(System):
         """The rates, with their derivatives by a parameter. Raises `TableError`."""
         names = {name: constant(value, float(name == by)) for name, value in self.named}
         if EPSILON in names:
-            names[EPSILON] = Form({("", "", 1): (1.0, 0.0)})
+            names[EPSILON] = Form({((), "", 1): (1.0, 0.0)})
         names = {
-            **{name: Form({(name, "", 0): (1.0, 0.0)}) for name in self.variables},
-            **{name: Form({("", name, 0): (1.0, 0.0)}) for name, _ in self.noises},
+            **{name: Form({((name,), "", 0): (1.0, 0.0)}) for name in self.variables},
+            **{name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises},
             **names,
         }
         rates = list[Form]()
@@ -315,14 +332,30 @@ class EquationSystem(System):
             total, place = Form({}), f"{variable}'s rate"
             try:
                 for written, form in summands(text, names, place) if text.strip() != "0" else ():
-                    if not all(state for state, _, _ in form.parts):
-                        told = f"the term {written} of {place} is not linear in {', '.join(self.variables)}"
-                        raise ExpressionError(f"{told}; multiply it by one of these, or leave it out")
+                    if fault := next(filter(None, map(self._fault, form.parts)), ""):
+                        raise ExpressionError(f"the term {written} of {place} {fault}")
                     total = total.plus(form)
             except ExpressionError as error:
                 raise TableError(str(error), "drift", i) from None
             rates.append(total)
         return tuple(rates)
+
+    def _fault(self, monomial: Monomial) -> str:
+        """What is wrong with a product in a rate, and what to do; or nothing."""
+        states, noise, _ = monomial
+        degree, names = len(states), ", ".join(self.variables)
+        told = f"is of degree {degree} in {names}"
+        if degree == 0:
+            return f"is not linear in {names}; multiply it by one of these, or leave it out"
+        if degree == 1:
+            return ""
+        if len(self.variables) > 2:
+            return f"{told}; of more than two variables all terms must be of degree 1: leave it out"
+        if degree < HIGHEST_DEGREE:
+            return f"{told}; must be of degree 1 or {HIGHEST_DEGREE}: leave it out"
+        return (
+            f"{told} and has the noise {noise}; a noise may only be in terms of degree 1: leave it out" if noise else ""
+        )
 
     def _terms_of(self, rates: Sequence[Form], at: int) -> tuple[CoefficientMatrix, ...]:
         """The terms of rates, of their values for `at` = 0, of their derivatives for 1."""
@@ -330,10 +363,12 @@ class EquationSystem(System):
         names = {name: section[6:] for name, section in self.noises} if len(self.noises) > 1 else {}
         matrices = dict[tuple[int, str], FloatArray]()
         for i, form in enumerate(rates):
-            for (state, noise, power), series in form.parts.items():
+            for (states, noise, power), series in form.parts.items():
+                if len(states) > 1:
+                    continue
                 order = power if has_orders else int(bool(noise))
                 matrix = matrices.setdefault((order, noise), np.zeros((len(rates), len(rates))))
-                matrix[i, self.variables.index(state)] += series[at]
+                matrix[i, self.variables.index(states[0])] += series[at]
         return tuple(
             CoefficientMatrix(order, matrix.tolist(), identity if noise else one, names.get(noise, ""))
             for (order, noise), matrix in sorted(matrices.items(), key=lambda item: item[0])
@@ -343,6 +378,16 @@ class EquationSystem(System):
     @cached_property
     def terms(self) -> tuple[CoefficientMatrix, ...]:  # type: ignore[override]
         return self._terms_of(self._rates, 0)
+
+    @cached_property
+    def cubic(self) -> CubicTerms | None:  # type: ignore[override]
+        """The terms of degree 3; None where there are none, or all are 0."""
+        matrix = np.zeros((2, HIGHEST_DEGREE + 1))
+        for i, form in enumerate(self._rates):
+            for (states, _, power), series in form.parts.items():
+                if len(states) == HIGHEST_DEGREE:
+                    matrix[i, states.count(self.variables[1])] += self.epsilon**power * series[0]
+        return CubicTerms(matrix.tolist()) if matrix.any() else None
 
     @cached_property
     def jumps(self) -> tuple[Jump, ...]:  # type: ignore[override]
@@ -372,7 +417,7 @@ class EquationSystem(System):
         variable, other = self.variables[i], self.variables[1 - i]
         parts = self._rates[i].parts
         speed = sum(series[0] * self.epsilon**power for (_, _, power), series in parts.items())
-        is_alone = {(state, noise) for state, noise, _ in parts} == {(other, "")}
+        is_alone = {(states, noise) for states, noise, _ in parts} == {((other,), "")}
         if not (is_alone and speed > 0):
             must = f"there {variable}'s rate must be c*{other} with c > 0 and nothing else"
             told = f"but it is {' '.join(self.drift[i].split())}{f', c = {speed:g}' if is_alone else ''}"
@@ -409,9 +454,26 @@ class EquationSystem(System):
             found[name] = terms, slopes if any(slopes) else ()
         return found
 
+    @cached_property
+    def inert(self) -> Sequence[str]:  # type: ignore[override]
+        """The parameters that are in terms of degree 3 alone: another value of theirs leaves all others as they are."""
+        if not any(len(states) > 1 for form in self._rates for states, _, _ in form.parts):
+            return ()
+        in_walls = frozenset[str]().union(*(names_in(str(wall.restitution)) for wall in self.walls))
+        used = frozenset[str]().union(*map(names_in, self.drift)) - in_walls
+        return tuple(name for name, value in self.named if name in used and self._is_linear_same(name, value))
+
+    def _is_linear_same(self, name: str, value: float) -> bool:
+        if name == EPSILON:
+            return not any(term.order for term in self.terms)
+        try:
+            return replace(self, named=tuple({**self.values, name: abs(value) + OTHER}.items())).terms == self.terms  # type: ignore[arg-type]
+        except ValueError:
+            return False
+
     @property
     def differentiable(self) -> Sequence[str]:
-        return tuple(self._derivatives)
+        return tuple(name for name in self._derivatives if name not in self.inert)
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂θ of the terms and of ln R, exact but for rounding. Raises `ValueError` where it is infinite."""

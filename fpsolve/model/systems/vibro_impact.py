@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from fractions import Fraction
 from functools import cached_property
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,8 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.exact import ExactJump, ExactMotion
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import SIZE, STRICT, parameter
-from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon
+from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
+from fpsolve.model.quantity import OSCILLATOR_RESPONSE, ResponseQuantities
 
 
 class ImpactLaw(StrEnum):
@@ -31,20 +32,6 @@ class ImpactLaw(StrEnum):
 
     DELTA = "delta"
     RESTITUTION = "restitution"
-
-
-class Motion(NamedTuple):
-    """The numbers of Eq. (3): ω, ε, ε²c₁, ε²c₂, ε²c₃ω², and the factor of u at an impact.
-
-    The factor is −R for the mass at its wall, Eq. (3), and R for the smooth coordinate y of Eq. (6).
-    """
-
-    omega: float
-    strength: float
-    linear: float
-    cubic: float
-    rayleigh: float
-    bounce: float
 
 
 DAMPING = ((0.0, 0.0), (0.0, 1.0))
@@ -142,22 +129,21 @@ class VibroImpactOscillator(System):
         left = 1 - self._loss
         return () if left > 0 else (Message(Code.IMPOSSIBLE_BOUNCE, left=left, factor=self.impact_factor()),)
 
-    @property
-    def is_nonlinear(self) -> bool:
-        """Whether c₂ or c₃ is not 0."""
-        return self.c2 > 0 or self.c3 > 0
+    @cached_property
+    def cubic(self) -> CubicTerms | None:  # type: ignore[override]
+        """The damping −ε²(c₂x² + c₃ẋ²) of ẋ, in (x, ẋ/ω); None for c₂ = c₃ = 0."""
+        square = self.epsilon**2
+        damping = (0.0, -square * self.c2, 0.0, -square * self.c3 * self.omega**2)
+        return CubicTerms(((0.0, 0.0, 0.0, 0.0), damping)) if any(damping) else None
 
-    def motion(self, *, smooth: bool = False) -> Motion:
-        """The coefficients of the system (3), or with `smooth` of Eq. (6) in y, whose modulus is x by Eq. (4)."""
-        square, R = self.epsilon**2, self.impact_factor()
-        return Motion(
-            omega=self.omega,
-            strength=self.epsilon,
-            linear=square * self.c1,
-            cubic=square * self.c2,
-            rayleigh=square * self.c3 * self.omega**2,
-            bounce=R if smooth else -R,
-        )
+    @property
+    def response(self) -> ResponseQuantities:
+        return OSCILLATOR_RESPONSE
+
+    @property
+    def second_unit(self) -> float:  # type: ignore[override]
+        """ω: the terms are those of (x, ẋ/ω)."""
+        return self.omega
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂θ of the terms and of ln R, θ = ω, r, c₁ or ε."""

@@ -1,0 +1,85 @@
+"""Whether the cubic terms bring large amplitudes down, without which there is no stationary response.
+
+Paths start at an amplitude at which the cubic terms are by far larger than the linear ones, at some phases, and follow
+the equation with the noise held at its mean. In the plane paths do not cross: where one comes back to its phase lower,
+none from below ever gets beyond it.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.model.frame import amplitude_frame
+from fpsolve.model.plane import CoefficientMatrix, matrix_at
+from fpsolve.model.problem import Problem
+
+LEVEL = 1e6
+"""Of the cubic terms over the linear ones, where paths start: far, as coefficients may be of different sizes."""
+PHASES = 8
+"""At which they start."""
+LEAST, LOWER, HIGHER = 1e-3, math.log(2), 30.0
+"""How far ln a must fall in a half-turn, and where the phase does not turn, and above which rise it is growing."""
+MOST = 500.0
+"""Of 2 ln a, for trial steps that go too far."""
+MOST_STEPS = 2000
+"""Of one path; one that is not lower by then counts as growing."""
+Field = Callable[[float, FloatArray], tuple[float, float]]
+
+
+def comes_down(problem: Problem) -> bool:
+    """Whether all of the paths come lower; a system without cubic terms has none to do so."""
+    system, frame = problem.system, amplitude_frame(problem.system)
+    if system.cubic is None:
+        return False
+    linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.coloured.mean).tolist())).matrix
+    cubic = frame.cubic(system.cubic).matrix
+    begin = 0.5 * math.log(LEVEL * float(np.linalg.norm(linear) / np.linalg.norm(cubic)))
+    most = begin - LEAST - math.fsum(jump.log_factor for jump in system.jumps)
+    field = _field(np.array(linear), np.array(cubic))
+    with warnings.catch_warnings(action="ignore"):  # of a path that goes to infinity
+        return all(_falls(field, begin, most, math.pi * k / PHASES) for k in range(PHASES))
+
+
+def _field(linear: FloatArray, cubic: FloatArray) -> Field:
+    """d ln a and dφ in a time that runs as fast as the path moves; a path takes some 1,000 of these, so no arrays."""
+    (a11, a12), (a21, a22) = linear.tolist()
+    (c10, c11, c12, c13), (c20, c21, c22, c23) = cubic.tolist()
+
+    def field(_: float, state: FloatArray) -> tuple[float, float]:
+        height, phi = state.tolist()
+        square, x, y = math.exp(min(2 * height, MOST)), math.cos(phi), -math.sin(phi)
+        f = a11 * x + a12 * y + square * (((c10 * x + c11 * y) * x + c12 * y * y) * x + c13 * y**3)
+        g = a21 * x + a22 * y + square * (((c20 * x + c21 * y) * x + c22 * y * y) * x + c23 * y**3)
+        return (x * f + y * g) / (1 + square), (y * f - x * g) / (1 + square)
+
+    return field
+
+
+def _falls(field: Field, begin: float, most: float, phi: float) -> bool:
+    """Whether the path from ln a = `begin` and a φ falls, in a half-turn to below `most`."""
+    from scipy.integrate import LSODA  # which takes long to import, and few need
+
+    solver = LSODA(field, 0.0, np.array([begin, phi]), math.inf, rtol=1e-7, atol=1e-9)
+    for _ in range(MOST_STEPS):
+        solver.step()
+        if solver.status == "failed" or solver.y[0] > begin + HIGHER:
+            return False
+        if solver.y[0] <= begin - LOWER:
+            return True
+        if abs(solver.y[1] - phi) >= math.pi:
+            return _height_at(solver, phi + math.copysign(math.pi, solver.y[1] - phi)) < most
+    return False
+
+
+def _height_at(solver: Any, phi: float) -> float:
+    """ln a where the path passed a φ in its last step."""
+    from scipy.optimize import brentq
+
+    path = solver.dense_output()
+    return float(path(brentq(lambda t: path(t)[1] - phi, solver.t_old, solver.t))[0])
