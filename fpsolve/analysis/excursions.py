@@ -164,7 +164,7 @@ def excursion(
     *,
     phi: Start = 0.0,
     xi: StartOfNoise = STATIONARY,
-    rtol: float = 1e-8,
+    rtol: float | None = None,
     budget: Budget | None = None,
 ) -> Excursion:
     """Bounds of the probability that ‖x‖ ever exceeds A ‖x₀‖, for every A > 1; for unbounded noise its exponent δ_p.
@@ -181,7 +181,7 @@ def excursion(
         ValueError: there is no such start.
         NotConverged: λ, δ_p or T is not resolved within the budget.
     """
-    solver = ExponentSolver(problem, rtol=rtol, budget=budget or Budget())
+    solver = ExponentSolver(problem, rtol=problem.wanted(rtol), budget=budget or Budget())
     return solve_excursion(solver, phi=phi, xi=xi)
 
 

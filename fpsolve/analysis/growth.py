@@ -180,7 +180,7 @@ def rate_function(
     s: ArrayLike,
     *,
     interval: tuple[float, float] = SEARCH_INTERVAL,
-    rtol: float = 1e-8,
+    rtol: float | None = None,
     mesh: CylinderMesh | None = None,
     budget: Budget | None = None,
 ) -> RateFunction:
@@ -198,7 +198,7 @@ def rate_function(
         NotConverged: some s are not reached by Λ′ in the interval, or some p are not resolved; `partial` is the result
             for the others.
     """
-    solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+    solver = ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
     return _found(Slopes(solver, interval), real_numbers(s, "s"))
 
 
@@ -210,7 +210,7 @@ def growth_law(
     *,
     start: float = 0.0,
     interval: tuple[float, float] = SEARCH_INTERVAL,
-    rtol: float = 1e-8,
+    rtol: float | None = None,
     mesh: CylinderMesh | None = None,
     budget: Budget | None = None,
 ) -> GrowthLaw:
@@ -232,7 +232,7 @@ def growth_law(
     times, phase = real_numbers(t, "t"), real_number(start, "start")
     if not np.all(times > 0):
         raise ValueError(f"got t = {shown(t)}; must be positive")
-    solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+    solver = ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
     if problem.dimension > 2 or any(each.basis == "pairs" for each in problem.coloured.parts.values()):
         raise NoSuchExponent(Message(Code.NO_PREFACTOR))
     slopes = Slopes(solver, interval)

@@ -208,7 +208,7 @@ def sensitivities(
     p: ArrayLike = (),
     *,
     original: Noise | None = None,
-    rtol: float = 1e-8,
+    rtol: float | None = None,
     mesh: CylinderMesh | None = None,
     budget: Budget | None = None,
     progress: Callable[[], None] = lambda: None,
@@ -229,7 +229,7 @@ def sensitivities(
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
     problem = with_original(problem, original)
-    solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+    solver = ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
     points = checked_moments(p, problem, may_be_empty=True)
     return solve_sensitivities(solver, points, problem.derivatives(), progress=progress)
 

@@ -243,7 +243,7 @@ def uncertainty(
     uncertain: Mapping[str, Any],
     p: ArrayLike = (),
     *,
-    rtol: float = 1e-8,
+    rtol: float | None = None,
     budget: Budget | None = None,
 ) -> Uncertainty:
     """How far λ, δ_p and Λ(p) spread, to first order, where parameters are uncertain.
@@ -261,7 +261,7 @@ def uncertainty(
         NotConverged: Λ(p) was not solved for one of the p.
     """
     laws = laws_of(problem, uncertain)
-    solver = ExponentSolver(problem, rtol=rtol, budget=budget or Budget())
+    solver = ExponentSolver(problem, rtol=problem.wanted(rtol), budget=budget or Budget())
     points = checked_moments(p, problem, may_be_empty=True)
     values: dict[str, Callable[[], Estimate | Absent]] = {
         LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent,

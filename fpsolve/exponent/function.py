@@ -58,7 +58,8 @@ class MomentLyapunovFunction(Result):
         oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
         interval: the smallest and the largest p.
         mesh: a mesh for all p; None chooses one for each p that meets rtol.
-        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, for more than two
+            variables 1e-5.
         budget: what the choice of a mesh may cost for one p; None for the default one.
         among: p to choose the nodes from, so that those solved are of use; None for the best ones.
         solver: one of the same problem, to go on with; it decides the mesh, rtol and the budget.
@@ -83,7 +84,7 @@ class MomentLyapunovFunction(Result):
         interval: tuple[float, float],
         mesh: CylinderMesh | None = None,
         *,
-        rtol: float = 1e-8,
+        rtol: float | None = None,
         budget: Budget | None = None,
         among: FloatArray | None = None,
         solver: ExponentSolver | None = None,
@@ -95,7 +96,7 @@ class MomentLyapunovFunction(Result):
         if grows_far_out(problem):
             raise NotConverged(Message(Code.KINKED))
         self.interval = low, high
-        self.solver = solver or ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+        self.solver = solver or ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
         self.interpolation_error, self._among, self._allowed = math.inf, among, SHARE * self._tolerance(1.0, 0.0)
         most = LEVELS[-1] if among is None else max(FEW_NODES, 3 * among.size // 10)
         for count in LEVELS:
@@ -322,7 +323,7 @@ def moment_lyapunov(
     problem: Problem,
     p: ArrayLike,
     *,
-    rtol: float = 1e-8,
+    rtol: float | None = None,
     mesh: CylinderMesh | None = None,
     budget: Budget | None = None,
 ) -> MomentLyapunov:
@@ -331,7 +332,8 @@ def moment_lyapunov(
     Args:
         oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
         p: one moment, or an array of shape (n,).
-        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, for more than two
+            variables 1e-5.
         mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
         budget: what the choice of a mesh may cost; None for the default one.
 
@@ -342,7 +344,7 @@ def moment_lyapunov(
         NoSuchExponent: Λ(p) is infinite.
         NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
     """
-    solver = ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+    solver = ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
     result = solve_moments(solver, real_numbers(p, "p"))
     if result.failures:
         raise NotConverged(Message(Code.SEVERAL, reasons=[failure.reason for failure in result.failures]), result)

@@ -167,7 +167,7 @@ def _critical_log_factor(solver: ExponentSolver, jump: int | None) -> Estimate |
 
 @of_problem
 def lyapunov_exponent(
-    problem: Problem, *, rtol: float = 1e-8, mesh: CylinderMesh | None = None, budget: Budget | None = None
+    problem: Problem, *, rtol: float | None = None, mesh: CylinderMesh | None = None, budget: Budget | None = None
 ) -> Estimate:
     """The largest Lyapunov exponent λ = Λ′(0), Eq. (2): how fast almost every path grows.
 
@@ -181,12 +181,12 @@ def lyapunov_exponent(
         ValueError: rtol is not positive.
         NotConverged: it is not resolved on the mesh, or within the budget.
     """
-    return ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()).lyapunov_exponent()
+    return ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget()).lyapunov_exponent()
 
 
 @of_problem
 def stability_index(
-    problem: Problem, *, rtol: float = 1e-8, mesh: CylinderMesh | None = None, budget: Budget | None = None
+    problem: Problem, *, rtol: float | None = None, mesh: CylinderMesh | None = None, budget: Budget | None = None
 ) -> Estimate | Absent:
     """The stability index δ_p, the non-zero root of Λ(p), or why there is none from -20 to 20.
 
@@ -200,7 +200,7 @@ def stability_index(
         ValueError: rtol is not positive.
         NotConverged: some p on the way to it is not resolved on the mesh, or within the budget.
     """
-    return nonzero_root(ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget()))
+    return nonzero_root(ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget()))
 
 
 @dataclass(frozen=True)

@@ -128,8 +128,12 @@ class Problem:
 
     @property
     def usual_rtol(self) -> float:
-        """The relative error that is wanted where a case names none."""
+        """The relative error that is wanted where none is named."""
         return RTOL if self.dimension == 2 else RTOL_BEYOND_PLANE
+
+    def wanted(self, rtol: float | None) -> float:
+        """A relative error that is given, or the usual one."""
+        return self.usual_rtol if rtol is None else rtol
 
     @property
     def is_on_cylinder(self) -> bool:

@@ -184,6 +184,13 @@ WHITE = {1.0: -0.00081016, 3.0: 0.1124463, -1.0: 0.0314237}
 WEAK = {0.5: -0.0248041093, 1.0: -0.0495297287, 3.0: -0.147647323}
 
 
+def test_the_usual_error_is_that_of_cases():
+    found = moment_lyapunov(problem(White(s=1.0), driven=0.1 * COUPLED), 1.0)
+    assert abs(found.value[0] - WEAK[1.0]) <= found.error_estimate[0] + 1e-9
+    assert found.error_estimate[0] <= 1e-5 * abs(WEAK[1.0])
+    assert problem(White(s=1.0)).usual_rtol == 1e-5
+
+
 @pytest.mark.parametrize(
     ("driven", "expected", "unit"),
     [(COUPLED, WHITE, 1e-7), pytest.param(0.1 * COUPLED, WEAK, 1e-9, marks=pytest.mark.slow)],
