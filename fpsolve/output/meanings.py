@@ -70,16 +70,20 @@ def equations_of(problem: Problem) -> list[str]:
             name = letter if line else f"g({letter})"
             driven[name] = driven.get(name, np.zeros((n, n))) + slope * size
     speed = float(still[0, 1])
-    first = [still[0, 0], *(each for matrix in driven.values() for each in matrix[0])]
-    rows: list[tuple[str, FloatArray, dict[str, FloatArray], Sequence[str]]]
+    cubic = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4))
+    first = [still[0, 0], *cubic[0], *(each for matrix in driven.values() for each in matrix[0])]
+    rows: list[tuple[str, FloatArray, FloatArray, dict[str, FloatArray], Sequence[str]]]
     names = problem.system.states
     x = names[0].removesuffix("₁")
     if n == 2 and speed != 0 and not any(first) and len(x) == 1:
         scale, names = np.array([speed, 1.0]), (x, _dotted(x, 1))
-        rows = [(_dotted(x, 2), still[1] * scale, {name: each[1] * scale for name, each in driven.items()}, names)]
+        bent = cubic[1] * speed ** np.array([1, 0, -1, -2])
+        by_noise = {name: each[1] * scale for name, each in driven.items()}
+        rows = [(_dotted(x, 2), still[1] * scale, bent, by_noise, names)]
     else:
-        rows = [(f"d{names[i]}/dt", still[i], {key: each[i] for key, each in driven.items()}, names) for i in range(n)]
-    lines = [f"{left} = {_sum(constant, by_noise, states)}" for left, constant, by_noise, states in rows]
+        each = [{key: matrix[i] for key, matrix in driven.items()} for i in range(n)]
+        rows = [(f"d{names[i]}/dt", still[i], cubic[i], each[i], names) for i in range(n)]
+    lines = [f"{row[0]} = {_sum(*row[1:])}" for row in rows]
     for jump in system.jumps:
         factor = f"{math.exp(jump.log_factor):.10g}"
         at_wall = math.isclose(math.cos(jump.phase), 0.0, abs_tol=1e-12)
@@ -97,9 +101,12 @@ def _dotted(letter: str, count: int) -> str:
     return unicodedata.normalize("NFC", letter + "\u0307\u0308"[count - 1])
 
 
-def _sum(constant: FloatArray, by_noise: Mapping[str, FloatArray], states: Sequence[str]) -> str:
-    """A sum of multiples of states, of the constant ones first: "−x + 0.001 ẋ + 0.1 ξ ẋ"."""
+def _sum(constant: FloatArray, cubic: FloatArray, by_noise: Mapping[str, FloatArray], states: Sequence[str]) -> str:
+    """A sum of multiples of states, the constant ones first: "−x + 0.001 ẋ − 0.2 x² ẋ + 0.1 ξ ẋ"."""
+    x, y = states[:2]
+    products = f"{x}³", f"{x}² {y}", f"{x} {y}²", f"{y}³"
     terms = [(float(size), state) for size, state in zip(constant, states, strict=True)]
+    terms += [(float(size), product) for size, product in zip(cubic, products, strict=True)]
     terms += [
         (float(size), f"{name} {s}") for name, row in by_noise.items() for size, s in zip(row, states, strict=True)
     ]

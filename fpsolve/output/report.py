@@ -341,7 +341,8 @@ def _response_grid(case: Case, result: CurveResult) -> Grid:
     for name, each in result.response.numbers.items() if result.response else ():
         about = case.system.response.numbers[name].timed(case.units.time)
         value = digits(each.value, each.error_estimate)
-        grid.rows.append([about.words, about.symbol, value, f"{each.error_estimate:.0e}", about.unit])
+        unit = "" if about.unit == "unknown" else about.unit
+        grid.rows.append([about.words, about.symbol, value, f"{each.error_estimate:.0e}", unit])
     return grid
 
 

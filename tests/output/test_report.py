@@ -15,7 +15,7 @@ from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import load_case
 from fpsolve.cli import BAD_INPUT, main
 from fpsolve.errors import OutputError, Remedy
-from fpsolve.model import PlaneSystem, Problem, White
+from fpsolve.model import OrnsteinUhlenbeck, PlaneSystem, Problem, White
 from fpsolve.output import pictures, report
 from fpsolve.output.meanings import Part, equations_of, meanings, noises_of, parts_of, region_meaning
 from fpsolve.output.tables import facts_of
@@ -276,6 +276,7 @@ def test_symbols_without_latex(latex, parts):
     ("name", "equations"),
     [
         ("theorem", ["ẍ = −x + 0.1 ẋ + ξ ẋ", "|ẋ|⁺ = 0.8 |ẋ|⁻ at x = 0"]),
+        ("response", ["ẍ = −x + 0.1 ẋ − 0.125 x² ẋ − 0.05 ẋ³ + 0.5 ξ ẋ"]),
         ("systems/own_equation", ["ẍ = −x − 0.2 ẋ − ξ x"]),
         ("systems/two_noises", ["ẍ = −x − 0.2 ẋ − ξ_axial x − ξ_lateral ẋ"]),
         ("systems/turning", ["dx/dt = x − ξ y", "dy/dt = −y + ξ x"]),
@@ -288,6 +289,11 @@ def test_equations_have_the_numbers_of_the_case(name, equations):
 def test_equations_have_the_variables_of_the_case():
     problem = Problem(PlaneSystem.of_equations(("q", "v"), ("2*v", "-q - xi*v")), White(s=0.5))
     assert equations_of(problem) == ["q̈ = −2 q − ξ q̇"]
+    rates = "2*v", "-q - xi*v - q**3/4 + q*v**2 - v**3"
+    problem = Problem(PlaneSystem.of_equations(("q", "v"), rates), OrnsteinUhlenbeck(alpha=1.0, sigma=1.0))
+    assert equations_of(problem) == ["q̈ = −2 q − 0.5 q³ + 0.5 q q̇² − 0.25 q̇³ − ξ q̇"]
+    problem = Problem(PlaneSystem.of_equations(("q", "v"), ("v - q**3", rates[1])), problem.noise)
+    assert equations_of(problem) == ["dq/dt = v − q³", "dv/dt = −q − 0.25 q³ + q v² − v³ − ξ v"]
 
 
 def test_a_region_tells_what_paths_and_moments_do():
