@@ -12,6 +12,7 @@ import numpy as np
 import scipy.linalg
 
 from fpsolve.arrays import FloatArray, finite, one
+from fpsolve.errors import MeshError
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import Factors, factorised
@@ -33,7 +34,7 @@ from fpsolve.model.problem import ParameterDerivative, Problem
 
 KEPT_SPACES = 16
 SAMPLES = 721
-"""φ at which the growth by white noise is looked at."""
+"""φ at which the growth by white noise is looked at, and ξ at which it is whether an arc is closed."""
 MOST_FOR_A_BOUND = 300
 """Functions of ξ up to which the sharper bound of Λ is used; beyond, that of noise that rests at an end."""
 LEFT_BY_STATES = 1.0
@@ -76,6 +77,15 @@ class Pencil:
         return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full, ring=self.ring)
 
 
+def is_closed(problem: Problem, ends: FloatArray, support: FloatArray) -> bool:
+    """Whether no path leaves an arc of the phase, while a noise is between the extremes of its support."""
+    if problem.diffusions or problem.impulses:
+        return False
+    xi = np.linspace(float(np.min(support)), float(np.max(support)), SAMPLES)
+    lower, upper = phase_speed(problem.motion, xi[:, None])(ends).T
+    return bool(np.all(lower > 0) and np.all(upper < 0))
+
+
 class Generator:
     """L(p) in weak form; `print` lists its terms.
 
@@ -84,7 +94,8 @@ class Generator:
         chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
     Raises:
-        MeshError: there is no φ-line at a jump, or a cell's polynomials in the noise cannot be told apart.
+        MeshError: there is no φ-line at a jump, paths leave an arc, or a cell's polynomials in the noise cannot be told
+            apart.
     """
 
     def __init__(self, problem: Problem, chosen: Discretisation | CylinderMesh) -> None:
@@ -99,7 +110,9 @@ class Generator:
         self._last: Pencil | None = None
         for jump in problem.motion.jumps:
             self.phi.vertices_at(jump.phase)
-        self.space(0.0)  # refuses a mesh that cannot be used
+        space = self.space(0.0)  # refuses a mesh that cannot be used
+        if self.phi.is_arc and not is_closed(problem, chosen.phase.lines[[0, -1]], space.xi.support):
+            raise MeshError("paths leave the arc of the phase")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What it is made of; the matrices are assembled again when they are needed."""
@@ -210,6 +223,8 @@ class Generator:
 
         def fastest(xi: Any) -> Any:
             q, speed = growth_rate(system, xi), phase_speed(system, xi)
+            if self.phi.is_arc:
+                return np.max(p * q(self.phi.points[:, None]), axis=0)
             gains = sum(max(0.0, p * jump.log_factor) for jump in system.jumps)
             return p * q.mean + abs(p) * q.amplitude + gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
 
