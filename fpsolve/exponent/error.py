@@ -3,7 +3,7 @@
 Without its highest modes, a projection Q, the pair (Λ, T, T*) would have the Rayleigh quotient Λ plus exactly
 ⟨Q T*, (L − Λ) Q T⟩/⟨T*, T⟩. Summed in absolute values over the unknowns of a cell, as their signs may cancel, that of
 the two highest modes bounds the error with a degree less by two, that of the four highest with a degree less by four,
-and how it falls tells what is left of it.
+and how it falls tells what is left of it. It may fall unevenly; the slower one of two falls counts, each by two degrees.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ from fpsolve.model.quantity import UNNAMED
 if TYPE_CHECKING:
     import xarray
 
+DEPTH = 4
+"""Of the highest modes of a cell whose effects are looked at."""
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
 
@@ -280,14 +282,14 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
             found.append(None)
             continue
         effects, (first, last) = [], (along(ladder.nested, table) for table in tables)
-        others = tuple(k for k in range(len(space.axes)) if k != ladder.at)
-        for depth in (2, 4):
+        others, image = tuple(k for k in range(len(space.axes)) if k != ladder.at), 0.0
+        for depth in range(1, DEPTH + 1):
             high = ladder.highest(depth)
-            mask = ladder.along(high)
-            image = space.table(operator @ np.ravel(first * mask))
-            shares = np.abs(last * mask * image).sum(axis=others)[high]
+            added = ladder.along(high & ~ladder.highest(depth - 1))
+            image = image + space.table(operator @ np.ravel(first * added))
+            shares = np.abs(last * ladder.along(high) * image).sum(axis=others)[high]
             effects.append(np.bincount(ladder.cells[high], shares, minlength=ladder.degrees.size) / abs(norm))
-        found.append(ModeEffects(ladder.degrees, effects[0], effects[1], ladder.slowest))
+        found.append(ModeEffects(ladder.degrees, np.array(effects), ladder.slowest))
     return tuple(found)
 
 

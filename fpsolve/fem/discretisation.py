@@ -45,21 +45,25 @@ class ModeEffects:
 
     Attributes:
         degrees: of the cells, shape (cells,).
-        two, four: the effects of the two and of the four highest modes, shape (cells,).
+        highest: the effects of the highest mode, of the two highest and so on up to four, shape (4, cells).
         slowest: the least share of the effect of two modes that is thought to be left.
         corners: that of the cells in which T is singular, 0 for others, shape (cells,); None if there are none.
     """
 
     degrees: Any
-    two: FloatArray
-    four: FloatArray
+    highest: FloatArray
     slowest: float = 0.0
     corners: FloatArray | None = None
 
     @property
+    def two(self) -> FloatArray:
+        """Those of the two highest modes, shape (cells,)."""
+        return self.highest[1]
+
+    @property
     def of_cells(self) -> FloatArray:
-        """Estimate of what each cell lacks, half way from the effect of two modes to what its fall predicts."""
-        left = np.sqrt(self.two / np.maximum(self.four, 1e-300))
+        """Estimate of what each cell lacks, half way from the effect of two modes to what its slower fall predicts."""
+        left = np.sqrt(np.max(self.highest[:2] / np.maximum(self.highest[2:], 1e-300), axis=0))
         shares = np.clip(left, self.slowest, 1.0)
         return self.two * (shares if self.corners is None else np.maximum(shares, self.corners))
 
@@ -75,7 +79,8 @@ class ModeEffects:
     @property
     def fall(self) -> FloatArray:
         """By how much the logarithm of the effect falls with each degree, shape (cells,)."""
-        return np.maximum(0.5 * np.log(np.maximum(self.four, 1e-300) / np.maximum(self.two, 1e-300)), 0.3)
+        four = self.highest[3]
+        return np.maximum(0.5 * np.log(np.maximum(four, 1e-300) / np.maximum(self.two, 1e-300)), 0.3)
 
     def needed(self, tolerance: float) -> FloatArray:
         """The degree at which each cell would lack `tolerance`, shape (cells,)."""
