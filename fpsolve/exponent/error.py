@@ -281,14 +281,14 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
         if ladder is None:
             found.append(None)
             continue
-        effects, (first, last) = [], (along(ladder.nested, table) for table in tables)
-        others, image = tuple(k for k in range(len(space.axes)) if k != ladder.at), 0.0
-        for depth in range(1, DEPTH + 1):
-            high = ladder.highest(depth)
-            added = ladder.along(high & ~ladder.highest(depth - 1))
-            image = image + space.table(operator @ np.ravel(first * added))
-            shares = np.abs(last * ladder.along(high) * image).sum(axis=others)[high]
-            effects.append(np.bincount(ladder.cells[high], shares, minlength=ladder.degrees.size) / abs(norm))
+        first, last = (along(ladder.nested, table) for table in tables)
+        height = ladder.degrees[ladder.cells] - ladder.modes  # 0 for the highest mode of a cell
+        masks = (ladder.cells >= 0) & (height == np.arange(DEPTH)[:, None])
+        images = np.cumsum(operator.images(first * np.stack([ladder.along(mask) for mask in masks])), axis=0)
+        others = tuple(1 + k for k in range(len(space.axes)) if k != ladder.at)
+        shares = np.abs(last * images).sum(axis=others) * np.cumsum(masks, axis=0)
+        inside = np.flatnonzero(ladder.cells >= 0)
+        effects = [np.bincount(ladder.cells[inside], each[inside], ladder.degrees.size) / abs(norm) for each in shares]
         found.append(ModeEffects(ladder.degrees, np.array(effects), ladder.slowest))
     return tuple(found)
 

@@ -119,6 +119,12 @@ class KroneckerSum:
             return np.ravel(sum(first @ (table @ last.T) for first, last in self.terms))
         return np.ravel(sum(along(term, table) for term in self.terms))
 
+    def images(self, tables: FloatArray) -> FloatArray:
+        """The images of several vectors, each as a table, shape (count, *shape)."""
+        if len(self.shape) == 2 and not self.is_sparse:
+            return np.asarray(sum(first @ (tables @ last.T) for first, last in self.terms))
+        return np.stack([(self @ np.ravel(table)).reshape(self.shape) for table in tables])
+
     @property
     def T(self) -> KroneckerSum:
         """The transpose."""

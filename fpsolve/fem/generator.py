@@ -198,10 +198,11 @@ class Generator:
 
     @cached_property
     def loss(self) -> float:
-        """About how many times its rounding elimination may harm T − 1: the size of the free transport over a rate."""
+        """About how many times its rounding elimination may harm T − 1: the size of L, free of forcing, over a rate."""
         orders = ALL_ORDERS if self.problem.diffusions or self.problem.impulses else slice(0, 1)
-        free = self.matrix(0.0, orders=orders).terms[0][0]
-        return 30 * float(abs(free).sum(axis=0).max()) / self.unit_rate
+        space = self.space(0.0)
+        free = [self.matrix(0.0, orders=orders).terms[0][0], *(axis.matrix(None) for axis in space.axes[1:])]
+        return 30 * sum(float(abs(each).sum(axis=0).max()) for each in free) / self.unit_rate
 
     @cached_property
     def keeps_constants(self) -> bool:
