@@ -3,7 +3,7 @@
 Without its highest modes, a projection Q, the pair (Λ, T, T*) would have the Rayleigh quotient Λ plus exactly
 ⟨Q T*, (L − Λ) Q T⟩/⟨T*, T⟩. Summed in absolute values over the unknowns of a cell, as their signs may cancel, that of
 the two highest modes bounds the error with a degree less by two, that of the four highest with a degree less by four,
-and how it falls tells what is left of it. It may fall unevenly; the slower one of two falls counts, each by two degrees.
+and how it falls tells what is left of it. It may fall unevenly; the slower one of two falls counts.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -36,7 +36,15 @@ LEAST_RATIO, LARGEST_RATIO = 1.1, 1.4
 """Of the z of two lines for a place far out, where cells are added: that of the innermost cell between these."""
 OPEN, OPENED = 3.0, np.array([1.0, 2.5, 5.0, 10.0])
 """z from which on paths may come and go, and lines that then are added on both sides."""
+MOST_SHARED = 100
+"""Functions of φ that are kept for the next problem."""
 NO_LINES = np.zeros(0)
+
+
+@lru_cache(maxsize=32)
+def _shared(lines: bytes, degrees: bytes) -> PhaseAxis:
+    """The functions of φ of some cells; a problem changes nothing in them."""
+    return PhaseAxis(np.frombuffer(lines), np.frombuffer(degrees, dtype=int))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +123,10 @@ class PhaseCells:
         return {"phi_cells": self.lines.size - 1, "phi_degrees": [int(degree) for degree in self.degrees]}
 
     def axis(self) -> PhaseAxis:
-        """The functions."""
-        return PhaseAxis(self.lines, self.degrees)
+        """The functions; many problems share small ones."""
+        if self.size > MOST_SHARED:
+            return PhaseAxis(self.lines, self.degrees)
+        return _shared(self.lines.tobytes(), np.asarray(self.degrees, dtype=int).tobytes())
 
     def enriched(self) -> PhaseCells:
         """Two degrees more; where there are none left, cells are halved."""

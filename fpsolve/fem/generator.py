@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -104,6 +105,7 @@ class Generator:
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
         self.phi = chosen.phase.axis()
         if any(noise.has_states for noise in problem.noise.parts.values()):
+            self.phi = copy(self.phi)
             self.phi.slowest = LEFT_BY_STATES
         self._spaces: dict[float, TensorSpace] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}

@@ -22,6 +22,8 @@ PENALTY = 2.0
 """η of the interior penalty method times size/(degree + 1)²."""
 STRIPS, MORE_POINTS = 32, 8
 """Of an impulse: parts of the domain before and after it, in which a rule of Gauss has points beyond the degree."""
+KEPT_IMPULSES = 8
+"""Whose matrices are kept, as many problems may share the functions."""
 MAX_DENSE_UNKNOWNS = 600
 """Matrices of φ, and of ξ, are NumPy arrays for so many unknowns, and sparse beyond."""
 
@@ -152,6 +154,8 @@ class PhaseAxis(Axis):
     def _struck(self, of: Impulse) -> tuple[Any, ...]:
         """The functions at the points of a rule and where an impulse takes them, weights, |exp(B)e|, and the points."""
         if of not in self._strikes:
+            if len(self._strikes) >= KEPT_IMPULSES:
+                self._strikes.clear()
             points, middles, weights = self._rule_of(of)
             stretch, end = of.stretched(points)
             _, inside = of.stretched(middles)
