@@ -71,10 +71,13 @@ def by_rest(case: Problem, p: float) -> tuple[float, float] | None:
         return None
     place = max(places)
     ends = {"lower": 1.3 * place.lower * unit, "upper": min(0.75 * place.upper * unit, -turning)}
-    rough, other, coarse, fine = (
-        asinh_grid.held(case.system, case.noise, p, phases=phases, steps=steps, above=1.0005 * place.rate, **ends)
-        for phases, steps in HELD
-    )
+    try:
+        rough, other, coarse, fine = (
+            asinh_grid.held(case.system, case.noise, p, phases=phases, steps=steps, above=1.0005 * place.rate, **ends)
+            for phases, steps in HELD
+        )
+    except ValueError:
+        return None
     changes = (other - rough) / 3, (fine - coarse) / 3
     return fine + sum(changes), sum(map(abs, changes))
 
@@ -101,7 +104,7 @@ def outcome(seed: int) -> tuple[float, float] | str:
         is_limit = case.noise.r0 - 1 < GAUSSIAN
         known, doubt = by_limit(case, p) if is_limit else by_differences(case, p, value)
         at_rest = None if is_limit else by_rest(case, p)
-        if at_rest and at_rest > (known, doubt):
+        if at_rest and at_rest[0] > known and at_rest[1] < WORST * at_rest[0]:
             known, doubt = at_rest
         elif not is_limit and (doubt > WORST * abs(known) or abs(value - known) > error + doubt):
             known, doubt = by_differences(case, p, value, GRIDS[1])

@@ -59,6 +59,7 @@ def moment_lyapunov(oscillator, noise, p, *, phases, steps, lower, upper, above,
     return float(np.max(principal.real))
 
 
+@np.errstate(divide="ignore", invalid="ignore")  # for T of one sign, which is looked at
 def held(oscillator, noise, p, *, phases, steps, lower, upper, above):
     """The eigenvalue next to `above` whose T has one sign, for paths that are killed where the phase begins to turn.
 
@@ -91,7 +92,7 @@ def held(oscillator, noise, p, *, phases, steps, lower, upper, above):
         if abs(distance - last) < 1e-10 * abs(above):
             break
         last = distance
-    if abs(found.sum()) < (1 - 1e-6) * np.abs(found).sum():
+    if not abs(found.sum()) > (1 - 1e-6) * np.abs(found).sum():
         raise ValueError(f"the eigenvalue next to {above:g} has no T of one sign")
     return above + distance
 
