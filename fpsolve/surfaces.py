@@ -98,13 +98,16 @@ class Surface:
     @property
     def limits(self) -> tuple[float, float]:
         """The range of the values; it begins at 0 where the least is next to it, or all are the same."""
-        low, high = float(self.values.min()), float(self.values.max())
+        low, high = float(np.nanmin(self.values)), float(np.nanmax(self.values))
         return (0.0 if abs(low) < NEXT_TO_ZERO * high or high - low < 1e-6 * high else low, high)
 
     def placed(self, phi: Any, xi: Any, values: Any, *, cylinder: bool) -> FloatArray:
         """Points of space for φ, ξ and values, which broadcast: in a box, or with φ around an axis and ξ along it."""
         low, high = self.limits
-        along, up = (xi - self.xi[0]) / (self.xi[-1] - self.xi[0]), (values - low) / (high - low)
+        along, up = (
+            (xi - self.xi[0]) / (self.xi[-1] - self.xi[0]),
+            (np.nan_to_num(values, nan=low) - low) / (high - low),
+        )
         radius = 1 + SWELL * up
         wrapped = radius * np.cos(phi), radius * np.sin(phi), LENGTH * along
         flat = BOX[0] * phi / (2 * math.pi), BOX[1] * along, BOX[2] * up

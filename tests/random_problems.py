@@ -1,12 +1,13 @@
 """Random parameter sets over the whole range that fpsolve is made for, each with an independent reference value.
 
-`python -m tests.random_problems` prints the errors, the error estimates and the times.
+`python -m tests.random_problems [first last]` prints the errors, the error estimates and the times.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+import sys
 import time
 from dataclasses import dataclass
 
@@ -130,9 +131,9 @@ def _finer(pair: PrincipalPair) -> tuple[float, float]:
     return values[1], abs(values[1] - values[0])
 
 
-def main() -> None:
-    """Print the outcomes of 300 problems, the histogram of estimate over error, and the times."""
-    outcomes = [solve(problem) for problem in problems(300)]
+def main(first: int = 0, last: int = 299) -> None:
+    """Print the outcomes of problems, the histogram of estimate over error, and the times."""
+    outcomes = [solve(problem) for problem in problems(last + 1)[first:]]
     solved = [outcome for outcome in outcomes if isinstance(outcome, Outcome)]
     for text in outcomes:
         if isinstance(text, str):
@@ -140,7 +141,7 @@ def main() -> None:
     print(f"{len(solved)} solved; largest error {max(each.error for each in solved):.1e} of max(|Λ|, scale)")
     telling = [each for each in solved if each.error > 3 * each.doubt]
     ratios = np.array([each.estimate / each.error for each in telling])
-    edges = (0, 1 / 3, 0.5, 0.9, 1.1, 2, 10, 100, math.inf)
+    edges = (0, 1 / 3, 0.5, 0.9, 1.1, 2, 10, 100, 1000, math.inf)
     for low, high in itertools.pairwise(edges):
         print(f"estimate/error from {low:.2g} to {high:.2g}: {np.count_nonzero((ratios >= low) & (ratios < high))}")
     print(f"error below what the reference can tell: {len(solved) - len(telling)}")
@@ -152,4 +153,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*map(int, sys.argv[1:]))

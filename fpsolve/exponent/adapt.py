@@ -24,6 +24,7 @@ from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.discretisation import (
     MOST_DEGREE,
+    SPLIT_DEGREE,
     Cells,
     Discretisation,
     ModeEffects,
@@ -33,7 +34,7 @@ from fpsolve.fem.discretisation import (
     first_part,
 )
 from fpsolve.fem.factors import MAX_BAND, MAX_DENSE_UNKNOWNS, one_thread
-from fpsolve.fem.generator import Generator
+from fpsolve.fem.generator import Generator, is_closed
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
@@ -63,10 +64,14 @@ FREE_STAGES = 4
 """From this number of stages on, no cell is made coarser."""
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
+MOST_GAIN = 1e-3
+"""Of an error in one stage of a large system: beyond, its fall is foreseen badly, and every unknown costs."""
 CORNERS = 0.3
 """Share that all cells at corners may lack."""
 FEWEST_CELLS, FALL_PER_CELL = 4, 8.0
 """Of a first discretisation of a place far out, and of ln P_s in one of its cells."""
+MARGIN = 0.6
+"""Of the innermost z of a place far out, down to which the phase should rest where it is solved on an arc."""
 WIDER = 4.0
 COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
@@ -458,7 +463,8 @@ class _Search:
             if error <= allowed:
                 return solution
             self.note(solution, error, allowed)
-            chosen = chosen.enriched() if seems_enough else refined(solution, allowed, self.stages)
+            goal = max(allowed, MOST_GAIN * error if chosen.size > WORTH_A_TRY else 0.0)
+            chosen = chosen.enriched() if seems_enough else refined(solution, goal, self.stages)
 
     def check(self, chosen: Discretisation) -> None:
         """Refuse a stage beyond the budget, and count it."""
@@ -528,7 +534,7 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
     if noise.basis == "cells":  # their lines on both sides, further apart further out
         steps = np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
         side = np.append(steps[steps < 0.8 * (12.0 + abs(center))], 12.0 + abs(center))
-        part = Cells(np.concatenate([-side[:0:-1], side]), round(2 + digits / 2))
+        part = Cells.of_degree(np.concatenate([-side[:0:-1], side]), round(2 + digits / 2))
     else:
         slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
         part = Polynomials(round(digits / 2) + (3 if math.isinf(end) else 5), slope)
@@ -543,11 +549,43 @@ def first_far(problem: Problem, place: Place, rtol: float) -> Discretisation:
     fall = abs(np.subtract(*_log_density(problem.coloured, np.array([place.lower, place.upper]))))
     cells = max(FEWEST_CELLS, math.ceil(fall / FALL_PER_CELL))
     lines = place.lower * np.exp(math.log(place.upper / place.lower) * np.linspace(0, 1, cells + 1))
-    phase = _phase(problem.motion, unit * lines[[0, -1]], digits, 1)
-    return Discretisation(phase, (Cells(lines, round(2 + digits / 2), is_killed=True),))
+    part = Cells.of_degree(lines, round(2 + digits / 2), is_killed=True)
+    phase = _resting(problem, lines, digits)
+    if phase is None or _resting(problem, np.append(lines, MARGIN * lines[-1]), digits) is None:
+        phase = _phase(problem.motion, unit * lines[[0, -1]], digits)
+    return Discretisation(phase, (part,))
 
 
-def _phase(system: System, xi: Xi, digits: float, more: int = 0, is_smooth: bool = False) -> PhaseCells:
+def _resting(problem: Problem, z: FloatArray, digits: float) -> PhaseCells | None:
+    """An arc around all phases where the phase rests for one of the z and paths come to; None where it does not rest.
+
+    T is smooth there. Elsewhere it has thin peaks beside the other phases at rest, which paths leave.
+    """
+    system, unit = problem.motion, problem.coloured.standard_deviation
+    speed = phase_speed(system, unit * z)
+    if np.any(np.abs(speed.mean) >= speed.amplitude):
+        return None
+    middle, half = np.unwrap(np.arctan2(speed.sine, speed.cosine)) / 2, np.arccos(-speed.mean / speed.amplitude) / 2
+    (lower, upper), (left, least) = ((np.min(each), np.max(each)) for each in (middle + half, middle - half))
+    width, below, above = upper - lower, np.mod(lower - least, math.pi), np.mod(left - upper, math.pi)
+    ends = np.array([lower - min(width, 0.5 * below), upper + min(width, 0.5 * above)])
+    rays = np.array([jump.phase for jump in system.jumps])
+    if np.any(np.mod(rays - ends[0], math.pi) <= np.ptp(ends)) or not is_closed(problem, ends, unit * z):
+        return None
+    return PhaseCells(ends, np.array([round(np.clip(digits - 2, 4, MOST_DEGREE))]))
+
+
+def _closed(problem: Problem, chosen: Discretisation) -> Discretisation:
+    """The same on an arc, or on the half circle, that no path leaves while the noise is in its cells."""
+    phase, lines, unit = chosen.phase, chosen.noise.lines, problem.coloured.standard_deviation
+    if not phase.is_arc or is_closed(problem, phase.lines[[0, -1]], unit * lines):
+        return chosen
+    if chosen.is_killed and (arc := _resting(problem, lines, 0.0)):
+        return replace(chosen, phase=replace(arc, degrees=np.array([np.max(phase.degrees)])))
+    return replace(chosen, phase=_phase(problem.motion, unit * lines[[0, -1]], SPLIT_DEGREE + 2))
+
+
+def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseCells:
     """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
 
     There are more where the speed of the phase changes much for some of the ξ; but one, of a higher degree, where
@@ -555,7 +593,7 @@ def _phase(system: System, xi: Xi, digits: float, more: int = 0, is_smooth: bool
     """
     speed = phase_speed(system, xi)
     widest = float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
-    cells = 1 if is_smooth else (8 if widest > 1 else 4 if widest > 0.5 else 2) + more
+    cells = 1 if is_smooth else 8 if widest > 1 else 4 if widest > 0.5 else 2
     rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
     lines = rays[0] + np.linspace(0, math.pi, cells + 1)
     others = rays[0] + np.mod(np.array(rays[1:]) - rays[0], math.pi)
@@ -577,10 +615,11 @@ def widened(generator: Generator) -> Discretisation:
     if not (lines.size and noise.has_algebraic_tails):
         return chosen
     if chosen.is_killed:
-        return chosen.with_noise(chosen.noise.reaching((math.e, math.e), partial(_log_density, noise)))
+        cells = chosen.noise.reaching((math.e, math.e), partial(_log_density, noise))
+        return _closed(generator.problem, chosen.with_noise(cells))
     steps = WIDER ** np.linspace(0, 1, 4)[1:]
     wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
-    return chosen.with_noise(replace(chosen.noise, lines=wide))
+    return chosen.with_noise(chosen.noise.on(wide))
 
 
 def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation:
@@ -591,6 +630,7 @@ def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation
     if chosen.noise.lines.size:
         lower, upper = solution.truncation
         new = new.with_noise(new.noise.reaching((lower / share, upper / share), partial(_log_density, noise)))
+        new = _closed(pair.generator.problem, new)
         if any(np.any(each.at_corners) for each in solution.effects if each):
             lacking = [float(np.sum(each.of_cells[each.at_corners])) for each in solution.effects if each]
             new = graded_more(solution.corners, new, [each / (CORNERS * tolerance) for each in lacking])

@@ -110,7 +110,7 @@ def resolving(
     far = np.min(np.abs(lines[1:-1, None] - z), axis=1) > 0.3 * np.min(np.diff(lines))
     lines = np.unique(np.concatenate([lines[:1], lines[1:-1][far], lines[-1:], z]))
     phase = replace(chosen.phase, degrees=np.minimum(DEGREE, chosen.phase.degrees))
-    cells = Discretisation(phase, (Cells(lines, DEGREE),))
+    cells = Discretisation(phase, (Cells.of_degree(lines, DEGREE),))
     to_end = noise.half_width / noise.standard_deviation - np.max(np.abs(z))
     levels = max(math.ceil(math.log2(WIDTH / min(to_end, WIDTH))), *(corner.levels(rtol) for corner in found))
     return _graded(found, cells, levels, levels)
@@ -187,7 +187,7 @@ def _graded(found: Sequence[Corner], chosen: Discretisation, in_phi: int, in_z: 
     phase, part = chosen.phase, chosen.noise
     phi, phi_cells = _towards(phase.lines, _rays(found, phase.lines), CUBED, in_phi)
     z, _ = _towards(part.lines, _z(found), RATIO, in_z)
-    return Discretisation(PhaseCells(phi, phase.degrees[phi_cells]), (replace(part, lines=z),))
+    return Discretisation(PhaseCells(phi, phase.degrees[phi_cells]), (part.on(z),))
 
 
 def _towards(lines: FloatArray, places: FloatArray, ratio: float, levels: int) -> tuple[FloatArray, Any]:

@@ -128,7 +128,7 @@ def principal_pair(
         lambda: _from_the_right(pencil, generator, clock),
     ]
     least = _tangents(generator.problem, p, pairs or ())
-    if is_doubtful := _has_other_positive(generator.problem, p, pairs or ()):
+    if is_doubtful := _has_other_positive(generator, p, pairs or ()):
         searches.reverse()
     found: list[PrincipalPair] = []
     for search in searches:
@@ -159,18 +159,21 @@ def principal_pair(
     return pair
 
 
-def _has_other_positive(problem: Problem, p: float, pairs: Sequence[PrincipalPair]) -> bool:
+def _has_other_positive(generator: Generator, p: float, pairs: Sequence[PrincipalPair]) -> bool:
     """Whether other pairs may seem to have T > 0, too, and there is none to start from.
 
     States that hardly mix have a pair each. Where the phase rests, between weak noise, T is about |x|^(p−k) |v|^k for
     the k-th pair, x along the faster mode and v along the other: for even k its sign does not change.
     """
+    problem = generator.problem
     if problem.dimension > 2:  # each search begins at a neighbouring p
         return False
     if problem.noise.mixes_slowly:
         return True
-    frozen = frozen_noise(problem)
-    return frozen is not None and frozen.rests(p) and not pairs
+    if pairs or (frozen := frozen_noise(problem)) is None:
+        return False
+    lines = generator.chosen.noise.lines
+    return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)
 
 
 def _goes_on(pair: PrincipalPair, pairs: Sequence[PrincipalPair]) -> bool:
@@ -307,11 +310,8 @@ def rayleigh_iteration(
         may_stall = int(best.residual > BACKWARD_ERROR_LIMIT)
         if best.residual <= BACKWARD_ERROR_GOAL or stalls > may_stall or not math.isfinite(best.value):
             break
-    # the value from the forcing is linear in the error of T; beside thin cells residuals look smaller than they are
-    has_cells = any(axis.is_local and axis.cells.max() >= 0 for axis in space.axes[1:])
-    if best.residual > 1e-3 * BACKWARD_ERROR_GOAL or has_cells:
-        best = _improved(factor, space, shift, size, best)
-    return best
+    # the value from the forcing is linear in the error of T, which residuals show beside the largest rates only
+    return _improved(factor, space, shift, size, best)
 
 
 def _improved(factor: Factors, space: TensorSpace, shift: float, size: float, old: Iterate) -> Iterate:

@@ -3,7 +3,7 @@
 Without its highest modes, a projection Q, the pair (Λ, T, T*) would have the Rayleigh quotient Λ plus exactly
 ⟨Q T*, (L − Λ) Q T⟩/⟨T*, T⟩. Summed in absolute values over the unknowns of a cell, as their signs may cancel, that of
 the two highest modes bounds the error with a degree less by two, that of the four highest with a degree less by four,
-and how it falls tells what is left of it.
+and how it falls tells what is left of it. It may fall unevenly; the slower one of two falls counts.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ from fpsolve.model.quantity import UNNAMED
 if TYPE_CHECKING:
     import xarray
 
+DEPTH = 4
+"""Of the highest modes of a cell whose effects are looked at."""
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
 
@@ -279,15 +281,15 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
         if ladder is None:
             found.append(None)
             continue
-        effects, (first, last) = [], (along(ladder.nested, table) for table in tables)
-        others = tuple(k for k in range(len(space.axes)) if k != ladder.at)
-        for depth in (2, 4):
-            high = ladder.highest(depth)
-            mask = ladder.along(high)
-            image = space.table(operator @ np.ravel(first * mask))
-            shares = np.abs(last * mask * image).sum(axis=others)[high]
-            effects.append(np.bincount(ladder.cells[high], shares, minlength=ladder.degrees.size) / abs(norm))
-        found.append(ModeEffects(ladder.degrees, effects[0], effects[1], ladder.slowest))
+        first, last = (along(ladder.nested, table) for table in tables)
+        height = ladder.degrees[ladder.cells] - ladder.modes  # 0 for the highest mode of a cell
+        masks = (ladder.cells >= 0) & (height == np.arange(DEPTH)[:, None])
+        images = np.cumsum(operator.images(first * np.stack([ladder.along(mask) for mask in masks])), axis=0)
+        others = tuple(1 + k for k in range(len(space.axes)) if k != ladder.at)
+        shares = np.abs(last * images).sum(axis=others) * np.cumsum(masks, axis=0)
+        inside = np.flatnonzero(ladder.cells >= 0)
+        effects = [np.bincount(ladder.cells[inside], each[inside], ladder.degrees.size) / abs(norm) for each in shares]
+        found.append(ModeEffects(ladder.degrees, np.array(effects), ladder.slowest))
     return tuple(found)
 
 

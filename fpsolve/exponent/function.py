@@ -99,9 +99,9 @@ class MomentLyapunovFunction(Result):
         self.solver = solver or ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
         self.interpolation_error, self._among, self._allowed = math.inf, among, SHARE * self._tolerance(1.0, 0.0)
         most = LEVELS[-1] if among is None else max(FEW_NODES, 3 * among.size // 10)
-        for count in LEVELS:
+        for count in LEVELS if among is None or self._is_hopeful(most) else ():
             last = self.interpolation_error
-            self._interpolate(count, progress)
+            self._interpolate(count, progress, self._tolerance)
             if self.is_converged or _nodes_needed(count, last, self.interpolation_error, self._allowed) > most:
                 break
         self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
@@ -196,12 +196,19 @@ class MomentLyapunovFunction(Result):
             raise ValueError(f"p must lie in [{low:g}, {high:g}], the interval of this function; make a wider one")
         return points
 
-    def _interpolate(self, count: int, progress: Callable[[], None]) -> None:
+    def _is_hopeful(self, most: int) -> bool:
+        """Whether it may converge with so many nodes, by the first few, within the usual tolerance."""
+        self._interpolate(LEVELS[0], lambda: None)
+        before, after = (float(np.max(np.abs(part), initial=0.0)) for part in np.split(self._series.coef[2:], [2]))
+        self.interpolation_error = math.inf
+        return _nodes_needed(LEVELS[0], before, after, self._allowed) <= most
+
+    def _interpolate(self, count: int, progress: Callable[[], None], tolerance: Tolerance | None = None) -> None:
         """Solve at so many Chebyshev points, the outermost first, and interpolate."""
         x, self.nodes = _nodes(count, self.interval, self._among)
         ratios = np.empty((x.size, 3))
         for i in best_order(self.nodes):
-            ratios[i] = self.solver.ratio(float(self.nodes[i]), self._tolerance)
+            ratios[i] = self.solver.ratio(float(self.nodes[i]), tolerance)
             progress()
         values, slopes, self._errors = ratios.T
         basis, half = np.eye(2 * x.size), 0.5 * (self.interval[1] - self.interval[0])
@@ -225,6 +232,8 @@ def _nodes_needed(count: int, last: float, error: float, allowed: float) -> floa
     """How many nodes convergence may take, if the error falls exponentially, as from half as many to `count`."""
     if not math.isfinite(last):
         return 2 * count - 1
+    if error <= allowed:
+        return count
     rate = math.log(max(last / error, 1.1)) / (count // 2)
     return max(2 * count - 1, count + math.log(error / allowed) / rate)
 

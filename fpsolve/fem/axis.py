@@ -30,6 +30,7 @@ class Axis:
         nested: the matrix to coefficients of modes whose sums by degree are all functions of a lower degree; None where
             they are that already.
         unit: ∫ u v; None where it is the identity, or for noise.
+        is_arc: whether the axis is a part of the half circle only, see `PhaseAxis`.
         is_full: whether every function is coupled to most others.
         ladders: cells, modes and `nested` of every direction, for which errors are estimated.
         turns: how often the axis fits on the full circle; 1 for noise.
@@ -47,7 +48,7 @@ class Axis:
     levels: Any = None
     unit: Any = None
     ring: Any = None
-    is_full = False
+    is_arc = is_full = False
     turns, slowest = 1, 0.0
 
     def __init__(self) -> None:
@@ -117,6 +118,12 @@ class KroneckerSum:
         if len(self.shape) == 2:  # by far the most products of a solve
             return np.ravel(sum(first @ (table @ last.T) for first, last in self.terms))
         return np.ravel(sum(along(term, table) for term in self.terms))
+
+    def images(self, tables: FloatArray) -> FloatArray:
+        """The images of several vectors, each as a table, shape (count, *shape)."""
+        if len(self.shape) == 2 and not self.is_sparse:
+            return np.asarray(sum(first @ (tables @ last.T) for first, last in self.terms))
+        return np.stack([(self @ np.ravel(table)).reshape(self.shape) for table in tables])
 
     @property
     def T(self) -> KroneckerSum:

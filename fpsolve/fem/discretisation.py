@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
 from fpsolve.fem.circle import CircleAxis
-from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
+from fpsolve.fem.mesh import MAX_DEGREE, TOLERANCE, CylinderMesh, halved
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
 from fpsolve.fem.pairs import PairAxis
 from fpsolve.fem.phase import PhaseAxis
@@ -32,13 +32,19 @@ SPARE = 1.0
 """Degrees beyond what seems to be enough that a cell keeps where none should be made coarser."""
 LITTLE = 1e-2
 """Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
-THIRDS = 3
-"""Into how many parts a cell of φ is cut for a place far out: where the phase rests must not come to lie on a line."""
-LARGEST_RATIO = 1.4
-"""Of the z of two lines there."""
+LEAST_RATIO, LARGEST_RATIO = 1.1, 1.4
+"""Of the z of two lines for a place far out, where cells are added: that of the innermost cell between these."""
 OPEN, OPENED = 3.0, np.array([1.0, 2.5, 5.0, 10.0])
 """z from which on paths may come and go, and lines that then are added on both sides."""
+MOST_SHARED = 100
+"""Functions of φ that are kept for the next problem."""
 NO_LINES = np.zeros(0)
+
+
+@lru_cache(maxsize=32)
+def _shared(lines: bytes, degrees: bytes) -> PhaseAxis:
+    """The functions of φ of some cells; a problem changes nothing in them."""
+    return PhaseAxis(np.frombuffer(lines), np.frombuffer(degrees, dtype=int))
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,21 +53,25 @@ class ModeEffects:
 
     Attributes:
         degrees: of the cells, shape (cells,).
-        two, four: the effects of the two and of the four highest modes, shape (cells,).
+        highest: the effects of the highest mode, of the two highest and so on up to four, shape (4, cells).
         slowest: the least share of the effect of two modes that is thought to be left.
         corners: that of the cells in which T is singular, 0 for others, shape (cells,); None if there are none.
     """
 
     degrees: Any
-    two: FloatArray
-    four: FloatArray
+    highest: FloatArray
     slowest: float = 0.0
     corners: FloatArray | None = None
 
     @property
+    def two(self) -> FloatArray:
+        """Those of the two highest modes, shape (cells,)."""
+        return self.highest[1]
+
+    @property
     def of_cells(self) -> FloatArray:
-        """Estimate of what each cell lacks, half way from the effect of two modes to what its fall predicts."""
-        left = np.sqrt(self.two / np.maximum(self.four, 1e-300))
+        """Estimate of what each cell lacks, half way from the effect of two modes to what its slower fall predicts."""
+        left = np.sqrt(np.max(self.highest[:2] / np.maximum(self.highest[2:], 1e-300), axis=0))
         shares = np.clip(left, self.slowest, 1.0)
         return self.two * (shares if self.corners is None else np.maximum(shares, self.corners))
 
@@ -77,7 +87,8 @@ class ModeEffects:
     @property
     def fall(self) -> FloatArray:
         """By how much the logarithm of the effect falls with each degree, shape (cells,)."""
-        return np.maximum(0.5 * np.log(np.maximum(self.four, 1e-300) / np.maximum(self.two, 1e-300)), 0.3)
+        four = self.highest[3]
+        return np.maximum(0.5 * np.log(np.maximum(four, 1e-300) / np.maximum(self.two, 1e-300)), 0.3)
 
     def needed(self, tolerance: float) -> FloatArray:
         """The degree at which each cell would lack `tolerance`, shape (cells,)."""
@@ -97,6 +108,11 @@ class PhaseCells:
     degrees: Any
 
     @property
+    def is_arc(self) -> bool:
+        """Whether they are on a part of the half circle only."""
+        return bool(np.ptp(self.lines) < math.pi * (1 - TOLERANCE))
+
+    @property
     def size(self) -> int:
         """Number of unknowns."""
         return int(np.sum(self.degrees + 1))
@@ -107,8 +123,10 @@ class PhaseCells:
         return {"phi_cells": self.lines.size - 1, "phi_degrees": [int(degree) for degree in self.degrees]}
 
     def axis(self) -> PhaseAxis:
-        """The functions."""
-        return PhaseAxis(self.lines, self.degrees)
+        """The functions; many problems share small ones."""
+        if self.size > MOST_SHARED:
+            return PhaseAxis(self.lines, self.degrees)
+        return _shared(self.lines.tobytes(), np.asarray(self.degrees, dtype=int).tobytes())
 
     def enriched(self) -> PhaseCells:
         """Two degrees more; where there are none left, cells are halved."""
@@ -116,14 +134,9 @@ class PhaseCells:
             return self.doubled()
         return replace(self, degrees=self.degrees + 2)
 
-    def doubled(self, parts: int = 2) -> PhaseCells:
-        """Cells cut into two; or, where they are cut into three, a higher degree first."""
-        if parts == 2:
-            return PhaseCells(halved(self.lines), np.repeat(self.degrees, 2))
-        lines, most = self.lines, int(np.max(self.degrees))
-        if most >= MOST_DEGREE - 2:
-            lines = np.interp(np.arange(parts * lines.size - parts + 1) / parts, np.arange(lines.size), lines)
-        return PhaseCells(lines, np.full(lines.size - 1, min(most + 4, MOST_DEGREE)))
+    def doubled(self) -> PhaseCells:
+        """Cells cut into two."""
+        return PhaseCells(halved(self.lines), np.repeat(self.degrees, 2))
 
 
 class NoisePart:
@@ -213,35 +226,59 @@ class Cells(NoisePart):
 
     Attributes:
         lines: the vertices, shape (n + 1,).
-        degree: of the elements.
+        degrees: of the elements in each cell, shape (n,).
         is_killed: whether T = 0 at the ends, as paths that leave are killed.
     """
 
     lines: FloatArray
-    degree: int
+    degrees: Any
     is_killed: bool = False
 
     kind, slope = "cells", 0.0
 
+    @classmethod
+    def of_degree(cls, lines: FloatArray, degree: int, is_killed: bool = False) -> Cells:
+        """With one degree in all of them."""
+        return cls(lines, np.full(lines.size - 1, degree), is_killed)
+
+    @property
+    def degree(self) -> int:  # type: ignore[override]
+        return int(np.max(self.degrees))
+
     @property
     def size(self) -> int:
-        return (self.lines.size - 1) * self.degree + 1 - 2 * self.is_killed
+        return int(np.sum(self.degrees)) + 1 - 2 * self.is_killed
 
     def axis(self, noise: Noise, p: float) -> CellAxis:
-        return CellAxis(noise, self.lines, self.degree, self.is_killed)
+        return CellAxis(noise, self.lines, self.degrees, self.is_killed)
 
     def enriched(self) -> Cells:
-        return self.doubled() if self.degree + 2 > MAX_DEGREE else replace(self, degree=self.degree + 2)
+        return self.doubled() if self.degree + 2 > MAX_DEGREE else replace(self, degrees=self.degrees + 2)
 
     def doubled(self) -> Cells:
-        return replace(self, lines=halved(self.lines))
+        return Cells(halved(self.lines), np.repeat(self.degrees, 2), self.is_killed)
 
     def raised(self) -> Cells:
-        return replace(self, degree=min(self.degree + 1, MAX_DEGREE))
+        return replace(self, degrees=np.minimum(self.degrees + 1, MAX_DEGREE))
 
     def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Cells:
         lines, degrees = _split(self.lines, effects, share, may_coarsen)
-        return replace(self, lines=lines, degree=int(np.max(degrees)))
+        if self.is_killed:  # T falls by many orders of magnitude in a cell at an end, and must not oscillate there
+            degrees = np.maximum(degrees, np.min(self.degrees))
+        return Cells(lines, degrees, self.is_killed)
+
+    def on(self, lines: FloatArray, is_killed: bool | None = None) -> Cells:
+        """Those between other lines, each with the degree of the cell that its middle is in, or is next to."""
+        middles = 0.5 * (lines[:-1] + lines[1:])
+        own = np.clip(np.searchsorted(self.lines, middles) - 1, 0, self.degrees.size - 1)
+        return Cells(lines, self.degrees[own], self.is_killed if is_killed is None else is_killed)
+
+    def opened(self) -> Cells:
+        """With cells that reach to ξ = 0 and beyond, from where paths return."""
+        side = math.copysign(1.0, self.lines[0])
+        lines = np.sort(side * self.lines)
+        lines = np.concatenate([-OPENED[::-1], [0.0], OPENED[0.8 * lines[0] > OPENED], lines])
+        return self.on(np.sort(side * lines), is_killed=False)
 
     def reaching(self, excess: tuple[float, float], log_density: Callable[[FloatArray], FloatArray]) -> Cells:
         """With further cells at each end whose effect exceeds its share, by these factors.
@@ -252,21 +289,21 @@ class Cells(NoisePart):
         if not self.is_killed:
             below = [1.6 * self.lines[0]] if excess[0] > 1 else []
             above = [1.6 * self.lines[-1]] if excess[1] > 1 else []
-            return replace(self, lines=np.concatenate([below, self.lines, above]))
+            return self.on(np.concatenate([below, self.lines, above]))
         side = math.copysign(1.0, self.lines[0])
         lines = np.sort(side * self.lines)
         inner, outer = excess if side > 0 else excess[::-1]
         if outer > 1:
             lines = np.append(lines, 1.6 * lines[-1])
         if inner > 1:
-            steps = lines[0] / LARGEST_RATIO ** np.arange(1, 200)
+            ratio = min(max(lines[1] / lines[0], LEAST_RATIO), LARGEST_RATIO)
+            steps = lines[0] / ratio ** np.arange(1, 200)
             gain = log_density(side * steps) - log_density(side * lines[:1])
             enough = int(np.argmax(gain > math.log(inner))) + 1 if math.log(inner) < gain[-1] else steps.size
             if steps[enough - 1] < OPEN:
-                lines = np.concatenate([-OPENED[::-1], [0.0], OPENED[0.8 * lines[0] > OPENED], lines])
-                return replace(self, lines=np.sort(side * lines), is_killed=False)
+                return self.on(np.sort(side * lines)).opened()
             lines = np.concatenate([steps[:enough][::-1], lines])
-        return replace(self, lines=np.sort(side * lines))
+        return self.on(np.sort(side * lines))
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,7 +410,7 @@ class Discretisation:
         if noise.has_states:
             return cls(phase, (States(noise.reached.size),))
         mesh = mesh.within(noise.half_width / noise.standard_deviation)
-        return cls(phase, (Cells(mesh.z_lines, mesh.xi_degree),))
+        return cls(phase, (Cells.of_degree(mesh.z_lines, mesh.xi_degree),))
 
     @property
     def noise(self) -> Any:
@@ -399,11 +436,6 @@ class Discretisation:
         """Whether paths that leave an interval of a noise are killed."""
         return any(part.is_killed for part in self.noises)
 
-    @property
-    def parts_of_phase(self) -> int:
-        """Into how many parts a cell of φ is cut."""
-        return THIRDS if self.is_killed else 2
-
     def enriched(self) -> Discretisation:
         """A finer one: two degrees more each way; where there are none left, cells are halved."""
         return Discretisation(self.phase.enriched(), tuple(part.enriched() for part in self.noises))
@@ -412,7 +444,7 @@ class Discretisation:
         """Twice as many functions along the axes that lack most by their effects; along all where nothing is known."""
         errors = [each.error if each else 0.0 for each in effects] or [1.0] * (1 + len(self.noises))
         of_phase, *of_noises = (error > LITTLE * max(errors) for error in errors)
-        phase = self.phase.doubled(self.parts_of_phase) if of_phase else self.phase
+        phase = self.phase.doubled() if of_phase else self.phase
         pairs = zip(self.noises, of_noises, strict=True)
         return Discretisation(phase, tuple(part.doubled() if is_coarse else part for part, is_coarse in pairs))
 
@@ -425,19 +457,16 @@ class Discretisation:
         """One on which every cell should lack no more than its share; the effects are those of every axis."""
         of_phase, *of_noises = effects
         assert of_phase is not None
-        phase = PhaseCells(*_split(self.phase.lines, of_phase, share, may_coarsen, self.parts_of_phase))
+        phase = PhaseCells(*_split(self.phase.lines, of_phase, share, may_coarsen))
         pairs = zip(self.noises, of_noises, strict=True)
         noises = tuple(part if each is None else part.refined(each, share, may_coarsen) for part, each in pairs)
         return Discretisation(phase, noises)
 
 
-def _split(
-    lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool, parts: int = 2
-) -> tuple[FloatArray, Any]:
+def _split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool) -> tuple[FloatArray, Any]:
     """Lines and a degree for each cell with which all together should lack no more than a share.
 
-    A cell is halved, or cut into other parts, where halves take fewer unknowns: in them the effects fall faster. Those
-    at corners are left as they are.
+    A cell is halved where halves take fewer unknowns: in them the effects fall faster. Those at corners stay.
     """
     rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
     if not may_coarsen:  # but for what is far more than enough
@@ -448,6 +477,6 @@ def _split(
     is_split |= needed > MOST_DEGREE
     degrees = np.ceil(np.where(is_split, in_half, needed) + 0.2)
     degrees = np.clip(degrees, np.maximum(LEAST_DEGREE, effects.degrees - 4), effects.degrees + 4)
-    counts = np.where(is_split, parts, 1)
-    new = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(lines[:-1], lines[1:], counts, strict=True)]
-    return np.concatenate([*new, lines[-1:]]), np.repeat(np.minimum(degrees, MOST_DEGREE).astype(int), counts)
+    middles = 0.5 * (lines[:-1] + lines[1:])
+    degrees = np.repeat(np.minimum(degrees, MOST_DEGREE).astype(int), np.where(is_split, 2, 1))
+    return np.sort(np.concatenate([lines, middles[is_split]])), degrees

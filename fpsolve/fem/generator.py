@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 import scipy.linalg
 
 from fpsolve.arrays import FloatArray, finite, one
+from fpsolve.errors import MeshError
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.dense import Factors
 from fpsolve.fem.discretisation import Discretisation
@@ -34,7 +36,7 @@ from fpsolve.model.problem import ParameterDerivative, Problem
 
 KEPT_SPACES = 16
 SAMPLES = 721
-"""φ at which the growth by white noise is looked at."""
+"""φ at which the growth by white noise is looked at, and ξ at which it is whether an arc is closed."""
 MOST_FOR_A_BOUND = 300
 """Functions of ξ up to which the sharper bound of Λ is used; beyond, that of noise that rests at an end."""
 LEFT_BY_STATES = 1.0
@@ -77,6 +79,15 @@ class Pencil:
         return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full, ring=self.ring)
 
 
+def is_closed(problem: Problem, ends: FloatArray, support: FloatArray) -> bool:
+    """Whether no path leaves an arc of the phase, while a noise is between the extremes of its support."""
+    if problem.diffusions or problem.impulses:
+        return False
+    xi = np.linspace(float(np.min(support)), float(np.max(support)), SAMPLES)
+    lower, upper = phase_speed(problem.motion, xi[:, None])(ends).T
+    return bool(np.all(lower > 0) and np.all(upper < 0))
+
+
 class Generator:
     """L(p) in weak form; `print` lists its terms.
 
@@ -85,7 +96,8 @@ class Generator:
         chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
     Raises:
-        MeshError: there is no φ-line at a jump, or a cell's polynomials in the noise cannot be told apart.
+        MeshError: there is no φ-line at a jump, paths leave an arc, or a cell's polynomials in the noise cannot be told
+            apart.
     """
 
     def __init__(self, problem: Problem, chosen: Discretisation | CylinderMesh) -> None:
@@ -94,13 +106,16 @@ class Generator:
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
         self.phi = chosen.phase.axis()
         if any(noise.has_states for noise in problem.noise.parts.values()):
+            self.phi = copy(self.phi)
             self.phi.slowest = LEFT_BY_STATES
         self._spaces: dict[float, TensorSpace] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
         for jump in problem.motion.jumps:
             self.phi.vertices_at(jump.phase)
-        self.space(0.0)  # refuses a mesh that cannot be used
+        space = self.space(0.0)  # refuses a mesh that cannot be used
+        if self.phi.is_arc and not is_closed(problem, chosen.phase.lines[[0, -1]], space.xi.support):
+            raise MeshError("paths leave the arc of the phase")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What it is made of; the matrices are assembled again when they are needed."""
@@ -186,10 +201,11 @@ class Generator:
 
     @cached_property
     def loss(self) -> float:
-        """About how many times its rounding elimination may harm T − 1: the size of the free transport over a rate."""
+        """About how many times its rounding elimination may harm T − 1: the size of L, free of forcing, over a rate."""
         orders = ALL_ORDERS if self.problem.diffusions or self.problem.impulses else slice(0, 1)
-        free = self.matrix(0.0, orders=orders).terms[0][0]
-        return 30 * float(abs(free).sum(axis=0).max()) / self.unit_rate
+        space = self.space(0.0)
+        free = [self.matrix(0.0, orders=orders).terms[0][0], *(axis.matrix(None) for axis in space.axes[1:])]
+        return 30 * sum(float(abs(each).sum(axis=0).max()) for each in free) / self.unit_rate
 
     @cached_property
     def keeps_constants(self) -> bool:
@@ -211,6 +227,8 @@ class Generator:
 
         def fastest(xi: Any) -> Any:
             q, speed = growth_rate(system, xi), phase_speed(system, xi)
+            if self.phi.is_arc:
+                return np.max(p * q(self.phi.points[:, None]), axis=0)
             gains = sum(max(0.0, p * jump.log_factor) for jump in system.jumps)
             return p * q.mean + abs(p) * q.amplitude + gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
 

@@ -36,14 +36,16 @@ class LineSpace:
 
     Args:
         lines: the vertices, shape (m + 1,).
-        degree: polynomial degree.
+        degree: polynomial degree, or that in each cell, shape (m,).
         weight: the weight w(x) > 0 of every integral.
         end_exponents: powers with which the weight vanishes at the two ends, honoured by Gauss-Jacobi rules.
         is_flat: whether the function of a vertex has no slope at the next vertices, by what it has of the first
             bubble: jumps of slopes then only couple the functions of one vertex and the bubbles beside it.
 
     Attributes:
-        size: number of unknowns.
+        degree: the highest one.
+        size: number of functions of this degree.
+        kept: which of them are those of the degrees of the cells, shape (size,).
         points: points of the quadrature rules, increasing, shape (n,).
         measure: their weights times w, shape (n,).
         cells: for each unknown the cell that it belongs to, -1 for one shared by two, shape (size,).
@@ -58,19 +60,21 @@ class LineSpace:
     def __init__(
         self,
         lines: FloatArray,
-        degree: int,
+        degree: Any,
         weight: Coefficient = one,
         *,
         end_exponents: tuple[float, float] = (0.0, 0.0),
         is_flat: bool = False,
     ) -> None:
-        self.lines, self.degree, self._sizes = lines, degree, np.diff(lines)
+        self.lines, self._sizes, degrees = lines, np.diff(lines), np.broadcast_to(degree, lines.size - 1)
+        self.degree = degree = int(np.max(degrees))
         dofs = skfem.Dofs(skfem.MeshLine(lines), _element(degree))
         self._dofs, self.size = dofs.element_dofs.T, int(dofs.N)
         self.cells, self.modes = np.full(self.size, -2), np.ones(self.size, dtype=int)
         for j, own in enumerate(self._dofs):  # in each cell skfem numbers two vertex functions, then bubbles by degree
             self.cells[own] = np.where(self.cells[own] == -2, j, -1)
             self.modes[own[2:]] = np.arange(2, own.size)
+        self.kept = (self.modes == 1) | (self.modes <= degrees[self.cells])
         self.first_cells = np.full(self.size, lines.size)
         np.minimum.at(self.first_cells, self._dofs, np.arange(lines.size - 1)[:, None])
         self.ends = self._dofs[[0, -1], [0, 1]]
@@ -83,7 +87,7 @@ class LineSpace:
         tables = [_reference(degree, rule.points.tobytes()) for rule in rules]
         values = np.stack([table[0] for table in tables])
         slopes = np.stack([table[1] for table in tables]) / self._sizes[:, None, None]
-        self._transform, shares = _orthogonalised(slopes, self._measure)
+        self._transform, shares = _orthogonalised(slopes, self._measure, self.kept[self._dofs[:, 2:]])
         squares = np.einsum("cq,cqi->ci", self._measure, (values @ self._transform) ** 2)
         self._norms = np.sqrt(np.bincount(self._dofs.ravel(), squares.ravel(), minlength=self.size))
         self._transform /= self._norms[self._dofs][:, None, :]
@@ -179,14 +183,14 @@ class LineSpace:
         return matrix
 
 
-def _orthogonalised(slopes: FloatArray, measure: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _orthogonalised(slopes: FloatArray, measure: FloatArray, kept: Any) -> tuple[FloatArray, FloatArray]:
     """New functions in the elements' own, shape (m, k + 1, k + 1), so that in every cell ∫ w u′v′ is diagonal.
 
     And what a vertex function holds of each bubble, shape (m, k − 1, 2).
 
     `slopes` are those of the elements' own at points with the weights `measure`, shapes (m, n, k + 1) and (m, n). The
-    bubbles are orthonormalised by QR, and the vertex functions are made orthogonal to them. All functions
-    keep their values at the vertices: bubbles have no trace.
+    bubbles are orthonormalised by QR, and the vertex functions are made orthogonal to those that are kept, a mask of
+    the shape (m, k − 1). All functions keep their values at the vertices: bubbles have no trace.
     """
     slopes = np.sqrt(measure)[..., None] * slopes
     scale = np.linalg.norm(slopes, axis=1)
@@ -198,7 +202,7 @@ def _orthogonalised(slopes: FloatArray, measure: FloatArray) -> tuple[FloatArray
     inverse = np.linalg.solve(r, np.broadcast_to(np.eye(r.shape[1]), r.shape)) / scale[:, 2:, None]
     transform = np.broadcast_to(np.eye(slopes.shape[2]), (len(slopes), *2 * slopes.shape[2:])).copy()
     transform[:, 2:, 2:] = inverse
-    shares = -q.transpose(0, 2, 1) @ slopes[:, :, :2]
+    shares = np.where(kept[:, :, None], -q.transpose(0, 2, 1) @ slopes[:, :, :2], 0.0)
     transform[:, 2:, :2] = inverse @ shares
     return transform, shares
 

@@ -258,7 +258,7 @@ class CellAxis(LineAxis):
     Args:
         noise: the noise.
         lines: vertices in z, within the support of the noise.
-        degree: of the elements.
+        degrees: of the elements in each cell.
         is_killed: whether paths that leave the interval are killed: T = 0 at its ends. Otherwise they are reflected.
 
     Attributes:
@@ -268,7 +268,7 @@ class CellAxis(LineAxis):
         MeshError: a cell's polynomials cannot be told apart under the weight.
     """
 
-    def __init__(self, noise: Noise, lines: FloatArray, degree: int, is_killed: bool = False) -> None:
+    def __init__(self, noise: Noise, lines: FloatArray, degrees: Any, is_killed: bool = False) -> None:
         from fpsolve.fem.line import LineSpace  # scikit-fem takes a while to import
 
         super().__init__(noise)
@@ -278,13 +278,13 @@ class CellAxis(LineAxis):
         end, exponent = noise.half_width / self.unit, noise.end_exponent
         reaches = (lines[0] <= -end * (1 - 1e-12), lines[-1] >= end * (1 - 1e-12))
         ends = (exponent * reaches[0], exponent * reaches[1])
-        self.line = LineSpace(lines, degree, self.weight, end_exponents=ends)
-        inner = np.ones(self.line.size, dtype=bool)
+        self.line = LineSpace(lines, degrees, self.weight, end_exponents=ends)
+        kept = self.line.kept.copy()
         if is_killed:
-            inner[self.line.ends] = False
-        self._inner = np.flatnonzero(inner)
+            kept[self.line.ends] = False
+        self._inner = np.flatnonzero(kept)
         self.points, self.measure, self.values = self.line.points, self.line.measure, self.line.values[:, self._inner]
-        self.size, self.cells, self.modes = self._inner.size, self.line.cells[inner], self.line.modes[inner]
+        self.size, self.cells, self.modes = self._inner.size, self.line.cells[self._inner], self.line.modes[self._inner]
         self.constant = self.line.constant()[self._inner]  # where paths are killed it falls to 0 at the ends
         self.support = self.unit * lines[[0, -1]]
 
@@ -315,7 +315,7 @@ class CellAxis(LineAxis):
 
     def _form(self, matrix: Any) -> Any:
         """Without the functions at killed ends; sparse where it is large."""
-        inner = matrix[self._inner][:, self._inner] if self.is_killed else matrix
+        inner = matrix[self._inner][:, self._inner]
         return inner.toarray() if inner.shape[0] <= MAX_DENSE_UNKNOWNS else inner
 
 

@@ -199,7 +199,7 @@ class Terms(NoiseTerms):
         system = self.system = problem.motion
         self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.axes[1:]
         self._impulses = problem.impulses
-        self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
+        self._vertices, self._jump = self.phi.vertices, self.phi.jump
         self._has_states = [noise.has_states for noise in problem.coloured.parts.values()]
         self._ends = problem.at_values([axis.support for axis in self.noises])
         speed = self._speed_at_ends(self._vertices)

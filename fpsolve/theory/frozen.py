@@ -137,9 +137,10 @@ class FrozenNoise:
             best = int(np.argmax(held.rate(p)))
         return float(held.z[best]), float(held.rate(p)[best])
 
-    def rests(self, p: float) -> bool:
-        """Whether the phase does not turn at the largest F."""
-        return not self._held.turns[np.argmax(self.rate(p))]
+    def rests(self, p: float, lower: float = -math.inf, upper: float = math.inf) -> bool:
+        """Whether the phase does not turn at the largest F between two z."""
+        rate = np.where((self.z >= lower) & (self.z <= upper), self.rate(p), -math.inf)
+        return not self._held.turns[np.argmax(rate)]
 
     def at_the_ends(self, p: float) -> float:
         """The larger F of the outermost z."""

@@ -204,7 +204,7 @@ def test_cells_that_reach_the_ends_of_the_noise_cut_nothing_off():
 
 def test_while_nothing_is_resolved_the_axis_that_lacks_most_is_doubled():
     chosen = Discretisation(PhaseCells(np.array([0.0, 1.0]), np.array([5])), (Polynomials(4), Polynomials(6)))
-    small, large = (ModeEffects(np.array([5]), np.array([size]), np.array([10 * size])) for size in (1e-4, 1.0))
+    small, large = (ModeEffects(np.array([5]), size * np.array([[0.5], [1.0], [5.0], [10.0]])) for size in (1e-4, 1.0))
     assert [part.count for part in chosen.doubled((small, large, small)).noises] == [8, 6]
     assert chosen.doubled((small, large, small)).phase.size == 6
     assert chosen.doubled().size == 8 * chosen.size

@@ -20,9 +20,12 @@ from fpsolve import (
     stability_index,
 )
 from fpsolve.arrays import identity
-from fpsolve.errors import NoSuchExponent, NotConverged
+from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import is_far_out
+from fpsolve.exponent.fields import Nodes
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem.discretisation import Discretisation, PhaseCells
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model import CoefficientMatrix
 from fpsolve.theory import far_places, frozen_noise
@@ -76,6 +79,47 @@ def test_the_far_place_counts(case, p, known):
     if known:
         assert value == pytest.approx(known, rel=1e-2)
     assert "rare paths carry the moment" in result.notes[0]
+
+
+@pytest.mark.parametrize("p", [*sampled(-0.9, -0.1)])
+def test_where_the_phase_rests_an_arc_of_it_will_do(p):
+    """By another code; at p = −0.9 T has peaks at other phases that no mesh resolves."""
+    case = problem(1.0, 0.5, 1.05, 0.1, restitution=0.8, c1=0.1)
+    solution = ExponentSolver(case).solution(p)
+    known, doubt = random_heavy_tails.by_rest(case, p)
+    assert solution.pair.generator.chosen.phase.is_arc
+    assert solution.error < 2e-8 * known
+    assert doubt < 1e-3 * known
+    assert abs(solution.pair.value - known) < solution.error + doubt
+
+
+def test_nothing_beyond_an_arc_counts():
+    """The matrix of the half circle has that of the arc, and nothing beside it in its rows."""
+    case, p = problem(1.0, 0.5, 1.05, 0.1, restitution=0.8, c1=0.1), -0.5
+    pair = ExponentSolver(case).pair(p)
+    arc, part = pair.generator.chosen.phase, pair.generator.chosen.noise
+    inside = math.pi / 2 + np.mod(arc.lines - math.pi / 2, math.pi)
+    lines = np.array([math.pi / 2, *inside, 3 * math.pi / 2])
+    whole = Generator(case, Discretisation(PhaseCells(lines, np.array([5, *arc.degrees, 5])), (part,)))
+    matrix, kept = whole.matrix(p), (whole.phi.cells > 0) & (whole.phi.cells < lines.size - 2)
+    own = pair.generator.matrix(p).toarray()
+    assert np.allclose(matrix.on(0, kept).toarray(), own, rtol=1e-12, atol=1e-12 * np.max(np.abs(own)))
+    rng = np.random.default_rng(1)
+    beside = np.where(np.repeat(kept, part.size), 0.0, rng.standard_normal(whole.size))
+    assert np.max(np.abs((matrix @ beside)[np.repeat(kept, part.size)])) < 1e-14 * matrix.norm
+    assert np.max(np.abs((matrix.T @ beside)[np.repeat(kept, part.size)])) > 1e-3
+    for lines in (arc.lines + 0.3, arc.lines - 0.3):
+        with pytest.raises(MeshError, match="paths leave the arc"):
+            Generator(case, Discretisation(PhaseCells(lines, arc.degrees), (part,)))
+    with pytest.raises(MeshError, match="the ray of a jump"):
+        Generator(case, Discretisation(PhaseCells(np.array([1.5, 4.0]), arc.degrees), (part,)))
+    nodes = Nodes.of(pair)
+    found, phi = nodes.fields(pair), nodes.phi.mean(axis=1)
+    is_inside = np.mod(phi - arc.lines[0], math.pi) < np.ptp(arc.lines)
+    assert np.count_nonzero(is_inside) >= 2
+    known = np.repeat(is_inside, nodes.phi.shape[1])
+    assert np.array_equal(np.isnan(found.right).any(axis=1), ~known)
+    assert np.all(found.adjoint[~known] == 0)
 
 
 @pytest.mark.slow

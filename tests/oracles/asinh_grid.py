@@ -59,7 +59,45 @@ def moment_lyapunov(oscillator, noise, p, *, phases, steps, lower, upper, above,
     return float(np.max(principal.real))
 
 
-def _noise(noise, steps, lower, upper):
+@np.errstate(divide="ignore", invalid="ignore")  # for T of one sign, which is looked at
+def held(oscillator, noise, p, *, phases, steps, lower, upper, above):
+    """The eigenvalue next to `above` whose T has one sign, for paths that are killed where the phase begins to turn.
+
+    Between the ends of ξ the force f = ε(ξ + εc₁) is below −2ω, and dφ/dt = ω + f ½ sin 2φ is positive at φ = π +
+    ¼ω/|f| and negative at φ = π + ½ atan(4ω/|f|). So no path leaves an arc between these for all ξ, and points on it,
+    even in ln(φ − π), will do. Differences look ahead, and are of the second order. Where paths are killed T = 0.
+    """
+    xi, couplings, losses = _noise(noise, steps, lower, upper, is_killed=True)
+    force = oscillator.epsilon * xi + oscillator.epsilon**2 * oscillator.c1
+    ratio = oscillator.omega / -force
+    assert np.all((ratio > 0) & (ratio < 0.5))
+    ends = math.log(0.25 * np.min(ratio)), math.log(0.5 * math.atan(4 * np.max(ratio)))
+    h = (ends[1] - ends[0]) / (phases - 1)
+    phi = np.exp(ends[0] + h * np.arange(phases))  # less π
+    speed = (oscillator.omega + np.outer(force, 0.5 * np.sin(2 * phi))) / phi
+    assert np.all(speed[:, 0] > 0)
+    assert np.all(speed[:, -1] < 0)
+    matrix = sp.kron(sp.diags([couplings, losses, couplings], [-1, 0, 1]), sp.identity(phases))
+    matrix = matrix + sp.diags((p * np.outer(force, np.sin(phi) ** 2)).ravel())
+    for sign in (1, -1):
+        first, second = sp.eye(phases, k=sign), sp.eye(phases, k=2 * sign)
+        ahead = (-3 * sp.identity(phases) + 4 * first - second) / (2 * h)
+        flow = sp.diags(np.maximum(sign * speed, 0).ravel())
+        matrix = matrix + flow @ sp.kron(sp.identity(steps), ahead)
+    lu, found, last = splu((matrix - above * sp.identity(matrix.shape[0])).tocsc()), np.ones(matrix.shape[0]), 0.0
+    for _ in range(100):
+        image = lu.solve(found)
+        distance = float(found @ found / (found @ image))
+        found = image / np.linalg.norm(image)
+        if abs(distance - last) < 1e-10 * abs(above):
+            break
+        last = distance
+    if not abs(found.sum()) > (1 - 1e-6) * np.abs(found).sum():
+        raise ValueError(f"the eigenvalue next to {above:g} has no T of one sign")
+    return above + distance
+
+
+def _noise(noise, steps, lower, upper, is_killed=False):
     """ξ, and the symmetric form of D (P_s T_ξ)_ξ / P_s: what couples neighbours, and the diagonal."""
     unit, diffusion = noise.standard_deviation, 0.5 * noise.diffusion**2
     s = np.linspace(math.asinh(lower / unit), math.asinh(upper / unit), 2 * steps + 1)
@@ -70,4 +108,7 @@ def _noise(noise, steps, lower, upper):
     losses = np.zeros(steps)
     losses[:-1] -= np.exp(flux - mass[:-1])
     losses[1:] -= np.exp(flux - mass[1:])
+    if is_killed:
+        ends = (logs - np.log(slope))[[0, -1]] + math.log(2 * diffusion / step**2)
+        losses[[0, -1]] -= np.exp(ends - mass[[0, -1]])
     return xi[1::2], np.exp(flux - 0.5 * (mass[:-1] + mass[1:])), losses
