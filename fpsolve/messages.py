@@ -416,8 +416,8 @@ class Code(Enum):
         "does; simulate the response instead"
     )
     RESPONSE_WALLS = (
-        "note: no stationary density by finite elements: it is for one wall at most, which is always passed in one "
-        "direction; leave out the others"
+        "note: no stationary response is computed: it is for one wall at most, where a variable is 0 whose rate is c "
+        "times the other one, c > 0; leave out the others"
     )
     RESPONSE_NOISE = (
         "note: no stationary response is computed: it is for one noise with a density, and no white noise, impulses or "

@@ -1,4 +1,4 @@
-"""Whether the cubic terms bring large amplitudes down, without which there is no stationary response.
+"""Whether there is a stationary response, as far as the equation tells: the cubic terms bring large amplitudes down.
 
 Paths start at an amplitude at which the cubic terms are by far larger than the linear ones, at some phases, and follow
 the equation with the noise held at its mean. In the plane paths do not cross: where one comes back to its phase lower,
@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.messages import Code, Message
 from fpsolve.model.frame import amplitude_frame
-from fpsolve.model.plane import CoefficientMatrix, matrix_at
+from fpsolve.model.plane import CoefficientMatrix, is_steady, matrix_at
 from fpsolve.model.problem import Problem
 
 LEVEL = 1e6
@@ -29,7 +30,23 @@ MOST = 500.0
 """Of 2 ln a, for trial steps that go too far."""
 MOST_STEPS = 2000
 """Of one path; one that is not lower by then counts as growing."""
+ROUNDED = 1e-12
+"""Of the largest coefficient, below which the cubic terms do not turn a ray."""
 Field = Callable[[float, FloatArray], tuple[float, float]]
+
+
+def no_response(problem: Problem) -> Message | None:
+    """Why there is no stationary response, or none is computed, whatever λ is."""
+    system = problem.system
+    if system.cubic is None:
+        return Message(Code.RESPONSE_LINEAR)
+    if len(problem.coloured.parts) > 1 or problem.diffusions or problem.impulses or problem.coloured.has_states:
+        return Message(Code.RESPONSE_NOISE)
+    size = ROUNDED * float(np.max(np.abs(system.cubic.matrix)))
+    is_passed = [is_steady(system, each) and abs(float(system.cubic.h(each.phase))) <= size for each in system.jumps]
+    if len(is_passed) > 1 or not all(is_passed):
+        return Message(Code.RESPONSE_WALLS)
+    return None if comes_down(problem) else Message(Code.RESPONSE_GROWS)
 
 
 def comes_down(problem: Problem) -> bool:
