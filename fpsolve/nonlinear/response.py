@@ -56,7 +56,7 @@ class StationaryResponse(Result, NearRest):
         balance: E[q] + ln R times the flux of ρ at the impacts, q the growth rate of ln a: 0 but for its error.
         stability_index: δ_p of the linear system.
         unknowns: of the largest system solved.
-        interval: of u = ln a − γ(φ), below which the tail of the linear system holds.
+        interval: of ln a in the middle of the half-turn, below which the tail of the linear system holds.
         settled: the density's coefficients, and coarser ones.
     """
 
@@ -228,7 +228,7 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryRe
     errors[-1] *= AT_ONE_PHASE
     estimates = list(map(Estimate, found.tolist(), errors.tolist(), scales.tolist()))
     numbers = dict(zip(problem.system.response.numbers, estimates, strict=False))
-    lines = settled.solution.height.lines
+    lines = settled.solution.height.lines + search.flow.log_unit
     return StationaryResponse(
         problem, rtol, numbers, numbers.pop("impact_rate", None), estimates[-1], index, search.unknowns,
         (float(lines[0]), float(lines[-1])), settled,
