@@ -56,9 +56,9 @@ def comes_down(problem: Problem) -> bool:
         return False
     linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.coloured.mean).tolist())).matrix
     cubic = frame.cubic(system.cubic).matrix
-    begin = 0.5 * math.log(LEVEL * float(np.linalg.norm(linear) / np.linalg.norm(cubic)))
+    begin = 0.5 * math.log(LEVEL)
     most = begin - LEAST - math.fsum(jump.log_factor for jump in system.jumps)
-    field = _field(np.array(linear), np.array(cubic))
+    field = _field(linear / np.linalg.norm(linear), cubic / np.linalg.norm(cubic))  # in units of their own
     with warnings.catch_warnings(action="ignore"):  # of a path that goes to infinity
         return all(_falls(field, begin, most, math.pi * k / PHASES) for k in range(PHASES))
 
