@@ -47,8 +47,10 @@ LEAST_DAMPING = 0.01
 """The least κ with which it begins, over the largest damping at a phase."""
 FURTHER = 0.5
 """How far the lower end of u moves in a step."""
-SEEN = 1e-3
-"""Of E aⁿ, above which the share of an element is no wave that is not resolved."""
+SEEN = math.inf
+"""Of E aⁿ, above which the share of an element is no wave that is not resolved, if it is certain."""
+CERTAIN = 0.5
+"""Of a share, below which it changes with the phase and the noise if it is certain."""
 SLOW = 0.25
 """The ratio of the last two shares of E a⁴ from which on the upper end is compared with one an element lower."""
 MOST_HIGHER = 2
@@ -208,7 +210,11 @@ class Settled:
 
     def fall(self, n: int) -> Fall:
         """Of E aⁿ above."""
-        return Fall.of(self.solution, n)
+        lines, shares = self.solution.height.lines, self.solution.shares(n)
+        alike = [each for each in self.lower if np.array_equal(each.height.lines, lines)]
+        changes = np.max([np.abs(shares - each.shares(n)) for each in alike], axis=0)
+        is_seen = (np.abs(shares) > SEEN * np.abs(shares).sum()) & (changes < CERTAIN * np.abs(shares))
+        return Fall.of(np.abs(shares), is_seen, lines)
 
     def compared(self, numbers: Callable[[Solution], Any]) -> tuple[Any, FloatArray]:
         """Numbers of the solution, and by how much they change in each direction."""
@@ -238,10 +244,10 @@ class Fall:
     ratio: float
 
     @classmethod
-    def of(cls, solution: Solution, n: int) -> Fall:
-        shares, lines = np.abs(solution.shares(n)), solution.height.lines
-        last, ratio, seen = int(np.argmax(shares)), 1.0, SEEN * shares.sum()
-        while last + 1 < shares.size and (shares[last + 1] < ratio * shares[last] or shares[last + 1] > seen):
+    def of(cls, shares: FloatArray, is_seen: Any, lines: FloatArray) -> Fall:
+        """From the shares of elements between vertices, and which of them are no waves, whether they fall or not."""
+        last, ratio = int(np.argmax(shares)), 1.0
+        while last + 1 < shares.size and (shares[last + 1] < ratio * shares[last] or is_seen[last + 1]):
             last, ratio = last + 1, float(shares[last + 1] / shares[last])
         share = shares[last] / shares.sum() * (ratio / (1 - ratio) if ratio < 1 else 1)
         return cls(float(lines[last + 1]), float(lines[-1] - lines[-2]), float(share), ratio)
