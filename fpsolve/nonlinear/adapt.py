@@ -47,7 +47,7 @@ LEAST_DAMPING = 0.01
 """The least κ with which it begins, over the largest damping at a phase."""
 FURTHER = 0.5
 """How far the lower end of u moves in a step."""
-SEEN = math.inf
+SEEN = 1e-3
 """Of E aⁿ, above which the share of an element is no wave that is not resolved, if it is certain."""
 CERTAIN = 0.5
 """Of a share, below which it changes with the phase and the noise if it is certain."""
