@@ -408,8 +408,8 @@ class Code(Enum):
         "degree 3; in a linear system nothing limits the amplitude"
     )
     RESPONSE_GROWS = (
-        "note: no stationary response: without noise the terms of degree 3 do not bring large amplitudes down; add "
-        "damping of degree 3, or change their signs"
+        "note: no stationary response is computed: without noise the terms of degree 3 do not bring large amplitudes "
+        "down, or hardly; add damping of degree 3, or change their signs"
     )
     RESPONSE_RAYS = (
         "note: no stationary density by finite elements: the phase never leaves φ = {phase:.6g}, whatever the noise "
@@ -431,7 +431,9 @@ class Code(Enum):
         "note: no stationary response: λ = {value:.6g} ± {error:.1g} is not positive, so that almost every path comes "
         "to rest"
     )
-    RESPONSE_NO_INDEX = "note: no stationary density by finite elements: there is no δ_p: {reason}"
+    RESPONSE_NO_INDEX = (
+        "note: no stationary density by finite elements: there is no δ_p: {reason}; simulate the response instead"
+    )
     RESPONSE_TOO_LARGE = (
         "failure: the stationary response did not converge: its means still change by {size:.1e} of them, and the next "
         "discretisation has {unknowns} unknowns, more than {most}; use a larger rtol"
