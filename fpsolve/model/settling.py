@@ -54,8 +54,8 @@ def comes_down(problem: Problem) -> bool:
     system, frame = problem.system, amplitude_frame(problem.system)
     if system.cubic is None:
         return False
-    linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.coloured.mean).tolist())).matrix
-    cubic = frame.cubic(system.cubic).matrix
+    linear = np.array(frame.term(CoefficientMatrix(0, matrix_at(system, problem.coloured.mean).tolist())).matrix)
+    cubic = np.array(frame.cubic(system.cubic).matrix)
     begin = 0.5 * math.log(LEVEL)
     most = begin - LEAST - math.fsum(jump.log_factor for jump in system.jumps)
     field = _field(linear / np.linalg.norm(linear), cubic / np.linalg.norm(cubic))  # in units of their own
