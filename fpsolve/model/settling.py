@@ -58,7 +58,7 @@ def comes_down(problem: Problem) -> bool:
     cubic = np.array(frame.cubic(system.cubic).matrix)
     begin = 0.5 * math.log(LEVEL)
     most = begin - LEAST - math.fsum(jump.log_factor for jump in system.jumps)
-    field = _field(linear / np.linalg.norm(linear), cubic / np.linalg.norm(cubic))  # in units of their own
+    field = _field(linear / (np.linalg.norm(linear) or 1.0), cubic / np.linalg.norm(cubic))  # in units of their own
     with warnings.catch_warnings(action="ignore"):  # of a path that goes to infinity
         return all(_falls(field, begin, most, math.pi * k / PHASES) for k in range(PHASES))
 
@@ -85,7 +85,7 @@ def _falls(field: Field, begin: float, most: float, phi: float) -> bool:
     solver = LSODA(field, 0.0, np.array([begin, phi]), math.inf, rtol=1e-7, atol=1e-9)
     for _ in range(MOST_STEPS):
         solver.step()
-        if solver.status == "failed" or solver.y[0] > begin + HIGHER:
+        if solver.status != "running" or solver.y[0] > begin + HIGHER:  # or it stands still
             return False
         if solver.y[0] <= begin - LOWER:
             return True

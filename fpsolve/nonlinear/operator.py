@@ -108,7 +108,8 @@ class Flow:
         assert cubic is not None
         linear = matrix_at(self.problem.system, self.problem.coloured.mean).tolist()
         both = self.frame.term(CoefficientMatrix(0, linear)).matrix, self.frame.cubic(cubic).matrix
-        return 0.5 * float(np.log(np.linalg.norm(both[0]) / np.linalg.norm(both[1])))
+        rates = [float(np.linalg.norm(each)) for each in both]
+        return 0.5 * math.log((rates[0] or 1 / self.problem.coloured.correlation_time) / rates[1])
 
     @cached_property
     def linear(self) -> Sequence[Rate]:

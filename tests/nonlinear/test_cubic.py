@@ -219,6 +219,14 @@ class Walled(System):
     cubic: ClassVar[CubicTerms] = CubicTerms(((0.0, 0.0, 0.0, 0.0), (0.0, -1.0, 0.0, 0.0)))
 
 
+@pytest.mark.parametrize("cubic", ["x**3", "0.1*x**2*y"])
+def test_noise_may_be_the_only_linear_term(cubic):
+    """It is refused by name, not by a fault: no phase of it is left, or large amplitudes grow."""
+    system = PlaneSystem.of_equations(("x", "y"), (f"xi*x - {cubic}", "-xi*y - y**3"))
+    with pytest.raises(FpsolveError, match=r"never leaves|do not bring"):
+        stationary_response(system, NOISE, rtol=0.1)
+
+
 @pytest.mark.parametrize("phases", [(0.0, math.pi / 2), (0.0,), (0.3,)])
 def test_other_walls_are_refused(phases):
     """Two of them, and one that the noise or the cubic terms move the phase across."""
