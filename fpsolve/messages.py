@@ -408,16 +408,16 @@ class Code(Enum):
         "degree 3; in a linear system nothing limits the amplitude"
     )
     RESPONSE_GROWS = (
-        "note: no stationary response: without noise the terms of degree 3 do not bring large amplitudes down; add "
-        "damping of degree 3, or change their signs"
+        "note: no stationary response is computed: without noise the terms of degree 3 do not bring large amplitudes "
+        "down, or hardly; add damping of degree 3, or change their signs"
     )
     RESPONSE_RAYS = (
         "note: no stationary density by finite elements: the phase never leaves φ = {phase:.6g}, whatever the noise "
         "does; simulate the response instead"
     )
     RESPONSE_WALLS = (
-        "note: no stationary density by finite elements: it is for one wall at most, which is always passed in one "
-        "direction; leave out the others"
+        "note: no stationary response is computed: it is for one wall at most, where a variable is 0 whose rate is c "
+        "times the other one, c > 0; leave out the others"
     )
     RESPONSE_NOISE = (
         "note: no stationary response is computed: it is for one noise with a density, and no white noise, impulses or "
@@ -431,7 +431,9 @@ class Code(Enum):
         "note: no stationary response: λ = {value:.6g} ± {error:.1g} is not positive, so that almost every path comes "
         "to rest"
     )
-    RESPONSE_NO_INDEX = "note: no stationary density by finite elements: there is no δ_p: {reason}"
+    RESPONSE_NO_INDEX = (
+        "note: no stationary density by finite elements: there is no δ_p: {reason}; simulate the response instead"
+    )
     RESPONSE_TOO_LARGE = (
         "failure: the stationary response did not converge: its means still change by {size:.1e} of them, and the next "
         "discretisation has {unknowns} unknowns, more than {most}; use a larger rtol"

@@ -13,7 +13,7 @@ import numpy as np
 
 from fpsolve import ExponentSolver, lyapunov_exponent, stability_index
 from fpsolve.model import NonGaussianNoise, PlaneSystem, Problem, VibroImpactOscillator
-from fpsolve.model.limit import comes_down
+from fpsolve.model.settling import comes_down
 from fpsolve.nonlinear import stationary_response
 from fpsolve.simulation import simulated_response
 

@@ -17,6 +17,7 @@ from .noises.telegraph import Telegraph as Telegraph
 from .noises.white import Interpretation as Interpretation
 from .noises.white import White as White
 from .plane import CoefficientMatrix as CoefficientMatrix
+from .plane import CubicTerms as CubicTerms
 from .plane import Jump as Jump
 from .plane import System as System
 from .problem import Problem as Problem

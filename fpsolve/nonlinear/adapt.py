@@ -3,7 +3,7 @@
 Each direction has two levels. What the means change from the lower to the higher one is taken for what the higher one
 lacks; where they converge this is more than it does lack. The lower end of the interval is a direction, too: it is
 compared with an interval that is shorter by one element. What lies above the upper end follows from the shares of E a⁴
-in the last two elements, as ρ falls faster and faster there.
+in the last two elements, as ρ falls faster and faster there; where it falls slowly that end is compared, too.
 """
 
 from __future__ import annotations
@@ -47,6 +47,12 @@ LEAST_DAMPING = 0.01
 """The least κ with which it begins, over the largest damping at a phase."""
 FURTHER = 0.5
 """How far the lower end of u moves in a step."""
+SEEN = 1e-3
+"""Of E aⁿ, above which the share of an element is no wave that is not resolved, if it is certain."""
+CERTAIN = 0.5
+"""Of a share, below which it changes with the phase and the noise if it is certain."""
+SLOW = 0.25
+"""The ratio of the last two shares of E a⁴ from which on the upper end is compared with one an element lower."""
 MOST_HIGHER = 2
 """Elements by which the upper end moves in a step."""
 ROUNDING = 1e-12
@@ -135,16 +141,25 @@ class Search:
         for _ in range(MOST_STAGES):
             lower = [tuple(level - (k == own) for own, level in enumerate(levels)) for k in range(len(levels))]
             found = Settled(self.solve(levels, top), tuple(self.solve(each, top) for each in lower))
-            numbers, changes = found.compared(self._numbers)
-            scales = np.abs(numbers[:-1])
-            errors = found.errors(changes, np.append(scales, self.rate))
-            self._reached = float(np.max(errors[:-1] / scales))
+            numbers, changes, errors = self._judged(found)
+            fall = found.fall(4)
+            if self._reached <= self.rtol and fall.ratio > SLOW:
+                found = replace(found, lower=(*found.lower, self.solve(levels, top - fall.step)))
+                numbers, changes, errors = self._judged(found)
             if self._reached <= self.rtol:
                 return found, numbers, errors
-            worst = np.max(changes[:, :-1] / (self.rtol * scales), axis=1)
+            worst = np.max(changes[: len(levels), :-1] / (self.rtol * np.abs(numbers[:-1])), axis=1)
             levels = tuple(int(n) for n in np.array(levels) + (worst > min(SHARE, worst.max() / 2)) + (worst > FAR))
-            top = found.fall(4).top(ABOVE * self.rtol)
+            top = max(fall.top(ABOVE * self.rtol), top + fall.step * (len(changes) > len(worst)))
         raise NotConverged(Message(Code.RESPONSE_OPEN, size=self._reached))
+
+    def _judged(self, found: Settled) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The means of a density, by how much they change in each direction, and their errors."""
+        numbers, changes = found.compared(self._numbers)
+        scales = np.abs(numbers[:-1])
+        errors = found.errors(changes, np.append(scales, self.rate))
+        self._reached = float(np.max(errors[:-1] / scales))
+        return numbers, changes, errors
 
     @cached_property
     def base(self) -> Choice:
@@ -187,7 +202,7 @@ class Settled:
 
     Attributes:
         solution: on the finest discretisation.
-        lower: on one that is coarser in each direction.
+        lower: on one that is coarser in each direction; last on an interval that ends lower, where E a⁴ falls slowly.
     """
 
     solution: Solution
@@ -195,7 +210,11 @@ class Settled:
 
     def fall(self, n: int) -> Fall:
         """Of E aⁿ above."""
-        return Fall.of(self.solution, n)
+        lines, shares = self.solution.height.lines, self.solution.shares(n)
+        alike = [each for each in self.lower if np.array_equal(each.height.lines, lines)]
+        changes = np.max([np.abs(shares - each.shares(n)) for each in alike], axis=0)
+        is_seen = (np.abs(shares) > SEEN * np.abs(shares).sum()) & (changes < CERTAIN * np.abs(shares))
+        return Fall.of(np.abs(shares), is_seen, lines)
 
     def compared(self, numbers: Callable[[Solution], Any]) -> tuple[Any, FloatArray]:
         """Numbers of the solution, and by how much they change in each direction."""
@@ -210,13 +229,13 @@ class Settled:
 
 @dataclass(frozen=True)
 class Fall:
-    """How E aⁿ falls in the uppermost elements of u: faster and faster, as far up as it is resolved.
+    """How E aⁿ falls in the uppermost elements of u: faster and faster where it is small, as far up as it is resolved.
 
     Attributes:
         end: up to where it does.
         step: the length of an element.
         share: what lies above `end`.
-        ratio: of the shares of the last two elements below; 1 if they do not fall.
+        ratio: of the shares of the last two elements below; 1 or more if they do not fall.
     """
 
     end: float
@@ -225,10 +244,10 @@ class Fall:
     ratio: float
 
     @classmethod
-    def of(cls, solution: Solution, n: int) -> Fall:
-        shares, lines = np.abs(solution.shares(n)), solution.height.lines
+    def of(cls, shares: FloatArray, is_seen: Any, lines: FloatArray) -> Fall:
+        """From the shares of elements between vertices, and which of them are no waves, whether they fall or not."""
         last, ratio = int(np.argmax(shares)), 1.0
-        while last + 1 < shares.size and shares[last + 1] < ratio * shares[last]:
+        while last + 1 < shares.size and (shares[last + 1] < ratio * shares[last] or is_seen[last + 1]):
             last, ratio = last + 1, float(shares[last + 1] / shares[last])
         share = shares[last] / shares.sum() * (ratio / (1 - ratio) if ratio < 1 else 1)
         return cls(float(lines[last + 1]), float(lines[-1] - lines[-2]), float(share), ratio)
@@ -239,7 +258,7 @@ class Fall:
 
     def top(self, share: float) -> float:
         """A place above which there is about a share, if what is above falls like exp(−const e^{2u}); not far above."""
-        if self.ratio == 1:
+        if self.ratio >= 1:
             return self.end + self.step
         rate = math.log(1 / self.ratio) / -math.expm1(-2 * self.step)
         return self.end + min(0.5 * math.log1p(max(0.0, math.log(self.share / share)) / rate), MOST_HIGHER * self.step)

@@ -8,7 +8,8 @@ and d ln a = q dt with
 for the oscillator of Eq. (3) h₃ = −N sin φ cos φ, q₃ = −N sin²φ, N = ε²(c₂ cos²φ + c₃ ω² sin²φ). At a wall, on the ray
 φ_w, ln a jumps by ln R. The gauge ln a = u + γ(φ), γ = ∓(ln R/π)(φ − φ_w + π/2) on the half-turn that ends at φ_w, with
 the upper sign where φ grows there, makes u continuous, and a² = e^{2u} e^{2γ}, so that with du/dt = q − γ′h every term
-is a product of functions of u, φ and ξ. A density ρ = P_s(ξ) Σ c w over (u, φ, ξ) is stationary where
+is a product of functions of u, φ and ξ. γ has the logarithm of a unit of a besides, so that u is of the order of 1
+where the cubic terms are as large as the linear ones. A density ρ = P_s(ξ) Σ c w over (u, φ, ξ) is stationary where
 
     ∫ ρ (u̇ ∂w/∂u + φ̇ ∂w/∂φ + L_ξ w) = what flows over the ends of the interval of u,    for every test function w.
 
@@ -30,7 +31,7 @@ from fpsolve.arrays import Coefficient, FloatArray, dense, identity, one
 from fpsolve.fem.discretisation import NoisePart
 from fpsolve.fem.line import LineSpace
 from fpsolve.model.frame import Frame, amplitude_frame
-from fpsolve.model.plane import CoefficientMatrix
+from fpsolve.model.plane import CoefficientMatrix, matrix_at
 from fpsolve.model.problem import Problem
 
 HALF_TURN = np.array([-0.5, 0.5]) * math.pi
@@ -98,7 +99,17 @@ class Flow:
 
     def gauge(self, phi: FloatArray) -> FloatArray:
         """γ(φ), for φ in the half-turn."""
-        return -self.log_factor / math.pi * (phi - self.half_turn.mean())
+        return self.log_unit - self.log_factor / math.pi * (phi - self.half_turn.mean())
+
+    @cached_property
+    def log_unit(self) -> float:
+        """The mean of γ: ln a where the cubic terms are as large as the linear ones, a unit of a."""
+        cubic = self.problem.system.cubic
+        assert cubic is not None
+        linear = matrix_at(self.problem.system, self.problem.coloured.mean).tolist()
+        both = self.frame.term(CoefficientMatrix(0, linear)).matrix, self.frame.cubic(cubic).matrix
+        rates = [float(np.linalg.norm(each)) for each in both]
+        return 0.5 * math.log((rates[0] or 1 / self.problem.coloured.correlation_time) / rates[1])
 
     @cached_property
     def linear(self) -> Sequence[Rate]:

@@ -23,10 +23,9 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import lyapunov_exponent, stability_index
 from fpsolve.messages import Code, Message
-from fpsolve.model.limit import comes_down
-from fpsolve.model.plane import is_steady
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import IMPACT_RATE
+from fpsolve.model.settling import no_response
 from fpsolve.nonlinear.adapt import Search, Settled
 from fpsolve.nonlinear.elimination import Solution
 from fpsolve.nonlinear.operator import Flow
@@ -57,7 +56,7 @@ class StationaryResponse(Result, NearRest):
         balance: E[q] + ln R times the flux of ρ at the impacts, q the growth rate of ln a: 0 but for its error.
         stability_index: δ_p of the linear system.
         unknowns: of the largest system solved.
-        interval: of u = ln a − γ(φ), below which the tail of the linear system holds.
+        interval: of ln a in the middle of the half-turn, below which the tail of the linear system holds.
         settled: the density's coefficients, and coarser ones.
     """
 
@@ -229,40 +228,25 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryRe
     errors[-1] *= AT_ONE_PHASE
     estimates = list(map(Estimate, found.tolist(), errors.tolist(), scales.tolist()))
     numbers = dict(zip(problem.system.response.numbers, estimates, strict=False))
-    lines = settled.solution.height.lines
+    lines = settled.solution.height.lines + search.flow.log_unit
     return StationaryResponse(
         problem, rtol, numbers, numbers.pop("impact_rate", None), estimates[-1], index, search.unknowns,
         (float(lines[0]), float(lines[-1])), settled,
     )  # fmt: skip
 
 
-def no_response(problem: Problem) -> Message | None:
-    """Why there is no stationary response that is computed here, as far as it is known without solving."""
-    system = problem.system
-    if system.cubic is None:
-        return Message(Code.RESPONSE_LINEAR)
-    if len(problem.coloured.parts) > 1 or problem.diffusions or problem.impulses or problem.coloured.has_states:
-        return Message(Code.RESPONSE_NOISE)
-    if problem.coloured.has_algebraic_tails:
-        return Message(Code.RESPONSE_TAILS)
-    if rays := problem.invariant_rays:
-        return Message(Code.RESPONSE_RAYS, phase=rays[0])
-    size = 1e-12 * float(np.max(np.abs(system.cubic.matrix)))
-    is_passed = [is_steady(system, each) and abs(float(system.cubic.h(each.phase))) <= size for each in system.jumps]
-    if len(is_passed) > 1 or not all(is_passed):
-        return Message(Code.RESPONSE_WALLS)
-    return None
-
-
 def _linear(problem: Problem) -> tuple[float, float]:
     """λ and δ_p of the linear system. Raises `FpsolveError` where there is no stationary response."""
-    if reason := no_response(problem):
+    reason = no_response(problem)
+    if reason is None and problem.coloured.has_algebraic_tails:
+        reason = Message(Code.RESPONSE_TAILS)
+    if reason is None and (rays := problem.invariant_rays):
+        reason = Message(Code.RESPONSE_RAYS, phase=rays[0])
+    if reason is not None:
         raise FpsolveError(reason)
     rate = lyapunov_exponent(problem)
     if not rate.value > rate.error_estimate:
         raise FpsolveError(Message(Code.RESPONSE_DIES, value=rate.value, error=rate.error_estimate))
-    if not comes_down(problem):
-        raise FpsolveError(Message(Code.RESPONSE_GROWS))
     index = stability_index(problem)
     if not index:
         raise FpsolveError(Message(Code.RESPONSE_NO_INDEX, reason=index.reason))

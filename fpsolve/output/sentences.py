@@ -29,8 +29,9 @@ def sentence(case: Case, result: CurveResult) -> str:
     found = result.moments
     rows = zip(found.p.tolist(), found.value.tolist(), found.error_estimate.tolist(), strict=True)
     second = next(((each, error) for p, each, error in rows if p == 2 and abs(each) > error), None)
-    if exponent.value > 0 and result.response is not None:
-        return f"Almost every path grows from rest ({value}) and settles into the stationary response."
+    if exponent.value > 0 and result.curve.problem.system.is_nonlinear:
+        rest = " and settles into the stationary response" if result.response is not None else ""
+        return f"Almost every path grows from rest ({value}){rest}."
     if exponent.value > 0:
         return f"Almost every path grows ({value}): it passes every level in the end."
     text, is_rare = f"Almost every path decays ({value})", second is not None and second[0] > 0

@@ -16,10 +16,10 @@ from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
 from fpsolve.model.frame import amplitude_frame
-from fpsolve.model.limit import comes_down
-from fpsolve.model.plane import System, angular_frequency
+from fpsolve.model.plane import Jump, System, angular_frequency, matrix_at
 from fpsolve.model.problem import Problem, of_problem
 from fpsolve.model.quantity import IMPACT_RATE, OSCILLATOR_RESPONSE, ResponseQuantities
+from fpsolve.model.settling import no_response
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.bounces import advance_and_count, motion_of
 from fpsolve.simulation.setup import BATCHES, simulated_parts, starting_state
@@ -229,14 +229,18 @@ def simulated_response(
 
 def no_simulation(problem: Problem) -> Message | None:
     """Why the response of a problem is not simulated, or there is none."""
-    system = problem.system
-    if system.cubic is None:
-        return Message(Code.RESPONSE_LINEAR)
-    if len(problem.coloured.parts) > 1 or problem.diffusions or problem.impulses or problem.coloured.has_states:
-        return Message(Code.RESPONSE_NOISE)
-    if not comes_down(problem):
-        return Message(Code.RESPONSE_GROWS)
-    return None
+    reason = no_response(problem)
+    if reason is None and any(not _is_wall(problem.system, jump) for jump in problem.system.jumps):
+        reason = Message(Code.RESPONSE_WALLS)
+    return reason
+
+
+def _is_wall(system: System, jump: Jump) -> bool:
+    """Whether a variable is 0 where a jump is, whose rate there grows with the other one."""
+    matrix = matrix_at(system, 0.0)
+    at = np.array([math.cos(jump.phase), math.sin(jump.phase)])
+    k = int(np.argmin(np.abs(at)))
+    return abs(at[k]) < 1e-12 and matrix[k, 1 - k] > 0
 
 
 def _damping(system: System) -> float:

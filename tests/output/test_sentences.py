@@ -1,6 +1,7 @@
 """What the terminal, summary.json and the report say of excursions, and in one sentence of a curve."""
 
 import json
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -91,6 +92,13 @@ def test_a_sentence_says_what_there_is(tmp_path, changes, words):
     found = sentence(case, result)
     assert words in found
     assert bool(words) == bool(found)
+
+
+def test_no_path_passes_every_level_where_a_stationary_response_is_not_known(tmp_path):
+    """Here none is computed, as the noise is a chain."""
+    case = case_in(tmp_path, TEXT, ["system.zeta=0.01", "system.drift=['v', '-x - 2*zeta*v - v**3 - xi*x']"])
+    [result] = solve_case(case)
+    assert re.fullmatch(r"Almost every path grows from rest \(λ = 0\.\d+\)\.", sentence(case, result))
 
 
 def test_a_table_over_a_parameter_has_a_column(tmp_path, capsys):

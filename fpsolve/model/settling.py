@@ -1,4 +1,4 @@
-"""Whether the cubic terms bring large amplitudes down, without which there is no stationary response.
+"""Whether there is a stationary response, as far as the equation tells: the cubic terms bring large amplitudes down.
 
 Paths start at an amplitude at which the cubic terms are by far larger than the linear ones, at some phases, and follow
 the equation with the noise held at its mean. In the plane paths do not cross: where one comes back to its phase lower,
@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.messages import Code, Message
 from fpsolve.model.frame import amplitude_frame
-from fpsolve.model.plane import CoefficientMatrix, matrix_at
+from fpsolve.model.plane import CoefficientMatrix, is_steady, matrix_at
 from fpsolve.model.problem import Problem
 
 LEVEL = 1e6
@@ -29,7 +30,23 @@ MOST = 500.0
 """Of 2 ln a, for trial steps that go too far."""
 MOST_STEPS = 2000
 """Of one path; one that is not lower by then counts as growing."""
+ROUNDED = 1e-12
+"""Of the largest coefficient, below which the cubic terms do not turn a ray."""
 Field = Callable[[float, FloatArray], tuple[float, float]]
+
+
+def no_response(problem: Problem) -> Message | None:
+    """Why there is no stationary response, or none is computed, whatever λ is."""
+    system = problem.system
+    if system.cubic is None:
+        return Message(Code.RESPONSE_LINEAR)
+    if len(problem.coloured.parts) > 1 or problem.diffusions or problem.impulses or problem.coloured.has_states:
+        return Message(Code.RESPONSE_NOISE)
+    size = ROUNDED * float(np.max(np.abs(system.cubic.matrix)))
+    is_passed = [is_steady(system, each) and abs(float(system.cubic.h(each.phase))) <= size for each in system.jumps]
+    if len(is_passed) > 1 or not all(is_passed):
+        return Message(Code.RESPONSE_WALLS)
+    return None if comes_down(problem) else Message(Code.RESPONSE_GROWS)
 
 
 def comes_down(problem: Problem) -> bool:
@@ -37,11 +54,11 @@ def comes_down(problem: Problem) -> bool:
     system, frame = problem.system, amplitude_frame(problem.system)
     if system.cubic is None:
         return False
-    linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.coloured.mean).tolist())).matrix
-    cubic = frame.cubic(system.cubic).matrix
-    begin = 0.5 * math.log(LEVEL * float(np.linalg.norm(linear) / np.linalg.norm(cubic)))
+    linear = np.array(frame.term(CoefficientMatrix(0, matrix_at(system, problem.coloured.mean).tolist())).matrix)
+    cubic = np.array(frame.cubic(system.cubic).matrix)
+    begin = 0.5 * math.log(LEVEL)
     most = begin - LEAST - math.fsum(jump.log_factor for jump in system.jumps)
-    field = _field(np.array(linear), np.array(cubic))
+    field = _field(linear / (np.linalg.norm(linear) or 1.0), cubic / np.linalg.norm(cubic))  # in units of their own
     with warnings.catch_warnings(action="ignore"):  # of a path that goes to infinity
         return all(_falls(field, begin, most, math.pi * k / PHASES) for k in range(PHASES))
 
@@ -68,7 +85,7 @@ def _falls(field: Field, begin: float, most: float, phi: float) -> bool:
     solver = LSODA(field, 0.0, np.array([begin, phi]), math.inf, rtol=1e-7, atol=1e-9)
     for _ in range(MOST_STEPS):
         solver.step()
-        if solver.status == "failed" or solver.y[0] > begin + HIGHER:
+        if solver.status != "running" or solver.y[0] > begin + HIGHER:  # or it stands still
             return False
         if solver.y[0] <= begin - LOWER:
             return True
