@@ -64,8 +64,10 @@ FREE_STAGES = 4
 """From this number of stages on, no cell is made coarser."""
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
+ALONE = 0.5
+"""The same for one that serves no other p."""
 MOST_GAIN = 1e-3
-"""Of an error in one stage of a large system: beyond, its fall is foreseen badly, and every unknown costs."""
+"""Of an error in one stage with cells of the noise: beyond, its fall is foreseen badly, and every unknown costs."""
 CORNERS = 0.3
 """Share that all cells at corners may lack."""
 FEWEST_CELLS, FALL_PER_CELL = 4, 8.0
@@ -463,8 +465,15 @@ class _Search:
             if error <= allowed:
                 return solution
             self.note(solution, error, allowed)
-            goal = max(allowed, MOST_GAIN * error if chosen.size > WORTH_A_TRY else 0.0)
-            chosen = chosen.enriched() if seems_enough else refined(solution, goal, self.stages)
+            goal = max(allowed, MOST_GAIN * error) if chosen.noise.lines.size else allowed
+            chosen = chosen.enriched() if seems_enough else self.affordable(solution, goal)
+
+    def affordable(self, solution: Solution, goal: float) -> Discretisation:
+        """A refined discretisation; where it takes more unknowns than there are, one that does for this p alone."""
+        found = refined(solution, goal, self.stages)
+        if found.size <= self.place.budget.unknowns:
+            return found
+        return refined(solution, ALONE / SHARE * goal, self.stages)
 
     def check(self, chosen: Discretisation) -> None:
         """Refuse a stage beyond the budget, and count it."""

@@ -71,7 +71,7 @@ class ModeEffects:
     @property
     def of_cells(self) -> FloatArray:
         """Estimate of what each cell lacks, half way from the effect of two modes to what its slower fall predicts."""
-        left = np.sqrt(np.max(self.highest[:2] / np.maximum(self.highest[2:], 1e-300), axis=0))
+        left = np.sqrt(self._left_by_two)
         shares = np.clip(left, self.slowest, 1.0)
         return self.two * (shares if self.corners is None else np.maximum(shares, self.corners))
 
@@ -87,8 +87,16 @@ class ModeEffects:
     @property
     def fall(self) -> FloatArray:
         """By how much the logarithm of the effect falls with each degree, shape (cells,)."""
-        four = self.highest[3]
-        return np.maximum(0.5 * np.log(np.maximum(four, 1e-300) / np.maximum(self.two, 1e-300)), 0.3)
+        return np.maximum(-0.5 * np.log(np.maximum(self._left_by_two, 1e-300)), 0.3)
+
+    @property
+    def _left_by_two(self) -> FloatArray:
+        """What two degrees leave of the effect, as it has fallen to that of two modes and, if more slowly, of one.
+
+        In cells of few modes the effect of one tells nothing.
+        """
+        of_one, of_two = self.highest[:2] / np.maximum(self.highest[2:], 1e-300)
+        return np.where(self.degrees >= SPLIT_DEGREE, np.maximum(of_one, of_two), of_two)
 
     def needed(self, tolerance: float) -> FloatArray:
         """The degree at which each cell would lack `tolerance`, shape (cells,)."""

@@ -58,7 +58,8 @@ class Harmonics:
 
     @property
     def vanishes(self) -> bool:
-        return not np.any([self.mean, self.cosine, self.sine])
+        parts = self.mean, self.cosine, self.sine
+        return not any(part.any() if isinstance(part, np.ndarray) else part for part in parts)
 
 
 def combined(parts: Iterable[tuple[float, CoefficientMatrix]]) -> tuple[float, float, float, float]:

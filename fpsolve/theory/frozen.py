@@ -12,7 +12,8 @@ from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem, kept
 
-SAMPLES = 1001
+SAMPLES, FEWER_SAMPLES = 1001, 601
+"""Points on each side; fewer without algebraic tails, where all lie within a few decades."""
 LARGEST_P = 25.0
 """The places for larger p may lie beyond those that are looked at."""
 FURTHEST = 1e12
@@ -95,7 +96,8 @@ class FrozenNoise:
         self._is_heavy = noise.has_algebraic_tails
         end = FURTHEST if self._is_heavy else min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
         spread = max(np.log(end / 1e-2), 1.0)
-        side = end * np.sinh(spread * np.linspace(0, 1, SAMPLES)) / np.sinh(spread)
+        count = SAMPLES if self._is_heavy else FEWER_SAMPLES
+        side = end * np.sinh(spread * np.linspace(0, 1, count)) / np.sinh(spread)
         self.z = np.concatenate([-side[:0:-1], side])
         self._problem, self._held = problem, _Held(problem, self.z)
         self._slope = np.gradient(noise.log_density(unit * self.z), self.z)

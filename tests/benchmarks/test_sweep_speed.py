@@ -57,7 +57,7 @@ def test_a_sweep_beside_a_loop(tmp_path):
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one processor")
 def test_two_processes_beside_one(tmp_path):
     """A minute of work by one process, by two, and by two workers of a Dask cluster on this machine."""
-    changes = {"stop = 4.0, num = 4": "stop = 4.0, num = 33", f"num = {SIZE}": "num = 20", "n = 0.5": "n = 0.85"}
+    changes = {"stop = 4.0, num = 4": "stop = 4.0, num = 33", f"num = {SIZE}": "num = 26", "n = 0.5": "n = 0.85"}
     text = CASE
     for old, new in changes.items():
         text = text.replace(old, new)
