@@ -1,9 +1,9 @@
 """How many functions of u, φ and ξ there are, and on which interval of u, until the means of the response settle.
 
-Each direction has two levels. What the means change from the lower to the higher one is taken for what the higher one
-lacks; where they converge this is more than it does lack. The lower end of the interval is a direction, too: it is
-compared with an interval that is shorter by one element. What lies above the upper end follows from the shares of E a⁴
-in the last two elements, as ρ falls faster and faster there; where it falls slowly that end is compared, too.
+Each direction has two levels. Twice what the means change from the lower to the higher one is taken for what the higher
+one lacks; where they converge fast this is more than it lacks. The lower end of the interval is a direction, too: it
+is compared with an interval that is shorter by one element. What lies above the upper end follows from the shares of
+E a⁴ in the last two elements, as ρ falls faster and faster there; where it falls slowly that end is compared, too.
 """
 
 from __future__ import annotations
@@ -55,6 +55,8 @@ SLOW = 0.25
 """The ratio of the last two shares of E a⁴ from which on the upper end is compared with one an element lower."""
 MOST_HIGHER = 2
 """Elements by which the upper end moves in a step."""
+SAFETY = 2.0
+"""What a direction may lack over what its last level changes, where it converges slowly."""
 ROUNDING = 1e-12
 
 
@@ -224,7 +226,7 @@ class Settled:
     def errors(self, changes: FloatArray, scales: Any, order: int = 4) -> FloatArray:
         """Error estimates of numbers that grow with a like its power of an order at most, and have these scales."""
         above = self.fall(order).share_above(float(self.solution.height.lines[-1]))
-        return np.asarray(changes.sum(axis=0) + (above + ROUNDING) * scales)
+        return np.asarray(SAFETY * changes.sum(axis=0) + (above + ROUNDING) * scales)
 
 
 @dataclass(frozen=True)
