@@ -49,15 +49,21 @@ def no_response(problem: Problem) -> Message | None:
     return None if comes_down(problem) else Message(Code.RESPONSE_GROWS)
 
 
+def mean_terms(problem: Problem) -> tuple[FloatArray, FloatArray]:
+    """The linear terms with the noise at its mean and the cubic terms, shapes (2, 2) and (2, 4), where ‖y‖ is a."""
+    system, frame = problem.system, amplitude_frame(problem.system)
+    assert system.cubic is not None
+    linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.coloured.mean).tolist()))
+    return np.array(linear.matrix), np.array(frame.cubic(system.cubic).matrix)
+
+
 def comes_down(problem: Problem) -> bool:
     """Whether all of the paths come lower; a system without cubic terms has none to do so."""
-    system, frame = problem.system, amplitude_frame(problem.system)
-    if system.cubic is None:
+    if problem.system.cubic is None:
         return False
-    linear = np.array(frame.term(CoefficientMatrix(0, matrix_at(system, problem.coloured.mean).tolist())).matrix)
-    cubic = np.array(frame.cubic(system.cubic).matrix)
+    linear, cubic = mean_terms(problem)
     begin = 0.5 * math.log(LEVEL)
-    most = begin - LEAST - math.fsum(jump.log_factor for jump in system.jumps)
+    most = begin - LEAST - math.fsum(jump.log_factor for jump in problem.system.jumps)
     field = _field(linear / (np.linalg.norm(linear) or 1.0), cubic / np.linalg.norm(cubic))  # in units of their own
     with warnings.catch_warnings(action="ignore"):  # of a path that goes to infinity
         return all(_falls(field, begin, most, math.pi * k / PHASES) for k in range(PHASES))

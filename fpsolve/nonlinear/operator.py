@@ -31,8 +31,9 @@ from fpsolve.arrays import Coefficient, FloatArray, dense, identity, one
 from fpsolve.fem.discretisation import NoisePart
 from fpsolve.fem.line import LineSpace
 from fpsolve.model.frame import Frame, amplitude_frame
-from fpsolve.model.plane import CoefficientMatrix, matrix_at
+from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
+from fpsolve.model.settling import mean_terms
 
 HALF_TURN = np.array([-0.5, 0.5]) * math.pi
 """The phases where x₁ is not negative."""
@@ -104,11 +105,7 @@ class Flow:
     @cached_property
     def log_unit(self) -> float:
         """The mean of γ: ln a where the cubic terms are as large as the linear ones, a unit of a."""
-        cubic = self.problem.system.cubic
-        assert cubic is not None
-        linear = matrix_at(self.problem.system, self.problem.coloured.mean).tolist()
-        both = self.frame.term(CoefficientMatrix(0, linear)).matrix, self.frame.cubic(cubic).matrix
-        rates = [float(np.linalg.norm(each)) for each in both]
+        rates = [float(np.linalg.norm(each)) for each in mean_terms(self.problem)]
         return 0.5 * math.log((rates[0] or 1 / self.problem.coloured.correlation_time) / rates[1])
 
     @cached_property
