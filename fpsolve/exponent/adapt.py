@@ -522,13 +522,8 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
     noise, system, digits = problem.coloured, problem.motion, -math.log10(rtol)
     frozen = frozen_noise(problem)
     if frozen is None:  # the noise has states, or a state of its own, or there are several
-        known = noise.parts.values()
-        typical = [
-            each.reached if each.has_states else np.array([-1, 1]) * min(2 * each.standard_deviation, each.half_width)
-            for each in known
-        ]
-        parts = tuple(first_part(each, digits) for each in known)
-        phase = _phase(system, problem.at_values(typical), digits, is_smooth=sum(each.dimension for each in parts) > 1)
+        parts = tuple(first_part(each, digits) for each in noise.parts.values())
+        phase = _phase(system, problem.typical, digits, is_smooth=sum(each.dimension for each in parts) > 1)
         chosen = Discretisation(phase, parts)
         if noise.basis != "pairs":
             return chosen

@@ -46,6 +46,9 @@ _EPS = float(np.finfo(float).eps)
 REFINEMENTS = 3
 """Of T′."""
 MAX_ITERATIONS = 12
+MAX_SHIFTS, STEP, NEAR_ENOUGH = 12, 0.15, 1e-3
+NEIGHBOURS = 6
+"""Eigenvalues nearest to a shift among which the real one is looked for."""
 STEPS_PER_FACTOR = 5
 SLOW = 1e-2
 """A step that lowers the backward error by less than this factor calls for new LU factors."""
@@ -120,47 +123,53 @@ def principal_pair(
         NotConverged: the iteration stalls, or both T and T* change sign: the mesh does not resolve the problem.
             `partial` is the pair that was reached.
     """
-    pairs, pencil = [start] if isinstance(start, PrincipalPair) else start, generator.at(p)
+    pairs, pencil = [start] if isinstance(start, PrincipalPair) else start or [], generator.at(p)
     if not pencil.matrix.norm < LARGEST_NORM:
         raise NumericalFailure(f"L(p) has the size {pencil.matrix.norm:.0e}")
-    searches: list[Callable[[], tuple[FloatArray, FloatArray]]] = [
-        lambda: _carried(pairs, pencil, generator) if pairs else _simplest(pencil, generator),
-        lambda: _from_the_right(pencil, generator, clock),
-    ]
-    least = _tangents(generator.problem, p, pairs or ())
-    if is_doubtful := _has_other_positive(generator, p, pairs or ()):
-        searches.reverse()
-    found: list[PrincipalPair] = []
-    for search in searches:
-        try:
-            vectors = search()
-        except NotConverged:  # the other searches may still find it
-            continue
-        pair = _pair(generator, pencil, rayleigh_iteration(pencil, *vectors, clock))
-        most = POSITIVE if is_doubtful or _goes_on(pair, pairs or ()) else SURELY_POSITIVE
-        is_found = pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= most
-        if is_found and (pair.value >= least or search is searches[-1]):
-            break
-        found.append(pair)
-    else:
-        pair = min(found, key=lambda pair: (pair.residual > BACKWARD_ERROR_LIMIT, min(pair.sign_defects)))
-        if not (pair.residual <= BACKWARD_ERROR_LIMIT and min(pair.sign_defects) <= POSITIVE):
+    is_doubtful, mixes_slowly = _has_other_positive(generator, p), generator.problem.noise.mixes_slowly
+    tangents, found = _tangents(generator.problem, p, pairs), list[PrincipalPair]()
+
+    def solved(x: FloatArray, y: FloatArray) -> PrincipalPair:
+        pair = _pair(generator, pencil, rayleigh_iteration(pencil, x, y, clock))
+        if pair.residual <= BACKWARD_ERROR_LIMIT:
+            found.append(pair)
+        return pair
+
+    def from_a_start() -> PrincipalPair | None:
+        pair = solved(*(_carried(pairs, pencil, generator) if pairs else _simplest(pencil, generator)))
+        goes_on = any(each.p == p and abs(pair.value - each.value) <= DOUBT * abs(each.value) for each in pairs)
+        is_told = goes_on or not is_doubtful or math.isfinite(tangents)
+        most = POSITIVE if goes_on else SURELY_POSITIVE
+        is_right = is_told and pair.value >= tangents and min(pair.sign_defects) <= most
+        return pair if is_right and pair.residual <= BACKWARD_ERROR_LIMIT else None
+
+    def from_the_right() -> PrincipalPair:
+        right, left, value, distance = _from_the_right(pencil, generator, clock)
+        pair = solved(right, left)
+        defect = min(pair.sign_defects)
+        if not (pair.residual <= BACKWARD_ERROR_LIMIT and defect <= POSITIVE and abs(pair.value - value) < distance):
             limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
-            told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=min(pair.sign_defects), **limits)
+            told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
             raise NotConverged(told, pair, Remedy.BOTH_AXES)
-    if is_doubtful:
-        others = [each.value for each in found if each.residual <= BACKWARD_ERROR_LIMIT]
-        if generator.problem.noise.mixes_slowly and generator.size <= SURVEYED_UNKNOWNS:
+        return pair
+
+    pair = None
+    if (pairs and not mixes_slowly) or not is_doubtful:
+        pair = from_a_start()
+    if pair is None:
+        pair = from_the_right()
+        others = [each.value for each in found]
+        if mixes_slowly and generator.size <= SURVEYED_UNKNOWNS:
             others.append(float(spectrum(generator, p, 1)[0].real))
-        rightmost = max(others, default=pair.value)
-        if rightmost - pair.value > 1e-6 * max(abs(rightmost), generator.unit_rate):
+        rightmost = max(others)
+        if is_doubtful and rightmost - pair.value > 1e-6 * max(abs(rightmost), generator.unit_rate):
             told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
             raise NotConverged(told, pair, Remedy.PHASE)
     return pair
 
 
-def _has_other_positive(generator: Generator, p: float, pairs: Sequence[PrincipalPair]) -> bool:
-    """Whether other pairs may seem to have T > 0, too, and there is none to start from.
+def _has_other_positive(generator: Generator, p: float) -> bool:
+    """Whether other pairs may seem to have T > 0, too.
 
     States that hardly mix have a pair each. Where the phase rests, between weak noise, T is about |x|^(p−k) |v|^k for
     the k-th pair, x along the faster mode and v along the other: for even k its sign does not change.
@@ -168,17 +177,10 @@ def _has_other_positive(generator: Generator, p: float, pairs: Sequence[Principa
     problem = generator.problem
     if problem.dimension > 2:  # each search begins at a neighbouring p
         return False
-    if problem.noise.mixes_slowly:
-        return True
-    if pairs or (frozen := frozen_noise(problem)) is None:
-        return False
+    if problem.noise.mixes_slowly or (frozen := frozen_noise(problem)) is None:
+        return problem.noise.mixes_slowly or problem.may_rest
     lines = generator.chosen.noise.lines
     return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)
-
-
-def _goes_on(pair: PrincipalPair, pairs: Sequence[PrincipalPair]) -> bool:
-    """Whether a pair is next to the principal one at the same p on another discretisation."""
-    return any(each.p == pair.p and abs(pair.value - each.value) <= DOUBT * abs(each.value) for each in pairs)
 
 
 def _tangents(problem: Problem, p: float, pairs: Sequence[PrincipalPair]) -> float:
@@ -248,31 +250,49 @@ def _simplest(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatAr
     return vector, vector
 
 
-def _from_the_right(pencil: Pencil, generator: Generator, clock: Callable[[], None]) -> tuple[FloatArray, FloatArray]:
-    """Right and left vectors near the principal ones, from shifts that start at an upper bound of Λ(p)."""
-    space, shift = pencil.space, generator.upper_bound(pencil.p) + 0.25 * generator.unit_rate
-    right, left = _simplest(pencil, generator)
-    for _ in range(2):
+def _from_the_right(
+    pencil: Pencil, generator: Generator, clock: Callable[[], None]
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Vectors T and T*, and the value, of the rightmost real eigenvalue, seen from the right; and its error at most.
+
+    For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is the largest eigenvalue of the
+    symmetric part of L, which lies to the right of all eigenvalues of the discrete L; each further one keeps `STEP` of
+    the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
+    """
+    space, value = pencil.space, math.inf
+    right = left = _simplest(pencil, generator)[0]
+    shift = pencil.numerical_abscissa(generator.unit_rate) + 0.1 * generator.unit_rate
+    for _ in range(MAX_SHIFTS):
         clock()
-        factor = pencil.factorised(shift)
-        right, inverse_distance = _dominant(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, pencil.p)
-        shift -= 0.95 / inverse_distance
-    for _ in range(4):
-        left = factor.solve(space.weighed(left), transposed=True)
-        left /= -np.linalg.norm(left)
-    return right, left
+        factor, last = pencil.factorised(shift), value
+        right, value = _nearest(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, shift, pencil.p)
+        if abs(value - last) <= NEAR_ENOUGH * (shift - value):
+            break
+        shift = value + STEP * (shift - value)
+    left, _ = _nearest(lambda v: -factor.solve(space.weighed(v), transposed=True), left, shift, pencil.p, value)
+    return right, left, value, 0.5 * (shift - value)
 
 
-def _dominant(apply: Any, start: FloatArray, p: float) -> tuple[FloatArray, float]:
-    """The dominant eigenvector of a positive operator, and its eigenvalue, by Arnoldi iteration."""
-    operator = LinearOperator((start.size, start.size), matvec=apply, dtype=float)
+def _nearest(
+    resolvent: Any, start: FloatArray, shift: float, p: float, value: float | None = None
+) -> tuple[FloatArray, float]:
+    """The real eigenvalue nearest to a shift, or to a value, and before it its eigenvector, by Arnoldi iteration."""
+    operator = LinearOperator((start.size, start.size), matvec=resolvent, dtype=float)
+    count = min(NEIGHBOURS, start.size - 2)
     try:
-        values, vectors = eigs(operator, k=1, v0=start, ncv=min(20, start.size - 1), tol=1e-3, maxiter=200)
+        inverses, vectors = eigs(operator, k=count, v0=start, ncv=min(4 * count, start.size), tol=1e-3, maxiter=200)
     except ArpackNoConvergence as failure:
-        raise NotConverged(Message(Code.NO_ARNOLDI, p=p), remedy=Remedy.DEGREES) from failure
+        inverses, vectors = failure.eigenvalues, failure.eigenvectors
+        if not inverses.size:
+            raise NotConverged(Message(Code.NO_ARNOLDI, p=p), remedy=Remedy.DEGREES) from failure
     except ArpackError as failure:
         raise SingularMatrix(*failure.args) from failure
-    return vectors[:, 0].real, float(values[0].real)
+    found = shift - 1 / inverses
+    is_real = np.abs(inverses.imag) <= 1e-6 * np.abs(inverses)
+    is_real |= not np.any(is_real)  # the mesh does not resolve the problem, as what is found will tell
+    distance = np.where(is_real, np.abs(found.real - (shift if value is None else value)), math.inf)
+    best = int(np.argmin(distance))
+    return vectors[:, best].real, float(found[best].real)
 
 
 class Iterate(NamedTuple):

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.linalg
+from scipy.sparse.linalg import LinearOperator, eigsh
 
-from fpsolve.arrays import FloatArray, finite, one
+from fpsolve.arrays import FloatArray, dense, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.axis import KroneckerSum, TensorSpace
+from fpsolve.fem.axis import KroneckerSum, TensorSpace, along
 from fpsolve.fem.dense import Factors
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import factorised
@@ -22,23 +21,14 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.rings import Ring
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.plane import (
-    Harmonics,
     angular_frequency,
-    crosses_both_ways,
-    growth_rate,
-    is_steady,
-    matrix_at,
     phase_speed,
-    stretching,
-    turning,
 )
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 KEPT_SPACES = 16
 SAMPLES = 721
-"""φ at which the growth by white noise is looked at, and ξ at which it is whether an arc is closed."""
-MOST_FOR_A_BOUND = 300
-"""Functions of ξ up to which the sharper bound of Λ is used; beyond, that of noise that rests at an end."""
+"""ξ at which it is looked whether an arc is closed."""
 LEFT_BY_STATES = 1.0
 """Share of the effect of two modes that is left at least where T is not analytic, as where the phase rests in a state,
 or at φ that white noise does not move: there it falls unevenly, and ever more slowly."""
@@ -73,6 +63,23 @@ class Pencil:
         if levels[axis]:
             levels[axis] = [place[level[kept[level]]] for level in levels[axis]]
         return replace(self, matrix=self.matrix.on(axis, kept), levels=levels)
+
+    def numerical_abscissa(self, unit: float) -> float:
+        """A number right of the whole spectrum: about the largest ω of ½(L + Lᵀ)v = ωMv. A unit is that of rates."""
+        space, size = self.space, self.space.size
+        masses = [axis.matrix(one) for axis in space.axes[1:]]
+        inverses = [None if each is None else np.linalg.inv(dense(each)) for each in (space.phi.unit, *masses)]
+        symmetric, mass, inverse = (
+            LinearOperator((size, size), matvec=apply, dtype=float)
+            for apply in (
+                lambda v: 0.5 * (self.matrix @ v + self.matrix.T @ v) + unit * space.weighed(v),
+                space.weighed,
+                lambda v: np.ravel(along(inverses, space.table(v))),
+            )
+        )
+        wanted: Any = {"k": 1, "which": "LA", "ncv": min(20, size), "tol": 1e-2, "return_eigenvectors": False}
+        [largest] = eigsh(symmetric, M=mass, Minv=inverse, v0=np.ones(size), **wanted)
+        return float(largest) - unit + 0.02 * abs(float(largest))
 
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM: dense, by blocks along an axis, or sparse."""
@@ -215,70 +222,3 @@ class Generator:
         free = [term for term in self.problem.motion.terms if term.order == 0]
         is_weak = all(each.order for each in self.problem.diffusions) and not self.problem.impulses
         return is_weak and all(term.h.amplitude == 0 and term.q.vanishes for term in free)
-
-    def upper_bound(self, p: float) -> float:
-        """A number right of Λ(p): the growth rate of E exp ∫ f(ξ) dt, f the supremum over φ of p q and of the jumps.
-
-        The jumps are spread evenly over φ. Where states of a chain move the phase over a ray to and fro, each jump
-        between them may bring a jump more. Several noises have a supremum each, beside that of what none drives.
-        """
-        system, noise, axes = self.problem.motion, self.problem.coloured, self.space(p).axes[1:]
-        support = self.problem.at_values([axis.support for axis in axes])
-
-        def fastest(xi: Any) -> Any:
-            q, speed = growth_rate(system, xi), phase_speed(system, xi)
-            if self.phi.is_arc:
-                return np.max(p * q(self.phi.points[:, None]), axis=0)
-            gains = sum(max(0.0, p * jump.log_factor) for jump in system.jumps)
-            return p * q.mean + abs(p) * q.amplitude + gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
-
-        if len(axes) == 1 and not (self.problem.diffusions or self.problem.impulses):
-            growth = self._growth_along(axes[0], fastest)
-        else:
-            growth = float(np.max(self._growth_of_one(p)))
-            for name, axis in zip(noise.parts, axes, strict=True):
-                if axis.size > 1:
-                    growth += self._growth_along(axis, partial(self._faster, p, name))
-        for jump in system.jumps:
-            if noise.largest_jump_rate and crosses_both_ways(system, jump, support):
-                growth += noise.largest_jump_rate * math.expm1(max(0.0, p * jump.log_factor))
-        return growth
-
-    def _growth_along(self, axis: Any, f: Callable[[Any], Any]) -> float:
-        """That of E exp ∫ f(ξ) dt by one noise."""
-        if axis.size > MOST_FOR_A_BOUND:
-            return float(np.max(f(axis.support)))
-        driven = axis.matrix(None) + axis.mass(f)
-        return float(np.max(scipy.linalg.eigvals(finite(driven), axis.matrix(one)).real))
-
-    def _faster(self, p: float, name: str, xi: Any) -> Any:
-        """By how much a noise makes the supremum over φ of `_growth_of_one` larger at most."""
-        system, none = self.problem.motion, self.problem.at_values([np.zeros(1)] * len(self.problem.coloured.parts))
-        at = {**none, name: xi} if isinstance(none, dict) else xi
-        change = matrix_at(system, at).reshape(-1, 2, 2) - matrix_at(system, 0.0)
-        q, speed, c = stretching(change), turning(change), self._stretch
-        rate = Harmonics(q.mean + c * speed.mean, q.cosine + c * speed.cosine, q.sine + c * speed.sine)
-        gains = sum(max(0.0, p * jump.log_factor) for jump in system.jumps if not is_steady(system, jump))
-        return p * rate.mean + abs(p) * rate.amplitude + 2 * gains / math.pi * (np.abs(speed.mean) + speed.amplitude)
-
-    @property
-    def _stretch(self) -> float:
-        """c = Σ ln R/π, by the way in which the phase passes each ray."""
-        speed = phase_speed(self.problem.motion, 0.0)
-        return float(sum(jump.log_factor * np.sign(speed(jump.phase)) for jump in self.problem.motion.jumps) / math.pi)
-
-    def _growth_of_one(self, p: float) -> FloatArray:
-        """e^{−pγ} L e^{pγ} 1 at some φ, γ′ = c such that jumps are spread evenly over φ: its supremum is above Λ(p)."""
-        system, phi = self.problem.motion, np.linspace(0, math.pi, SAMPLES)
-        q, speed = growth_rate(system, 0.0), phase_speed(system, 0.0)
-        c, ray = self._stretch, system.jumps[0].phase if system.jumps else 0.0
-        growth = p * (q(phi) + c * speed(phi))
-        for each in self.problem.diffusions:
-            size = system.epsilon ** (2 * each.order)
-            rate, slope = each.q(phi) + c * each.h(phi), each.q.slope(phi) + c * each.h.slope(phi)
-            growth += 0.5 * size * (p * each.h(phi) * slope + (p * rate) ** 2)
-        for struck in self.problem.impulses:
-            stretch, end = struck.stretched(phi)
-            turn = np.mod(end - ray, math.pi) - np.mod(phi - ray, math.pi)  # never over a ray
-            growth += struck.rate * np.expm1(p * (np.log(stretch) + c * turn))
-        return np.asarray(growth + 1e-3 * np.max(np.abs(growth)))

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ from fpsolve.fem.axis import Axis, KroneckerSum, TensorSpace, along
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.terms import NoiseTerms, OfMoment, Term
-from fpsolve.model.plane import CoefficientMatrix, is_driven, written_coefficient
+from fpsolve.model.plane import CoefficientMatrix, written_coefficient
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 PENALTY = 0.02
@@ -515,27 +515,3 @@ class SphereGenerator(Generator):
     def keeps_constants(self) -> bool:
         """False: damping moves directions."""
         return False
-
-    def upper_bound(self, p: float) -> float:
-        """A number right of Λ(p): that of E exp ∫ f dt, f the supremum of p q over all directions."""
-        problem, axes, matrix = self.problem, self.space(p).axes[1:], self._own_terms.matrix
-
-        def fastest(terms: Sequence[CoefficientMatrix], xi: Any) -> Any:
-            values = np.asarray(xi, dtype=float)
-            total = np.zeros((*values.shape, problem.dimension, problem.dimension))
-            for term in terms:
-                total += np.asarray(term.g(values))[..., None, None] * matrix(term)
-            rates = np.linalg.eigvalsh(0.5 * (total + np.swapaxes(total, -1, -2)))
-            return np.maximum(p * rates[..., 0], p * rates[..., -1])
-
-        named = dict(zip(problem.coloured.parts, axes, strict=True))
-        parts = {
-            name: [each for each in problem.motion.terms if is_driven(each.g) and each.noise in (name, "")]
-            for name in named
-        }
-        growth = float(fastest([each for each in problem.motion.terms if not is_driven(each.g)], 0.0))
-        for name, axis in named.items():
-            growth += self._growth_along(axis, partial(fastest, parts[name]))
-        for each in problem.diffusions:
-            growth += float(0.5 * (p * p + 2 * abs(p)) * np.linalg.norm(matrix(each), 2) ** 2)
-        return growth

@@ -178,11 +178,6 @@ class Noise(Parametrised):
         return np.asarray(min(self.half_width, 1e6 * self.standard_deviation) * np.linspace(-1, 1, 1001))
 
     @property
-    def largest_jump_rate(self) -> float:
-        """The highest rate at which ξ leaves a state; 0 for continuous paths."""
-        return 0.0
-
-    @property
     def longest_jump(self) -> int:
         """The largest difference of the numbers of two states between which ξ jumps; 0 for continuous paths."""
         return 0

@@ -172,6 +172,24 @@ class Problem:
         return self.at_values(each if len(each) == 1 else [values[:: max(1, values.size // 20)] for values in each])
 
     @property
+    def typical(self) -> Xi:
+        """All combinations of the states of chains, and of ends of the range where other noises are mostly."""
+
+        def most(noise: Noise) -> FloatArray:
+            return np.array([-1.0, 1.0]) * min(2 * noise.standard_deviation, noise.half_width)
+
+        parts = self.coloured.parts.values()
+        return self.at_values([each.reached if each.has_states else most(each) for each in parts])
+
+    @cached_property
+    def may_rest(self) -> bool:
+        """Whether the phase rests at some φ for some of the `typical` ξ, or noises may hold it together."""
+        if len(self.coloured.parts) > 1 or self.coloured.basis == "pairs":
+            return True
+        speed = phase_speed(self.motion, self.typical)
+        return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
+
+    @property
     def drift(self) -> System:
         """What is left of the system beside white noise."""
         return self._moved[0]

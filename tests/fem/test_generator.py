@@ -124,7 +124,7 @@ def test_coefficients_and_their_derivatives(coefficient, derivative):
 
 
 @pytest.mark.parametrize("p", sampled(0.5, -3.0, 4.0))
-def test_the_upper_bound_lies_right_of_the_spectrum(both, p):
+def test_the_numerical_abscissa_lies_right_of_the_spectrum(both, p):
     generator, _ = both
     if generator.size < 1500:
-        assert generator.upper_bound(p) >= spectrum(generator, p, 1)[0].real
+        assert generator.at(p).numerical_abscissa(generator.unit_rate) >= spectrum(generator, p, 1)[0].real

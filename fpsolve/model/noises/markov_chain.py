@@ -63,10 +63,6 @@ class Chain(Noise):
         return np.array(self.states)
 
     @property
-    def largest_jump_rate(self) -> float:
-        return float(-np.min(self.rates))
-
-    @property
     def longest_jump(self) -> int:
         first, last = np.nonzero(np.array(self.rates))
         return int(np.max(np.abs(first - last)))

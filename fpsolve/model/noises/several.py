@@ -145,11 +145,6 @@ class Noises(Noise):
         return all(noise.is_bounded for noise in self._valued)
 
     @property
-    def largest_jump_rate(self) -> float:
-        """The sum of the highest rates at which the noises leave a state; 0 for continuous paths."""
-        return sum(noise.largest_jump_rate for noise in self._valued)
-
-    @property
     def longest_jump(self) -> int:
         return max(noise.longest_jump for noise in self._valued)
 
