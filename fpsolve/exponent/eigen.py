@@ -39,9 +39,10 @@ POSITIVE = 1e-2
 """T, or T*, is taken for positive where no more than this share of it has the wrong sign, the least of all found."""
 SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
+MOSTLY = 0.5
+"""Share of the principal pair of another p or discretisation beyond which a pair goes on from it."""
 DOUBT = 1e-3
-"""Share of its terms by which a tangent of Λ may lie too high, and Λ change from one discretisation to the next where
-both are surely its: the errors of its p."""
+"""Share of its terms by which a tangent of Λ may lie too high: the errors of its p."""
 _EPS = float(np.finfo(float).eps)
 REFINEMENTS = 3
 """Of T′."""
@@ -136,8 +137,9 @@ def principal_pair(
         return pair
 
     def from_a_start() -> PrincipalPair | None:
-        pair = solved(*(_carried(pairs, pencil, generator) if pairs else _simplest(pencil, generator)))
-        goes_on = any(each.p == p and abs(pair.value - each.value) <= DOUBT * abs(each.value) for each in pairs)
+        x, y = _carried(pairs, pencil, generator) if pairs else _simplest(pencil, generator)
+        pair = solved(x, y)
+        goes_on = bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY
         is_told = goes_on or not is_doubtful or math.isfinite(tangents)
         most = POSITIVE if goes_on else SURELY_POSITIVE
         is_right = is_told and pair.value >= tangents and min(pair.sign_defects) <= most
@@ -181,6 +183,12 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
         return problem.noise.mixes_slowly or problem.may_rest
     lines = generator.chosen.noise.lines
     return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)
+
+
+def _share(space: TensorSpace, pair: PrincipalPair, x: FloatArray, y: FloatArray) -> float:
+    """That of a pair in the Rayleigh quotient of x = Σ aᵢTᵢ and y = Σ bᵢTᵢ*: of the aᵢbᵢ⟨Tᵢ*, Tᵢ⟩ in ⟨y, x⟩."""
+    of_right, of_x = space.weighed(pair.right), space.weighed(x)
+    return float((y @ of_right) * (pair.left @ of_x) / ((y @ of_x) * (pair.left @ of_right)))
 
 
 def _tangents(problem: Problem, p: float, pairs: Sequence[PrincipalPair]) -> float:
@@ -261,7 +269,7 @@ def _from_the_right(
     """
     space, value = pencil.space, math.inf
     right = left = _simplest(pencil, generator)[0]
-    shift = pencil.numerical_abscissa(generator.unit_rate) + 0.1 * generator.unit_rate
+    shift = pencil.numerical_abscissa + 0.1 * generator.unit_rate
     for _ in range(MAX_SHIFTS):
         clock()
         factor, last = pencil.factorised(shift), value

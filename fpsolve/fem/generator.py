@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, eigsh
+import scipy.linalg
 
 from fpsolve.arrays import FloatArray, dense, one
 from fpsolve.errors import MeshError
@@ -27,6 +28,7 @@ from fpsolve.model.plane import (
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 KEPT_SPACES = 16
+LANCZOS_STEPS = 16
 SAMPLES = 721
 """ξ at which it is looked whether an arc is closed."""
 LEFT_BY_STATES = 1.0
@@ -64,22 +66,23 @@ class Pencil:
             levels[axis] = [place[level[kept[level]]] for level in levels[axis]]
         return replace(self, matrix=self.matrix.on(axis, kept), levels=levels)
 
-    def numerical_abscissa(self, unit: float) -> float:
-        """A number right of the whole spectrum: about the largest ω of ½(L + Lᵀ)v = ωMv. A unit is that of rates."""
-        space, size = self.space, self.space.size
+    @cached_property
+    def numerical_abscissa(self) -> float:
+        """About the largest ω of ½(L + Lᵀ)v = ωMv, rather above it, by some steps of Lanczos from a start of all v."""
+        space, rows, betas = self.space, [0.0], [0.0]
         masses = [axis.matrix(one) for axis in space.axes[1:]]
         inverses = [None if each is None else np.linalg.inv(dense(each)) for each in (space.phi.unit, *masses)]
-        symmetric, mass, inverse = (
-            LinearOperator((size, size), matvec=apply, dtype=float)
-            for apply in (
-                lambda v: 0.5 * (self.matrix @ v + self.matrix.T @ v) + unit * space.weighed(v),
-                space.weighed,
-                lambda v: np.ravel(along(inverses, space.table(v))),
-            )
-        )
-        wanted: Any = {"k": 1, "which": "LA", "ncv": min(20, size), "tol": 1e-2, "return_eigenvectors": False}
-        [largest] = eigsh(symmetric, M=mass, Minv=inverse, v0=np.ones(size), **wanted)
-        return float(largest) - unit + 0.02 * abs(float(largest))
+        rest, old = np.random.default_rng(0).standard_normal(space.size), np.zeros(space.size)
+        for _ in range(LANCZOS_STEPS):
+            weighed = space.weighed(rest)
+            betas.append(math.sqrt(rest @ weighed))
+            new = rest / betas[-1]
+            image = 0.5 * (self.matrix @ new + self.matrix.T @ new)
+            rows.append(float(new @ image))
+            rest = np.ravel(along(inverses, space.table(image))) - rows[-1] * new - betas[-1] * old
+            old = new
+        ritz, ends = scipy.linalg.eigh_tridiagonal(rows[1:], betas[2:])
+        return float(ritz[-1] + abs(ends[-1, -1]) * math.sqrt(rest @ space.weighed(rest)))
 
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM: dense, by blocks along an axis, or sparse."""

@@ -127,4 +127,4 @@ def test_coefficients_and_their_derivatives(coefficient, derivative):
 def test_the_numerical_abscissa_lies_right_of_the_spectrum(both, p):
     generator, _ = both
     if generator.size < 1500:
-        assert generator.at(p).numerical_abscissa(generator.unit_rate) >= spectrum(generator, p, 1)[0].real
+        assert generator.at(p).numerical_abscissa >= spectrum(generator, p, 1)[0].real
