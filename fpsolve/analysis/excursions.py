@@ -32,10 +32,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_array, real_number, real_numbers, shown
+from fpsolve.budget import one_number
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget, Countdown
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
@@ -56,8 +57,8 @@ Start = float | Literal["uniform"]
 StartOfNoise = float | Literal["stationary"]
 FINE, MOST_POINTS = 8, 4_000_000
 """Points of T for each polynomial degree, either way; fewer where they would be more than so many."""
-CLOSE, MOST_ROUNDS, GROWTH = 1e-4, 4, 2.0
-"""The relative error of T, at its extremes, that finer discretisations are made for, how many, how their time grows."""
+CLOSE, MOST_ROUNDS = 1e-4, 4
+"""The relative error of T, at its extremes, that finer discretisations are made for, and how many."""
 PARTS, POINTS = 32, 2000
 """Into how many parts a cell of φ is cut for the integral of q⁺, which has kinks, and points of ξ."""
 LEAST_SHOWN = 1e-12
@@ -185,6 +186,7 @@ def excursion(
     return solve_excursion(solver, phi=phi, xi=xi)
 
 
+@one_number("the bounds of P(sup ‖x‖ ≥ A)")
 def solve_excursion(
     solver: ExponentSolver, *, phi: Start = 0.0, xi: StartOfNoise = STATIONARY, root: float | None = None
 ) -> Excursion:
@@ -282,26 +284,22 @@ class Crossing(NamedTuple):
 
 
 class Ladder:
-    """The pair at p, and on ever finer discretisations as far as the budget allows; each is solved once.
+    """The pair at p, and on ever finer discretisations; each is solved once.
 
     One of them there is at least, if it has not too many unknowns.
     """
 
     def __init__(self, solver: ExponentSolver, p: float) -> None:
-        self._solver, self._pairs, self._last = solver, [solver.pair(p)], 0.0
-        self._time = Countdown(solver.budget.seconds)
+        self._solver, self._pairs = solver, [solver.pair(p)]
 
     def __iter__(self) -> Iterator[PrincipalPair]:
         for number in range(1 + MOST_ROUNDS):
             if number == len(self._pairs):
-                last, begun = self._pairs[-1], self._time.elapsed
-                if begun + GROWTH * self._last > self._time.seconds:
-                    return
+                last = self._pairs[-1]
                 try:
                     self._pairs.append(self._solver.near.finer_pair(last, last.generator.chosen.enriched()))
                 except NotConverged:
                     return
-                self._last = self._time.elapsed - begun
             yield self._pairs[number]
 
 

@@ -32,6 +32,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 from scipy.stats import norm
 
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
+from fpsolve.budget import counted
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, widened
@@ -325,7 +326,8 @@ class Slopes:
         if p not in self._known:
             ratio, ratio_slope, error = self.solver.ratio(p)
             pair = (self.solver.near if abs(p) < TINY_P else self.solver).solution(p).pair
-            self._known[p] = Slope(p, ratio, ratio_slope, abs(p) * error, second_derivative(pair), pair)
+            with counted(self.solver.budget.countdown(f"Λ″({p:g})")):
+                self._known[p] = Slope(p, ratio, ratio_slope, abs(p) * error, second_derivative(pair), pair)
         return self._known[p]
 
     def end(self, side: int) -> Slope:
@@ -442,7 +444,8 @@ class _Saddle:
     @cached_property
     def _others(self) -> Sequence[tuple[float, float]]:
         """Of eigenvalues near Λ how far they are from it, and |aₖ|/C."""
-        return others(self.pair, self._start) if self.p else ()
+        with counted(self._solver.budget.countdown(f"the eigenvalues next to Λ({self.p:g})")):
+            return others(self.pair, self._start) if self.p else ()
 
     def remainder(self, t: FloatArray) -> FloatArray:
         """Σ |aₖ|/C e^{−(Λ − Re Λₖ)t} over these."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.budget import Countdown
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Message
 
@@ -158,18 +159,18 @@ def scan_row(row: Row, told: Callable[[], bool] = lambda: False) -> ScannedRow:
     Args:
         told: called after each node, such as `pool.Steps`; whether that shows progress.
     """
-    started, shown = time.thread_time(), 0
-    field, reasons = row.begin(), dict[Message, None]()
+    whole, shown, field, reasons = Countdown(math.inf), 0, row.begin(), dict[Message, None]()
     values, gradients = np.full(row.count, np.nan), np.full((row.count, 2), np.nan)
     shares = np.linspace(0, 1, row.count)
     for k in range(row.count):
         try:
-            sample = field(shares[[k, row.number] if row.axis == 0 else [row.number, k]])
+            with whole.running():
+                sample = field(shares[[k, row.number] if row.axis == 0 else [row.number, k]])
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
             reasons.setdefault(failure.message)
         shown += told()
-    return ScannedRow(values, gradients, tuple(reasons), time.thread_time() - started, shown)
+    return ScannedRow(values, gradients, tuple(reasons), whole.spent, shown)
 
 
 def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable[[], None] = lambda: None) -> Scan:

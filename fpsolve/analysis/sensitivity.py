@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
+from fpsolve.budget import one_number
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
@@ -332,8 +333,9 @@ class Gradient:
     """
 
     def __init__(self, solver: ExponentSolver, along: Mapping[str, ParameterDerivative]) -> None:
-        self._solver, self._along = solver, along
+        self._solver, self._along, self.budget = solver, along, solver.budget
 
+    @one_number("∂Λ({:g})/∂θ")
     def moment(self, p: float) -> Slopes:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         if p == 0:
@@ -349,6 +351,7 @@ class Gradient:
         finer = solver.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
         return _compared(values, {key: each.value for key, each in _changed(Bordered(finer), along).items()})
 
+    @one_number("∂λ/∂θ")
     def lyapunov_exponent(self) -> dict[str, Estimate]:
         """∂λ/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         solver, along = held_by(self._solver, 0.0, self._along)
@@ -362,6 +365,7 @@ class Gradient:
             values, {key: float(np.sum(np.abs(each))) / abs(near.pair.p) for key, each in errors.items()}
         )
 
+    @one_number("∂Λ″(0)/∂θ")
     def variance_rate(self) -> Slopes:
         """∂Λ″(0)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         self._solver.variance_rate()
@@ -370,6 +374,7 @@ class Gradient:
         )
         return _compared(coarse, fine)
 
+    @one_number("∂δ_p/∂θ")
     def root(self, p: float) -> Slopes:
         """∂δ_p/∂θ, p being δ_p: that of Λ(p)/p, for small p from its derivatives at p = 0, over that by p.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,8 +15,9 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 from fpsolve.analysis.scan import Sample
 from fpsolve.analysis.sensitivity import SMALL_P, Changed, held_by
 from fpsolve.arrays import FloatArray, real_number, shown
+from fpsolve.budget import Countdown, OverBudget, one_number
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget, Countdown
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.modes import EVEN
@@ -189,6 +189,7 @@ def line_rtol(problem: Problem, zero: Zero) -> float:
     return RTOL if problem.dimension == 2 or zero.p in EVEN else RTOL_BEYOND_PLANE
 
 
+@one_number("Λ({0:g})/{0:g} and its slopes")
 def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> tuple[float, float, FloatArray]:
     """Λ(p)/p, at p = 0 λ, with its error, and its derivatives by some parameters.
 
@@ -266,44 +267,44 @@ class ZeroField:
         Raises:
             FpsolveError: there is none, or the time does not suffice.
         """
-        left, started = self._seconds - self.spent_seconds, time.thread_time()
+        left = self._seconds - self.spent_seconds
         if left <= 0:
             raise self._stop()
-        share = HALF * left
-        is_short = share < self._budget.seconds
+        share = Countdown(HALF * left)
         try:
-            return self._at(at, rtol, Countdown(share) if is_short else None)
-        except NotConverged as failure:
-            if is_short and failure.message.tells_of(Code.SECONDS_SPENT):
-                raise self._stop() from failure
-            raise
+            with share.running():
+                return self._at(at, rtol)
+        except OverBudget as failure:
+            if failure.countdown is not share:
+                raise
+            raise self._stop() from None
         finally:
-            self.spent_seconds += time.thread_time() - started
+            self.spent_seconds += share.spent
 
     def _stop(self) -> NotConverged:
         self.stopped = self._spent
         return NotConverged(self.stopped)
 
-    def _at(self, at: FloatArray, rtol: float | None, countdown: Countdown | None) -> Sample:
-        """F at (u, v); without a countdown each p has its own."""
+    def _at(self, at: FloatArray, rtol: float | None) -> Sample:
+        """F at (u, v)."""
         values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}
         try:
             problem = self._problem.at(values)
         except ValueError as failure:
             raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
         if self._bounce is None:
-            return self._sample(at, problem, rtol, countdown)
+            return self._sample(at, problem, rtol)
         known = self._solved.setdefault((rtol or self._rtol, float(at[1 - self._bounce])), {})
         log_factor = problem.system.jumps[0].log_factor
         if len(known) < 2 and log_factor not in known:
-            known[log_factor] = self._sample(at, problem, rtol, countdown)
+            known[log_factor] = self._sample(at, problem, rtol)
         return known[log_factor] if log_factor in known else self._between(at, problem, log_factor, known, self._bounce)
 
-    def _sample(self, at: FloatArray, problem: Problem, rtol: float | None, countdown: Countdown | None) -> Sample:
+    def _sample(self, at: FloatArray, problem: Problem, rtol: float | None) -> Sample:
         """F from a solve. Raises as `ratio_with_slopes`."""
         p = self._zero.p
         refuse_infinite(problem, p)
-        own: Any = {"rtol": rtol or self._rtol, "budget": self._budget, "countdown": countdown, "is_alone": True}
+        own: Any = {"rtol": rtol or self._rtol, "budget": self._budget, "is_alone": True}
         place, known = self._before
         is_near = rtol is None and bool(np.linalg.norm(at - place) <= NEAR)
         solver = ExponentSolver(problem, starts=known if is_near else {}, **own)

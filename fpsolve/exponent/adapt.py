@@ -7,7 +7,6 @@ place than the one that was found: then both are solved.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
@@ -17,6 +16,7 @@ import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from fpsolve.arrays import FloatArray
+from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, one_number, under_way
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.corners import corners, graded_more, resolving
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
@@ -33,7 +33,7 @@ from fpsolve.fem.discretisation import (
     Polynomials,
     first_part,
 )
-from fpsolve.fem.factors import MAX_BAND, MAX_DENSE_UNKNOWNS, one_thread
+from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, one_thread
 from fpsolve.fem.generator import Generator, is_closed
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
@@ -77,30 +77,27 @@ MARGIN = 0.6
 WIDER = 4.0
 COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
-GIGABYTES = 3e-5
-"""Of memory for an unknown of the budget."""
 A_THIRD_MORE = 4 / 3
 """What a budget may be exceeded by."""
 Tolerance = Callable[[float, float], float]
 """The largest error allowed, from p and a value of Λ(p)."""
-SECONDS_PER_UNKNOWN = 3e-8
-"""A solve takes about this times the power 1.5 of the number of unknowns; it is corrected by the last one."""
-SECONDS_PER_CUBE = 1e-10
-"""Where jumps lead from every state of a chain to all others, times its third power."""
+GROWTH = 1.5
+"""A stage costs about this power of the number of unknowns, by the last one."""
 
 
 @told_in_words
 @pydantic_dataclass(frozen=True, config=STRICT)
 class Budget:
-    """What one Λ(p) may cost, and a line of a chart.
+    """What one number may cost, and a line of a chart. A number that is given does not depend on it.
 
     Args:
-        unknowns: of the largest system; memory grows with it, up to 30 kB each, 2.4 GB in all for the 80,000, a fifth
-            of that in the plane under one noise.
-        seconds: of the processor for one p; foreseen before every solve from the last one, and looked at before every
-            factorisation, so that it may take a third more. The nodes of a row of a scan share it, and each may take
-            half of what is left.
-        line_seconds: of the processor for a line of a chart, its scan, which may take half of them, and its branches;
+        unknowns: of the largest system.
+        seconds: of a processor for one number, such as Λ(2), λ or Λ″(0), with all that it takes; foreseen before each
+            factorisation, by counting operations at a fixed speed. The nodes of a row of a scan share it, and each may
+            take half of what is left.
+        memory: of the process, in gigabytes, foreseen as the seconds; None for half of that of the machine, which the
+            processes of a run share.
+        line_seconds: of a processor for a line of a chart, its scan, which may take half of them, and its branches;
             None for any time.
 
     Raises:
@@ -108,28 +105,18 @@ class Budget:
     """
 
     unknowns: Annotated[int, parameter("number of unknowns of the largest system", "unknowns = 80000", ge=100)] = 80_000
-    seconds: Annotated[float, parameter("seconds of processor time for one p", "seconds = 60.0", gt=0)] = 60.0
+    seconds: Annotated[float, parameter("seconds of processor time for one number", "seconds = 60.0", gt=0)] = 60.0
+    memory: Annotated[
+        float | None,
+        parameter("memory in GB; if omitted, half of that of the machine", "memory = 8.0", gt=0),
+    ] = None
     line_seconds: Annotated[
         float | None, parameter("seconds of processor time for a line of a chart", "line_seconds = 600.0", gt=0)
     ] = None
 
-
-@dataclass(frozen=True)
-class Countdown:
-    """Time of the processor that runs from when this is made, for all solves that it is given to.
-
-    Attributes:
-        seconds: how many there are.
-        started: by `time.thread_time`.
-    """
-
-    seconds: float
-    started: float = field(default_factory=lambda: time.thread_time())
-
-    @property
-    def elapsed(self) -> float:
-        """How many are gone."""
-        return time.thread_time() - self.started
+    def countdown(self, name: str) -> Countdown:
+        """For one number."""
+        return Countdown(self.seconds, self.memory or half_the_memory(), name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +130,6 @@ class NearPlace:
         budget: what the choice of a discretisation may cost.
         tolerance: the usual one.
         starts: solutions of a problem with parameters close by, by their p.
-        countdown: that all p share; each has the seconds of the budget if None.
 
     Attributes:
         known: what was solved, by p.
@@ -159,17 +145,15 @@ class NearPlace:
     budget: Budget
     tolerance: Tolerance
     starts: Mapping[float, Solution] = field(default_factory=dict)
-    countdown: Countdown | None = None
     known: dict[float, Solution] = field(init=False, default_factory=dict)
     _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
 
-    def solution(self, p: float, tolerance: Tolerance | None = None, countdown: Countdown | None = None) -> Solution:
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
 
         Args:
             p: the moment.
             tolerance: the largest error allowed.
-            countdown: for all work on this p; if None that of all p, or a new one.
 
         Raises:
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
@@ -180,7 +164,7 @@ class NearPlace:
         if p not in self.known or (self.mesh is None and not self.meets(self.known[p], allowed)):
             try:
                 with one_thread():
-                    self.known[p] = _Search(self, p, allowed, countdown or self.begun()).found()
+                    self.known[p] = _Search(self, p, allowed, under_way() or self.budget.countdown(f"Λ({p:g})")).found()
             except NotConverged as failure:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure
@@ -198,10 +182,6 @@ class NearPlace:
             except ArithmeticError as failure:
                 raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
         return self.known[p]
-
-    def begun(self) -> Countdown:
-        """The countdown of all p, or a new one for one p."""
-        return self.countdown or Countdown(self.budget.seconds)
 
     @property
     def remedy(self) -> Remedy:
@@ -232,7 +212,7 @@ class NearPlace:
             reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=self.budget.unknowns)
         else:
             try:
-                with one_thread():
+                with one_thread(), counted(self.budget.countdown(f"a finer Λ({pair.p:g})")):
                     return self.pair_on(type(pair.generator)(self.problem, chosen), pair.p, pair)
             except MeshError as failure:
                 reason = failure.message
@@ -249,12 +229,10 @@ class NearPlace:
         except NotConverged as failure:
             raise NotConverged(Message(Code.NEAR_ZERO, p=q, reason=failure.message), failure.partial) from failure
 
-    def loose(self, p: float, places: Sequence[Place], countdown: Countdown | None = None) -> Solution:
+    def loose(self, p: float, places: Sequence[Place]) -> Solution:
         """That at p, to compare with other places: where one outdoes it, its eigenvalue is no exact one."""
         best = max((place.rate for place in places), default=0.0)
-        return self.solution(
-            p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)), countdown
-        )
+        return self.solution(p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)))
 
     def searched(self, search: _Search, start: Solution | None) -> Solution:
         """A solution within a tolerance from a first discretisation, or from a solution that does not suffice.
@@ -309,9 +287,9 @@ class FarPlaces(NearPlace):
 
     small_p, is_far = 0.0, True
 
-    def solution(self, p: float, tolerance: Tolerance | None = None, countdown: Countdown | None = None) -> Solution:
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         try:
-            return super().solution(p, tolerance, countdown)
+            return super().solution(p, tolerance)
         except NotConverged as failure:
             raise NotConverged(Message(Code.FAR_OUT, reason=failure.message), failure.partial) from failure
 
@@ -341,25 +319,27 @@ class AllPlaces:
     near: NearPlace
     far: FarPlaces
 
+    @property
+    def budget(self) -> Budget:
+        """What both may cost together."""
+        return self.near.budget
+
+    @one_number("Λ({:g})")
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """That of the larger eigenvalue. Raises `NotConverged`."""
         if p == 0:
             return self.near.solution(p, tolerance)
-        countdown, elsewhere = self.near.begun(), outlook(self.near.problem, p)
+        elsewhere = outlook(self.near.problem, p)
         elsewhere.refuse(p, elsewhere.highest)
-        near = self.near.loose(p, elsewhere.places, countdown)
+        near = self.near.loose(p, elsewhere.places)
         elsewhere.refuse(p, max(near.pair.value + near.error, *(place.rate for place in elsewhere.places), 0.0))
-        far = self.far.solution(p, tolerance, countdown) if other_places(near.pair) else None
+        far = self.far.solution(p, tolerance) if other_places(near.pair) else None
         if far is None or far.pair.value - far.error < near.pair.value + 10 * near.error:
-            near = self.near.solution(p, tolerance, countdown)
+            near = self.near.solution(p, tolerance)
         found = max((each for each in (near, far) if each), key=lambda each: each.pair.value)
         if found.pair.value + found.error < 0 and grows_far_out(self.near.problem):
             raise NotConverged(Message(Code.HELD_TOO_FAR, p=p, z=FURTHEST, value=found.pair.value))
         return found
-
-
-class _OutOfTime(Exception):
-    """A search has used up its budget within a stage."""
 
 
 @dataclass
@@ -376,19 +356,21 @@ class _Search:
     share: float = math.inf
     failure: Exception | None = None
     last: tuple[float, int] = (0.0, 0)
-    ticked: float = math.inf
-    longest: float = 0.0
 
     def found(self) -> Solution:
         """A solution within the tolerance, or the one on the given mesh."""
-        try:
+        if self.countdown is under_way():
             return self.sought()
-        except _OutOfTime:
-            seconds = self.countdown.elapsed + self.longest
-            return self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.countdown.seconds))
+        try:
+            with self.countdown.running():
+                return self.sought()
+        except OverBudget as failure:
+            if failure.countdown is not self.countdown:
+                raise
+            return self.stop(failure.reason)
 
     def sought(self) -> Solution:
-        """The same, which `tick` may end."""
+        """The same, which a budget may end."""
         if self.place.mesh is not None:
             coarse, fine = self.place.given
             pair = self.tried(coarse).pair
@@ -454,7 +436,7 @@ class _Search:
         while True:
             self.check(chosen)
             try:
-                pair = principal_pair(Generator(self.place.problem, chosen), self.p, start=pair, clock=self.tick)
+                pair = principal_pair(Generator(self.place.problem, chosen), self.p, start=pair)
             except (MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError) as failure:
                 self.failure, pair = failure, None
                 chosen = chosen.doubled(effects_of(failure))
@@ -477,26 +459,15 @@ class _Search:
 
     def check(self, chosen: Discretisation) -> None:
         """Refuse a stage beyond the budget, and count it."""
-        size, elapsed = chosen.size, self.countdown.elapsed
-        cost = max(SECONDS_PER_UNKNOWN, (elapsed - self.last[0]) / max(self.last[1], 1) ** 1.5 if self.last[1] else 0.0)
-        seconds = elapsed + cost * size**1.5
-        if not self.last[1] and self.place.problem.coloured.longest_jump > MAX_BAND:
-            seconds += SECONDS_PER_CUBE * size**3
+        size, spent = chosen.size, self.countdown.spent
         if size > self.place.budget.unknowns:
             self.stop(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=self.place.budget.unknowns))
-        if seconds > self.countdown.seconds:
-            self.stop(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.countdown.seconds))
+        seconds = spent + (spent - self.last[0]) * (size / max(self.last[1], 1)) ** GROWTH
+        if self.last[1] and seconds > self.countdown.seconds:
+            raise OverBudget(self.countdown, Message(Code.SECONDS_SPENT, seconds=seconds, most=self.countdown.seconds))
         if self.stages >= MAX_STAGES:
             self.stop(Message(Code.MESHES_SPENT, count=MAX_STAGES))
-        self.last, self.stages = (elapsed, size), self.stages + 1
-        self.ticked, self.longest = math.inf, 0.0
-
-    def tick(self) -> None:
-        """End the search where the next factorisation, by the longest of this stage, leaves no time."""
-        now = self.countdown.elapsed
-        self.longest, self.ticked = max(self.longest, now - self.ticked), now
-        if now + self.longest > A_THIRD_MORE * self.countdown.seconds:
-            raise _OutOfTime
+        self.last, self.stages = (spent, size), self.stages + 1
 
     def note(self, solution: Solution, error: float, allowed: float) -> None:
         """Keep the best solution; stop where only rounding is left."""

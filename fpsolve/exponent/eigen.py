@@ -22,6 +22,7 @@ import scipy.linalg
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.arrays import FloatArray, dense, finite, one
+from fpsolve.budget import charge
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
 from fpsolve.exponent.fields import EigenfunctionPlot
@@ -56,6 +57,8 @@ SLOW = 1e-2
 MAX_DENSE_UNKNOWNS = 4000
 LARGEST_NORM = 1e150
 """Of L(p): vectors of this size have lengths."""
+SECONDS_OF_CUBE = 2e-9
+"""Of all eigenvalues of a dense matrix with their vectors, times the third power of its size."""
 SURVEYED_UNKNOWNS = 600
 """Up to so many, a chain is checked by all eigenvalues."""
 
@@ -108,7 +111,6 @@ def principal_pair(
     p: float,
     *,
     start: PrincipalPair | Sequence[PrincipalPair] | None = None,
-    clock: Callable[[], None] = lambda: None,
 ) -> PrincipalPair:
     """The principal eigenvalue Λ(p) of Eq. (19) with T and T*.
 
@@ -117,7 +119,6 @@ def principal_pair(
         p: the moment.
         start: the pair of a neighbouring p or of another generator, or several pairs, between which the eigenfunctions
             are interpolated in p where they are of this generator; it saves time.
-        clock: called before each factorisation; what it raises ends the search.
 
     Raises:
         NumericalFailure: the numbers of L(p) are too large to be squared.
@@ -131,7 +132,7 @@ def principal_pair(
     tangents, found = _tangents(generator.problem, p, pairs), list[PrincipalPair]()
 
     def solved(x: FloatArray, y: FloatArray) -> PrincipalPair:
-        pair = _pair(generator, pencil, rayleigh_iteration(pencil, x, y, clock))
+        pair = _pair(generator, pencil, rayleigh_iteration(pencil, x, y))
         if pair.residual <= BACKWARD_ERROR_LIMIT:
             found.append(pair)
         return pair
@@ -146,7 +147,7 @@ def principal_pair(
         return pair if is_right and pair.residual <= BACKWARD_ERROR_LIMIT else None
 
     def from_the_right() -> PrincipalPair:
-        right, left, value, distance = _from_the_right(pencil, generator, clock)
+        right, left, value, distance = _from_the_right(pencil, generator)
         pair = solved(right, left)
         defect = min(pair.sign_defects)
         if not (pair.residual <= BACKWARD_ERROR_LIMIT and defect <= POSITIVE and abs(pair.value - value) < distance):
@@ -216,15 +217,15 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
     return values[np.lexsort((values.imag, -values.real))][:k]
 
 
-def rightmost_pair(generator: Generator, p: float, clock: Callable[[], None] = lambda: None) -> PrincipalPair:
+def rightmost_pair(generator: Generator, p: float) -> PrincipalPair:
     """The pair of the rightmost eigenvalue, for spaces in which no other lies further to the right than Λ(p)."""
+    charge(SECONDS_OF_CUBE * generator.size**3, 64e-9 * generator.size**2, generator.size)
     root, matrix = _standard(generator, p)
-    clock()
     values, left, right = scipy.linalg.eig(matrix, left=True)
     best = int(np.argmax(values.real))
     x, y = (scipy.linalg.solve_triangular(root, each[:, best].real, lower=True, trans="T") for each in (right, left))
     pencil = generator.at(p)
-    return _pair(generator, pencil, rayleigh_iteration(pencil, x, y, clock))
+    return _pair(generator, pencil, rayleigh_iteration(pencil, x, y))
 
 
 def _standard(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
@@ -258,9 +259,7 @@ def _simplest(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatAr
     return vector, vector
 
 
-def _from_the_right(
-    pencil: Pencil, generator: Generator, clock: Callable[[], None]
-) -> tuple[FloatArray, FloatArray, float, float]:
+def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray, float, float]:
     """Vectors T and T*, and the value, of the rightmost real eigenvalue, seen from the right; and its error at most.
 
     For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is the largest eigenvalue of the
@@ -271,7 +270,7 @@ def _from_the_right(
     right = left = _simplest(pencil, generator)[0]
     shift = pencil.numerical_abscissa + 0.1 * generator.unit_rate
     for _ in range(MAX_SHIFTS):
-        clock()
+        factor: Any = None  # there is room for the next ones
         factor, last = pencil.factorised(shift), value
         right, value = _nearest(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, shift, pencil.p)
         if abs(value - last) <= NEAR_ENOUGH * (shift - value):
@@ -315,9 +314,7 @@ class Iterate(NamedTuple):
 
 
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # a start may be useless, as its residual tells then
-def rayleigh_iteration(
-    pencil: Pencil, x: FloatArray, y: FloatArray, clock: Callable[[], None] = lambda: None
-) -> Iterate:
+def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> Iterate:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
     space, operator = pencil.space, pencil.matrix
     mx = space.weighed(x)
@@ -325,7 +322,7 @@ def rayleigh_iteration(
     size, stalls = operator.norm, 0
     for _ in range(MAX_ITERATIONS):
         shift, last = best.value, best.residual
-        clock()
+        factor: Any = None  # there is room for the next ones
         factor = pencil.factorised(shift)
         for _ in range(STEPS_PER_FACTOR):
             new = _improved(factor, space, shift, size, best)

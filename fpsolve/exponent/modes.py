@@ -20,17 +20,15 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse import issparse
 
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.errors import MeshError, NotConverged, SingularMatrix
-from fpsolve.exponent.adapt import GIGABYTES, SHARE, NearPlace, _Search
+from fpsolve.exponent.adapt import SHARE, NearPlace, _Search
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair, rightmost_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.fem.discretisation import Discretisation, ModeEffects, Polynomials, first_part
 from fpsolve.fem.harmonics import HarmonicCells
 from fpsolve.fem.sphere import Coordinates, SphereCells, SphereGenerator, group_dimensions
-from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES, FIRST_DEGREE = 2, 6
@@ -53,8 +51,6 @@ LEFT = 0.5
 MEASURED = 3.0
 """What is left after elements or polynomials of the noise, over what two degrees more of them change."""
 DIGITS = 10.0
-GIGABYTES_OF_ENTRY = 3e-7
-"""For an entry of the sparse matrices of a stage, with those of coarser stages and of the next one."""
 
 
 def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
@@ -229,7 +225,7 @@ class SpherePlace(NearPlace):
         level = 0
         while True:
             chosen = self._chosen(level)
-            self._check(search, level, chosen)
+            search.check(chosen)
             try:
                 pair = self._pair(level, search, pair)
             except (NotConverged, SingularMatrix, MeshError) as failure:
@@ -301,22 +297,6 @@ class SpherePlace(NearPlace):
         first = self._levels[0].chosen
         return replace(first, phase=replace(first.phase, waves=first.phase.waves + 2 * level))
 
-    def _check(self, search: _Search, level: int, chosen: Discretisation) -> None:
-        """Refuse a stage beyond the budget.
-
-        Its memory is that of elimination, over the noise or over elements in η, and that of the matrices.
-        """
-        directions, noises = chosen.phase.size, chosen.size // chosen.phase.size
-        numbers = min(directions**2 * (noises + 4), 2.5 * chosen.size**2 / chosen.phase.elements)
-        entries = 0
-        if level < len(self._levels):
-            terms = self._levels[level].at(search.p).matrix.terms
-            entries = sum(int(phase.nnz) for phase, *_ in terms if issparse(phase))
-        limits = {"most": GIGABYTES * self.budget.unknowns, "unknowns": self.budget.unknowns}
-        if (size := 8e-9 * numbers + GIGABYTES_OF_ENTRY * entries) > limits["most"]:
-            search.stop(Message(Code.MEMORY_SPENT, size=size, **limits))
-        search.check(chosen)
-
     def _finer(
         self, chosen: Discretisation, effects: Sequence[Any], errors: Sequence[float], allowed: float
     ) -> Discretisation:
@@ -341,16 +321,16 @@ class SpherePlace(NearPlace):
         """The pair at p on one level, from that on a coarser one, or from p to p since p = 0."""
         generator, p = self._generator(level), search.p
         if coarse is not None:
-            return principal_pair(generator, p, start=coarse, clock=search.tick)
+            return principal_pair(generator, p, start=coarse)
         if self.cells:
-            return rightmost_pair(generator, p, search.tick)
+            return rightmost_pair(generator, p)
         near = [pair for pair in self._pairs if pair.generator is generator]
         if not near:
-            near = [principal_pair(generator, 0.0, clock=search.tick)]
+            near = [principal_pair(generator, 0.0)]
         closest = min(near, key=lambda pair: abs(pair.p - p)).p
         steps = math.ceil(abs(p - closest) / LARGEST_STEP)
         for k in range(1, steps + 1):
             sides = sorted(near, key=lambda pair: abs(pair.p - p))[:2]
-            near.append(principal_pair(generator, closest + k / steps * (p - closest), start=sides, clock=search.tick))
+            near.append(principal_pair(generator, closest + k / steps * (p - closest), start=sides))
         self._pairs[:] = near
         return min(near, key=lambda pair: abs(pair.p - p))

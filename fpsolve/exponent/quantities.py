@@ -31,6 +31,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from fpsolve.arrays import is_whole, shown
+from fpsolve.budget import one_number
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
@@ -53,6 +54,7 @@ DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
 QuantityName = Literal[DrawnName, "variance_rate", "impact_rate", "critical_impact_factor", "critical_restitution"]
 
 
+@one_number("N")
 def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
     """N = ∂λ/∂ ln R, the mean number of impacts per unit time; it does not depend on R.
 
@@ -76,6 +78,7 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
     return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.near.refinement)
 
 
+@one_number("R_c")
 def critical_impact_factor(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
     """R_c = R exp(−λ/N), with which λ = 0: more loss makes almost every path decay. It is > 1 if they do without loss.
 
@@ -97,6 +100,7 @@ def critical_impact_factor(solver: ExponentSolver, jump: int | None = None) -> E
     return checked(found, solver.near.refinement)
 
 
+@one_number("r_c")
 def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
     """r_c, the coefficient of restitution with which λ = 0, by the impact law of the system; or why there is none.
 
@@ -237,10 +241,12 @@ def _restitution_by_theory(problem: Problem) -> float:
     return system.impact_value(theory.critical_log_factor) if theory and len(system.jumps) == 1 else math.nan
 
 
+def _root(solver: ExponentSolver, guess: float | None) -> Estimate | Absent:
+    return nonzero_root(solver, guess=guess)
+
+
 LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())
-STABILITY_INDEX: Index = _index(
-    quantity.STABILITY_INDEX, lambda solver, root: nonzero_root(solver, guess=root), SEARCH_INTERVAL
-)
+STABILITY_INDEX: Index = _index(quantity.STABILITY_INDEX, _root, SEARCH_INTERVAL)
 VARIANCE_RATE = _index(quantity.VARIANCE_RATE, lambda solver, _: solver.variance_rate())
 IMPACT_RATE = _index(quantity.IMPACT_RATE, lambda solver, _: impact_rate(solver))
 CRITICAL_IMPACT_FACTOR = _index(quantity.CRITICAL_IMPACT_FACTOR, lambda solver, _: critical_impact_factor(solver))

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
+from fpsolve.budget import one_number
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
     WIDER,
     AllPlaces,
     Budget,
-    Countdown,
     FarPlaces,
     NearPlace,
     Tolerance,
@@ -156,7 +156,6 @@ class ExponentSolver:
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a discretisation may cost.
         starts: solutions of a problem with parameters close by, by their p, see `NearPlace`.
-        countdown: that all p share; each has the seconds of the budget if None.
         is_alone: whether no derivative by p is asked for, which saves time for more than two variables and p = 2, 4.
 
     Raises:
@@ -171,7 +170,6 @@ class ExponentSolver:
     rtol: float = 1e-8
     budget: Budget = field(default_factory=Budget)
     starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
-    countdown: Countdown | None = field(default=None, repr=False)
     is_alone: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -203,7 +201,7 @@ class ExponentSolver:
     @property
     def _own(self) -> dict[str, Any]:
         tolerance = partial(tolerated, self.rtol, self.scales)  # not a method: a cycle would keep matrices for long
-        return {"rtol": self.rtol, "budget": self.budget, "tolerance": tolerance, "countdown": self.countdown}
+        return {"rtol": self.rtol, "budget": self.budget, "tolerance": tolerance}
 
     @cached_property
     def place(self) -> NearPlace | AllPlaces:
@@ -232,7 +230,7 @@ class ExponentSolver:
 
     @property
     def _usual(self) -> dict[str, Any]:
-        return {"rtol": self.rtol, "budget": self.budget, "countdown": self.countdown}
+        return {"rtol": self.rtol, "budget": self.budget}
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, that of rtol if none is given.
@@ -357,6 +355,7 @@ class ExponentSolver:
         p = solution.pair.p
         return Estimate(solution.pair.value, solution.error, self.scale(p), quantity=quantity.moment_at(p))
 
+    @one_number("λ")
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
         value, error = self.ratio_alone(0.0)
@@ -364,6 +363,7 @@ class ExponentSolver:
         found = Estimate(value, error, self.scales.linear, meaning, quantity.LYAPUNOV_EXPONENT)
         return checked(found, self.near.refinement)
 
+    @one_number("Λ″(0)")
     def variance_rate(self) -> Estimate:
         """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
 
@@ -399,6 +399,7 @@ class ExponentSolver:
         pair = self.around_zero.pair
         return Bordered(self.near.finer_pair(pair, widened(pair.generator).enriched()))
 
+    @one_number("Λ({0:g})/{0:g}")
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""
         value, error = self.ratio_alone(p, tolerance)

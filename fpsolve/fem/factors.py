@@ -5,23 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dgemm
 from scipy.sparse import csr_matrix, identity
-from scipy.sparse.csgraph import shortest_path
+from scipy.sparse.csgraph import reverse_cuthill_mckee, shortest_path
 from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray
+from fpsolve.budget import charge
 from fpsolve.errors import SingularMatrix
-from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.axis import KroneckerSum, on_one_pattern
 from fpsolve.fem.dense import DenseFactors, Factors
 from fpsolve.fem.refined import RefinedFactors
-from fpsolve.fem.rings import Ring, RingFactors, ring_seconds
+from fpsolve.fem.rings import Ring, RingFactors, ring_gigabytes, ring_seconds
 
 MAX_DENSE_UNKNOWNS = 350
 """Below it one dense matrix is the fastest."""
@@ -31,6 +32,10 @@ MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 MAX_LEVEL = 0.2
 """Share of the functions of the last axis that one level may have."""
+SPARSE_SECONDS, SPARSE_BYTES = 2e-10, 24.0
+"""Of SuperLU, for an unknown times the square of the width of a front, and times the width."""
+SECONDS_PER_OPERATION = 5e-11
+"""Of large dense matrices."""
 ROUGH_COST = 5e9
 """Operations of an elimination from which on single precision, with its refinements, is faster."""
 LARGEST_GROWTH = 1e3
@@ -55,6 +60,14 @@ def sparse_lu(matrix: Any, **options: Any) -> Any:
         raise SingularMatrix(*failure.args) from failure
 
 
+class Plan(NamedTuple):
+    """What makes factors, and what it takes: seconds of a processor and gigabytes, all that it needs for a while."""
+
+    seconds: float
+    gigabytes: float
+    factorise: Callable[[], Factors]
+
+
 def factorised(
     operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: bool = False, ring: Ring | None = None
 ) -> Factors:
@@ -65,80 +78,129 @@ def factorised(
         levels: for each axis the functions that are eliminated together, see `Axis`; nothing where none are.
         is_full: whether most functions of the first axis are coupled, so that no order of elimination spares anything.
         ring: the cells of the first axis, where only their end values couple them.
+
+    Raises:
+        OverBudget: what it takes is more than a number may still cost.
     """
+    *others, last = plans(operator, levels, is_full=is_full, ring=ring)
+    for plan in others:
+        with suppress(SingularMatrix):
+            return _made(plan, operator)
+    return _made(last, operator)
+
+
+def _made(plan: Plan, operator: KroneckerSum) -> Factors:
+    charge(plan.seconds, plan.gigabytes, operator.size)
+    return plan.factorise()
+
+
+def plans(
+    operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: bool = False, ring: Ring | None = None
+) -> list[Plan]:
+    """What factors of a sum there may be, the best ones first, each in the place of those that cannot be made."""
     if operator.size <= MAX_DENSE_UNKNOWNS and not operator.is_sparse:
-        return DenseFactors(operator.toarray())
+        return [_dense(operator)]
     m, n = operator.halves
     if is_full:
         return _of_full(operator, levels)
     if len(operator.shape) == 2 and (not levels or levels[-1] is None):
         return _of_plane(operator, ring)
     if operator.is_sparse:
-        return SparseFactors(operator)
+        return [_sparse(operator)]
     if len(operator.shape) == 3 and operator.shape[1] > n:
-        return SwappedFactors(operator, levels)
+        swapped = KroneckerSum([(phase, last, first) for phase, first, last in operator.terms])
+        inner = plans(swapped, levels and (levels[0], levels[2], levels[1]))
+        return [each._replace(factorise=partial(SwappedFactors, operator.shape, each.factorise)) for each in inner]
     own = levels[-1] if levels else None
     if own is None and m <= MAX_THICK_BLOCK and operator.band <= MAX_BAND < n:
-        return BlockFactors(operator)
+        return [_by_blocks(operator)]
+    found = []
     if own is not None and m <= MAX_BLOCK:
         own = own or levels_of(operator)
         if max(level.size for level in own) <= MAX_LEVEL * n:
-            for each in (own, paired(own)):
-                with suppress(SingularMatrix):
-                    return LevelFactors(operator, along_last(operator, each))
-    return SparseFactors(operator)
+            found = [_by_levels(operator, along_last(operator, each), math.inf) for each in (own, paired(own))]
+    return [*found, _sparse(operator)]
 
 
-def _of_plane(operator: KroneckerSum, ring: Ring | None) -> Factors:
+def _of_plane(operator: KroneckerSum, ring: Ring | None) -> list[Plan]:
     """Of the phase and one noise: by blocks or cell by cell, what should take less time with four solves, or sparse."""
     (m, n), band = operator.shape, max(operator.band, 1)
-    choices: list[tuple[float, Callable[[], Factors]]] = [(math.inf, lambda: SparseFactors(operator))]
+    found = []
     if m <= MAX_BLOCK and band <= MAX_BAND and 2 * band < n:
-        seconds = 1.4 * n * (1.5e-5 + 4e-6 * band**2 + 5e-11 * (1 + band) ** 2 * m**3)
-        choices.append((seconds, lambda: BlockFactors(operator.with_dense_first())))
+        found.append(_by_blocks(operator))
     if ring is not None and len(ring.number) > 2 and band <= MAX_BAND:
-        choices.append(
-            (5e-4 + 2 * ring_seconds(operator, ring), lambda: RefinedFactors(operator, RingFactors(operator, ring)))
+        found.append(
+            Plan(
+                5e-4 + 2 * ring_seconds(operator, ring),
+                ring_gigabytes(operator, ring),
+                lambda: RefinedFactors(operator, RingFactors(operator, ring)),
+            )
         )
-    return _cheapest(choices)
+    return [*sorted(found, key=lambda plan: plan.seconds), _sparse(operator)]
 
 
-def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> Factors:
+def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> list[Plan]:
     """By levels of the first axis or of the last one, by blocks, or dense: what takes the fewest operations."""
     (m, n), band = operator.halves, operator.band
-    choices: list[tuple[float, Callable[[], Factors]]] = [
-        (_dense_cost(operator.size), lambda: DenseFactors(operator.toarray())),
-    ]
+    found = [_dense(operator)]
     if n > 2 and levels and levels[-1] is not None:
-        choices.append(_by_levels(operator, along_last(operator, levels[-1] or levels_of(operator))))
+        found.append(_by_levels(operator, along_last(operator, levels[-1] or levels_of(operator))))
     elif 2 * band < n:
         cost = n * (_dense_cost(m) + 2 * band * (1 + band) * m**3)
         if cost > ROUGH_COST:
             groups = np.split(np.arange(n), range(max(band, 1), n, max(band, 1)))
-            choices.append(_by_levels(operator, along_last(operator, groups)))
+            found.append(_by_levels(operator, along_last(operator, groups)))
         else:
-            choices.append((cost, lambda: BlockFactors(operator.with_dense_first())))
+            found.append(_by_blocks(operator)._replace(seconds=SECONDS_PER_OPERATION * cost))
     if levels and levels[0] is not None:
-        choices.append(_by_levels(operator, along_first(operator, levels[0])))
-    return _cheapest(choices)
+        found.append(_by_levels(operator, along_first(operator, levels[0])))
+    return sorted(found, key=lambda plan: plan.seconds)
 
 
-def _cheapest(choices: Sequence[tuple[float, Callable[[], Factors]]]) -> Factors:
-    """The factors that take least, or the next ones where those cannot be made."""
-    *others, last = [factorise for _, factorise in sorted(choices, key=lambda choice: choice[0])]
-    for factorise in others:
-        with suppress(SingularMatrix):
-            return factorise()
-    return last()
+def _dense(operator: KroneckerSum) -> Plan:
+    size = operator.size
+    return Plan(SECONDS_PER_OPERATION * _dense_cost(size), 16e-9 * size**2, lambda: DenseFactors(operator.toarray()))
 
 
-def _by_levels(operator: KroneckerSum, levels: Sequence[Any]) -> tuple[float, Callable[[], Factors]]:
-    """Operations of an elimination by levels, and what does it."""
+def _by_blocks(operator: KroneckerSum) -> Plan:
+    """Of the factors there are 1 + 2 band blocks for each function, and the lower ones twice for a while."""
+    (m, n), band = operator.halves, max(operator.band, 1)
+    seconds = 1.4 * n * (1.5e-5 + 4e-6 * band**2 + 5e-11 * (1 + band) ** 2 * m**3)
+    gigabytes = 8e-9 * m**2 * (n * (1 + 3 * band) + 2 * len(operator.terms))
+    return Plan(seconds, gigabytes, lambda: BlockFactors(operator.with_dense_first()))
+
+
+def _sparse(operator: KroneckerSum) -> Plan:
+    seconds, gigabytes = sparse_cost(operator)
+    return Plan(seconds, gigabytes, lambda: SparseFactors(operator))
+
+
+def _by_levels(operator: KroneckerSum, levels: Sequence[Any], rough_cost: float = ROUGH_COST) -> Plan:
+    """An elimination by levels, in single precision from a number of operations on."""
     sizes = [level.size for level in levels]
     cost = sum(_dense_cost(size) for size in sizes) + sum(2 * a**2 * b for a, b in pairwise(reversed(sizes)))
-    if cost < ROUGH_COST:
-        return cost, lambda: LevelFactors(operator, levels)
-    return cost, lambda: RefinedFactors(operator, LevelFactors(operator, levels, np.float32))
+    numbers, largest = sum(size**2 for size in sizes), max(sizes) ** 2
+    seconds, gigabytes = SECONDS_PER_OPERATION * cost, 1e-9 * (8 * numbers + 40 * largest)
+    if cost < rough_cost:
+        return Plan(seconds, gigabytes, lambda: LevelFactors(operator, levels))
+    return Plan(seconds, 0.5 * gigabytes, lambda: RefinedFactors(operator, LevelFactors(operator, levels, np.float32)))
+
+
+def sparse_cost(operator: KroneckerSum) -> tuple[float, float]:
+    """Seconds and gigabytes of SuperLU, which is as good as an elimination along the axis that makes narrow fronts."""
+    (m, n), size = operator.halves, operator.size
+    (first, _), (last, _) = (on_one_pattern([pair[side] for pair in operator.pairs]) for side in (0, 1))
+    width = min(bandwidth(first) * n, bandwidth(last) * m, size)
+    entries = first.nnz * last.nnz
+    return SPARSE_SECONDS * size * width**2, 1e-9 * (SPARSE_BYTES * size * width + 40 * entries)
+
+
+def bandwidth(pattern: Any) -> int:
+    """How far apart coupled functions are in the order of Cuthill and McKee."""
+    order = reverse_cuthill_mckee((pattern + pattern.T).tocsr(), symmetric_mode=True)
+    place = np.argsort(order)
+    rows, columns = pattern.nonzero()
+    return int(np.max(np.abs(place[rows] - place[columns]), initial=0)) + 1
 
 
 def _dense_cost(size: int) -> float:
@@ -184,10 +246,8 @@ class BlockFactors:
 class SwappedFactors:
     """Those of a sum of three factors with the two last ones exchanged."""
 
-    def __init__(self, operator: KroneckerSum, levels: Sequence[Any] = ()) -> None:
-        self._shape = operator.shape
-        swapped = KroneckerSum([(phase, last, first) for phase, first, last in operator.terms])
-        self._inner = factorised(swapped, levels and (levels[0], levels[2], levels[1]))
+    def __init__(self, shape: tuple[int, ...], factorise: Callable[[], Factors]) -> None:
+        self._shape, self._inner = shape, factorise()
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         phase, first, last = self._shape

@@ -274,6 +274,12 @@ def ring_seconds(operator: KroneckerSum, ring: Ring) -> float:
     return 3.5e-5 * levels + 1e-4 * rounds + within + (18 * cells + 16) * n**3 / 3e10
 
 
+def ring_gigabytes(operator: KroneckerSum, ring: Ring) -> float:
+    """What an elimination needs: A by groups, images of all loads, and what joins the cells."""
+    (cells, modes), n, band = ring.number.shape, operator.shape[-1], max(operator.band, 1)
+    return 8e-9 * cells * (5 * n * band * modes**2 + n**2 * (modes + 30))
+
+
 def _inverse(matrices: FloatArray, most: float) -> FloatArray:
     """Their inverses. Raises `SingularMatrix` where one is larger than it may be."""
     try:

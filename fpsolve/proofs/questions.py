@@ -6,10 +6,9 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget, Countdown
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem, of_problem
@@ -17,7 +16,7 @@ from fpsolve.proofs.balls import precision
 from fpsolve.proofs.bounds import LOWER, UPPER
 from fpsolve.proofs.certificate import NOTHING, Enclosure, around, enclosure_of, trivial
 from fpsolve.proofs.excursions import excursion_factor
-from fpsolve.proofs.search import enclose, sign_certificate
+from fpsolve.proofs.search import Timer, enclose, sign_certificate
 from fpsolve.proofs.statement import Statement, cylinder, statement_of
 from fpsolve.theory.perturbation import scale_of
 
@@ -191,7 +190,7 @@ def prove_bounds(
     progress: Callable[[], None] = lambda: None,
 ) -> Enclosure:
     """Bounds on Λ(p), or on λ where p is None, with p as a decimal, within the seconds of a budget."""
-    countdown, guess = Countdown(budget.seconds), None
+    timer, guess = Timer(budget.seconds), None
     order = math.nan if p is None else float(p)
     if p is not None and not math.isfinite(order):
         raise ValueError(f"got p = {p}; must be finite")
@@ -200,8 +199,7 @@ def prove_bounds(
     if order == 0:
         return trivial(stated)
     for rtol in (1e-8, 1e-3):  # what finite elements find, at a smaller accuracy if need be
-        most: Any = {"budget": budget, "countdown": Countdown(GUESS_SHARE * budget.seconds)}
-        solver = ExponentSolver(problem, rtol=rtol, **most)
+        solver = ExponentSolver(problem, rtol=rtol, budget=replace(budget, seconds=GUESS_SHARE * budget.seconds))
         with suppress(NotConverged):
             guess = solver.lyapunov_exponent().value if p is None else solver.solution(order).pair.value
             break
@@ -209,7 +207,7 @@ def prove_bounds(
     scale = max(abs(guess or 0.0), float(theory.linear if p is None else theory.moment(order)))
     wanted = SHARE * scale if width is None else width
     is_hopeless = p is not None and guess is None
-    found = NOTHING if is_hopeless else enclose(stated, p, wanted, guess or 0.0, countdown, progress)
+    found = NOTHING if is_hopeless else enclose(stated, p, wanted, guess or 0.0, timer, progress)
     return replace(found, wanted=wanted)
 
 
@@ -221,9 +219,8 @@ def prove_index(
     They may take twice the seconds of a budget, as they need bounds at two p.
     """
     refuse_unprovable(stated)
-    countdown = Countdown(2 * budget.seconds)
-    most: Any = {"budget": budget, "countdown": Countdown(2 * GUESS_SHARE * budget.seconds)}
-    solver = ExponentSolver(problem, **most)
+    timer = Timer(2 * budget.seconds)
+    solver = ExponentSolver(problem, budget=replace(budget, seconds=2 * GUESS_SHARE * budget.seconds))
     try:
         found = nonzero_root(solver)
         if not found:
@@ -237,7 +234,7 @@ def prove_index(
             sides = [repr(float(f"{found.value + sign * half:.12g}")) for sign in (-1, 1)]
             moments = []
             for left, p in zip((2, 1), sides, strict=True):  # for the first half of what is left
-                seconds = (countdown.seconds - countdown.elapsed) / left
+                seconds = (timer.seconds - timer.elapsed) / left
                 if seconds <= 0:
                     return NO_INDEX
                 most = replace(budget, seconds=seconds)
@@ -255,9 +252,10 @@ def prove_excursions(
 ) -> ExcursionEnclosure:
     """Bounds of excursions from p beside δ_p; none where there is no δ_p > 0, or where they are not found."""
     refuse_unprovable(stated)
-    countdown = Countdown(budget.seconds)
+    timer = Timer(budget.seconds)
     try:
-        found = nonzero_root(ExponentSolver(problem, budget=budget, countdown=Countdown(GUESS_SHARE * budget.seconds)))
+        most = replace(budget, seconds=GUESS_SHARE * budget.seconds)
+        found = nonzero_root(ExponentSolver(problem, budget=most))
     except NotConverged:
         return NO_EXCURSION
     if not found or found.value <= 0:
@@ -267,8 +265,8 @@ def prove_excursions(
         bounds.append(None)
         for away in NEARBY:
             p = repr(float(f"{found.value * (1 - sense * away):.7g}"))
-            seconds = share * (countdown.seconds - countdown.elapsed) / len(NEARBY)
-            certificate = sign_certificate(stated, p, sense, Countdown(seconds), progress)
+            seconds = share * (timer.seconds - timer.elapsed) / len(NEARBY)
+            certificate = sign_certificate(stated, p, sense, Timer(seconds), progress)
             factor = math.nan if certificate is None else excursion_factor(certificate, sense)
             if certificate is not None and factor > 0:
                 bounds[-1] = ExcursionBound(p, factor * (1 + sense * LOOSE), enclosure_of(certificate))

@@ -10,8 +10,9 @@ the noise part of L is −½ ν ∫ P_s T_z S_z in its weak form, so that u solv
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ import scipy.sparse as sp
 from scipy.special import roots_jacobi
 
 from fpsolve.arrays import FloatArray
-from fpsolve.exponent.adapt import Budget, Countdown
+from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.factors import sparse_lu
 from fpsolve.proofs.balls import above, ball, balls, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Core, Whole, hermite_table
@@ -53,6 +54,24 @@ NUDGE = 1e-10
 """Of a shift off an eigenvalue, relative."""
 RULE_REACH = 11.0
 """Standard deviations of the weight that the quadrature covers on either side."""
+
+
+@dataclass(frozen=True)
+class Timer:
+    """Seconds of the processor that run from when this is made: of proofs, whose operations are not counted.
+
+    Attributes:
+        seconds: how many there are.
+        started: by `time.process_time`.
+    """
+
+    seconds: float
+    started: float = field(default_factory=lambda: time.process_time())
+
+    @property
+    def elapsed(self) -> float:
+        """How many are gone."""
+        return time.process_time() - self.started
 
 
 @dataclass(frozen=True)
@@ -212,7 +231,7 @@ def enclose(
     p: str | None,
     width: float,
     guess: float = 0.0,
-    countdown: Countdown | None = None,
+    timer: Timer | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Enclosure:
     """Bounds on Λ(p), or on λ where p is None, that are at most `width` apart, if that can be done.
@@ -221,7 +240,7 @@ def enclose(
         stated: parameters as decimals.
         p: the moment as a decimal.
         guess: Λ(p), about.
-        countdown: of the time for it; the next trial is foreseen from the last one, so that it may take a third more.
+        timer: of the time for it; the next trial is foreseen from the last one, so that it may take a third more.
         progress: called after each trial function.
 
     Returns:
@@ -230,7 +249,7 @@ def enclose(
     Raises:
         NoSuchExponent: the noise has algebraic tails, r₀ > 1.
     """
-    noise, size, left = cylinder(stated), SMALLEST, countdown or Countdown(Budget().seconds)
+    noise, size, left = cylinder(stated), SMALLEST, timer or Timer(Budget().seconds)
     if noise.states is not None:
         size = size[0], len(noise.states)
     found, closest = list[Certificate](), math.inf
@@ -253,7 +272,7 @@ def _enlarged(
     guess: float,
     width: float,
     size: tuple[int, int],
-    countdown: Countdown,
+    timer: Timer,
     progress: Callable[[], None],
 ) -> Iterator[tuple[Certificate, int, int]]:
     """Certificates by larger and larger trials, as long as the bounds come closer, and the sizes of the trials.
@@ -265,9 +284,9 @@ def _enlarged(
     cost, unknowns, edge = 0.0, (2 * waves + 1) * degrees, math.inf
     passed: tuple[Basis, Pair, int, int] | None = None
     while idle < PATIENCE[delta > FAR * abs(value)] and (2 * waves + 1) * degrees <= MOST_UNKNOWNS:
-        begun = countdown.elapsed
+        begun = timer.elapsed
         cost, unknowns = cost * ((2 * waves + 1) * degrees / unknowns) ** 1.5, (2 * waves + 1) * degrees
-        if begun + cost > countdown.seconds:
+        if begun + cost > timer.seconds:
             break
         try:
             pair, basis = _solved(noise, basis, p, guess, waves, degrees)
@@ -278,7 +297,7 @@ def _enlarged(
             break
         edges = pair.edges if noise.states is None else (pair.edges[0], 0.0)
         before, edge = edge, max(edges)
-        if ROUGH * width < edge < PROGRESS * before and begun < EARLY * countdown.seconds:
+        if ROUGH * width < edge < PROGRESS * before and begun < EARLY * timer.seconds:
             passed = basis, pair, waves, degrees
         else:
             passed = None
@@ -290,7 +309,7 @@ def _enlarged(
                 yield certificate, waves, degrees
             elif delta < math.inf:
                 idle += 1
-        cost = countdown.elapsed - begun
+        cost = timer.elapsed - begun
         waves, degrees = (
             min(math.ceil(GROWTH * n) + 1, most) if of_it > 0.1 * edge else n
             for n, of_it, most in zip((waves, degrees), edges, (MOST["rows"] - 1, MOST["columns"]), strict=True)
@@ -308,13 +327,13 @@ def sign_certificate(
     stated: Statement,
     p: str,
     sense: int,
-    countdown: Countdown,
+    timer: Timer,
     progress: Callable[[], None] = lambda: None,
 ) -> Certificate | None:
     """That Λ(p) ≤ 0 (sense 1), or Λ(p) ≥ 0 (−1), by a trial function without W; None where that is not found.
 
     Args:
-        stated, p, countdown, progress: as for `enclose`.
+        stated, p, timer, progress: as for `enclose`.
     """
     noise = cylinder(stated)
     if (kind := noise.bases[-1]) not in OTHERS:
@@ -323,7 +342,7 @@ def sign_certificate(
     if noise.states is not None:
         degrees = len(noise.states)
     cost = 0.0
-    while (2 * waves + 1) * degrees <= MOST_UNKNOWNS and (begun := countdown.elapsed) + cost <= countdown.seconds:
+    while (2 * waves + 1) * degrees <= MOST_UNKNOWNS and (begun := timer.elapsed) + cost <= timer.seconds:
         try:
             pair = Galerkin(noise, basis, float(p), waves, degrees, evenly=True).pair(0.0)
         except ArithmeticError:
@@ -332,7 +351,7 @@ def sign_certificate(
         progress()
         if found is not None and not objection(found):
             return found
-        cost = (countdown.elapsed - begun) * GROWTH**3
+        cost = (timer.elapsed - begun) * GROWTH**3
         waves = math.ceil(GROWTH * waves) + 1
         if noise.states is None:
             degrees = math.ceil(GROWTH * degrees) + 1

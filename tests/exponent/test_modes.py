@@ -23,12 +23,12 @@ from fpsolve import (
 )
 from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
-from fpsolve.errors import FpsolveError, NotConverged
-from fpsolve.exponent.adapt import Budget, _Search
+from fpsolve.errors import FpsolveError
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.modes import SpherePlace, left_of, modal_coordinates, second_moments
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.discretisation import Discretisation, Polynomials, first_part
+from fpsolve.fem.discretisation import Discretisation, first_part
 from fpsolve.fem.sphere import SphereCells
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
 from fpsolve.simulation.response import simulated_response
@@ -165,18 +165,6 @@ def test_what_is_left_of_an_algebraic_series(power):
     falling = [1 - 10.0**-k for k in range(5)]
     assert left_of([2, 4, 6, 8, 10], falling) == pytest.approx(2 * (1 - falling[-1]), rel=1e-9)
     assert left_of([4, 6, 8], [1.0, 1.1, 1.3]) == math.inf
-
-
-def test_memory_is_foreseen():
-    """A block of all functions of directions for each of the noise, and four more, and what sparse matrices take."""
-    given = problem(OU)
-    place = SpherePlace(given, rtol=1e-6, budget=Budget(), tolerance=lambda p, value: 1e-6)
-    coordinates, *_ = modal_coordinates(given)
-    cells = SphereCells(coordinates, np.linspace(0, math.pi / 2, 3), 8, 20)
-    chosen = Discretisation(cells, (Polynomials(9, 0.0),))
-    size = 8e-9 * cells.size**2 * (9 + 4)
-    with pytest.raises(NotConverged, match=f"needs some {size:.2g} GB of memory, more than the 2.4 GB that budget"):
-        place._check(_Search(place, 1.0, place.tolerance, place.begun()), 0, chosen)
 
 
 # by elements and by harmonics of the sphere of another code, to the last digit written
