@@ -12,7 +12,7 @@ a neighbouring p and must reach its tangent: Λ is convex.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Any, NamedTuple
