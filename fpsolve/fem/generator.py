@@ -133,7 +133,7 @@ class Generator:
 
     def __str__(self) -> str:
         lines = [f"  {power_of_epsilon(term.order):<2}  {term.text}" for term in self.terms()]
-        words = "" if self.problem.frame is None else ", where the order 0 is a uniform rotation,"
+        words = "" if self.problem.frame is None else " in coordinates of its own,"
         return "\n".join([f"L(p), Eq. (19){words} the sum of", *lines])
 
     def space(self, p: float) -> TensorSpace:

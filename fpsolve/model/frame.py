@@ -1,8 +1,9 @@
-"""Coordinates y = S⁻¹x in which the motion without noise is growth and a uniform rotation.
+"""Coordinates y = S⁻¹x of a problem's own, in which the rates of its phase and of its growth are small.
 
 A linear change of coordinates leaves Λ(p) alone, as ‖x‖ and ‖y‖ are within constant factors, and the phase ψ of y needs
-fewer functions than φ of x: with x″ + ω²x = 0 the phase of (x, ẋ) runs between the speeds 1 and ω². With x = a e(φ),
-e = (cos φ, −sin φ), and ρ(φ) = |S⁻¹e(φ)|,
+fewer functions than φ of x: with x″ + ω²x = 0 the phase of (x, ẋ) runs between the speeds 1 and ω². So Λ(p) is right
+whatever the units of x. That of time needs no care: every number scales with it. With x = a e(φ), e = (cos φ, −sin φ),
+and ρ(φ) = |S⁻¹e(φ)|,
 
     ‖x‖^p T(φ) = ‖y‖^p T_y(ψ),  so that  T(φ) = ρ^p T_y(ψ(φ)),  dψ/dφ = 1/(det S ρ²).
 """
@@ -25,12 +26,19 @@ from fpsolve.model.plane import (
     ImpulseDerivative,
     LinearMotion,
     System,
+    affine,
     combined,
     is_driven,
     rotating_coordinates,
 )
 
 MOST_PARTS = 1000
+HARDLY = 1.5
+"""How many times larger the rates may be in a frame that is preferred."""
+BARELY = 0.99
+"""The share of the rates with which the search ends: μ changes by powers of two in it, so that nothing is rounded."""
+ROUNDED = 1e-14
+"""Of the terms of an entry of S⁻¹AS."""
 T = TypeVar("T", Impulse, ImpulseDerivative)
 
 
@@ -67,13 +75,16 @@ class Frame:
         return replace(of, exponent=(self._inverse @ np.array(of.exponent) @ self._array).tolist())
 
     def motion(self, system: System) -> System:
-        """The same system for y, the terms of order 0 that no noise drives as one."""
+        """The same system for y, the terms of order 0 that no noise drives as one; a rotation is one exactly."""
         others = [self.term(term) for term in system.terms if not is_free(term)]
-        a = self._inverse @ np.reshape(_free(system.terms), (2, 2)) @ self._array
+        free = np.reshape(_free(system.terms), (2, 2))
+        a = self._inverse @ free @ self._array
         growth, speed = 0.5 * (a[0, 0] + a[1, 1]), 0.5 * (a[0, 1] - a[1, 0])
-        rotation = CoefficientMatrix(0, ((growth, speed), (-speed, growth)))  # exactly one
+        turned = np.array([[growth, speed], [-speed, growth]])
+        is_turn = np.all(abs(a - turned) <= ROUNDED * (abs(self._inverse) @ abs(free) @ abs(self._array)))
+        steady = CoefficientMatrix(0, (turned if is_turn else a).tolist())
         jumps = [replace(jump, phase=float(self.phase(np.array(jump.phase)))) for jump in system.jumps]
-        return LinearMotion(system.epsilon, (rotation, *others), tuple(jumps))
+        return LinearMotion(system.epsilon, (steady, *others), tuple(jumps))
 
     @property
     def parts(self) -> int:
@@ -107,46 +118,64 @@ def is_free(term: CoefficientMatrix) -> bool:
     return term.order == 0 and not is_driven(term.g)
 
 
-def normal_frame(
+def own_frame(
     drift: Sequence[CoefficientMatrix],
     diffusions: Sequence[CoefficientMatrix],
+    impulses: Sequence[Impulse],
     epsilon: float,
     spread: Callable[[str], tuple[float, float]],
 ) -> Frame | None:
-    """The frame in which the order 0 of a drift is growth and a uniform rotation; None where it does not rotate.
+    """The frame in which a motion is small; None where x itself is hardly worse.
 
-    It is also None where the phase of x runs more evenly, as where noise is much stronger than what turns the state.
+    Its size is ‖A‖ + Σ‖B‖² + Σ r‖C‖ + Σ min(s‖D‖, τs²‖D‖²), A all that no noise drives, B of white noise, C of impulses
+    at the rate r, D of noise with the standard deviation s and the correlation time τ: what the rates of growth and of
+    the phase may be. In a frame in which the order 0 is growth and a uniform rotation the phase is the smoothest, so
+    that this one is taken where there is one and the size hardly larger.
 
     Args:
-        drift, diffusions: what moves the state along a path of ξ, and by white noise.
+        drift, diffusions, impulses: what moves the state along a path of ξ, by white noise, and at random times.
         epsilon: ε.
         spread: by the name of a noise the standard deviation of ξ and about how long it remembers its value.
     """
-    numbers = _free(drift)
-    if numbers[1] == -numbers[2] and numbers[0] == numbers[3]:
-        return None
-    if (rotating := rotating_coordinates(np.reshape(numbers, (2, 2)))) is None:
-        return None
-    (first, _), (lower, last) = rotating.tolist()
-    frame = Frame(((1.0, 0.0), (lower / first, last / abs(first))))
+    parts = dict[str | None, list[tuple[float, CoefficientMatrix]]]()
+    for term in drift:
+        for name, c in zip((None, term.noise), affine(term.g) or (0.0, 1.0), strict=True):
+            parts.setdefault(name, []).append((c * epsilon**term.order, term))
+    steady = combined(parts.pop(None, ()))
+    driven = [(combined(terms), *spread(name or "")) for name, terms in parts.items() if any(c for c, _ in terms)]
+    white = [combined([(epsilon**each.order, each)]) for each in diffusions]
+    struck = [(each.rate, (*each.exponent[0], *each.exponent[1])) for each in impulses]
 
-    def unevenness(terms: Sequence[CoefficientMatrix], whites: Sequence[CoefficientMatrix]) -> float:
-        """The amplitudes of the waves of dφ/dt over its mean."""
-        total, driven, mean = 0.0, dict[str, float](), 0.0
-        for term in terms:
-            size = epsilon**term.order
-            if is_driven(term.g):
-                strength = size * spread(term.noise)[0] * float(abs(term.h.mean) + term.h.amplitude)
-                driven[term.noise] = driven.get(term.noise, 0.0) + strength
-            else:
-                total += size * abs(float(term.g(0.0))) * float(term.h.amplitude)
-                mean += size * float(term.g(0.0)) * float(term.h.mean)
-        total += sum(each * min(1.0, each * spread(name)[1]) for name, each in driven.items())
-        total += sum((epsilon**each.order * float(abs(each.h.mean) + each.h.amplitude)) ** 2 for each in whites)
-        return total / max(abs(mean), 1e-300)
+    def size(row: tuple[float, float]) -> float:
+        total = _norm(steady, row) + sum((norm := _norm(each, row)) * norm for each in white)
+        total += sum(rate * _norm(each, row) for rate, each in struck)
+        for each, deviation, time in driven:
+            strength = deviation * _norm(each, row)
+            total += strength * min(1.0, strength * time)
+        return total
 
-    here = unevenness([frame.term(each) for each in drift], [frame.term(each) for each in diffusions])
-    return frame if here < unevenness(drift, diffusions) else None
+    own = best = 0.0, 1.0
+    least = size(own)
+    while True:
+        slant, ratio = best
+        near = (slant, 2 * ratio), (slant, ratio / 2), (slant + ratio / 2, ratio), (slant - ratio / 2, ratio)
+        found = min((size(row), row) for row in near)
+        if not found[0] < BARELY * least:
+            break
+        least, best = found
+    choice = [own, best]
+    if (rotating := rotating_coordinates(np.reshape(_free(drift), (2, 2)))) is not None:
+        (first, _), (lower, last) = rotating.tolist()
+        choice.insert(0, (lower / first, last / abs(first)))
+    chosen = next((row for row in choice if size(row) <= HARDLY * least), own)
+    return None if chosen == own else Frame(((1.0, 0.0), chosen))
+
+
+def _norm(matrix: Sequence[float], row: tuple[float, float]) -> float:
+    """‖S⁻¹AS‖ of A row by row and S of the rows (1, 0) and (l, μ)."""
+    (a, b, c, d), (slant, ratio) = matrix, row
+    first = a + b * slant
+    return math.hypot(first, b * ratio, (c + d * slant - slant * first) / ratio, d - slant * b)
 
 
 def _free(terms: Sequence[CoefficientMatrix]) -> tuple[float, float, float, float]:

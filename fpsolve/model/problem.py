@@ -20,7 +20,7 @@ from fpsolve.data import plain_unit, written
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message
 from fpsolve.model.checks import refuse_wrong_derivative
-from fpsolve.model.frame import Frame, normal_frame
+from fpsolve.model.frame import Frame, own_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import Parameter, Parametrised
@@ -48,6 +48,8 @@ PHASES = 360
 """At which it is seen which way the phase passes them."""
 RTOL, RTOL_BEYOND_PLANE = 1e-8, 1e-5
 """The relative error that is wanted where a case names none: of two variables, and of more."""
+EVERY_RAY = (0.0,)
+"""What stands for all rays."""
 LINE = 90
 """Letters of a line of parameters at most."""
 
@@ -213,9 +215,10 @@ class Problem:
         if self.dimension > 2:
             return None
         drift, diffusions = self._moved
-        return normal_frame(
+        return own_frame(
             drift.terms,
             diffusions,
+            self._struck,
             drift.epsilon,
             lambda name: ((noise := self.named_noise(name)).standard_deviation, noise.correlation_time),
         )
@@ -245,35 +248,38 @@ class Problem:
     @cached_property
     def invariant_rays(self) -> tuple[float, ...]:
         """φ of rays that the phase never leaves, nor reaches, whatever the noise does; 0 alone where all rays are."""
+        rays = np.array(self._resting)
+        return tuple((rays if self.frame is None else self.frame.own_phase(rays) % math.pi).tolist())
+
+    @cached_property
+    def _resting(self) -> tuple[float, ...]:
+        """The phases of the `invariant_rays` in the coordinates of `frame`."""
         if self.dimension > 2:
             return ()
-        drift, diffusions = self._moved
-        lines = [affine(term.g) for term in drift.terms]
+        terms = self.motion.terms
+        lines = [affine(term.g) for term in terms]
         if None not in lines:  # most turn without noise: numbers are quicker than arrays
             a, b, c, d = combined(
-                (line[0] * drift.epsilon**each.order, each)
-                for line, each in zip(lines, drift.terms, strict=True)
+                (line[0] * self.motion.epsilon**each.order, each)
+                for line, each in zip(lines, terms, strict=True)
                 if line
             )
             if abs(b - c) > math.hypot(a - d, b + c) * (1 + 1e-12):
                 return ()
-        matrices = [np.array(each.matrix) for each in diffusions] + [each.matrix for each in self._struck]
-        matrices += self._by_noise(drift.terms)
-        speeds = [speed for speed in map(turning, matrices) if abs(speed.mean) + speed.amplitude > 0]
-        if not speeds:
-            return (0.0,)
-        first = speeds[0]
+        jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
+        matrices = [*map(np.array, jolts), *self._by_noise(terms)]
+        limits = [ROUNDED * float(np.linalg.norm(each)) for each in matrices]
+        pairs = zip(map(turning, matrices), limits, strict=True)
+        turns = [(speed, limit) for speed, limit in pairs if abs(speed.mean) + speed.amplitude > limit]
+        if not turns:
+            return EVERY_RAY
+        first, _ = turns[0]
         if abs(first.mean) > first.amplitude * (1 + 1e-12):
             return ()
         middle = math.atan2(first.sine, first.cosine)
         away = math.acos(min(max(-first.mean / first.amplitude, -1.0), 1.0))
         found = {0.5 * (middle + away) % math.pi, 0.5 * (middle - away) % math.pi}
-        limits = [1e-12 * (abs(speed.mean) + speed.amplitude) for speed in speeds]
-        return tuple(
-            phi
-            for phi in sorted(found)
-            if all(abs(float(speed(phi))) <= limit for speed, limit in zip(speeds, limits, strict=True))
-        )
+        return tuple(phi for phi in sorted(found) if all(abs(float(speed(phi))) <= limit for speed, limit in turns))
 
     @cached_property
     def has_cones(self) -> bool:
@@ -317,12 +323,13 @@ class Problem:
                 basis, groups, rounded = hidden_blocks(matrices)
                 names = [f"y{'₁₂₃₄'[k]}" for k in range(n)]
             return subsystems(self.system, basis, groups, names, rounded) if len(groups) > 1 else ()
-        if not (rays := self.invariant_rays):
+        if not (rays := self._resting):
             return ()
         phases = np.array(rays if len(rays) == 2 else (rays[0], rays[0] + math.pi / 2))
-        found = subsystems(self.system, np.stack([np.cos(phases), -np.sin(phases)]), [(0,), (1,)], ("", ""), ROUNDED)
-        is_one = all(not term.h.mean and not term.h.amplitude for term in self.system.terms)
-        return found[:1] if is_one else found
+        basis = np.stack([np.cos(phases), -np.sin(phases)])
+        basis = basis if self.frame is None else np.array(self.frame.matrix) @ basis
+        found = subsystems(self.system, basis, [(0,), (1,)], ("", ""), ROUNDED)
+        return found[:1] if rays == EVERY_RAY else found
 
     @cached_property
     def classes(self) -> tuple[Problem, ...]:

@@ -45,7 +45,7 @@ def steady_places(problem: Problem, p: float) -> tuple[FloatArray, FloatArray]:
     """z at which paths that hold slow Gaussian noise grow the fastest, the best first, and the rates pG − ξ²/2S(0)."""
     noise = problem.coloured
     unit, spectrum = noise.standard_deviation, noise.spectral_density(0.0)
-    reach = 2 * abs(p) * noise_strength(problem.system) * spectrum
+    reach = 2 * abs(p) * noise_strength(problem.motion) * spectrum
     xi = reach * np.linspace(-1, 1, SAMPLES)
     rate = p * eigenvalues_at(problem, xi)[0] - (xi**2 / (2 * spectrum) if spectrum else 0.0)
     at = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
@@ -92,7 +92,7 @@ class FrozenNoise:
         if not noise.is_diffusion:
             raise TypeError("there is no z to look for where ξ is no diffusion by itself")
         unit = noise.standard_deviation
-        furthest = 5 * LARGEST_P * unit * noise_strength(problem.drift) * noise.correlation_time
+        furthest = 5 * LARGEST_P * unit * noise_strength(problem.motion) * noise.correlation_time
         self._is_heavy = noise.has_algebraic_tails
         end = FURTHEST if self._is_heavy else min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
         spread = max(np.log(end / 1e-2), 1.0)

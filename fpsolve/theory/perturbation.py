@@ -239,14 +239,12 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
 
 
 def scale_of(problem: Problem) -> Scale:
-    """The scale of Λ(p): of perturbation theory, or where that does not apply of the sizes of the terms.
+    """The scale of Λ(p): of perturbation theory, or of the sizes of the terms where these are less, as in strong noise.
 
     Then constant terms, with the mean of the noise, count by the largest |Re| of an eigenvalue of theirs, noise of
     strength c by c min(1, c τ), white noise by the largest ½(h q′ + q²) and ½q², jumps once in a half-turn, impulses
     that stretch by e^s by their rate times s min(1, s).
     """
-    if theory := second_order_or_none(problem):
-        return theory.scale
     system, of_noises = problem.motion, dict[str, float]()
     steady = np.zeros((problem.dimension, problem.dimension))
     for term in system.terms:
@@ -268,7 +266,9 @@ def scale_of(problem: Problem) -> Scale:
         h, q = (system.epsilon**each.order * speed for speed in each.fastest)
         driven += 0.5 * q * max(h, q)
     driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in problem.impulses)
-    return Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
+    sizes = Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
+    theory = second_order_or_none(problem)
+    return theory.scale if theory and theory.scale.moment(2.0) <= sizes.moment(2.0) else sizes
 
 
 def _growth(matrix: Any, frame: FloatArray) -> Harmonics:
