@@ -67,11 +67,6 @@ class Code(Enum):
         "failure: Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
         "hide this; choose p in [{low:g}, {high:g}], r0 <= 1, {remedy}"
     )
-    INFINITE_ON_RAY = (
-        "failure: Λ({p:g}) is infinite or cannot be computed: the noise moves the phase to and fro over the ray at "
-        "phi = {phase:.6g}, where ‖x‖^p grows by a factor > {factor:.3g} each time; choose a p nearer to 0, or a ray "
-        "on which no noise acts"
-    )
     INVARIANT_RAY = (
         "failure: Λ({p:g}) is not known: the phase never leaves the ray at phi = {phase:.6g}, whatever the noise does"
         "{has_jumps:?, and how often it passes a jump depends on the start; remove the jumps¦, so that for p < -1 rare "

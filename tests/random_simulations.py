@@ -49,8 +49,7 @@ MOST, USUAL = 4.0, 3.0
 def drawn(seed: int) -> tuple[str, Problem]:
     """The kind of noise and the system: every kind in turn; half of the A₀ turn, half of the systems have a wall.
 
-    White noise and impulses leave the phase alone at a wall, as do two noises, and other noise in half of the systems
-    with one.
+    Noise leaves the phase alone at a wall.
     """
     rng = np.random.default_rng([2027, seed])
     kind = KINDS[seed % len(KINDS)] if seed < LATER else MORE_KINDS[seed % len(MORE_KINDS)]
@@ -63,11 +62,10 @@ def drawn(seed: int) -> tuple[str, Problem]:
     if rng.random() < 0.5:
         phase = rng.uniform(0, math.pi)
         jumps = (Jump(phase, math.log(rng.uniform(0.6, 1.0))),)
-        if kind in ("white", "poisson") or len(kinds) > 1 or rng.random() < 0.5:
-            along = np.array([math.cos(phase), -math.sin(phase)])
-            across = np.array([along[1], -along[0]])
-            for each in driven:
-                each -= np.outer(across, along) * (across @ each @ along)
+        along = np.array([math.cos(phase), -math.sin(phase)])
+        across = np.array([along[1], -along[0]])
+        for each in driven:
+            each -= np.outer(across, along) * (across @ each @ along)
     terms = [CoefficientMatrix(0, steady.tolist())]
     if len(kinds) == 1:
         terms.append(CoefficientMatrix(1, driven[0].tolist(), identity))

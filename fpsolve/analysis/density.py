@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.analysis.directions import DirectionDensity, settled_directions
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, one
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import QUARTERS, add_legend, coloured, draw_plane, label_axes
 from fpsolve.errors import NotConverged
@@ -133,8 +133,8 @@ def negative_share(pair: PrincipalPair) -> float:
 def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     """λ = ∫(ε q₁ξ + ε² q₂) ρ dφ dξ + ω ln R ∫[ρ(π/2, ξ) + ρ(3π/2, ξ)] dξ, with ρ from the pair at p = 0.
 
-    ω ρ, or |dφ/dt| ρ where the noise moves the phase there, is the probability flux through an impact, where the
-    log-amplitude jumps by ln R; it is taken on the side from where the impact is met.
+    ω ρ, in other systems |dφ/dt| ρ, is the probability flux through an impact, where the log-amplitude jumps by ln R;
+    it is taken on the side from where the impact is met.
 
     Raises:
         ValueError: the pair is not the one at p = 0, several noises have values, or there are more than two variables.
@@ -154,14 +154,10 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     growth = space.turns * float(space.phi.weights @ (rate * density) @ at.measure)
     table = space.table(pair.left)
     for jump in system.jumps:
-        at = space.phi.vertices_at(jump.phase)
-        for traces, direction in ((space.phi.left_trace[at], 1), (space.phi.right_trace[at], -1)):
-
-            def flux(xi: Any, phi: float = jump.phase, sign: int = direction) -> Any:
-                return np.maximum(sign * phase_speed(system, xi)(phi), 0)
-
-            density = np.sum(traces @ table, axis=0)
-            growth += space.turns * jump.log_factor * float(density @ (space.xi.mass(flux) @ space.xi.constant))
+        vertices, speed = space.phi.vertices_at(jump.phase), float(phase_speed(system, np.ravel(at.xi)[0])(jump.phase))
+        density = np.sum((space.phi.left_trace if speed > 0 else space.phi.right_trace)[vertices] @ table, axis=0)
+        passages = abs(speed) * float(density @ (space.xi.matrix(one) @ space.xi.constant))
+        growth += space.turns * jump.log_factor * passages
     return growth
 
 

@@ -365,7 +365,7 @@ def _is_none(reason: Message) -> bool:
     return reason.tells_of(Code.NO_PROBLEM) or reason.code in _INFINITE
 
 
-_INFINITE = (Code.INFINITE, Code.INFINITE_ON_RAY, Code.INFINITE_VARIANCE, Code.RARE_NOWHERE_ZERO)
+_INFINITE = (Code.INFINITE, Code.INFINITE_VARIANCE, Code.RARE_NOWHERE_ZERO)
 
 
 def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sample | Absent:

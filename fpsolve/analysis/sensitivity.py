@@ -323,7 +323,7 @@ class Gradient:
     """The derivatives along some directions, with their errors.
 
     That of ∂Λ(p)/∂θ is about how what Λ(p) lacks by its highest modes changes, see `MissingModes`; that of ∂λ/∂θ is
-    the same next to p = 0, over p. Where the modes do not tell, on a given mesh, for algebraic tails, at corners and
+    the same next to p = 0, over p. Where the modes do not tell, on a given mesh, for algebraic tails and
     beyond the plane, errors are from the differences to a finer discretisation, for algebraic tails also a wider one:
     at their ends ∂ ln P_s/∂r₀ is large. So are those of ∂Λ″(0)/∂θ, as that of Λ″(0) is.
 

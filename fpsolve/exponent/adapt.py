@@ -18,7 +18,6 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, one_number, under_way
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
-from fpsolve.exponent.corners import corners, graded_more, resolving
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.fields import noise_marginal
@@ -68,8 +67,6 @@ ALONE = 0.5
 """The same for one that serves no other p."""
 MOST_GAIN = 1e-3
 """Of an error in one stage with cells of the noise: beyond, its fall is foreseen badly, and every unknown costs."""
-CORNERS = 0.3
-"""Share that all cells at corners may lack."""
 FEWEST_CELLS, FALL_PER_CELL = 4, 8.0
 """Of a first discretisation of a place far out, and of ln P_s in one of its cells."""
 MARGIN = 0.6
@@ -273,8 +270,6 @@ class NearPlace:
             return False
         if frozen is None or part.kind != "polynomials":
             return True
-        if corners(self.problem, p):
-            return False
         away = abs(frozen.tilt(frozen.center(p)) - part.slope * p) if self.problem.coloured.may_tilt else 0.0
         return away <= MOST_TILT_AWAY
 
@@ -387,7 +382,7 @@ class _Search:
     def from_start(self) -> Solution | None:
         """The solution with what was chosen for this p in the problem close by, or None."""
         start, problem = self.place.starts.get(self.p), self.place.problem
-        if start is None or corners(problem, self.p):  # which lie elsewhere there
+        if start is None:
             return None
         if _bases(start.pair.generator.problem) != _bases(problem):
             return None
@@ -513,9 +508,7 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
     else:
         slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
         part = Polynomials(round(digits / 2) + (3 if math.isinf(end) else 5), slope)
-    chosen = Discretisation(phase, (part,))
-    found = corners(problem, p, center)
-    return resolving(found, chosen, noise, center, rtol) if found else chosen
+    return Discretisation(phase, (part,))
 
 
 def first_far(problem: Problem, place: Place, rtol: float) -> Discretisation:
@@ -606,9 +599,6 @@ def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation
         lower, upper = solution.truncation
         new = new.with_noise(new.noise.reaching((lower / share, upper / share), partial(_log_density, noise)))
         new = _closed(pair.generator.problem, new)
-        if any(np.any(each.at_corners) for each in solution.effects if each):
-            lacking = [float(np.sum(each.of_cells[each.at_corners])) for each in solution.effects if each]
-            new = graded_more(solution.corners, new, [each / (CORNERS * tolerance) for each in lacking])
     return new if new.size > chosen.size or solution.error_by_modes <= tolerance else new.raised()
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, Any, Literal
@@ -20,9 +20,8 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, brief, dataset
-from fpsolve.errors import MeshError, NotConverged
-from fpsolve.exponent.corners import Corner, corners, left_on_mesh, slow_shares
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.errors import NotConverged
+from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.axis import KroneckerSum, TensorSpace, along
 from fpsolve.fem.discretisation import ModeEffects
 from fpsolve.messages import Code, Message, Remedy
@@ -155,15 +154,8 @@ class Solution:
 
     @cached_property
     def effects(self) -> tuple[ModeEffects | None, ...]:
-        """Those of φ, and those of ξ if it has elements, with T singular in some cells where there are corners."""
-        found, chosen = mode_effects(self.pair), self.pair.generator.chosen
-        if not (chosen.noise.lines.size and self.corners):
-            return found
-        phi, xi = found
-        assert phi is not None
-        assert xi is not None
-        slow = slow_shares(self.corners, chosen, (phi.degrees, xi.degrees))
-        return replace(phi, corners=slow[0]), replace(xi, corners=slow[1])
+        """Those of φ, and those of ξ if it has elements."""
+        return mode_effects(self.pair)
 
     @cached_property
     def truncation(self) -> tuple[float, float]:
@@ -174,35 +166,18 @@ class Solution:
     def error(self) -> float:
         """Estimate of the error of `pair.value`: discretisation, truncation and rounding."""
         if self.finer is not None:
-            return self._beside(self.finer) + self._other
-        if not self.corners:
-            return self.error_by_modes
-        generator = self.pair.generator
-        try:
-            finer = principal_pair(generator.enriched(), self.pair.p, start=self.pair)
-        except (NotConverged, MeshError):
-            return math.inf
-        return max(self.error_by_modes, self._beside(finer) + self._other)
+            return abs(self.finer.value - self.pair.value) + self._other
+        return self.error_by_modes
 
     @cached_property
     def error_by_modes(self) -> float:
-        """The same from the highest modes alone, which where T is singular may be too small."""
+        """The same from the highest modes alone."""
         own = sum(each.error for each in self.effects if each) if self.measured is None else self.measured
         return own + self._other
 
     @cached_property
     def _other(self) -> float:
         return sum(self.truncation) + self.pair.rounding + self.search
-
-    @cached_property
-    def corners(self) -> list[Corner]:
-        """Where T is singular."""
-        return corners(self.pair.generator.problem, self.pair.p)
-
-    def _beside(self, finer: PrincipalPair) -> float:
-        """What is missing, by that of a finer pair."""
-        degrees = (int(np.max(pair.generator.chosen.phase.degrees)) for pair in (self.pair, finer))
-        return abs(finer.value - self.pair.value) * left_on_mesh(self.corners, *degrees)
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,7 +40,6 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model import quantity
-from fpsolve.model.plane import crosses_both_ways, is_steady
 from fpsolve.model.problem import ParameterDerivative, Problem, of_problem
 from fpsolve.model.quantity import MOMENT as MOMENT
 from fpsolve.model.quantity import Quantity as Quantity
@@ -105,7 +104,7 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
     """r_c, the coefficient of restitution with which λ = 0, by the impact law of the system; or why there is none.
 
     Args:
-        solver, jump: as `impact_rate`, the phase passing the ray one way; r is R itself where the system has no law.
+        solver, jump: as `impact_rate`; r is R itself where the system has no law.
 
     Raises:
         NotConverged: λ or N is not resolved.
@@ -114,8 +113,6 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
     system = solver.problem.system
     if (number := _ray(solver, jump)) is None:
         return _not_one_ray(solver)
-    if not is_steady(system, ray := system.jumps[number]) and crosses_both_ways(system, ray, solver.problem.reached):
-        return Absent(Message(Code.NO_RESTITUTION))
     log = _critical_log_factor(solver, number)
     if not log:
         return log

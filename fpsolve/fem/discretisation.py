@@ -55,13 +55,11 @@ class ModeEffects:
         degrees: of the cells, shape (cells,).
         highest: the effects of the highest mode, of the two highest and so on up to four, shape (4, cells).
         slowest: the least share of the effect of two modes that is thought to be left.
-        corners: that of the cells in which T is singular, 0 for others, shape (cells,); None if there are none.
     """
 
     degrees: Any
     highest: FloatArray
     slowest: float = 0.0
-    corners: FloatArray | None = None
 
     @property
     def two(self) -> FloatArray:
@@ -71,14 +69,7 @@ class ModeEffects:
     @property
     def of_cells(self) -> FloatArray:
         """Estimate of what each cell lacks, half way from the effect of two modes to what its slower fall predicts."""
-        left = np.sqrt(self._left_by_two)
-        shares = np.clip(left, self.slowest, 1.0)
-        return self.two * (shares if self.corners is None else np.maximum(shares, self.corners))
-
-    @property
-    def at_corners(self) -> Any:
-        """Which cells T is singular in, shape (cells,)."""
-        return np.zeros_like(self.degrees, dtype=bool) if self.corners is None else self.corners > 0
+        return self.two * np.clip(np.sqrt(self._left_by_two), self.slowest, 1.0)
 
     @property
     def error(self) -> float:
@@ -474,12 +465,11 @@ class Discretisation:
 def _split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool) -> tuple[FloatArray, Any]:
     """Lines and a degree for each cell with which all together should lack no more than a share.
 
-    A cell is halved where halves take fewer unknowns: in them the effects fall faster. Those at corners stay.
+    A cell is halved where halves take fewer unknowns: in them the effects fall faster.
     """
     rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
     if not may_coarsen:  # but for what is far more than enough
         needed = np.maximum(needed, np.minimum(effects.degrees, needed + SPARE))
-    needed = np.where(effects.at_corners, effects.degrees - 0.2, needed)  # they are graded instead
     in_half = needed * rate / (rate + HALVING)
     is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)
     is_split |= needed > MOST_DEGREE

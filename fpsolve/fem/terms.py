@@ -25,7 +25,6 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, one
-from fpsolve.errors import MeshError
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.phase import by_rows
 from fpsolve.model.plane import (
@@ -43,10 +42,6 @@ from fpsolve.model.plane import (
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 ALL_ORDERS = slice(None)
-SEVERAL_OVER_RAY = (
-    "two noises with a density move the phase across the ray of a jump, which is not solved; let at most one of them "
-    "move the phase there"
-)
 
 
 @dataclass(frozen=True)
@@ -189,9 +184,6 @@ class Terms(NoiseTerms):
     Args:
         problem: whose motion it is, and what white noise adds to it.
         space: the trial and test functions.
-
-    Raises:
-        MeshError: several noises with values move the phase over the ray of a jump.
     """
 
     def __init__(self, problem: Problem, space: TensorSpace) -> None:
@@ -200,10 +192,9 @@ class Terms(NoiseTerms):
         self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.axes[1:]
         self._impulses = problem.impulses
         self._vertices, self._jump = self.phi.vertices, self.phi.jump
-        self._has_states = [noise.has_states for noise in problem.coloured.parts.values()]
         self._ends = problem.at_values([axis.support for axis in self.noises])
         speed = self._speed_at_ends(self._vertices)
-        # where θ = |v|: a sum of products of functions of each noise is that of one, or of states
+        # where θ = |v|
         is_exact = np.full(self._vertices.size, all(axis.is_local for axis in self.noises))
         for ray in system.jumps:
             is_exact[self.phi.vertices_at(ray.phase)] = True
@@ -213,31 +204,16 @@ class Terms(NoiseTerms):
         # nothing is left of the other side: where ξ is large that would count
         self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - by_rows(0.5 * direction, self._jump)
 
-    def _terms(
-        self, phase: Any, f: Callable[[Xi], Any], text: str, of_p: OfMoment = OfMoment(0), order: int = 0
-    ) -> Iterator[Term]:
-        """Those with a function of all noises at once: one for each combination of the states of all but one."""
-        if f == one or len(self.noises) == 1:
-            yield self._term(phase, f, text, of_p, order)
-            return
-        shape = np.shape(f(self._ends))
-        moving = [k for k, n in enumerate(shape) if n > 1 and np.any(np.ptp(f(self._ends), axis=k))]
-        free = next((k for k in moving if not self._has_states[k]), moving[0] if moving else 0)
-        others = [k for k in moving if k != free]
-        if any(not self._has_states[k] for k in others):
-            raise MeshError(SEVERAL_OVER_RAY)
-        for values in product(*(np.unique(self.noises[k].support) for k in others)):
-            held = dict.fromkeys(self._names, 0.0)
-            held |= {self._names[k]: value for k, value in zip(others, values, strict=True)}
+    def _terms(self, phase: Any, f: Callable[[Xi], Any], text: str) -> Iterator[Term]:
+        """Those with a function of all noises at once: one for each combination of the states of all but the first."""
+        first, *others = self._names
+        for values in product(*(np.unique(axis.support) for axis in self.noises[1:])):
+            held = dict(zip(others, values, strict=True))
 
-            def of_free(xi: Any, held: dict[str, float] = held) -> Any:
-                return f({**held, self._names[free]: xi})
+            def of_first(xi: Any, held: dict[str, float] = held) -> Any:
+                return f({**held, first: xi} if held else xi)
 
-            noises: list[Coefficient] = [one] * len(shape)
-            noises[free] = of_free
-            for k, value in zip(others, values, strict=True):
-                noises[k] = At(value)
-            yield Term(order, of_p, phase, tuple(noises), text)
+            yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
 
     def whole(self) -> Iterator[Term]:
         """L(p) of Eq. (19)."""
@@ -257,10 +233,8 @@ class Terms(NoiseTerms):
             yield from self._terms(-0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(self._vertices[j])), text)
         for ray in self.system.jumps:
             text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
-            change = OfMoment(0, ray.log_factor, is_change=True)
-            for load, sign in self._loads(ray):
-                size, flux = self._flux(ray, sign)
-                yield from self._terms(size * load, flux, text, change, order=2)
+            speed, load = self._load(ray)
+            yield self._term(abs(speed) * load, one, text, OfMoment(0, ray.log_factor, is_change=True), order=2)
 
     def changed(self, by: ParameterDerivative) -> Iterator[Term]:
         """∂L(p)/∂θ of the same terms where the motion and its jumps change with θ.
@@ -277,13 +251,13 @@ class Terms(NoiseTerms):
         for j in self._two_way:
             yield from self._terms(-0.5 * jump[[j]].T @ jump[[j]], self._faster(moved, float(self._vertices[j])), text)
         for ray, slope in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
-            change = OfMoment(0, ray.log_factor, is_change=True)
-            for load, sign in self._loads(ray):
-                if slope:
-                    size, flux = self._flux(ray, sign)
-                    yield from self._terms(slope * size * load, flux, text, OfMoment(1, ray.log_factor), order=2)
-                if by.terms:
-                    yield from self._terms(load, self._more_flux(moved, ray, sign), text, change, order=2)
+            speed, load = self._load(ray)
+            if slope:
+                yield self._term(slope * abs(speed) * load, one, text, OfMoment(1, ray.log_factor), order=2)
+            for term in by.terms:
+                faster = math.copysign(self.system.epsilon**term.order, speed) * float(term.h(ray.phase))
+                change = OfMoment(0, ray.log_factor, is_change=True)
+                yield self._term(faster * load, term.g, text, change, 2, term.noise)
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h ∂φ with the loads at the φ-vertices, and p q."""
@@ -338,24 +312,17 @@ class Terms(NoiseTerms):
                 driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
         return np.asarray(abs(steady) + driven)
 
-    def _loads(self, ray: Jump) -> Iterator[tuple[Any, int]]:
-        """A jump's loads beyond continuity: w(φ⁻) T(φ⁺) where the phase runs forward, 1, else w(φ⁺) T(φ⁻), −1."""
-        at = self.phi.vertices_at(ray.phase)
+    def _load(self, ray: Jump) -> tuple[float, Any]:
+        """dφ/dt at the ray of a jump, and its load: w(φ⁻) T(φ⁺) where the phase runs forward, else w(φ⁺) T(φ⁻)."""
+        at, speed = self.phi.vertices_at(ray.phase), float(np.mean(phase_speed(self.system, self._ends)(ray.phase)))
         left, right = self.phi.left_trace[at], self.phi.right_trace[at]
-        speed = self._speed(ray.phase)(self._ends)
-        for load, sign in ((left.T @ right, 1), (right.T @ left, -1)):
-            if np.any(sign * speed > 0):
-                yield load, sign
+        return speed, left.T @ right if speed > 0 else right.T @ left
 
     def _speed_at_ends(self, phi: FloatArray) -> FloatArray:
         """dφ/dt at the extremes of all noises, shape (extremes, len(phi))."""
         speed = phase_speed(self.system, self._ends)
         parts = (np.ravel(part)[:, None] for part in (speed.mean, speed.cosine, speed.sine))
         return Harmonics(*parts)(phi)
-
-    def _speed(self, phi: float) -> Callable[[Xi], Any]:
-        """dφ/dt at φ."""
-        return lambda xi: phase_speed(self.system, xi)(phi)
 
     def _size_of_speed(self, phi: float) -> Callable[[Xi], Any]:
         """|dφ/dt| at φ."""
@@ -364,19 +331,6 @@ class Terms(NoiseTerms):
     def _faster(self, moved: LinearMotion, phi: float) -> Callable[[Xi], Any]:
         """∂|dφ/dt|/∂θ at φ."""
         return lambda xi: np.sign(phase_speed(self.system, xi)(phi)) * phase_speed(moved, xi)(phi)
-
-    def _flux(self, ray: Jump, sign: int) -> tuple[float, Callable[[Xi], Any]]:
-        """max(± dφ/dt, 0) at the ray of a jump: a number, times a function of ξ."""
-        at = self._speed(ray.phase)
-        speed = np.ravel(at(self._ends))
-        if np.ptp(speed) <= 1e-12 * np.max(np.abs(speed)):
-            return abs(float(speed[0])), one
-        return 1.0, lambda xi: np.maximum(sign * at(xi), 0)
-
-    def _more_flux(self, moved: LinearMotion, ray: Jump, sign: int) -> Callable[[Xi], Any]:
-        """Its ∂/∂θ."""
-        at = self._speed(ray.phase)
-        return lambda xi: np.where(sign * at(xi) > 0, sign * phase_speed(moved, xi)(ray.phase), 0.0)
 
 
 def power_of_epsilon(order: int) -> str:

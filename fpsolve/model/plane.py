@@ -31,8 +31,6 @@ Xi = ArrayLike | Mapping[str, ArrayLike]
 """ξ, or with several noises that of each by its name."""
 SHAPES = [(n, n) for n in (2, 3, 4)]
 """Of matrices."""
-SAMPLES = 4001
-"""ξ among which the speed of the phase is seen to change its sign."""
 
 
 @dataclass(frozen=True)
@@ -279,12 +277,6 @@ class Impulse:
         x, u = np.tensordot(self.matrix, _direction(phi), 1)
         return np.hypot(x, u), np.arctan2(-u, x)
 
-    def keeps(self, phi: float) -> bool:
-        """Whether a ray stays where it is."""
-        e = _direction(phi)
-        x, u = np.array(self.exponent) @ e
-        return abs(float(x * e[1] - u * e[0])) <= 1e-12 * float(np.linalg.norm(self.exponent))
-
     @property
     def strength(self) -> float:
         """|ln| of what it multiplies ‖x‖ by, at most."""
@@ -522,30 +514,22 @@ def growth_rate(system: System, xi: Xi) -> Harmonics:
     return stretching(matrix_at(system, xi))
 
 
-def crosses_both_ways(system: System, jump: Jump, xi: Xi) -> bool:
-    """Whether the phase passes the ray of a jump forward for some of the ξ and backward for others."""
-    speed = phase_speed(system, xi)(jump.phase)
-    return bool(np.min(speed) < 0 < np.max(speed))
+def moves_phase(system: System, terms: Sequence[CoefficientMatrix], phase: float, xi: FloatArray) -> bool:
+    """Whether a noise changes the speed of the phase at a ray, but for rounding.
 
-
-def is_steady(system: System, jump: Jump) -> bool:
-    """Whether no noise changes the speed of the phase at the ray of a jump, but for rounding."""
-    return all(
-        not is_driven(term.g) or abs(float(term.h(jump.phase))) <= 1e-12 * term.h.amplitude for term in system.terms
-    )
-
-
-def turning_noise(system: System, jump: Jump, ends: FloatArray) -> FloatArray:
-    """The ξ between two ends for which the phase turns at the ray of a jump, from forward to backward or back."""
-    from scipy.optimize import brentq  # which takes long to import, and few need
-
-    def speed(xi: ArrayLike) -> FloatArray:
-        return phase_speed(system, xi)(jump.phase)
-
-    xi = np.linspace(ends[0], ends[1], SAMPLES)
-    backward = speed(xi) < 0
-    at = np.flatnonzero(backward[1:] != backward[:-1])
-    return np.array([brentq(speed, xi[i], xi[i + 1], xtol=1e-14, rtol=1e-14) for i in at])
+    Args:
+        system: whose terms they are.
+        terms: those that the noise drives.
+        phase: φ of the ray.
+        xi: values of the noise, shape (n,).
+    """
+    speed, size = np.zeros(xi.size), 0.0
+    for term in terms:
+        strength, along = system.epsilon**term.order, term.h(phase)
+        values = strength * (term.g(xi) - term.g(xi[:1]))
+        speed += along * values
+        size += term.fastest[0] * float(np.max(np.abs(values)))
+    return not np.max(np.abs(speed)) <= 1e-12 * size
 
 
 def squared_frequency(a: FloatArray) -> FloatArray:

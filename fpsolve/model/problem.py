@@ -28,12 +28,14 @@ from fpsolve.model.plane import (
     CoefficientMatrix,
     Impulse,
     ImpulseDerivative,
+    Jump,
     LinearMotion,
     System,
     Xi,
     affine,
     combined,
-    crosses_both_ways,
+    is_driven,
+    moves_phase,
     phase_speed,
     turning,
 )
@@ -50,6 +52,8 @@ RTOL, RTOL_BEYOND_PLANE = 1e-8, 1e-5
 """The relative error that is wanted where a case names none: of two variables, and of more."""
 EVERY_RAY = (0.0,)
 """What stands for all rays."""
+SUPPORT = np.linspace(-12, 12, 2401)
+"""In standard deviations, where a coefficient of noise is looked at."""
 LINE = 90
 """Letters of a line of parameters at most."""
 
@@ -89,7 +93,8 @@ class Problem:
     Raises:
         TypeError: one of them is something else.
         ValueError: white noise would drive the system in a way that has no meaning, see `White.motion`; or the noises
-            are not those that the terms name; or nothing is random, as under a harmonic load alone.
+            are not those that the terms name; or one moves the phase over the ray of a jump; or nothing is random, as
+            under a harmonic load alone.
     """
 
     system: System
@@ -111,6 +116,8 @@ class Problem:
                 raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
         if any(noise.is_white for noise in given.values()):
             _ = self._moved, self._struck  # refuses what has no meaning
+        for jump in self.system.jumps:
+            self._refuse_turned(jump)
         if self.dimension > 2 and (self._struck or self.noise.has_algebraic_tails):
             raise ValueError(
                 f"got {self.noise.kind} noise for {self.dimension} variables; impulses and noise with algebraic tails "
@@ -122,6 +129,22 @@ class Problem:
                 "real part of the Floquet exponents: compute these from the equation over one period, or add a random "
                 "noise"
             )
+
+    def _refuse_turned(self, jump: Jump) -> None:
+        """Refuse the ray of a jump that a noise turns. Raises `ValueError`."""
+        for name, noise in self.noise.parts.items():
+            driven = [term for term in self.system.terms if is_driven(term.g) and name in ("", term.noise)]
+            xi = np.array([0.0, 1.0])
+            if any(affine(term.g) is None for term in driven):
+                xi = np.array(noise.states) if noise.has_states else noise.standard_deviation * SUPPORT  # type: ignore[attr-defined]
+                xi = np.unique(np.clip(xi, -noise.half_width, noise.half_width))
+            if driven and moves_phase(self.system, driven, jump.phase, xi):
+                which = f'the noise "{name}"' if name else f"{noise.kind} noise"
+                raise ValueError(
+                    f"{which} moves the phase across the ray of a jump, phi = {jump.phase:.6g}, which it does over no "
+                    "wall: x = 0, phi = pi/2 = 1.5707963267948966, is passed with the speed v whatever the noise; let "
+                    "it drive terms that do not move the phase there, or remove the jump"
+                )
 
     @cached_property
     def coloured(self) -> Noise:
@@ -166,12 +189,6 @@ class Problem:
         if len(values) == 1:
             return values[0]
         return dict(zip(self.coloured.parts, np.meshgrid(*values, indexing="ij", sparse=True), strict=True))
-
-    @property
-    def reached(self) -> Xi:
-        """Values of ξ that go as far as the noise does where that matters, see `Noise.reached`."""
-        each = [noise.reached for noise in self.coloured.parts.values()]
-        return self.at_values(each if len(each) == 1 else [values[:: max(1, values.size // 20)] for values in each])
 
     @property
     def typical(self) -> Xi:
@@ -586,15 +603,10 @@ def with_original(problem: Problem, original: Any) -> Problem:
 
 
 def refuse_infinite(problem: Problem, p: float) -> None:
-    """Refuse a p for which E‖x‖^p is infinite, or carried by a layer that no mesh resolves.
-
-    Where the noise moves the phase to and fro over a ray at which ‖x‖^p grows by R^p, crossings add up. The speed of a
-    diffusing noise changes between them by a factor u with E u^s = ½/sin(π(2s + 5)/6), H. P. McKean, J. Math. Kyoto
-    Univ. 2, 1963, so that they have a finite mean only for R^p < 2 = 1/min E u^s. For a chain the layer is thin for
-    R^p > e.
+    """Refuse a p for which E‖x‖^p is infinite, or not known.
 
     Raises:
-        NoSuchExponent: p is not among the `moments` of the problem, or there is such a ray.
+        NoSuchExponent: p is not among the `moments` of the problem, or the phase never leaves the ray of a jump.
     """
     noise, system = problem.noise, problem.motion
     noise.check_existence(p)
@@ -602,13 +614,6 @@ def refuse_infinite(problem: Problem, p: float) -> None:
         has_jumps = any(jump.log_factor for jump in system.jumps)
         if has_jumps or p < problem.moments[0]:
             raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_ray, has_jumps=has_jumps))
-        return
-    if not any(p * jump.log_factor > math.log(2.0) for jump in system.jumps):
-        return
-    xi, most = problem.reached, math.e if noise.has_states else 2.0
-    for jump in system.jumps:
-        if p * jump.log_factor > math.log(most) and crosses_both_ways(system, jump, xi):
-            raise NoSuchExponent(Message(Code.INFINITE_ON_RAY, p=p, phase=jump.phase, factor=most))
 
 
 def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = False) -> FloatArray:

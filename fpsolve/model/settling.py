@@ -17,7 +17,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.messages import Code, Message
 from fpsolve.model.frame import amplitude_frame
-from fpsolve.model.plane import CoefficientMatrix, is_steady, matrix_at
+from fpsolve.model.plane import CoefficientMatrix, matrix_at
 from fpsolve.model.problem import Problem
 
 LEVEL = 1e6
@@ -43,7 +43,7 @@ def no_response(problem: Problem) -> Message | None:
     if len(problem.coloured.parts) > 1 or problem.diffusions or problem.impulses or problem.coloured.has_states:
         return Message(Code.RESPONSE_NOISE)
     size = ROUNDED * float(np.max(np.abs(system.cubic.matrix)))
-    is_passed = [is_steady(system, each) and abs(float(system.cubic.h(each.phase))) <= size for each in system.jumps]
+    is_passed = [abs(float(system.cubic.h(each.phase))) <= size for each in system.jumps]
     if len(is_passed) > 1 or not all(is_passed):
         return Message(Code.RESPONSE_WALLS)
     return None if comes_down(problem) else Message(Code.RESPONSE_GROWS)

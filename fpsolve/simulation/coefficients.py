@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System, affine, is_driven, is_steady, matrix_at, squared_frequency
+from fpsolve.model.plane import System, affine, is_driven, matrix_at, squared_frequency
 from fpsolve.simulation.rays import Rays
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
         0.0,
         math.sqrt(intensity),
         half_turn,
-        _rays(system, noise, even, even @ steady @ back),
+        _rays(system, even, even @ steady @ back),
         _settling(free, list(zip(intensities, even @ np.array(driven) @ back, strict=True)), half_turn),
         sizes=sizes,
     )
@@ -227,7 +227,7 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         strength,
         fluctuation,
         half_turn,
-        _rays(system, noise, even, steady),
+        _rays(system, even, steady),
         _settling(free, moves, half_turn),
         impulses,
     )
@@ -336,7 +336,7 @@ def _balance(matrix: FloatArray) -> FloatArray:
     return np.exp(np.linalg.lstsq(sides, gaps, rcond=None)[0])
 
 
-def _rays(system: System, noise: Noise, even: FloatArray, steady: FloatArray) -> Rays:
+def _rays(system: System, even: FloatArray, steady: FloatArray) -> Rays:
     """The lines of the jumps in even coordinates."""
     if not system.jumps:
         return Rays(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
@@ -344,10 +344,7 @@ def _rays(system: System, noise: Noise, even: FloatArray, steady: FloatArray) ->
     along = np.stack([np.cos(phases), -np.sin(phases)], axis=1) @ even.T
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     across = along[:, ::-1] * np.array([1.0, -1.0])
-    ways = np.zeros(phases.size)
-    for j, jump in enumerate(system.jumps):
-        if noise.is_white or is_steady(system, jump):
-            ways[j] = math.copysign(1.0, across[j] @ steady.reshape(-1, 2, 2)[0] @ along[j])
+    ways = np.copysign(1.0, np.sum(across * (along @ steady.reshape(-1, 2, 2)[0].T), axis=1))
     return Rays(along, across, np.array([jump.log_factor for jump in system.jumps]), ways)
 
 

@@ -169,8 +169,7 @@ def simulate(
         paths: how many; a multiple of 32 is used.
         time: length of the paths after the transient; 64 transients if None, and 16 beyond the plane, where
             they are longer. Whole transients are used.
-        step: time step; None chooses one, which loses some 0.5 % of the passages of a ray that coloured noise lets the
-            phase pass both ways.
+        step: time step; None chooses one.
         seed: ≥ 0.
         progress: called 100 times in all.
 

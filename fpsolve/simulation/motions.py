@@ -149,8 +149,6 @@ def _crossings(rays, j, x, u, x1, u1):  # type: ignore[no-untyped-def]
     before, after = _side(rays, j, x, u) >= 0, _side(rays, j, x1, u1) >= 0
     if before == after:
         return 0
-    if rays.ways[j] == 0:
-        return 1
     is_forward = after == (rays.along[j, 0] * x1 + rays.along[j, 1] * u1 >= 0)
     return 1 if is_forward == (rays.ways[j] > 0) else -1
 
@@ -188,12 +186,6 @@ def step_driven(m, h, x, u, mean, rise, log_norm, x_end, u_end, care):  # type: 
         for i in range(n):
             before, after = _side(rays, j, x[i], u[i]), _side(rays, j, x_end[i], u_end[i])
             care[i] = max(care[i], 0.0 if before * after > 0 else 1.0)
-        if rays.ways[j] == 0:
-            turn = h * h * (p1 * p1 + 0.5 * (q1 * q1 + r1 * r1)) / _LIMIT
-            for i in range(n):
-                is_far = turn * rise[i] * rise[i] > 1  # and back again
-                if is_far or _may_return(m, j, x[i], u[i], x_end[i], u_end[i], mean[i], rise[i]):
-                    care[i] = 2.0
     for i in range(n):
         if care[i] == 2:
             x_end[i], u_end[i], log, count = _in_parts(m, h, x[i], u[i], mean[i], rise[i])
@@ -206,24 +198,6 @@ def step_driven(m, h, x, u, mean, rise, log_norm, x_end, u_end, care):  # type: 
                 crossed += count
         x[i], u[i] = x_end[i], u_end[i]
     return crossed
-
-
-@inlined
-def _speed(m, j, x, u, xi):  # type: ignore[no-untyped-def]
-    """Its derivative by time, without the growth of the norm."""
-    p = m.matrices[0, 1] + xi * m.matrices[1, 1]
-    q = m.matrices[0, 2] + xi * m.matrices[1, 2]
-    r = m.matrices[0, 3] + xi * m.matrices[1, 3]
-    return _side(m.rays, j, p * x + q * u, r * x - p * u)
-
-
-@inlined
-def _may_return(m, j, x, u, x1, u1, mean, rise):  # type: ignore[no-untyped-def]
-    """Whether a path comes nearer to a line and then leaves it on the same side: it may have been beyond."""
-    before, after = _side(m.rays, j, x, u), _side(m.rays, j, x1, u1)
-    comes = before * _speed(m, j, x, u, mean - rise) < 0
-    leaves = after * _speed(m, j, x1, u1, mean + rise) > 0
-    return comes and leaves and before * after >= 0
 
 
 @inlined
@@ -259,33 +233,12 @@ def _in_parts(m, h, x, u, mean, rise):  # type: ignore[no-untyped-def]
         x1, u1 = _flow(m, x, u, s, xi, slope)
         for j in range(rays.logs.size):
             count = _crossings(rays, j, x, u, x1, u1)
-            if rays.ways[j] == 0 and _may_return(m, j, x, u, x1, u1, xi, slope):
-                count = 2 * _returns(m, j, s, x, u, xi, slope)
             log += count * rays.logs[j]
             crossed += count
         norm = math.sqrt(x1 * x1 + u1 * u1)
         log += math.log(norm)
         x, u = x1 / norm, u1 / norm
     return x, u, log, crossed
-
-
-@compiled
-def _returns(m, j, s, x, u, mean, rise):  # type: ignore[no-untyped-def]
-    """Whether a path that comes and leaves has been beyond the line: at the time between, by halving."""
-    low, high = 0.0, s
-    side = _side(m.rays, j, x, u)
-    for _ in range(30):
-        t = 0.5 * (low + high)
-        xi, slope = mean + rise * (t / s - 1), rise * t / s
-        x1, u1 = _flow(m, x, u, t, xi, slope)
-        here = _side(m.rays, j, x1, u1)
-        if here * side < 0:
-            return 1
-        if side * _speed(m, j, x1, u1, mean + rise * (2 * t / s - 1)) < 0:
-            low = t
-        else:
-            high = t
-    return 0
 
 
 @compiled

@@ -13,7 +13,7 @@ class Rays(NamedTuple):
     Attributes:
         along, across: unit vectors along each line, and the same turned by 90°, shape (rays, 2).
         logs: ln R.
-        ways: the side to which the line is crossed, 1 or −1; 0 where it is crossed to both sides.
+        ways: the side to which the line is crossed, 1 or −1.
     """
 
     along: FloatArray

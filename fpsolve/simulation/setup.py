@@ -11,7 +11,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray, is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System, affine, is_steady, written_coefficient
+from fpsolve.model.plane import System, affine, written_coefficient
 from fpsolve.model.problem import Problem, refuse_infinite
 from fpsolve.simulation.coefficients import coefficients
 
@@ -36,9 +36,6 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
         FpsolveError: they cannot.
     """
     system, noise = problem.system, problem.noise
-    if len(noise.parts) > 1 and any(jump.log_factor and not is_steady(system, jump) for jump in system.jumps):
-        told = "under several noises a simulation needs walls across which none of them moves the phase"
-        raise FpsolveError(f"{told}; use the finite elements")
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")

@@ -17,7 +17,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import CoefficientMatrix, Jump, crosses_both_ways
+from fpsolve.model.plane import CoefficientMatrix, Jump
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
@@ -153,14 +153,13 @@ def test_the_telegraph_with_a_wall():
 
 
 @pytest.mark.parametrize("turn", [1.0, -1.0])
-def test_crossings_of_a_ray_that_noise_acts_on_count_in_both_directions(turn):
-    terms = [
-        CoefficientMatrix(0, ((0.0, turn), (-turn, 0.0))),
-        CoefficientMatrix(1, ((0.4, 0.2), (0.9, -0.7)), identity),
-    ]
+def test_a_ray_is_crossed_in_the_direction_of_the_motion(turn):
+    """N is the slope of λ in ln R, whichever way the phase runs, and wherever the ray is that no noise turns."""
+    e = np.array([math.cos(0.7), -math.sin(0.7)])
+    driven = 0.9 * np.outer(e, [0.4, -0.7]) - 0.3 * np.eye(2)  # whose eigenvector is e
+    terms = [CoefficientMatrix(0, ((0.0, turn), (-turn, 0.0))), CoefficientMatrix(1, driven.tolist(), identity)]
     systems = [PlaneSystem(terms, [Jump(0.7, log)]) for log in (-0.1, 0.2)]
     noise = MarkovChain((-2.0, 0.1, 1.7), ((0, 1.0, 0.4), (0.7, 0, 0.3), (0.2, 0.9, 0)))
-    assert crosses_both_ways(systems[0], systems[0].jumps[0], np.array(noise.states))
     solvers = [solver(system, noise) for system in systems]
     low, high = (each.lyapunov_exponent().value for each in solvers)
     for each in solvers:
@@ -169,7 +168,7 @@ def test_crossings_of_a_ray_that_noise_acts_on_count_in_both_directions(turn):
 
 @pytest.mark.parametrize(("count", "words"), [(0, "no rays"), (2, "2 rays")])
 def test_impacts_on_no_ray_or_several_have_no_rate(count, words):
-    system = PlaneSystem(STRONG.terms, [Jump(phase, -0.1) for phase in (0.4, 1.5)[:count]])
+    system = PlaneSystem(STRONG.terms, [Jump(phase, -0.1) for phase in (0.0, math.pi / 2)[:count]])
     absent = impact_rate(solver(system, GAUSSIAN))
     assert not absent
     assert words in absent.reason

@@ -51,7 +51,7 @@ def test_refusals(given, told):
 
 
 def test_impulses_over_a_wall_and_too_large_ones_are_refused():
-    with pytest.raises(ValueError, match="impulses move the phase across the ray of a jump"):
+    with pytest.raises(ValueError, match="poisson noise moves the phase across the ray of a jump"):
         of(even(), [WALL], driven=[[0.0, 1.0], [0.0, 0.0]])
     with pytest.raises(ValueError, match="use smaller sizes"):
         of(even(1e3))

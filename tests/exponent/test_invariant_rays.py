@@ -182,7 +182,7 @@ def test_refused():
     with pytest.raises(NoSuchExponent, match=r"never leaves the ray at phi = 1\.5708, .* choose p >= -1"):
         moment_lyapunov(own, NOISES["OU"], -1.5)
     with pytest.raises(NoSuchExponent, match="remove the jumps"):
-        moment_lyapunov(PlaneSystem(own.terms, [Jump(0.3, -0.1)]), NOISES["OU"], 1.0)
+        moment_lyapunov(PlaneSystem(own.terms, [Jump(math.pi / 2, -0.1)]), NOISES["OU"], 1.0)
     with pytest.raises(NotConverged, match="no positive eigenfunction"):
         ExponentSolver(Problem(own, NOISES["OU"])).pair(1.0)
 

@@ -8,20 +8,26 @@ import pytest
 
 from fpsolve.analysis.density import furstenberg_khasminskii, stationary_density
 from fpsolve.arrays import identity
-from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
+from fpsolve.errors import MeshError, NotConverged
 from fpsolve.exponent.eigen import principal_pair, spectrum
 from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.exponent.quantities import impact_rate
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.noises.poisson import Poisson
+from fpsolve.model.noises.white import White
 from fpsolve.model.plane import CoefficientMatrix, Jump, matrix_at
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import UNIT_NOISE
 from tests.oracles import moment_hierarchy
+
+ROTATION, MODEST = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-0.1, 0.0))
 
 
 def oscillator(omega=1.0, b=0.05, jumps=(), epsilon=1.0):
@@ -152,17 +158,43 @@ def test_the_choice_of_coordinates_does_not_matter():
     np.testing.assert_allclose(values[0], values[1], atol=1e-10)
 
 
-def test_a_kick_on_a_ray_where_noise_moves_the_phase():
-    """The wall in another place: the phase may pass it in both directions. λ by the flux through the ray is Λ′(0)."""
-    system = oscillator(jumps=[Jump(0.4, math.log(0.8))])
-    strong = Problem(system, MarkovChain.telegraph(amplitude=1.8, rate=0.7))
-    pair = ExponentSolver(strong, rtol=1e-10).pair(0.0)
-    assert furstenberg_khasminskii(pair) == pytest.approx(pair.derivative, abs=1e-10)
-    free = Problem(oscillator(), strong.noise)
-    for p in (-0.5, 1.0):  # a stretch by 1 is none
-        still = Problem(oscillator(jumps=[Jump(0.4, 0.0)]), strong.noise)
-        values = [moment_lyapunov(problem, [p], rtol=1e-10).value[0] for problem in (free, still)]
-        assert values[0] == pytest.approx(values[1], abs=1e-9)
+@pytest.mark.parametrize(
+    ("g", "matrix", "noise"),
+    [
+        (lambda xi: xi**2, ((0.0, 0.3), (0.0, 0.0)), OrnsteinUhlenbeck(alpha=1.0, sigma=0.5)),
+        (np.cos, ((0.0, 0.3), (0.0, 0.0)), NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.8)),
+        (np.cos, ((0.0, 0.3), (0.0, 0.0)), MarkovChain((-1.0, 0.0, 1.0), ((0, 1, 0), (1, 0, 1), (0, 1, 0)))),
+        (identity, ((0.0, 0.3), (0.0, 0.0)), White(s=0.5)),
+        (identity, ((0.0, 0.3), (0.0, 0.0)), Poisson(rate=1.0, sizes=(0.5,))),
+        (identity, ROTATION, MarkovChain.telegraph(1.0, 5.0)),
+    ],
+    ids=["x**2", "bounded", "chain", "white", "impulses", "turning"],
+)
+@pytest.mark.parametrize("log", [-0.2, 0.0])
+def test_a_wall_is_a_ray_that_no_noise_turns(g, matrix, noise, log):
+    """x = 0 is passed with ẋ = (1 + 0.3 g(ξ))v, g the same at both ends of the noise: λ was -6.68 in place of -0.17."""
+    terms = [CoefficientMatrix(0, ((0.0, 1.0), (-1.0, -0.2))), CoefficientMatrix(1, matrix, g)]
+    with pytest.raises(ValueError, match=f"{noise.kind} noise moves the phase across the ray of a jump, phi = 1.5708"):
+        Problem(PlaneSystem(terms, [Jump(math.pi / 2, log)]), noise)
+    named = [terms[0], CoefficientMatrix(1, matrix, g, "gust"), CoefficientMatrix(1, MODEST, identity, "sea")]
+    with pytest.raises(ValueError, match='the noise "gust" moves the phase across'):
+        Problem(PlaneSystem(named, [Jump(math.pi / 2, log)]), {"gust": noise, "sea": TELEGRAPH})
+
+
+@pytest.mark.parametrize("second", [((0.0, -0.3), (0.0, -0.1)), ((0.0, 0.0), (-0.5, 0.0))])
+def test_a_function_that_a_noise_does_not_change_leaves_a_wall_alone(second):
+    """ξ² is 1 in both states, and what two terms of one noise do to x = 0 together is nothing: λ = λ₀ + N ln R."""
+    chain = MarkovChain.telegraph(1.0, 0.7)
+    one, other = CoefficientMatrix(1, ((0.0, 0.3), (-0.4, 0.0)), np.square), CoefficientMatrix(1, second, identity)
+    rest = CoefficientMatrix(1, ((0.0, 0.3), (0.0, 0.0)), identity)
+    terms = [CoefficientMatrix(0, ((0.0, 1.0), (-1.0, -0.2))), one, *([other, rest] if second[0][1] else [other])]
+    still, walled = (
+        ExponentSolver(Problem(PlaneSystem(terms, [Jump(math.pi / 2, log)]), chain), rtol=1e-10) for log in (0.0, -0.2)
+    )
+    rate = impact_rate(walled)
+    change = walled.lyapunov_exponent().value - still.lyapunov_exponent().value
+    assert change == pytest.approx(-0.2 * rate.value, abs=1e-9)
+    assert furstenberg_khasminskii(walled.pair(0.0)) == pytest.approx(walled.lyapunov_exponent().value, abs=1e-9)
 
 
 def test_several_kicks():
@@ -217,9 +249,6 @@ def test_a_chain_refuses_a_mesh_with_lines():
         Generator(Problem(oscillator(), TELEGRAPH), make_mesh())
 
 
-ROTATION = ((0.0, 1.0), (-1.0, 0.0))
-
-
 def test_slow_noise_is_sought_on_both_sides():
     """Symmetric noise does not know the sign of its term: the far place may lie at ξ < 0 although p > 0."""
     noise = OrnsteinUhlenbeck(alpha=0.05, sigma=0.05)
@@ -231,20 +260,6 @@ def test_slow_noise_is_sought_on_both_sides():
         values.append(moment_lyapunov(Problem(system, noise), [2.0]).value[0])
     assert values[0] == pytest.approx(values[1], rel=1e-7)
     assert values[0] == pytest.approx(1.12906, rel=1e-4)  # populations: 1.12902 ± 2e-5
-
-
-def test_a_ray_that_is_crossed_to_and_fro():
-    """T lives at the ray: with k jumps in unit time each brings R^p or R^−p, Λ = k (cosh(p ln R) − 1) but for e^−2π…"""
-    system = PlaneSystem([CoefficientMatrix(0, ROTATION, identity)], [Jump(0.3, 0.5)])
-    result = moment_lyapunov(Problem(system, MarkovChain.telegraph(1.0, 5.0)), [2.0])
-    assert result.value[0] == pytest.approx(5 * (math.cosh(1.0) - 1), rel=1e-6)
-    with pytest.raises(NoSuchExponent, match=r"to and fro over the ray at phi = 0\.3"):
-        moment_lyapunov(Problem(system, MarkovChain.telegraph(1.0, 50.0)), [4.0])
-    moved = PlaneSystem(
-        [CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), identity)], [Jump(0.4, 0.5)]
-    )
-    with pytest.raises(NoSuchExponent, match="is infinite or cannot be computed"):
-        moment_lyapunov(Problem(moved, UNIT_NOISE), [1.5])
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])

@@ -25,7 +25,7 @@ from fpsolve.model import (
     White,
 )
 from fpsolve.theory import second_order
-from tests.conftest import sampled
+from tests.conftest import keeping, sampled
 from tests.oracles.fourier_hermite import moment_lyapunov as oracle
 
 UNIT = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
@@ -108,6 +108,7 @@ NOISES = {
 def system(epsilon, free, *, jumps):
     driven, damped = np.random.default_rng(0).uniform(-1, 1, (2, 2, 2)).tolist()
     rays = [Jump(0.4, -0.3 * epsilon**2), Jump(1.9, 0.5 * epsilon**2)] if jumps else []
+    driven = keeping(0.4, 1.9, (0.5, -0.6)) if jumps else driven
     terms = [CoefficientMatrix(0, free), CoefficientMatrix(1, driven, identity), CoefficientMatrix(2, damped)]
     return PlaneSystem(terms, rays, epsilon)
 

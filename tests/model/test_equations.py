@@ -26,6 +26,7 @@ from fpsolve.model.frame import Frame
 from fpsolve.model.plane import CubicTerms
 from fpsolve.model.systems import EquationSystem, ImpactLaw
 from fpsolve.theory.perturbation import second_order
+from tests.conftest import keeping
 
 NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=0.6)
 PAPER = "omega*v", "-omega*x + epsilon**2*c1*v + epsilon*xi*v"
@@ -135,8 +136,9 @@ def test_walls_at_rays_of_a_plane_system():
     """λ = λ₀ + Σ N_j ln R_j for two rays in different places; the rate of each is a slope of λ."""
 
     def walled(first, second):
-        terms, _ = by_matrices(**VALUES)
-        system = PlaneSystem(terms, [Jump(math.pi / 2, first), Jump(0.4, second)])
+        free, *_ = by_matrices(**VALUES)[0]
+        driven = CoefficientMatrix(1, keeping(math.pi / 2, 0.4), identity)
+        system = PlaneSystem([free, driven], [Jump(math.pi / 2, first), Jump(0.4, second)])
         return ExponentSolver(Problem(system, MarkovChain.telegraph(0.5, 1.0)))
 
     solver = walled(-0.1, -0.2)

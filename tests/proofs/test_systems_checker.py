@@ -29,12 +29,12 @@ PROOFS = {
     "paths, circle": (spring(0.1, 2.0), SineWiener(0.3, 1.0), None, 1e-6),
     "paths, white": (SADDLE, White(1.0), None, 1e-6),
     "paths, chain": (spring(0.05, 1.5, wall(0.85)), CHAIN, None, 1e-6),
-    "circle with two rays": (spring(0.1, 1.0, wall(0.9), Jump(0.4, 0.1)), SineWiener(0.3, 1.0), -1.0, 1e-6),
+    "circle with two rays": (driven_velocity(wall(0.8), Jump(0.0, 0.1)), SineWiener(0.3, 1.0), -1.0, 1e-6),
     "parametric, by its decimals": (ParametricOscillator(1.0, 0.1, 0.8), White(0.5), 3.0, 1e-7),
     "the paper's oscillator, telegraph": (OSCILLATOR, Telegraph(0.5, 1.0), 2.5, 1e-8),
     "Gaussian noise with a wall": (spring(0.1, 2.0, wall(0.8)), fpsolve.OrnsteinUhlenbeck(1.0, 0.2), 2.0, 1e-6),
     "paths, Gaussian noise": (spring(0.1, 2.0, wall(0.8)), fpsolve.OrnsteinUhlenbeck(1.0, 0.2), None, 1e-5),
-    "bounded noise": (spring(0.1, 2.0, Jump(0.4, 0.1)), fpsolve.NonGaussianNoise(0.02, 0.6, 0.7), 1.0, 1e-6),
+    "bounded noise": (spring(0.1, 2.0, wall(1.1)), fpsolve.NonGaussianNoise(0.02, 0.6, 0.7), 1.0, 1e-6),
 }
 AHEAD = {"ray": [1.0, 0.0], "log_factor": 0.1}
 QUICK = sampled(*PROOFS, keep=5)

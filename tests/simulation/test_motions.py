@@ -7,14 +7,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, simulate
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, simulate
 from fpsolve.arrays import identity
-from fpsolve.errors import NoSuchExponent
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, ParametricOscillator, White
 from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.kernels import advance
 from fpsolve.simulation.motions import step_driven
-from fpsolve.simulation.setup import default_step, largest_step, transient
+from fpsolve.simulation.setup import largest_step, transient
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, sampled
 from tests.oracles import closed_forms, moment_hierarchy
 
@@ -112,17 +111,6 @@ def test_lines_are_counted_in_a_rotation(noise):
     turns = math.ceil(1000 * 2 / 20.3)  # and a half: after the last whole one both lines are crossed
     assert crossed == 2 * turns
     assert log[0] == pytest.approx(-0.2 * turns, abs=1e-9)
-
-
-@pytest.mark.parametrize("h", [0.1, 1.0, 9.0])
-def test_a_path_that_comes_and_goes_within_a_step_is_seen(h):
-    """φ̇ = ξ goes from −1 to 1: φ = t²/h − t has its least value −h/4; a ray a bit nearer is crossed twice."""
-    turning, rise = CoefficientMatrix(1, ((0.0, 1.0), (-1.0, 0.0)), identity), np.ones((1, 1))
-    for share, times in ((0.24, 2), (0.26, 0)):
-        system = PlaneSystem([turning], [Jump(-share * h, -1.0)])
-        log, _, crossed = along(system, UNIT_NOISE, h, (1.0, 0.0), 0 * rise, rise)
-        assert crossed == times
-        assert log[0] == pytest.approx(-times, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -249,22 +237,3 @@ def test_a_function_of_a_chain_is_simulated():
         )
     )
     assert one.lyapunov_exponent == pytest.approx(other.lyapunov_exponent, rel=1e-12)
-
-
-def test_a_moment_that_crossings_make_infinite_is_refused():
-    problem = Problem(plane([[0.0, 1.0], [-1.0, 0.0]], J, (Jump(0.0, 1.0),)), OrnsteinUhlenbeck(1.0, 3.0))
-    with pytest.raises(NoSuchExponent, match="infinite"):
-        simulate(problem, [2.0])
-
-
-@pytest.mark.slow
-def test_passages_of_a_ray_that_is_passed_both_ways():
-    """φ̇ = ω + ξ passes a ray E|ω + ξ|/π times in unit time, as φ is uniform; some are lost, fewer in smaller steps."""
-    omega, system = 0.2, plane([[0.0, 0.2], [-0.2, 0.0]], ((0.0, 1.0), (-1.0, 0.0)), (Jump(0.3, -0.1),))
-    rate = omega * math.erf(omega / math.sqrt(2)) + math.sqrt(2 / math.pi) * math.exp(-(omega**2) / 2)
-    noise, lost = OrnsteinUhlenbeck(1.0, math.sqrt(2)), []
-    for factor in (2, 0.5):
-        step = factor * default_step(system, noise)
-        found = simulate(system, noise, [], paths=8192, time=100.0, step=step, seed=1)
-        lost.append(1 - found.impacts / (found.paths * found.time) * math.pi / rate)
-    assert 0 < lost[1] < 0.7 * lost[0] < 0.01

@@ -5,10 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, simulate
-from fpsolve.arrays import identity
-from fpsolve.errors import FpsolveError
-from fpsolve.model import Bounded, CoefficientMatrix, Jump, Poisson, Telegraph, White
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve.model import Bounded, Poisson, Telegraph, White
 from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.kernels import advance
 from fpsolve.simulation.setup import default_step, largest_step, starting_state, transient
@@ -71,11 +69,3 @@ def test_impacts_at_a_wall_are_counted():
     count = advance(known.motion(h), known.noise_step(h), h, x, u, state, log_norm, push, steps, 4, rng)
     assert count == 8 * 20
     np.testing.assert_allclose(log_norm, 20 * math.log(0.9), atol=1e-6)
-
-
-def test_noise_that_moves_the_phase_over_a_wall_is_refused():
-    free, moved = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.1), (0.0, 0.0))
-    terms = [CoefficientMatrix(0, free), *(CoefficientMatrix(1, moved, identity, name) for name in "ab")]
-    system = PlaneSystem(terms, [Jump(math.pi / 2, -0.1)])
-    with pytest.raises(FpsolveError, match="none of them moves the phase"):
-        simulate(Problem(system, {"a": GAUSSIAN, "b": Telegraph(a=0.1, k=1.0)}), 1.0)

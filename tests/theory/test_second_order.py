@@ -16,6 +16,7 @@ from fpsolve.model.problem import Problem
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.theory.perturbation import first_order_eigenfunction, scale_of, second_order
+from tests.conftest import keeping
 from tests.oracles import perturbation
 
 ROTATION = ((0.0, 1.0), (-1.0, 0.0))
@@ -52,12 +53,12 @@ SKEWED = MarkovChain((-1.0, 0.5), ((0, 1.0), (0.5, 0)))
 
 @pytest.mark.parametrize("p", [-1.0, 2.0])
 @pytest.mark.parametrize(("noise", "order", "slack"), [(GAUSSIAN, 2, 0.05), (SKEWED, 1, 0.2)], ids=["OU", "chain"])
-@pytest.mark.parametrize("seed", [0, 1, 4])
+@pytest.mark.parametrize("seed", [0, 5, 6])  # whose Λ₃ is not small
 def test_what_is_left_out_is_of_higher_order(seed, noise, order, slack, p):
     """Any matrices, a free motion on ellipses, damping of order 2, two rays. Symmetric noise leaves ε⁴, other ε³."""
     rng = np.random.default_rng(seed)
     ellipse = np.array([[0.3, 1.5], [-0.8, -0.3]])
-    driven, damped = rng.uniform(-1, 1, (2, 2, 2))
+    damped, driven = rng.uniform(-1, 1, (2, 2)), keeping(0.4, 1.9, rng.uniform(-1, 1, 2))
     rests = []
     for epsilon in (0.04, 0.02):
         jumps = [Jump(0.4, -0.3 * epsilon**2), Jump(1.9, 0.5 * epsilon**2)]
@@ -71,7 +72,7 @@ def test_what_is_left_out_is_of_higher_order(seed, noise, order, slack, p):
 @pytest.mark.parametrize("shift", [0.9, -3.0])
 def test_the_mean_of_a_noise_is_a_part_of_the_drift(shift):
     """States moved by m and the drift by −εmA: all numbers are the same, and ε²Λ₂ is about the drift with the mean."""
-    driven, damped = ((0.2, -0.7), (0.4, 1.0)), ((0.0, 0.0), (0.0, -0.3))
+    driven, damped = keeping(0.4, 2.0), ((0.0, 0.0), (0.0, -0.3))
     epsilon = 0.2
     rest = [CoefficientMatrix(0, ROTATION), CoefficientMatrix(1, driven, identity), CoefficientMatrix(2, damped)]
     moved = CoefficientMatrix(0, (-epsilon * shift * np.array(driven)).tolist())

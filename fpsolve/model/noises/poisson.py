@@ -123,25 +123,17 @@ class Poisson(Memoryless):
         """One for each size, in their order, by which the simulation draws them.
 
         Raises:
-            ValueError: they move the ray of a jump, or multiply the state by more than floating-point numbers hold.
+            ValueError: they multiply the state by more than floating-point numbers hold.
         """
         _, driven = split_by_noise(system, system.terms)
         if not driven.any():
             return ()
         if float(np.linalg.norm(driven, 2)) * max(map(abs, self.sizes)) > LARGEST:
             raise ValueError(f"an impulse multiplies the state by up to e^{LARGEST:g} or more; use smaller sizes")
-        found = [
+        return [
             Impulse(self.rate * float(share), (size * driven).tolist())
             for size, share in zip(self.sizes, self.shares, strict=True)
         ]
-        for jump in system.jumps:
-            for each in found:
-                if jump.log_factor and not each.keeps(jump.phase):
-                    raise ValueError(
-                        f"impulses move the phase across the ray of a jump, phi = {jump.phase:.6g}; let them drive a "
-                        "term that does not move the phase there"
-                    )
-        return found
 
     def changed_motion(
         self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""

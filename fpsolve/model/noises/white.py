@@ -95,17 +95,10 @@ class White(Memoryless):
         """The drift in the sense of Stratonovich, and s A of the term that the noise drives, as one matrix.
 
         Raises:
-            ValueError: a coefficient is no a + bξ, or the noise moves the phase over the ray of a jump.
+            ValueError: a coefficient is no a + bξ.
         """
         drift, driven = split_by_noise(system, system.terms)
         diffusions = [_term(system, self.s * driven, _order(system))] if driven.any() else []
-        for jump, diffusion in ((jump, each) for jump in system.jumps for each in diffusions):
-            if jump.log_factor and abs(float(diffusion.h(jump.phase))) > 1e-12 * diffusion.h.amplitude:
-                raise ValueError(
-                    f"white noise moves the phase across the ray of a jump, phi = {jump.phase:.6g}, where ‖x‖ would "
-                    "change infinitely often; let it drive a term that does not move the phase there, or use coloured "
-                    "noise"
-                )
         if self.interpretation == Interpretation.ITO and diffusions:
             drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))
         return LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions
