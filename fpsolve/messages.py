@@ -245,6 +245,7 @@ class Code(Enum):
     INDEX_ABSENT = "note: no {symbols}: {reason}"
     NO_MOMENT = "failure: there is no Λ({p:g})"
     NO_INDEX = f"note: {_RARE}"
+    NOT_DRIVEN = "note: no noise moves the state, so that Λ(p) is λ p and has no other root"
     NO_ROOT = (
         "note: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded "
         "noise P(sup ‖x‖ > A) may fall faster than any power of A}"

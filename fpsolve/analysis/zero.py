@@ -199,7 +199,7 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
             `held_by`.
     """
     value, error = solver.ratio_alone(p)
-    if value > 0 > p and solver.problem.noise.has_algebraic_tails:
+    if value > 0 > p and solver.problem.has_algebraic_tails:
         near = solver.near.solution(p).pair
         if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
             raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))

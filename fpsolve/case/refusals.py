@@ -96,7 +96,9 @@ def _obstacle(at: Callable[[Varied], Problem], varied: Varied, p: FloatArray, *,
         with np.errstate(all="ignore"):
             factors = [math.exp(each * jump.log_factor) for jump in problem.system.jumps for each in extremes]
             theory = second_order_or_none(problem)
-            sizes = np.array([*factors, *([] if theory is None else [*theory.scale.moment(p), theory.stability_index])])
+            if theory is not None:
+                factors += [*theory.scale.moment(p), theory.stability_index if theory.quadratic else 0.0]
+            sizes = np.array(factors)
     except ValueError as error:
         return said(error)
     except OverflowError:  # of R^p

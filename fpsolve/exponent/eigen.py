@@ -286,8 +286,9 @@ def _nearest(
     """The real eigenvalue nearest to a shift, or to a value, and before it its eigenvector, by Arnoldi iteration."""
     operator = LinearOperator((start.size, start.size), matvec=resolvent, dtype=float)
     count = min(NEIGHBOURS, start.size - 2)
+    mixed = start + 1e-8 * np.linalg.norm(start) * np.sin(np.arange(start.size))  # beyond spaces that L keeps to itself
     try:
-        inverses, vectors = eigs(operator, k=count, v0=start, ncv=min(4 * count, start.size), tol=1e-3, maxiter=200)
+        inverses, vectors = eigs(operator, k=count, v0=mixed, ncv=min(4 * count, start.size), tol=1e-3, maxiter=200)
     except ArpackNoConvergence as failure:
         inverses, vectors = failure.eigenvalues, failure.eigenvectors
         if not inverses.size:

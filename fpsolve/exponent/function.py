@@ -276,6 +276,8 @@ def nonzero_root(
     Raises:
         NotConverged: some p on the way is not resolved.
     """
+    if not solver.problem.is_driven:
+        return Absent(Message(Code.NOT_DRIVEN))
     if grows_far_out(solver.problem):
         return Absent(Message(Code.NO_INDEX))
     noise = solver.problem.noise

@@ -209,7 +209,7 @@ def _refuse(problem: Problem) -> None:
         raise NoPerturbationTheory("perturbation theory is for two variables only")
     if problem.impulses:
         raise NoPerturbationTheory("perturbation theory is for weak noise, not for impulses")
-    if problem.noise.has_algebraic_tails:
+    if problem.has_algebraic_tails:
         raise NoPerturbationTheory(
             "for r0 > 1 the noise has algebraic tails, so that all but the first orders of Λ(p) are infinite; choose "
             "r0 <= 1, or the Ornstein-Uhlenbeck reduction of the noise"

@@ -209,7 +209,7 @@ class ExponentSolver:
 
         On a given mesh only the first is; `misplaced` warns of others.
         """
-        if self.mesh is not None or not self.problem.noise.has_algebraic_tails:
+        if self.mesh is not None or not self.problem.has_algebraic_tails:
             return self.near
         return AllPlaces(self.near, FarPlaces(self.problem, **self._own))
 
@@ -374,6 +374,8 @@ class ExponentSolver:
             NoSuchExponent: the variance grows faster than t.
             NotConverged: it is not resolved.
         """
+        if not self.problem.is_driven:
+            return Estimate(0.0, 0.0, 0.0, quantity=quantity.VARIANCE_RATE)
         if len(self.classes) > 1:
             rates = sorted((each.lyapunov_exponent() for each in self.classes), key=lambda each: -each.value)
             if rates[0].value - rates[1].value <= rates[0].error_estimate + rates[1].error_estimate:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg.blas import dgemm
 from scipy.sparse import csr_matrix, identity
-from scipy.sparse.csgraph import reverse_cuthill_mckee, shortest_path
+from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee, shortest_path
 from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
@@ -318,9 +318,10 @@ def along_last(operator: KroneckerSum, levels: Sequence[Any]) -> list[Any]:
 
 
 def levels_of(operator: KroneckerSum) -> list[Any]:
-    """The functions of the last axis by how many of its couplings lead to the first one."""
+    """The functions of the last axis by how many of its couplings lead to the first one, or one of each part."""
     pattern = sum(abs(csr_matrix(last)) for _, last in operator.pairs)
-    distance = shortest_path(pattern + pattern.T, method="D", unweighted=True, indices=0)
+    starts = np.unique(connected_components(pattern)[1], return_index=True)[1]
+    distance = np.min(shortest_path(pattern + pattern.T, method="D", unweighted=True, indices=starts), axis=0)
     return [np.flatnonzero(distance == d) for d in range(int(distance.max()) + 1)]
 
 

@@ -142,9 +142,12 @@ def own_frame(
         for name, c in zip((None, term.noise), affine(term.g) or (0.0, 1.0), strict=True):
             parts.setdefault(name, []).append((c * epsilon**term.order, term))
     steady = combined(parts.pop(None, ()))
-    driven = [(combined(terms), *spread(name or "")) for name, terms in parts.items() if any(c for c, _ in terms)]
+    driven = [(matrix, *spread(name or "")) for name, terms in parts.items() if any(matrix := combined(terms))]
     white = [combined([(epsilon**each.order, each)]) for each in diffusions]
     struck = [(each.rate, (*each.exponent[0], *each.exponent[1])) for each in impulses]
+    rotating = rotating_coordinates(np.reshape(_free(drift), (2, 2)))
+    if rotating is None and not (driven or white or struck):
+        return None  # what is nilpotent is as small as one likes
 
     def size(row: tuple[float, float]) -> float:
         total = _norm(steady, row) + sum((norm := _norm(each, row)) * norm for each in white)
@@ -164,7 +167,7 @@ def own_frame(
             break
         least, best = found
     choice = [own, best]
-    if (rotating := rotating_coordinates(np.reshape(_free(drift), (2, 2)))) is not None:
+    if rotating is not None:
         (first, _), (lower, last) = rotating.tolist()
         choice.insert(0, (lower / first, last / abs(first)))
     chosen = next((row for row in choice if size(row) <= HARDLY * least), own)

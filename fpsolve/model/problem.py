@@ -419,9 +419,19 @@ class Problem:
         return sum(self.drift.epsilon**each.order * each.matrix[0][0] for each in self.drift.terms)
 
     @property
+    def is_driven(self) -> bool:
+        """Whether a noise moves the state; one of strength 0 does not, and Λ(p) is p times the growth rate."""
+        return any(is_driven(term.g) and np.any(term.matrix) for term in self.system.terms)
+
+    @property
+    def has_algebraic_tails(self) -> bool:
+        """Whether some moments are infinite as the noise has such tails."""
+        return self.noise.has_algebraic_tails and self.is_driven
+
+    @property
     def moments(self) -> tuple[float, float]:
         """The p for which Λ(p) is finite and known, as a closed interval."""
-        low, high = self.noise.moments
+        low, high = self.noise.moments if self.is_driven else (-math.inf, math.inf)
         return (max(low, -1.0), high) if len(self.blocks) > len(self.invariant_rays) > 0 else (low, high)
 
     @property
@@ -609,7 +619,8 @@ def refuse_infinite(problem: Problem, p: float) -> None:
         NoSuchExponent: p is not among the `moments` of the problem, or the phase never leaves the ray of a jump.
     """
     noise, system = problem.noise, problem.motion
-    noise.check_existence(p)
+    if problem.is_driven:
+        noise.check_existence(p)
     if problem.invariant_rays:
         has_jumps = any(jump.log_factor for jump in system.jumps)
         if has_jumps or p < problem.moments[0]:

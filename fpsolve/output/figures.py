@@ -322,7 +322,7 @@ def _rates(result: CurveResult, *, with_theory: bool) -> Series:
     found, theory = result.moments, perturbation.second_order_or_none(result.curve.problem)
     known = np.isfinite(found.derivative)
     s, line, values = found.derivative[known], _NOTHING, _NOTHING
-    if with_theory and theory and s.size:
+    if with_theory and theory and theory.variance_rate and s.size:
         line = np.linspace(s.min(), s.max(), 200)
         values = (line - theory.lyapunov_exponent) ** 2 / (2 * theory.variance_rate)
     return Series(dict(result.curve.varied), s, found.rate_function[known], line, values)

@@ -87,7 +87,7 @@ def far_places(problem: Problem, p: float) -> tuple[Place, ...]:
 
 def outlook(problem: Problem, p: float) -> Outlook:
     """Where to look for the largest eigenvalue besides ξ = 0: nowhere but for algebraic tails and p ≠ 0."""
-    if p == 0 or not problem.noise.has_algebraic_tails:
+    if p == 0 or not problem.has_algebraic_tails:
         return Outlook()
     return _outlook(problem, p)
 
@@ -106,7 +106,7 @@ def grows_far_out(problem: Problem) -> bool:
 
     It is so where the growth rate G(ξ) of noise that rests is negative far out, on one side, and |G|ξ² → ∞.
     """
-    if not problem.noise.has_algebraic_tails:
+    if not problem.has_algebraic_tails:
         return False
     z = np.array(FAR_OUT)
     for side in (-1.0, 1.0):
@@ -134,7 +134,7 @@ def variance_tail(problem: Problem) -> float:
     P_s ~ |ξ|^(−d), s = d − 2a − 3. For the paper's oscillator a is 1 where it is fed with energy, and Λ″(0) is finite
     for r₀ < 7/5.
     """
-    if not problem.noise.has_algebraic_tails:
+    if not problem.has_algebraic_tails:
         return math.inf
     xi, least = problem.noise.standard_deviation * np.array(FAR_OUT), math.inf
     for side in (-1.0, 1.0):

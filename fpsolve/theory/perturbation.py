@@ -84,8 +84,8 @@ class SecondOrder:
 
     @property
     def stability_index(self) -> float:
-        """δ_p, the non-zero root of ε²Λ₂(p), Eq. (38)."""
-        return -self.lyapunov_exponent / self.quadratic + 0.0
+        """δ_p, the non-zero root of ε²Λ₂(p), Eq. (38); nan where there is none, as without noise."""
+        return -self.lyapunov_exponent / self.quadratic + 0.0 if self.quadratic else math.nan
 
     @property
     def variance_rate(self) -> float:
@@ -268,7 +268,8 @@ def scale_of(problem: Problem) -> Scale:
     driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in problem.impulses)
     sizes = Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
     theory = second_order_or_none(problem)
-    return theory.scale if theory and theory.scale.moment(2.0) <= sizes.moment(2.0) else sizes
+    found = theory.scale if theory and theory.scale.moment(2.0) <= sizes.moment(2.0) else sizes
+    return found if found.moment(1.0) else Scale(angular_frequency(system), 0.0)  # nothing grows
 
 
 def _growth(matrix: Any, frame: FloatArray) -> Harmonics:

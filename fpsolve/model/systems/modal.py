@@ -154,7 +154,7 @@ class _Rates:
         parts = [(matrix, of[key]) for key, matrix in matrices.items()]
         driven = [(noise, self._entries(matrix, *path), of[path[0]]) for noise, path, matrix in self._driven()]
         for name in self.noises:
-            if not any(noise == name and np.any(self._numbers(matrix)) for noise, matrix, _ in driven):
+            if all(noise != name or not any(map(any, matrix)) for noise, matrix, _ in driven):  # a name may be 0
                 raise TableError(f"{name} is in no matrix; write stiffness_noise or damping_noise", "noises", name)
         parts += [(matrix, [f"{noise}*{state}" for state in states]) for noise, matrix, states in driven]
         forces = [[each for matrix, states in parts for each in zip(matrix[j], states, strict=True)] for j in self]
