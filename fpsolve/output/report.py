@@ -23,8 +23,9 @@ from fpsolve.data import plain_unit, written
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
-from fpsolve.files import parsed_json, plain_text, write_text
+from fpsolve.files import plain_text, write_text
 from fpsolve.messages import Code, Message, Severity, message_of
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import RATE_FUNCTION
 from fpsolve.output.charts import draw_chart
 from fpsolve.output.directions import directions_file, draw_densities
@@ -46,12 +47,18 @@ from fpsolve.output.terminal import (
     simulation_grid,
     verdicts,
 )
+from fpsolve.proofs.balls import MissingFlint
+from fpsolve.proofs.certificate import MalformedProof
+from fpsolve.proofs.claims import CurveClaims, claims_from
+from fpsolve.proofs.statement import statement_of
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.prove import CurveProof
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.uncertain import Samples, spreads_of
 
 REPORT = "report.html"
+MOST_CHECKED = 3e7
+"""Operations for the certificates of a curve that a report checks: some seconds."""
 _OTHERS = "summary.json", "monte_carlo.json", "chart.json", "design.json", "proof.json"
 """What a command says that it has done."""
 MOST_PICTURES, MOST_REMARKS = 3, 100
@@ -140,7 +147,7 @@ class Reporter:
             equations=equations_of(curve.problem),
             about=list(_about(case, found, curve)),
             parameters=list(_parameters(case, curve)),
-            meanings=list(_meanings(case, found, _proven(folder) if found.results else {})),
+            meanings=list(_meanings(case, found, _claimed(folder) if found.results else {})),
             figures=list(_figures(case, found, folder)),
             plots=plots,
             plotly=_plotly() if plots else "",
@@ -171,18 +178,39 @@ def _parameters(case: Case, curve: Curve) -> Iterator[dict[str, Any]]:
         yield {"key": key, "symbol": parts_of(quantity.latex), "value": shown, "unit": unit, "words": words}
 
 
-def _proven(folder: Path) -> dict[frozenset[Any], list[str]]:
-    """What a proof.json beside the results says of paths and moments, by the parameters."""
+def _claimed(folder: Path) -> dict[frozenset[Any], CurveClaims]:
+    """What a proof.json beside the results claims, by the parameters."""
     try:
-        curves = parsed_json(plain_text(folder / PROOF))["curves"]
-        return {
-            frozenset(each["parameters"].items()): [f"Proven: {text}." for text in each["verdicts"]] for each in curves
-        }
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):  # there is none, or it is none of ours
+        curves = claims_from(plain_text(folder / PROOF)).curves
+    except (OSError, ValueError, MalformedProof):  # there is none, or it is none of ours
         return {}
+    numbers = [{key: v if isinstance(v, str) else float(v) for key, v in each.parameters.items()} for each in curves]
+    return {frozenset(key.items()): each for key, each in zip(numbers, curves, strict=True)}
 
 
-def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str]]) -> Iterator[tuple[str, list[str]]]:
+def _verdicts(claims: CurveClaims | None, problem: Problem) -> list[str]:
+    """What is claimed of paths and moments: proven where it follows from certificates for this system."""
+    if claims is None or not claims.verdicts:
+        return []
+    bounds = [each for claim in claims.claims.values() for each in claim.bounds]
+    certificates = [each.certificate for each in bounds if each.certificate is not None]
+    says = f"{PROOF} says: {'; '.join(claims.verdicts)}. This"
+    if sum(each.work for each in certificates) > MOST_CHECKED:
+        return [f"{says} was not checked here, as that takes long; `fpsolve prove --check {PROOF}` does it."]
+    try:
+        own = statement_of(problem)
+        is_own = all((each.motion, each.chain) == (own.motion, own.chain) for each in certificates)
+        objection = next(claims.objections(), "") if is_own else "its certificates are of another system"
+    except MissingFlint as missing:
+        return [f"{says} was not checked here: {missing}."]
+    except (FpsolveError, TypeError, ValueError) as failure:
+        objection = str(failure)
+    return [f"{says} does not follow: {objection}."] if objection else [f"Proven: {each}." for each in claims.verdicts]
+
+
+def _meanings(
+    case: Case, found: Found, claimed: Mapping[frozenset[Any], CurveClaims]
+) -> Iterator[tuple[str, list[str]]]:
     """By curves what their numbers say, and what is proven of them; of many curves, whose table is enough, nothing."""
     time_unit = case.units.time
     if len(found.results) <= MOST_DRAWN:
@@ -191,7 +219,8 @@ def _meanings(case: Case, found: Found, proven: Mapping[frozenset[Any], list[str
             sure = [f"{each}, as parameters are uncertain." for each in verdicts(spreads_of(case, result))]
             rare = [text] if (text := excursions(case, result)) else []
             rare += [shape_of_response(result.response, case.system.response)] if result.response else []
-            if told := [*meanings(result, time_unit), *rare, *sure, *proven.get(parameters, [])]:
+            proven = _verdicts(claimed.get(parameters), result.curve.problem)
+            if told := [*meanings(result, time_unit), *rare, *sure, *proven]:
                 yield result.curve.label, told
     if not found.results and len(found.simulated) <= MOST_DRAWN:
         for each in found.simulated:
