@@ -29,7 +29,7 @@ def surface_from(path: Path) -> Surface:
     count = int(np.argmax(phi != phi[0])) or phi.size
     rows = (-1, count)
     z, facts = np.asarray(grid.point_data["z"]).reshape(rows)[0], grid.field_data
-    along, y = str(facts["along_y"][0]), xi.reshape(rows)[0]
+    along, y = bytes(facts["along_y"]).decode(), xi.reshape(rows)[0]
     is_lines = not along.startswith("noise xi")  # y is the number of a state, each a strip on which T is constant
     if is_lines:
         numbers, near = np.unique(np.round(y), return_index=True)
@@ -39,7 +39,7 @@ def surface_from(path: Path) -> Surface:
     else:
         near = np.flatnonzero(np.abs(z) <= FURTHEST)
         near = near if near.size > 1 else np.arange(z.size)
-    impacts = [float(each) for each in str(facts["impacts"][0]).split() if each != "none"]
+    impacts = [each for each in np.asarray(facts["impacts"]).tolist() if not math.isnan(each)]
     about = {"phi": PHASE.attributes, "xi": {**NOISE.attributes, "units": "1"}}
     about["values"] = {**UNNAMED.attributes, "long_name": "eigenfunction", "symbol": "$T$", "units": "1"}
     return Surface(
@@ -49,7 +49,7 @@ def surface_from(path: Path) -> Surface:
         about=about,
         name="T",
         title=f"p = {float(facts['p'][0]):g}, Λ(p) = {float(facts['Lambda'][0]):.6g}",
-        lines=str(facts["held"][0]).splitlines() if "held" in facts else (),
+        lines=bytes(facts["held"]).decode().splitlines() if "held" in facts else (),
         impacts=[each % (2 * math.pi) for each in impacts],
         is_lines=is_lines,
     )

@@ -67,8 +67,8 @@ def main(arguments: list[str]) -> None:
     simple.SaveScreenshot(str(chosen.output), view, OverrideColorPalette="WhiteBackground")
     known = servermanager.Fetch(reader).GetFieldData()
     words = [f"p = {known.GetArray('p').GetValue(0):g}"]
-    if known.GetAbstractArray("varied"):
-        words.insert(0, known.GetAbstractArray("varied").GetValue(0))
+    if known.GetArray("varied"):
+        words.insert(0, text_of(known, "varied"))
     print(f"{', '.join(words)}: {chosen.output}")
 
 
@@ -151,24 +151,34 @@ def draw(reader: Any, view: Any, p: float, chosen: argparse.Namespace) -> None:
     # the varied parameters, p and Lambda(p), or the name of what has no p; below, the other parameters
     of_p = '"p = %g     Lambda(p) = %.6g (1/time)" % (p[0], round(float(Lambda[0]), 14) + 0.0)'
     head = repr("stationary density (p = 0)") if chosen.field == "stationary_density" else of_p
-    if facts.GetAbstractArray("varied"):
-        head = f"varied.GetValue(0) + {chr(10)!r} + {head}"
+    if facts.GetArray("varied"):
+        head = f"varied.tobytes().decode() + {chr(10)!r} + {head}"
     annotate(reader, view, head, "Upper Center", 36)
-    if facts.GetAbstractArray("held"):
-        annotate(reader, view, "held.GetValue(0)", "Lower Center", 26)
+    if facts.GetArray("held"):
+        annotate(reader, view, "held.tobytes().decode()", "Lower Center", 26)
+
+
+def numbers_of(facts: Any, name: str) -> list[float]:
+    """Those of an array of the field data."""
+    array = facts.GetArray(name)
+    return [array.GetValue(i) for i in range(array.GetNumberOfTuples())]
+
+
+def text_of(facts: Any, name: str) -> str:
+    """The text of which an array has the codes."""
+    return bytes(map(int, numbers_of(facts, name))).decode()
 
 
 def impacts_of(facts: Any) -> list[float]:
     """The phases at which T jumps, as the files say; those of a wall at x = 0 where they do not."""
-    if not facts.GetAbstractArray("impacts"):
+    if not facts.GetArray("impacts"):
         return [QUARTER, 3 * QUARTER]
-    words = facts.GetAbstractArray("impacts").GetValue(0)
-    return [] if words == "none" else [float(each) for each in words.split()]
+    return [each for each in numbers_of(facts, "impacts") if not math.isnan(each)]
 
 
 def along_y(facts: Any) -> str:
     """What stands along y: the noise with its unit, or its states."""
-    return facts.GetAbstractArray("along_y").GetValue(0) if facts.GetAbstractArray("along_y") else "noise xi (1/time)"
+    return text_of(facts, "along_y") if facts.GetArray("along_y") else "noise xi (1/time)"
 
 
 def annotate(reader: Any, view: Any, expression: str, place: str, size: int) -> None:

@@ -1,7 +1,8 @@
 """Eigenfunctions and densities as ParaView files: Lagrange quadrilaterals on the full circle, x = φ, y = ξ.
 
 A file shows the elements' polynomials at their `Nodes`; its field data name the curve. Where the noise has
-states, y is the number of the state, each a strip.
+states, y is the number of the state, each a strip. Field data are numbers, as meshio refuses texts: a text is the
+codes of its letters, `bytes(mesh.field_data["held"]).decode()`.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ CURVES = "curves.pvd"
 MOST_STATES = 8
 """States of the noise that a picture names."""
 _DIGITS = str.maketrans("₁₂₃₄²", "12342")
-Facts = Mapping[str, float | str]
+Facts = Mapping[str, Any]
 
 
 def write_eigenfunctions(
@@ -275,11 +276,12 @@ def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: 
 
 
 def _write(path: Path, grid: Any, facts: Facts) -> None:
-    """Write a grid with field data of one value each; as a text, for VTK itself is silent about a full disk."""
+    """Write a grid with field data; as a text, for VTK itself is silent about a full disk."""
     from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLUnstructuredGridWriter
 
     for name, value in facts.items():
-        grid.field_data[name] = [value]
+        is_text = isinstance(value, str)
+        grid.field_data[name] = np.frombuffer(value.encode(), np.uint8) if is_text else np.atleast_1d(value)
     writer = vtkXMLImageDataWriter() if path.suffix == ".vti" else vtkXMLUnstructuredGridWriter()
     writer.SetInputData(grid)
     writer.WriteToOutputStringOn()
@@ -296,10 +298,12 @@ def _pyvista() -> Any:
 
 
 def _facts(parameters: Facts, varied: Collection[str], problem: Problem) -> Facts:
-    """The parameters, and the words about those of a problem that a picture shows, if there are any, in ASCII."""
+    """The parameters, words in the name, and the words about those that a picture shows, if there are any, in ASCII."""
     known = {key: each._replace(value=parameters[key]) for key, each in problem.parameters.items() if key in parameters}
     words = {"varied": parameter_words(known, varied), "held": "\n".join(parameter_lines(known, varied))}
-    return {**parameters, **{name: text.replace("²", "^2") for name, text in words.items() if text}}
+    named = {f"{key} = {each.value}": 1.0 for key, each in known.items() if isinstance(each.value, str)}
+    numbers = {key: each for key, each in parameters.items() if f"{key} = {each}" not in named}
+    return {**numbers, **named, **{name: text.replace("²", "^2") for name, text in words.items() if text}}
 
 
 def _frame(problem: Problem) -> Facts:
@@ -315,7 +319,7 @@ def _frame(problem: Problem) -> Facts:
                 *(states if len(states) <= MOST_STATES else ()),
             ]
         )
-    return {"impacts": " ".join(f"{turn:.12g}" for turn in sorted(turns)) or "none", "along_y": along}
+    return {"impacts": sorted(turns) or [math.nan], "along_y": along}
 
 
 def _name(stem: str, p: float) -> str:

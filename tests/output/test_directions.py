@@ -62,7 +62,7 @@ def test_files_of_two_modes(modes):
     np.testing.assert_array_equal(grid["tilted_density"], found.tilted_density.values.ravel())
     np.testing.assert_allclose(grid["share"], np.sin(grid.points[:, 0]) ** 2, atol=1e-12)
     assert grid.active_scalars_name == "tilted_density"
-    assert grid.field_data["along_x"][0] == "angle whose squared sine is the share of q2 (rad)"
+    assert bytes(grid.field_data["along_x"]).decode() == "angle whose squared sine is the share of q2 (rad)"
     assert grid.compute_cell_sizes()["Area"].sum() == pytest.approx(np.pi**2)
     density = pyvista.read(folder / "density.vtu")
     np.testing.assert_array_equal(density["stationary_density"], found.stationary_density.values.ravel())

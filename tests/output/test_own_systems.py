@@ -55,8 +55,8 @@ PLANE = """
 title = "two rays"
 [system]
 kind = "plane"
-terms = [{ matrix = [[0, 1], [-1, -0.2]] }, { order = 1, matrix = [[0, 0], [-1, 0]], noise = true }]
-jumps = [{ phase = 1.5707963267948966, log_factor = -0.05 }, { phase = 0.3, log_factor = 0.1 }]
+terms = [{ matrix = [[0, 1], [-1, -0.2]] }, { order = 1, matrix = [[0, 0], [0, -1]], noise = true }]
+jumps = [{ phase = 1.5707963267948966, log_factor = -0.05 }, { phase = 0.0, log_factor = 0.1 }]
 [noise]
 kind = "telegraph"
 a = 0.5
@@ -244,7 +244,7 @@ def test_every_ray_has_its_rate_in_the_summary(tmp_path, capsys):
         )
         assert ray["critical_restitution"] is None
     print_results(case, results)
-    assert "φ = 0.3:" in "".join(capsys.readouterr())
+    assert "φ = 0:" in "".join(capsys.readouterr())
 
 
 @pytest.mark.parametrize("noise", [Telegraph(a=0.5, k=1.0), White(s=0.5), CHAIN], ids=lambda noise: noise.kind)
@@ -270,8 +270,8 @@ def test_eigenfunctions_of_white_noise_are_written(tmp_path):
     )
     run(case_in(tmp_path, text), tmp_path)
     facts = pyvista.read(tmp_path / "test/eigenfunctions/p+2.0.vtu").field_data
-    assert facts["along_y"][0] == "white noise"
-    assert facts["impacts"][0] == "none"
+    assert bytes(facts["along_y"]).decode() == "white noise"
+    assert np.isnan(facts["impacts"]).tolist() == [True]
     assert (tmp_path / "test/density.vtu").is_file()
 
 
@@ -324,10 +324,8 @@ def test_files_say_where_the_impacts_are(tmp_path):
     [solved] = solve_sets(case)
     write_functions(solved, solved.result.curve, tmp_path)
     facts = pyvista.read(tmp_path / "eigenfunctions/p+2.0.vtu").field_data
-    assert [float(each) for each in facts["impacts"][0].split()] == pytest.approx(
-        [0.3, np.pi / 2, np.pi + 0.3, 1.5 * np.pi], abs=1e-11
-    )
-    assert facts["along_y"][0] == "states; xi = -0.5; xi = 0.5"
+    assert facts["impacts"] == pytest.approx([0.0, np.pi / 2, np.pi, 1.5 * np.pi], abs=1e-11)
+    assert bytes(facts["along_y"]).decode() == "states; xi = -0.5; xi = 0.5"
 
 
 @pytest.mark.parametrize("noise", [Telegraph(a=0.5, k=1.0), White(s=0.5)], ids=lambda noise: noise.kind)

@@ -78,10 +78,12 @@ p = [2.0]
 """
 
 
-def test_a_ray_that_the_phase_passes_both_ways_is_refused(tmp_path, capsys):
+def test_a_ray_that_the_noise_turns_is_refused(tmp_path, capsys):
     path = tmp_path / "beam.toml"
     path.write_text(TURNED, encoding="utf-8")
     assert main(["prove", str(path), "--out", str(tmp_path)]) == BAD_INPUT
     told = " ".join(capsys.readouterr().err.split())
-    assert "got a jump at the ray of (1, 0), which the phase does not pass one way only; proofs are for jumps" in told
+    assert (
+        "ornstein-uhlenbeck noise moves the phase across the ray of a jump, phi = 0, which it does over no wall" in told
+    )
     assert not (tmp_path / "beam").exists()
