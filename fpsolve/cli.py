@@ -288,6 +288,9 @@ def run(
     json: Annotated[
         bool, Parameter(help="Print the summaries, one line of JSON for each case, instead of tables.", negative="")
     ] = False,
+    everything: Annotated[
+        bool, Parameter(name="--all", help='Compute everything, as quantities = "all" in [output].', negative="")
+    ] = False,
     sample: Annotated[
         Count | None,
         Parameter(help="Also solve so many samples of the parameters that [uncertain] of the case names."),
@@ -301,10 +304,10 @@ def run(
 
     Curves that an earlier run has finished are not solved again, even if that run was killed.
 
-    Without [output] quantities a case computes all of them: moment,
-    lyapunov_exponent, stability_index, variance_rate, impact_rate,
-    critical_impact_factor, critical_restitution, sensitivities, eigenfunctions, response.
-    Only where they are named it computes rate_function and excursions, too.
+    Without [output] quantities a case computes moment, lyapunov_exponent, stability_index, of walls impact_rate and
+    critical_impact_factor, of terms of degree 3 the response, one of the eigenfunctions, and what other sections name.
+    Only where they are named, or with --all, it computes variance_rate, critical_restitution, sensitivities, all
+    eigenfunctions with densities, rate_function and excursions, too.
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
@@ -315,6 +318,7 @@ def run(
 
     code, reporter = 0, reporter_of(report, interactive)
     options = {} if sample is None else {f"--sample {sample}": f"uncertain.sample={sample}"}
+    options |= {"--all": 'output.quantities="all"'} if everything else {}
     loaded = load_to_write(cases, overrides, options, monte_carlo=monte_carlo)
     for case in loaded:
         refuse_wrong_samples(case)

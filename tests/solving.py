@@ -11,6 +11,8 @@ from fpsolve.case.case import Case, load_case
 from fpsolve.study.results import CurveResult, Solved
 from fpsolve.study.solve import Numerics, everything, solve_curve
 
+ALL = 'output.quantities="all"'
+"""Sets what a case asks for to everything."""
 OSCILLATOR = {"epsilon": 0.1, "omega": 1.0, "restitution": 0.8, "c1": 0.1}
 NOISE = {"D0": 0.5, "tau0": 0.5, "r0": 0.95}
 

@@ -15,8 +15,10 @@ from types import SimpleNamespace
 import pytest
 
 from fpsolve import cli
+from fpsolve.case.case import load_case
 from fpsolve.case.sections import QUANTITY_NAMES
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
+from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
 from fpsolve.model.problem import Problem
 from fpsolve.output import figures, tables
@@ -46,7 +48,7 @@ def shown(tmp_path_factory):
     folder, out, err = tmp_path_factory.mktemp("shown"), io.StringIO(), io.StringIO()
     (folder / "test.toml").write_text(DRAWN, encoding="utf-8")
     with chdir(folder), redirect_stdout(out), redirect_stderr(err):
-        assert main(["run", "test.toml"]) == 0
+        assert main(["run", "test.toml", "--all"]) == 0
     return SimpleNamespace(out=out.getvalue(), err=err.getvalue(), folder=folder / "results/test")
 
 
@@ -67,16 +69,47 @@ def test_run_prints_a_table_and_writes_the_results(shown):
     assert "summary.json" in files(shown.folder)
 
 
-@pytest.mark.slow
-def test_eigenfunctions_that_are_left_out_are_told_once_with_the_remedy(case, tmp_path, capsys):
-    many = ["--set", 'vary."noise.D0"={start=0.1, stop=1.0, num=11}', "--set", "moments.p=[-1.0, 1.5]"]
+@pytest.mark.parametrize("wall", ["0.8", "1.0"])
+def test_what_is_computed_unasked_is_cheap_and_the_rest_is_told_in_one_line(case, tmp_path, capsys, monkeypatch, wall):
+    """One eigenfunction, of the first curve at the p next to 2, and nothing that takes a finer discretisation."""
+    for name in ("solve_sensitivities", "solve_excursion", "solve_response", "settled_directions"):
+        monkeypatch.setattr(solve, name, lambda *_, **__: pytest.fail("nobody has asked for it"))
+    monkeypatch.setattr(ExponentSolver, "variance_rate", lambda _: pytest.fail("nobody has asked for it"))
     Path(case).write_text(TEXT.replace("eigenfunctions = [2.0]", ""), encoding="utf-8")
-    assert main(["run", case, *many]) == 0
-    said = " ".join(capsys.readouterr().err.split())
-    assert said.count("no eigenfunctions are written, as there are more than 10 curves") == 1
-    assert "[output] eigenfunctions = [1.5]" in said
-    assert main(["run", case, *many, "--set", LEAN]) == 0
-    assert "no eigenfunctions" not in capsys.readouterr().err
+    assert main(["run", case, "--set", f"oscillator.restitution={wall}", "--set", "moments.p=[-1.0, 1.5]"]) == 0
+    out, err = capsys.readouterr()
+    assert all(f"{each} = " in out for each in ("λ", "δ_p", "N", "R_c"))
+    told = [line for line in " ".join(err.split()).split("note: ") if "there are also" in line]
+    names = "variance_rate, critical_restitution, sensitivities, eigenfunctions, rate_function, excursions"
+    assert told == [f"test: there are also {names}: name them in [output] quantities, or --all"]
+    written = files(tmp_path / "results/test")
+    assert {name for name in written if name.endswith((".vtu", ".pvd"))} == {
+        "eigenfunctions.pvd",
+        "eigenfunctions/p+1.5.vtu",
+    }
+
+
+@pytest.mark.parametrize(
+    ("sets", "more"),
+    [
+        (["expect=[{quantity='variance_rate', value=1.0, atol=1.0, source='x'}]"], ["variance_rate"]),
+        (["output.sensitivities=true"], ["sensitivities"]),
+        (["excursions={}"], ["excursions"]),
+        (["output.eigenfunctions=[]"], []),
+        (["oscillator.c2=0.1"], ["response"]),
+        (["expect=[{quantity='response.energy', value=1.0, atol=1.0, source='x'}]"], ["response"]),
+        (["uncertain={'noise.D0'=0.1}", "vary={}"], []),
+    ],
+)
+def test_other_sections_name_quantities(case, sets, more):
+    loaded = load_case(case, sets)
+    cheap = {"moment", "lyapunov_exponent", "stability_index", "impact_rate", "critical_impact_factor"}
+    pictures = [] if "output.eigenfunctions=[]" in sets else ["eigenfunctions"]
+    assert {*loaded.asked} == cheap | {*more, *pictures}
+    wanted = solve.everything(loaded)
+    assert (wanted.differentiated is not None) == ("sensitivities" in more or bool(loaded.uncertain))
+    assert (wanted.start is not None) == ("excursions" in more)
+    assert (wanted.response is not None) == ("response" in more)
 
 
 def test_out_and_set(case, tmp_path, capsys):
@@ -112,7 +145,7 @@ def test_indices_stand_whole_in_short_lines(shown):
 @pytest.mark.parametrize(("c1", "words"), [("-0.8", "almost surely stable for every r in (0, 1]"), ("0.7", "unstable")])
 def test_why_there_is_no_critical_restitution_is_a_note(case, tmp_path, capsys, c1, words):
     sets = [f"oscillator.c1={c1}", "noise.D0=0.1", "vary={}", "output.eigenfunctions=[]"]
-    assert main(["run", case, *(f"--set={text}" for text in sets)]) == 0
+    assert main(["run", case, "--all", *(f"--set={text}" for text in sets)]) == 0
     out, err = capsys.readouterr()
     assert "r_c = none" in out
     assert f"note: test: no r_c: {words}" in err

@@ -28,7 +28,10 @@ from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
     EIGENFUNCTIONS,
+    EXCURSIONS,
+    QUANTITY_NAMES,
     RESPONSE,
+    SENSITIVITIES,
     ChartSection,
     DesignSection,
     ExcursionSection,
@@ -51,6 +54,14 @@ from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import EXAMPLE, Vary, assignments, vary_of
 from fpsolve.errors import CaseError, Fault
 from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.quantities import (
+    BY_JUMP,
+    CRITICAL_IMPACT_FACTOR,
+    IMPACT_RATE,
+    LYAPUNOV_EXPONENT,
+    MOMENT,
+    STABILITY_INDEX,
+)
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import is_control
 from fpsolve.model.noise import Noise
@@ -61,8 +72,12 @@ from fpsolve.model.quantity import Quantity
 
 COMPUTED = ("oscillator", "system", "noise", "vary", "mesh")
 """The sections that say of what the numbers are."""
+CHEAP = (MOMENT.name, LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
+"""What is computed where nothing is named, beside one eigenfunction."""
+CHEAP_OF_WALLS = (IMPACT_RATE.name, CRITICAL_IMPACT_FACTOR.name)
+"""The same of a system with walls."""
 MOST_DRAWN = 10
-"""Of so many curves at most eigenfunctions are written unasked."""
+"""Of so many curves at most the response is computed unasked, and densities of it are written."""
 MOST_DENSITIES = 3
 """p of which densities of more than two variables are written unasked, which take seconds each."""
 USUAL_P = 2.0
@@ -223,14 +238,41 @@ class Case(Section):
         return self.moments.rtol if "rtol" in self.moments.model_fields_set else self.problem.usual_rtol
 
     @property
-    def shown(self) -> FloatArray:
-        """The p whose eigenfunctions are written: those of [output], or else at most nine, evenly spread, or none.
+    def asked(self) -> tuple[str, ...]:
+        """The names of what is computed: those of [output], or else what is cheap and what other sections name."""
+        if self.output.names is not None:
+            return self.output.names
+        named = {*CHEAP, *(CHEAP_OF_WALLS if self.problem.system.jumps else ())}
+        named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
+        is_drawn = self.output.eigenfunctions is None and self.problem.dimension == 2
+        about = {
+            EIGENFUNCTIONS: is_drawn or self.output.asks_for_eigenfunctions,
+            SENSITIVITIES: self.output.sensitivities,
+            EXCURSIONS: EXCURSIONS in self.model_fields_set,
+            RESPONSE: RESPONSE in self.model_fields_set or self.is_nonlinear,
+        }
+        return tuple(name for name in QUANTITY_NAMES if name in named or about.get(name))
 
-        Of more than two variables at most three.
+    @property
+    def unasked(self) -> tuple[str, ...]:
+        """What else there is of this case, where it leaves open what is computed."""
+        if self.output.names is not None:
+            return ()
+        is_there = {RESPONSE: self.is_nonlinear, EIGENFUNCTIONS: not self.problem.no_picture}
+        is_there |= dict.fromkeys(BY_JUMP, bool(self.problem.system.jumps))
+        known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())
+        return tuple(name for name in QUANTITY_NAMES if name not in known and is_there.get(name, True))
+
+    @property
+    def shown(self) -> FloatArray:
+        """The p whose eigenfunctions are written: those of [output]; where that names none, at most nine, evenly
+        spread, of more than two variables at most three; unasked that next to 2, of the first curve alone.
         """
         wanted = self.output.eigenfunctions
-        if EIGENFUNCTIONS not in self.output.quantities or self.leaves_out_eigenfunctions or self.problem.no_picture:
+        if EIGENFUNCTIONS not in self.asked or self.problem.no_picture:
             wanted = ()
+        elif not self.output.asks_for_eigenfunctions:
+            wanted = (USUAL_P,)
         if wanted is None:
             return _spread(self.p, 9 if self.problem.dimension == 2 else MOST_DENSITIES)
         return np.array([self.p[np.argmin(np.abs(self.p - p))] for p in wanted])
@@ -241,26 +283,22 @@ class Case(Section):
         return float(min(self.shown if self.shown.size else self.p, key=lambda p: abs(p - USUAL_P)))
 
     @property
-    def leaves_out_eigenfunctions(self) -> bool:
-        """Whether no eigenfunctions are written, as there are too many curves and nobody asks for them."""
-        is_wanted = EIGENFUNCTIONS in self.output.quantities
-        return is_wanted and self.planned > MOST_DRAWN and not self.output.asks_for_eigenfunctions
-
-    @property
     def has_response(self) -> bool:
-        """Whether the stationary response is computed: it is asked for, or some of at most ten curves are nonlinear."""
-        if RESPONSE not in self.output.quantities or self.response.off:
+        """Whether the stationary response is computed: it is named, or some of at most ten curves are nonlinear."""
+        if RESPONSE not in self.asked or self.response.off:
             return False
-        return self.output.states_quantities or (self.planned <= MOST_DRAWN and self._is_nonlinear)
+        is_named = self.output.lists_quantities or any(each.of_response for each in self.expect)
+        if is_named or (self.output.names is None and RESPONSE in self.model_fields_set):
+            return True
+        return self.is_nonlinear and (self.planned <= MOST_DRAWN or self.output.names is not None)
 
     @property
     def leaves_out_response(self) -> bool:
-        """Whether it is not, as there are too many curves and nobody asks for it."""
-        is_wanted = RESPONSE in self.output.quantities and not (self.response.off or self.has_response)
-        return is_wanted and self.planned > MOST_DRAWN and self._is_nonlinear
+        """Whether it is not, as there are too many curves and nobody names it."""
+        return RESPONSE in self.asked and not (self.response.off or self.has_response) and self.is_nonlinear
 
     @property
-    def _is_nonlinear(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """Whether some of the first curves are."""
         problem = varying(self.problem)
         return any(problem(varied).system.is_nonlinear for varied in self.vary.sets(0, MOST_DRAWN))

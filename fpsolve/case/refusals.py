@@ -213,11 +213,11 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
     yield from _of_orders(valid, wanted, f"choose one of them, {_without('output.eigenfunctions')}")
     figure: FigureSection = valid.get("figure", FigureSection())
     drawn = figure.model_fields_set
-    if drawn & {"x", "y"} and figure.needed not in output.quantities:
+    if drawn & {"x", "y"} and output.lacks(figure.needed):
         text = f"has no {shown(figure.needed)}, which figure.y draws; add it, or let figure.y be one of the names here"
         yield ("quantities",), output.quantities, text
     for name in figure.mark if "mark" in drawn else ():
-        if name not in output.quantities:
+        if output.lacks(name):
             text = f"has no {shown(name)}, which figure.mark marks; add it, or remove it from figure.mark"
             yield ("quantities",), output.quantities, text
 
@@ -251,7 +251,7 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
 def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """A section of what is not computed, and a start that the noise of some curve does not have."""
     output: OutputSection = valid.get("output", OutputSection())
-    if section.model_fields_set and EXCURSIONS not in output.quantities:
+    if section.model_fields_set and output.lacks(EXCURSIONS):
         text = f'stands here, but output.quantities has no "{EXCURSIONS}"; add it there, or remove this section'
         yield (), None, text
     problem = problem_of(valid)
@@ -271,11 +271,10 @@ def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> I
 def _of_response(section: ResponseSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """A section of what is not computed, or that leaves out what is asked for."""
     output: OutputSection = valid.get("output", OutputSection())
-    is_named = RESPONSE in output.quantities
-    if section.off and output.states_quantities and is_named:
+    if section.off and output.lists_quantities and not output.lacks(RESPONSE):
         text = f'got true, but output.quantities names "{RESPONSE}"; remove one of the two'
         yield ("off",), True, text
-    elif section.model_fields_set and not section.off and not is_named:
+    elif section.model_fields_set and not section.off and output.lacks(RESPONSE):
         text = f'stands here, but output.quantities has no "{RESPONSE}"; add it there, or remove this section'
         yield (), None, text
 

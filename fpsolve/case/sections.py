@@ -54,10 +54,10 @@ _SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
 SENSITIVITIES, EIGENFUNCTIONS, EXCURSIONS = "sensitivities", "eigenfunctions", "excursions"
 RESPONSE = "response"
-USUAL_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS, RESPONSE)
-"""What is computed where nothing is asked for: eigenfunctions with a density, and the response if there is one."""
-QUANTITY_NAMES = (*USUAL_NAMES, RATE_FUNCTION.name, EXCURSIONS)
+QUANTITY_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS, RESPONSE, RATE_FUNCTION.name, EXCURSIONS)
 """What may be asked for."""
+EVERYTHING = "all"
+"""What stands for all of these."""
 _LARGEST = 1e30
 WANTED = f"wanted relative error; if omitted {RTOL_BEYOND_PLANE:g} for more than two variables"
 _APART = 1e-9
@@ -285,10 +285,14 @@ class MonteCarloSection(Section):
     p: Annotated[NonEmpty | None, parameter("orders of the moments that are simulated", "p = [1.0, 2.0]")] = None
 
 
-def _names(known: Sequence[str], must: str, unknown: str, *, may_be_empty: bool = False) -> BeforeValidator:
-    """Takes a list of some names, each at most once; both texts follow what was got."""
+def _names(
+    known: Sequence[str], must: str, unknown: str, *, may_be_empty: bool = False, word: str = ""
+) -> BeforeValidator:
+    """Takes a list of some names, each at most once, or a word for all of them; both texts follow what was got."""
 
-    def checked(names: Any) -> tuple[str, ...]:
+    def checked(names: Any) -> Any:
+        if word and names in (word, None):
+            return names
         if not is_list(names) or not (names or may_be_empty):
             raise ValueError(f"got {shown_with_kind(names)}; {must}")
         wrong = list[Refusal]()
@@ -301,8 +305,8 @@ def _names(known: Sequence[str], must: str, unknown: str, *, may_be_empty: bool 
         refuse(wrong)
         return tuple(names)
 
-    stated = Annotated[tuple[Literal[*known], ...], Field(min_length=0 if may_be_empty else 1)]  # type: ignore[valid-type]
-    return BeforeValidator(checked, json_schema_input_type=stated)
+    stated: Any = Annotated[tuple[Literal[*known], ...], Field(min_length=0 if may_be_empty else 1)]  # type: ignore[valid-type]
+    return BeforeValidator(checked, json_schema_input_type=stated | Literal[word] if word else stated)
 
 
 class MomentAt(Section):
@@ -417,14 +421,15 @@ class OutputSection(Section):
     """[output]: what is computed, the p whose eigenfunctions are written, and what is drawn."""
 
     quantities: Annotated[
-        tuple[str, ...],
+        tuple[str, ...] | Literal["all"] | None,
         _names(
             QUANTITY_NAMES,
-            f"must be a non-empty list of some of {quoted(QUANTITY_NAMES)}; name one",
+            f'must be "{EVERYTHING}", or a non-empty list of some of {quoted(QUANTITY_NAMES)}; name one',
             f"{{guess}} known names: {quoted(QUANTITY_NAMES)};",
+            word=EVERYTHING,
         ),
         parameter("what is computed", 'quantities = ["lyapunov_exponent", "stability_index"]'),
-    ] = USUAL_NAMES
+    ] = None
     eigenfunctions: Annotated[
         Values | None,
         parameter(
@@ -438,14 +443,23 @@ class OutputSection(Section):
     sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
 
     @property
-    def states_quantities(self) -> bool:
-        """Whether the file itself says what is computed."""
-        return "quantities" in self.model_fields_set
+    def names(self) -> tuple[str, ...] | None:
+        """What is computed, if the file says so."""
+        return QUANTITY_NAMES if self.quantities == EVERYTHING else self.quantities  # type: ignore[return-value]
+
+    @property
+    def lists_quantities(self) -> bool:
+        """Whether the file names each quantity that it wants, so that it is told which of them there are not."""
+        return self.quantities not in (None, EVERYTHING)
+
+    def lacks(self, name: str) -> bool:
+        """Whether the file says what is computed, and not this."""
+        return self.names is not None and name not in self.names
 
     @property
     def asks_for_eigenfunctions(self) -> bool:
         """Whether the file itself says that they are written, and not the defaults alone."""
-        return EIGENFUNCTIONS in self.quantities and (self.eigenfunctions is not None or self.states_quantities)
+        return EIGENFUNCTIONS in (self.names or ()) or (self.names is None and bool(self.eigenfunctions))
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -459,11 +473,11 @@ class OutputSection(Section):
             ("sensitivities", self.sensitivities, "false"),
             ("eigenfunctions", self.eigenfunctions, "eigenfunctions = []"),
         ):
-            if value and name not in self.quantities:
+            if value and self.lacks(name):
                 text = f'got {shown(value)}, but output.quantities has no "{name}"; add it there, or write {instead}'
                 wrong.append(((name,), value, text))
-        if RATE_FUNCTION.name in self.quantities and MOMENT.name not in self.quantities:
-            at = "quantities", self.quantities.index(RATE_FUNCTION.name)
+        if RATE_FUNCTION.name in (names := self.names or ()) and MOMENT.name not in names:
+            at = "quantities", names.index(RATE_FUNCTION.name)
             text = f"got {shown(RATE_FUNCTION.name)}, which follows from Λ(p); add {shown(MOMENT.name)}, or remove it"
             wrong.append((at, RATE_FUNCTION.name, text))
         refuse(wrong)

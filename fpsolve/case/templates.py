@@ -112,17 +112,18 @@ _UNITS = """
 time = "s"                          # labels tables, figures and files
 """
 
-_MOMENTS = """
-[moments]
-p = { start = -2.0, stop = 4.0, num = 25 }   # Λ(p) < 0 means that the moment of order p decays
+_OUTPUT = """
+[output]
+# quantities = "all"                # or a list of names; if omitted Λ(p), λ, δ_p, and of walls N and R_c
 """
-_MOMENTS_OF_FOUR = """
+_MOMENTS = f"""
+[moments]
+p = {{ start = -2.0, stop = 4.0, num = 25 }}   # Λ(p) < 0 means that the moment of order p decays
+{_OUTPUT}"""
+_MOMENTS_OF_FOUR = f"""
 [moments]
 p = [1.0, 2.0]                      # Λ(p) < 0 means that the moment of order p decays
-
-[output]
-quantities = ["moment", "lyapunov_exponent"]
-"""
+{_OUTPUT}"""
 
 
 def _line(key: str, value: float | str, comment: str) -> str:

@@ -100,8 +100,8 @@ def _variables(case: Case, results: Iterable[CurveResult]) -> dict[str, Variable
     is_list = bool(vary) and vary.mode != "product"
     over: tuple[str, ...] = (SET,) if is_list else vary.keys
     shape = (planned,) if is_list else tuple(len(vary.values(key)) for key in over)
-    places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.output.quantities else {}
-    stored = STORED_MOMENTS | (OF_RATE if RATE_FUNCTION.name in case.output.quantities else {})
+    places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.asked else {}
+    stored = STORED_MOMENTS | (OF_RATE if RATE_FUNCTION.name in case.asked else {})
     moments = {name: np.full((planned, len(places)), math.nan) for name in stored if places}
     indices = {index: np.full((3, planned), math.nan) for index in asked(case)}
     status, seconds = np.full(planned, Status.MISSING, dtype=np.int8), np.full(planned, math.nan)
@@ -147,7 +147,7 @@ def _coordinates(case: Case) -> dict[str, Variable]:
         )
         about = {} if vary.is_text(key) else case.about(key).attributes
         found[key] = Variable((SET if is_list else key,), values, about)
-    if MOMENT.name in case.output.quantities:
+    if MOMENT.name in case.asked:
         found["p"] = Variable(("p",), case.p, P.attributes)
     return found
 

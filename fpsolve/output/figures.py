@@ -156,7 +156,7 @@ def draw(
     none of a case that does not ask for Λ(p).
     """
     setting = case.figure
-    if not case.output.figure or setting.needed not in case.output.quantities or not results:
+    if not case.output.figure or setting.needed not in case.asked or not results:
         return
     held = held_in_words(results[0].curve, case.vary.keys, case.units.time)
     with figure_for(*headed(folder, "figure", into, case.caption), held, FORMATS[setting.width]) as figure:
@@ -177,7 +177,7 @@ def draw(
 
 def draw_rates(case: Case, results: Sequence[CurveResult], folder: Path, *, into: Path | None = None) -> None:
     """Draw rate_function.png and .pdf, if the case asks for it: I(s) at s = Λ′(p) of every p, 0 at s = λ."""
-    if RATE_FUNCTION.name not in case.output.quantities or not case.output.figure or not results:
+    if RATE_FUNCTION.name not in case.asked or not case.output.figure or not results:
         return
     held, is_few = held_in_words(results[0].curve, case.vary.keys, case.units.time), len(results) <= MOST_NAMED
     shown = _some(len(results))

@@ -413,7 +413,7 @@ def _plotly() -> str:
 def _plots(case: Case, found: Found) -> Iterator[dict[str, Any]]:
     """Λ(p) of the curves and the lines of a chart as plotly takes them; texts are escaped, as it reads them as HTML."""
     unit = escape(MOMENT.timed(case.units.time).unit)
-    if MOMENT.name in case.output.quantities and found.results:
+    if MOMENT.name in case.asked and found.results:
         moments = [(result.curve.label or MOMENT.symbol, result.moments) for result in found.results[:MOST_TABLES]]
         lines = [
             _line(name, each.p.tolist(), each.value.tolist(), error_y={"array": each.error_estimate.tolist()})

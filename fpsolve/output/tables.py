@@ -78,7 +78,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
     Args:
         facts: on the run, see `facts_of`.
     """
-    has_moments, names = MOMENT.name in case.output.quantities, columns_of(case)
+    has_moments, names = MOMENT.name in case.asked, columns_of(case)
     indices = [column.name for each in asked(case) for column in (each, each.error())]
     settled = [column.name for each in response_columns(case).values() for column in (each, each.error())]
     ends = [f"{each.name}_{part}" for each in _uncertain(case) for part in ENDS]
@@ -192,12 +192,12 @@ def write_samples(case: Case, samples: Samples, folder: Path) -> None:
 
 def columns_of(case: Case) -> list[str]:
     """The names of what a case asks for at every p."""
-    return [*MOMENTS, *[RATE_FUNCTION.name] * (RATE_FUNCTION.name in case.output.quantities)]
+    return [*MOMENTS, *[RATE_FUNCTION.name] * (RATE_FUNCTION.name in case.asked)]
 
 
 def asked(case: Case) -> list[Index]:
     """The indices that a case asks for."""
-    return [index for name, index in INDICES.items() if name in case.output.quantities]
+    return [index for name, index in INDICES.items() if name in case.asked]
 
 
 def response_columns(case: Case) -> Mapping[str, Quantity]:
@@ -259,7 +259,7 @@ def _summary(case: Case, result: CurveResult) -> dict[str, Any]:
     """What a case asks for of a curve."""
     names = columns_of(case)
     found: dict[str, Any] = {}
-    if MOMENT.name in case.output.quantities:
+    if MOMENT.name in case.asked:
         found["moments"] = [dict(zip(names, row, strict=True)) for row in _rows(result, names)]
     for index in asked(case):
         numbers = result.index(index)
@@ -318,9 +318,9 @@ def _beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
             }
             for each in result.classes
         ]
-    if SENSITIVITIES in case.output.quantities:
+    if SENSITIVITIES in case.asked:
         found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
-    if EXCURSIONS in case.output.quantities:
+    if EXCURSIONS in case.asked:
         found["excursions"] = None if result.excursion is None else _excursion(case, result.excursion)
     if case.has_response:
         found[RESPONSE] = None if result.response is None else _response(result.response)

@@ -91,7 +91,7 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
     is_whole = all(result.status == Status.CONVERGED for _, result in chosen)
     columns += [Column("status", 1 if is_whole else 0)] * has_status + [Column("which", is_text=True)] * is_digest
     told = [THEORY] * bool(theories) + [STAR] * any("*" in each.heading for each in theories)
-    has_moments = case.figure.x == "p" and MOMENT.name in case.output.quantities
+    has_moments = case.figure.x == "p" and MOMENT.name in case.asked
     units = units_in_words(case, [*_told(case), *[MOMENT] * has_moments])
     grid = Grid(case.headline, columns, remark="; ".join(filter(None, [*told, units])))
     for which, result in chosen:
@@ -114,7 +114,7 @@ def varied_columns(case: Case) -> list[Column]:
 
 def _told(case: Case) -> list[Index]:
     """The indices that a case asks for, without those of impacts where it names none, and not one ray has them."""
-    has_impacts = len(case.system.jumps) == 1 or case.output.states_quantities
+    has_impacts = len(case.system.jumps) == 1 or case.output.lists_quantities
     return [index for index in asked(case) if has_impacts or index.name not in BY_JUMP]
 
 
@@ -133,7 +133,7 @@ def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
 def _quantities(case: Case) -> list[_Shown]:
     """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
     ordered = sorted(_told(case), key=lambda index: index not in MAIN)
-    rare = [_excursion(case)] * (EXCURSIONS in case.output.quantities) + [_mean_square()] * case.has_response
+    rare = [_excursion(case)] * (EXCURSIONS in case.asked) + [_mean_square()] * case.has_response
     if case.figure.x != "p":
         main = [
             each
@@ -147,7 +147,7 @@ def _quantities(case: Case) -> list[_Shown]:
         for rank, each in enumerate(ordered)
         for column in (_index(each, rank + 1 if rank > 1 else 0), *_interval(case, each))
     ]
-    p = [float(each) for each in case.p if each] if MOMENT.name in case.output.quantities else []
+    p = [float(each) for each in case.p if each] if MOMENT.name in case.asked else []
     if len(p) > MOST_MOMENTS:
         p = [] if found else [p[0], p[-1]]
     return found + rare + [_moment(each, 2 if found else 0) for each in p]
@@ -636,15 +636,15 @@ def print_message(case: Case, message: Message) -> None:
 
 
 def note_missing(case: Case, *, monte_carlo: bool) -> None:
-    """What a run leaves out: dots of a simulation that has none to give, eigenfunctions of too many curves."""
+    """What a run leaves out: dots of a simulation that has none to give, pictures, and what nobody has named."""
     if monte_carlo and case.figure.y == STABILITY_INDEX.name:
         print_remark(f"{case.name}: a simulation gives no stability index, so that the figure has no dots")
     if case.output.asks_for_eigenfunctions and (why := case.problem.no_picture):
         print_remark(f"{case.name}: no eigenfunctions are written: {why}")
-    elif case.leaves_out_eigenfunctions:
-        why = f"no eigenfunctions are written, as there are more than {MOST_DRAWN} curves"
-        wanted = f"name the p that you want, as in [output] eigenfunctions = [{case.usual_p!r}]"
-        print_remark(f"{case.name}: {why}; {wanted}")
     if case.leaves_out_response:
         why = f"no stationary response is computed, as there are more than {MOST_DRAWN} curves"
         print_remark(f'{case.name}: {why}; name "{RESPONSE}" in [output] quantities to have its means')
+    if case.unasked:
+        print_remark(
+            f"{case.name}: there are also {', '.join(case.unasked)}: name them in [output] quantities, or --all"
+        )

@@ -107,14 +107,14 @@ def write_density(
     return path
 
 
-def write_functions(solved: Solved, curve: Curve, folder: Path) -> None:
-    """Write the eigenfunctions of a curve; with the first curve the stationary density too."""
+def write_functions(solved: Solved, curve: Curve, folder: Path, *, has_density: bool = True) -> None:
+    """Write the eigenfunctions of a curve; with the first curve the stationary density too, if that is wanted."""
     if solved.directions:
         write_directions(solved.directions, curve, folder)
     if solved.stationary is None:
         return
     about = ({**curve.parameters, "curve": float(curve.number), **_frame(curve.problem)}, curve.varied)
-    if curve.number == 1:
+    if curve.number == 1 and has_density:
         write_density(folder / "density.vtu", solved.stationary, *about)
     if solved.eigenpairs:
         copy_show_script(folder)
@@ -194,7 +194,7 @@ def write_curves(case: Case, folder: Path) -> Path | None:
     The time is the varied value where there is one that is a number, and else the number of the curve; the name of each
     entry tells which, and p. Nothing is written of a single curve.
     """
-    p, shown = case.usual_p, case.curves() if case.shown.size else ()
+    p, shown = case.usual_p, case.curves() if case.shown.size and case.output.asks_for_eigenfunctions else ()
     names = [(curve, _name(f"eigenfunctions{curve.suffix}", p)) for curve in shown]
     there = [(curve, name) for curve, name in names if (folder / name).is_file()]
     if case.planned == 1 or not there:

@@ -96,7 +96,7 @@ class Plan:
     def indices(self) -> list[str]:
         """Those of λ, δ_p and excursions that are asked for."""
         known = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name, EXCURSIONS)
-        return [name for name in known if name in self.case.output.quantities]
+        return [name for name in known if name in self.case.asked]
 
     @property
     def each(self) -> int:

@@ -26,7 +26,7 @@ from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.kinds import varying
-from fpsolve.case.sections import EIGENFUNCTIONS, EXCURSIONS, RESPONSE, SENSITIVITIES, Varied
+from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES, Varied
 from fpsolve.errors import FpsolveError, NoDerivative, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
@@ -104,21 +104,22 @@ class Numerics:
 
 
 def everything(case: Case, number: int = 1) -> Wanted:
-    """What [output] names as `quantities`, of the curve with a number; the density goes with what is drawn of it."""
-    names = set(case.output.quantities)
-    draws, has_moments = EIGENFUNCTIONS in names and not case.problem.no_picture, MOMENT.name in names
+    """What a case asks for, of the curve with a number; the density goes with what is drawn of it, if that is named."""
+    names = set(case.asked)
+    has_moments, is_named = MOMENT.name in names, case.output.asks_for_eigenfunctions
+    draws = is_named and not case.problem.no_picture
     slopes = tuple(case.differentiated) if has_moments else ()
     grid = case.response.grid
     return Wanted(
         case.p if has_moments else np.zeros(0),
         tuple(name for name in INDICES if name in names),
-        shown=tuple(case.shown),
+        shown=tuple(case.shown) if is_named or number == 1 else (),
         density=draws and (number == 1 or case.shown.size > 0),
         differentiated=slopes if SENSITIVITIES in names or case.uncertain else None,
         start=(case.excursions.phi, case.excursions.xi) if EXCURSIONS in names else None,
         response=case.response.rtol if case.has_response else None,
         grid=(grid.amplitude, grid.phi, grid.xi) if case.has_response and case.planned <= MOST_DRAWN else None,
-        is_stated=case.output.states_quantities,
+        is_stated=case.output.lists_quantities,
     )
 
 
@@ -272,7 +273,7 @@ def _functions(
         except NotConverged:
             return None
 
-    pairs, stationary = tuple(filter(None, map(pair, wanted.shown))), pair(0.0) if wanted.density else None
+    pairs, stationary = tuple(filter(None, map(pair, wanted.shown))), pair(0.0) if wanted.draws else None
     try:
         if stationary is not None:
             stationary_density(stationary)

@@ -148,7 +148,7 @@ def refuse_wrong_samples(case: Case) -> None:
 def sampled_case(case: Case) -> Case:
     """The case with its samples as parameter sets, beside it under the name of `SAMPLE`; λ, δ_p, Λ(p) are asked for."""
     vary = _drawn(case)
-    wanted = [name for name in (MOMENT.name, *UNCERTAIN) if name in case.output.quantities]
+    wanted = [name for name in (MOMENT.name, *UNCERTAIN) if name in case.asked]
     output = case.output.model_copy(update={"quantities": tuple(wanted), "eigenfunctions": None, "figure": False})
     updated = {"vary": vary, "output": output, "uncertain": Uncertain(), "expect": (), "chart": None, "design": None}
     made = case.model_copy(update={**updated, "figure": type(case.figure)()})

@@ -47,7 +47,7 @@ REST = 50
 def keep(folder: Path, numerics: Numerics, order: Order, curve: Curve, solved: Solved) -> Found:
     """Write what was found of a set into the folder of its case, and say where the numbers are."""
     result = solved.result
-    write_functions(solved, curve, folder)
+    write_functions(solved, curve, folder, has_density=order.wanted.density)
     is_failed = result is not None and result.status.fails
     if result is None or solved.is_passing:
         return curve.number, result, is_failed

@@ -21,6 +21,7 @@ from fpsolve.fem.mesh import make_mesh, write_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
+from fpsolve.study.solve import everything
 from tests.oracles import perturbation
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -158,8 +159,9 @@ def test_defaults_and_integers(write: Write) -> None:
 @pytest.mark.parametrize(
     ("curves", "override", "shown"),
     [
-        (10, "moments.rtol=1e-8", [-1.0, 2.0]),
-        (11, "moments.rtol=1e-8", []),
+        (10, "moments.rtol=1e-8", [2.0]),  # of the first curve alone
+        (11, "moments.rtol=1e-8", [2.0]),
+        (11, 'output.quantities="all"', [-1.0, 2.0]),
         (11, "output.eigenfunctions=[2.0]", [2.0]),
         (11, "output.eigenfunctions=[]", []),
         (11, 'output.quantities=["eigenfunctions"]', [-1.0, 2.0]),
@@ -171,7 +173,9 @@ def test_eigenfunctions_of_many_curves_are_written_if_asked_for(
 ) -> None:
     case = load_case(write(SMALL), [override, f'vary."noise.D0"={{start=0.1, stop=1.0, num={curves}}}'])
     assert case.shown.tolist() == shown
-    assert case.leaves_out_eigenfunctions == (curves == 11 and "rtol" in override)
+    assert case.output.asks_for_eigenfunctions == ("rtol" not in override and bool(shown))
+    further = everything(case, 2)
+    assert (further.shown, further.density) == ((), False) if "rtol" in override else further.shown == tuple(shown)
 
 
 def test_a_case_made_in_python_is_checked_too_and_cannot_be_changed() -> None:

@@ -17,7 +17,7 @@ from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.model.quantity import MOMENT
 from fpsolve.output.datasets import write_dataset
-from tests.solving import case_in, case_text
+from tests.solving import ALL, case_in, case_text
 
 TEXT = case_text("[moments]\np = [2.0, 0.0, -1.0]\n[output]\neigenfunctions = []\nfigure = false\n")
 PRODUCT = '[vary]\n"noise.D0" = [1.0, 0.1]\n"noise.treatment" = ["exact", "ou-reduction"]\n'
@@ -36,7 +36,7 @@ def solved(folder, text, name="test", overrides=()):
 
 
 def test_a_product_has_a_dimension_for_each_key(tmp_path):
-    case, results, found = solved(tmp_path, TEXT + PRODUCT)
+    case, results, found = solved(tmp_path, TEXT + PRODUCT, overrides=[ALL])
     assert dict(found.sizes) == {"noise.D0": 2, "noise.treatment": 2, "p": 3}
     assert found.p.values.tolist() == [2.0, 0.0, -1.0]
     for result in results:

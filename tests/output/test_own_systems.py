@@ -36,7 +36,7 @@ from fpsolve.simulation.estimators import MomentEstimate
 from fpsolve.surfaces import flat_figure
 from fpsolve.workflow import run
 from tests.output.eigenfunctions import integral
-from tests.solving import case_in, solve_case, solve_sets
+from tests.solving import ALL, case_in, solve_case, solve_sets
 
 OWN = """
 title = "mine"
@@ -230,7 +230,7 @@ def test_a_map_shows_no_perturbation_theory(tmp_path, is_map, is_shown):
 
 
 def test_every_ray_has_its_rate_in_the_summary(tmp_path, capsys):
-    case = case_in(tmp_path, PLANE + MOMENTS)
+    case = case_in(tmp_path, PLANE + MOMENTS, [ALL])
     results = solve_case(case)
     write_results(case, results, tmp_path, {})
     [curve] = json.loads((tmp_path / "summary.json").read_text())["curves"]
@@ -344,7 +344,7 @@ def test_python_draws_lines_for_states(noise):
 def test_parameters_without_a_derivative_are_named(tmp_path):
     """d sqrt(c)/dc is infinite at 0."""
     text = own("telegraph").replace("2*s*v", "(2*s + sqrt(c))*v").replace("s = 0.1", "s = 0.1, c = 0.0")
-    [result] = solve_case(case_in(tmp_path, text + MOMENTS))
+    [result] = solve_case(case_in(tmp_path, text + MOMENTS, [ALL]))
     assert "system.c" not in result.sensitivities.theta
     assert "no sensitivities to system.c: the derivative of the system by it is not finite at 0" in result.notes
 

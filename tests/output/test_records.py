@@ -20,7 +20,7 @@ from fpsolve.output import records as plain
 from fpsolve.output.records import Records, Results, _packed, append, key_of, record_of, result_of
 from fpsolve.study.solve import Numerics, Wanted, everything, solve_curve
 from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
-from tests.solving import case_in, solve_case
+from tests.solving import ALL, case_in, solve_case
 
 VALUES = {"numbers": [0.1, 1 / 3, 1e-300, math.inf, -0.0], "text": 'Λ(2) "quoted" , "record": {}\n', "nothing": None}
 
@@ -120,7 +120,7 @@ def test_what_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("text", [TEXT + PRODUCT, TEXT + HOPELESS])
 def test_results_are_the_same_from_their_records(tmp_path, text):
-    for result in solve_case(case_in(tmp_path, text)):
+    for result in solve_case(case_in(tmp_path, text, [ALL])):
         record = record_of(result)
         again = result_of(json.loads(json.dumps(record)), result.curve)
         assert same(record_of(again), record)
@@ -181,7 +181,7 @@ def test_a_record_of_another_form_is_solved_anew(tmp_path, capsys):
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory):
     """A case, its first curve, and the record of that."""
-    case = case_in(tmp_path_factory.mktemp("solved"), TEXT + PRODUCT)
+    case = case_in(tmp_path_factory.mktemp("solved"), TEXT + PRODUCT, [ALL])
     [curve] = case.curves(0, 1)
     return case, curve, record_of(solve_curve(curve, everything(case), Numerics.of(case)).result)
 

@@ -20,6 +20,7 @@ from fpsolve.output.vtk import copy_show_script
 from fpsolve.workflow import run
 from tests.conftest import UNIT_NOISE, sampled
 from tests.output.eigenfunctions import COARSE, HARD, MESHES, MOMENTS, written
+from tests.solving import ALL
 
 ROOT = Path(__file__).parents[2]
 INSTALL = "apt-get install --no-install-recommends paraview python3-paraview xvfb xauth"
@@ -274,7 +275,9 @@ def test_the_stationary_density_is_that_at_p_0(paraview, named_results):
 def several_curves(tmp_path_factory):
     folder = tmp_path_factory.mktemp("several")
     run(
-        load_case(ROOT / "cases/minimal.toml", ["expect=[]", "output.figure=false", 'vary."noise.D0"=[0.5, 0.75]']),
+        load_case(
+            ROOT / "cases/minimal.toml", ["expect=[]", "output.figure=false", ALL, 'vary."noise.D0"=[0.5, 0.75]']
+        ),
         folder,
     )
     return folder / "minimal"

@@ -27,11 +27,11 @@ from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import failed
 from tests.conftest import sampled
-from tests.solving import case_in, solve_case
+from tests.solving import ALL, case_in, solve_case
 from tests.test_workflow import TEXT
 
 NONLINEAR = ["vary={}", "oscillator.c1=0.8", "oscillator.c2=0.5", "response.rtol=0.01"]
-NONLINEAR += ["monte_carlo={ paths = 64, time = 100.0 }"]
+NONLINEAR += ["monte_carlo={ paths = 64, time = 100.0 }", "output.quantities='all'"]
 MEANS = {each.symbol for each in OSCILLATOR_RESPONSE.means.values()}
 QUANTITY = re.compile(r"(\S+) = \S+ ± \S+")
 
@@ -212,7 +212,9 @@ def test_of_more_curves_the_extreme_and_the_failed_ones_have_a_row(tmp_path, cap
 
 
 def test_of_many_failed_curves_the_first_are_shown(tmp_path, capsys):
-    case, results = many(tmp_path, 60, failures=lambda i: (Failure(2.0, "Λ(2) did not converge"),) if i % 2 else ())
+    case, results = many(
+        tmp_path, 60, [ALL], failures=lambda i: (Failure(2.0, "Λ(2) did not converge"),) if i % 2 else ()
+    )
     for each in results[1::2]:
         each.estimates.update(dict.fromkeys(INDICES))
     print_results(case, results)
@@ -224,7 +226,7 @@ def test_of_many_failed_curves_the_first_are_shown(tmp_path, capsys):
 
 
 def test_a_file_has_all_columns_whatever_the_terminal_is(tmp_path, capsys, monkeypatch):
-    case, results = many(tmp_path, 12)
+    case, results = many(tmp_path, 12, [ALL])
     texts = []
     for width in ("20", "200"):
         monkeypatch.setenv("COLUMNS", width)

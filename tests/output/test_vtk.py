@@ -26,6 +26,7 @@ from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.oracles.perturbation import first_order_eigenfunction
 from tests.output.eigenfunctions import HARD, MESHES, MOMENTS, integral, written
+from tests.solving import ALL
 
 ROOT = Path(__file__).parents[2]
 NO_FIGURE = "output.figure=false"
@@ -126,7 +127,9 @@ def test_files_hold_parameters_and_say_what_is_shown_first(tmp_path, fig1_solver
 
 
 def test_files_of_a_curve_hold_its_parameters(tmp_path):
-    case = load_case(ROOT / "cases/minimal.toml", ["oscillator.omega=1.25", 'vary."noise.D0"=[0.5, 0.75]', NO_FIGURE])
+    case = load_case(
+        ROOT / "cases/minimal.toml", ["oscillator.omega=1.25", ALL, 'vary."noise.D0"=[0.5, 0.75]', NO_FIGURE]
+    )
     run(case, tmp_path)
     files = sorted(tmp_path.rglob("*.vtu"))
     assert {file.parent.name for file in files} == {"eigenfunctions", "eigenfunctions-2", case.name}
@@ -166,7 +169,9 @@ TWO = 'vary."noise.D0"=[0.75, 0.5]'
 )
 def test_series_over_the_curves(tmp_path, overrides, times, names):
     """At the p next to 2; the time is the one number that is varied, or else the number of the curve."""
-    case = load_case(ROOT / "cases/minimal.toml", ["moments.p=[-1.0, 1.5, 4.0]", "expect=[]", NO_FIGURE, *overrides])
+    case = load_case(
+        ROOT / "cases/minimal.toml", ["moments.p=[-1.0, 1.5, 4.0]", "expect=[]", ALL, NO_FIGURE, *overrides]
+    )
     run(case, tmp_path)
     series = tmp_path / case.name / "curves.pvd"
     sets = ElementTree.parse(series).findall("Collection/DataSet")
@@ -186,7 +191,7 @@ def test_series_over_the_curves(tmp_path, overrides, times, names):
 
 @pytest.mark.slow
 def test_a_run_that_ends_early_lists_the_curves_that_are_there(tmp_path, monkeypatch):
-    case = load_case(ROOT / "cases/minimal.toml", ["expect=[]", 'vary."noise.D0"=[0.5, 0.75, 1.0]'])
+    case = load_case(ROOT / "cases/minimal.toml", ["expect=[]", ALL, 'vary."noise.D0"=[0.5, 0.75, 1.0]'])
     run(case, tmp_path)
     series = tmp_path / case.name / "curves.pvd"
     assert len(pyvista.PVDReader(series).time_values) == 3
