@@ -329,7 +329,7 @@ def run(
         outcome = run_case(case, out, pool=pool, watch=watch, **how)
         if outcome.interruption:
             print_error(outcome.interruption)
-        if not quiet:
+        if not (quiet or outcome.interruption):
             note_missing(case, monte_carlo=monte_carlo)
         if json:
             print(whole_summary(case, outcome.results, outcome.facts))

@@ -13,6 +13,9 @@ from fpsolve.study.solve import Numerics, everything, solve_curve
 
 ALL = 'output.quantities="all"'
 """Sets what a case asks for to everything."""
+INDICES = '["moment", "lyapunov_exponent", "stability_index", "variance_rate", "impact_rate", "critical_impact_factor"'
+INDICES += ', "critical_restitution", "eigenfunctions"]'
+"""All that is one number, Λ(p), and eigenfunctions."""
 OSCILLATOR = {"epsilon": 0.1, "omega": 1.0, "restitution": 0.8, "c1": 0.1}
 NOISE = {"D0": 0.5, "tau0": 0.5, "r0": 0.95}
 

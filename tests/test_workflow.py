@@ -28,7 +28,7 @@ from fpsolve.study import solve
 from fpsolve.study.solve import compare, solve_curve
 from fpsolve.workflow import Watch, check_case, run_case, sets, simulate_case
 from tests.conftest import painted
-from tests.solving import solve_case, solve_sets
+from tests.solving import INDICES, solve_case, solve_sets
 
 TEXT = """
 title = "A test"
@@ -50,7 +50,7 @@ p = [2.0, 0.0, -1.0]
 figure = false
 eigenfunctions = [2.0]
 """
-DRAWN = TEXT.replace("figure = false", "figure = true")
+DRAWN = TEXT.replace("figure = false", f"figure = true\nquantities = {INDICES}")
 
 
 @pytest.fixture
@@ -185,11 +185,12 @@ def test_no_eigenfunctions_where_none_are_asked_for(tmp_path):
 MANY = 'vary."noise.D0"={start=0.1, stop=1.0, num=11}'
 
 
-def test_of_many_curves_only_the_first_density_is_written(tmp_path):
+def test_of_many_curves_only_an_eigenfunction_of_the_first_is_written(tmp_path):
     case, calls = write(tmp_path, TEXT.replace("eigenfunctions = [2.0]", ""), [MANY, "moments.p=[2.0]"]), []
     fpsolve.run(case, tmp_path / "out", progress=lambda: calls.append(1))
     assert len(calls) == 11
-    assert {name for name in files(tmp_path / "out/test") if "vt" in name or "pv" in name} == {"density.vtu"}
+    written = {name for name in files(tmp_path / "out/test") if "vt" in name or "pv" in name}
+    assert written == {"eigenfunctions/p+2.0.vtu", "eigenfunctions.pvd"}
 
 
 def test_without_vary_there_is_one_curve(tmp_path):
@@ -256,6 +257,7 @@ def test_failures_are_values(tmp_path):
 def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     """λ, Λ″(0) and δ_p need the same solve; Λ(0) = 0 needs none."""
     sets = [f"moments.p=[9.0, {small}]", "oscillator.epsilon=2.0", "budget.unknowns=100", "output.eigenfunctions=[]"]
+    sets += [f"output.quantities={INDICES}"]
     outcome = run_case(write(tmp_path, TEXT, [*sets, 'vary={"noise.D0"=[1.0]}']), tmp_path / "out")
     (curve,) = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
     assert [failure.p for failure in outcome.results[0].failures] == [9.0, small][: 2 if small else 1]
@@ -678,7 +680,12 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
 
 def test_sensitivities_are_written(tmp_path):
     """At nine p or all, and of the indices, each with its error; those of the Python function."""
-    sets = ["moments.p={start=-2.0, stop=6.0, num=17}", "vary={}", "output.sensitivities=true"]
+    sets = [
+        "moments.p={start=-2.0, stop=6.0, num=17}",
+        "vary={}",
+        "output.sensitivities=true",
+        "output.quantities='all'",
+    ]
     case = write(tmp_path, TEXT, sets)
     fpsolve.run(case, tmp_path)
     [curve] = json.loads((tmp_path / "test/summary.json").read_text(encoding="utf-8"))["curves"]

@@ -11,7 +11,7 @@ from fpsolve.cli import main
 from fpsolve.output.records import record_of, result_of
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import compare
-from tests.solving import case_in, case_text, solve_sets
+from tests.solving import ALL, INDICES, case_in, case_text, solve_sets
 
 SECTIONS = """[moments]
 p = [1.0]
@@ -33,7 +33,7 @@ SLOW_NOISE = {"D0": 0.09531017, "tau0": 49.143166, "r0": 0.61455889, "treatment"
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory):
-    return case_in(tmp_path_factory.mktemp("case"), CASE)
+    return case_in(tmp_path_factory.mktemp("case"), CASE, [ALL])
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +74,7 @@ def test_results_are_frozen(result):
 def test_what_did_not_converge_is_printed_once(case, tmp_path, capsys):
     """No empty table, and one sentence for all indices, which fail for one reason."""
     tight = ["--set", "budget.unknowns=100", "--set", "oscillator.epsilon=2.0", "--set", "moments.p=[9.0]"]
+    tight += ["--set", f"output.quantities={INDICES}"]
     assert main(["run", str(case.path), "--out", str(tmp_path), *tight]) == 3
     printed = capsys.readouterr()
     assert "┃" not in printed.out
