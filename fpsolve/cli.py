@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, CycloptsError, CycloptsPanel, Parameter, Token
 
 from fpsolve import __version__
+from fpsolve.arrays import shown
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import CaseError, FpsolveError, NotConverged
 from fpsolve.messages import Severity, escaped, message_of
@@ -150,6 +151,8 @@ def _called(arguments: Sequence[str]) -> int | None:
     if not arguments or [*arguments] in (["--help"], ["-h"]):
         print(_overview())
         return 0
+    if split := [each for each in arguments if "\n" in each and "=" not in each]:  # values may have line ends
+        raise FpsolveError(f"got {shown(split[0])}; a file's name may have no line ends here; rename the file")
     from rich.console import Console
 
     errors = Console(stderr=True)
@@ -639,6 +642,9 @@ def prove(
             return CHECK_FAILED
         unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
         print(f"accepted: {escaped(str(check))} ({bounds} follow from their certificates{unfinished})")
+        if checked.claims.labels:
+            told = "they are labels, as the certificates state matrices or rates, of which the bounds are"
+            print(f"note: {', '.join(checked.claims.labels)} were not verified: {told}")
         return 0
     code, reporter = 0, reporter_of(report)
     loaded = load_to_write(cases or [], overrides)

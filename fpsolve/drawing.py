@@ -99,6 +99,7 @@ def figure_for(
     logging.getLogger("fontTools").setLevel(logging.ERROR)  # it remarks on the dates inside fonts
     with rc_context(form.style), warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph .* missing", UserWarning)  # it draws boxes for letters without one
+        warnings.filterwarnings("ignore", "constrained_layout not applied", UserWarning)  # where words leave no room
         layout = ConstrainedLayoutEngine(h_pad=0.07 * form.scale)
         figure = Figure(figsize=(form.width, 1.3 * form.height), dpi=form.dpi, layout=layout)
         FigureCanvasAgg(figure)

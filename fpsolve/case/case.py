@@ -22,7 +22,7 @@ from pydantic import (
     model_validator,
 )
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, shown
 from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of, varying
 from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.refusals import REFUSALS
@@ -401,6 +401,8 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
     Raises:
         CaseError: with every fault of the file and of the overrides, each with its line and its remedy.
     """
+    if not isinstance(path, str | Path):
+        raise TypeError(f"got {shown(path)}; must be the path of a case file")
     document = read_document(path, overrides, options)
     faults, data = document.faults, document.data
     context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds_of(data)}

@@ -100,11 +100,17 @@ ExpectedName = Annotated[
 MarkedName = Literal["stability_index", "lyapunov_exponent"]
 
 
+MOST_TEXT = 500
+"""Letters of a text that stands above tables and figures."""
+
+
 def _printed(text: str) -> str:
     controls = [each for each in dict.fromkeys(text) if is_control(each) and each != "\n"]
     if controls:
         accepted = "must have no control characters but line ends"
         raise ValueError(f"got {shown(text)}; {accepted}; leave out {', '.join(map(shown, controls))}")
+    if len(text) > MOST_TEXT:
+        raise ValueError(f"got {len(text)} letters; must be at most {MOST_TEXT}; shorten it")
     return text
 
 

@@ -20,6 +20,8 @@ _KEY = re.compile(r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')
 _STRING = re.compile(r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'', re.DOTALL)
 _WORDS = Words("the case", "a case file", "fig1.toml", "TOML", "start from a copy of cases/minimal.toml")
 _SCALAR = re.compile(r"[^,\]}\n#]+")
+LONGEST_SHOWN = 200
+"""Letters of an assignment of the command line in a message."""
 _TOO_DEEP = "lists or tables are nested too deeply; a case needs three levels"
 
 
@@ -240,7 +242,7 @@ def read_document(
         raise CaseError(str(path), [Fault("", None, _TOO_DEEP)]) from None
     except ValueError as error:
         raise CaseError(str(path), [_syntax_fault(text, str(error))]) from None
-    for typed, change in [*((f"--set {each}", each) for each in overrides), *(options or {}).items()]:
+    for typed, change in [*((f"--set {_cut(f'{each}')}", each) for each in overrides), *(options or {}).items()]:
         document.override(change, typed)
     return document
 
@@ -254,6 +256,11 @@ def document_of(text: str) -> Document:
 def loads(text: str) -> dict[str, Any]:
     """The data of TOML, 0 without a sign. Raises ValueError where it is none."""
     return tomllib.loads(text, parse_float=lambda number: float(number) + 0.0)
+
+
+def _cut(text: str) -> str:
+    """A text as messages repeat it."""
+    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
 
 
 def _syntax_fault(text: str, message: str) -> Fault:
@@ -283,4 +290,6 @@ def _syntax_remedy(line: str) -> str:
         return f"write the number alone, without a unit: {line}"
     if re.fullmatch(r"[A-Za-z][\w./-]*", value):
         return f'write a text in quotes, as in {key} = "{value}"'
+    if line and (slip := re.search(r",\s*,", line) or re.search(r"[\]\"'\d]\s*,\s*$", value)):
+        return f"remove the comma at {slip.group().strip()!r}: {line}"
     return f"correct the syntax{' of: ' + line if line else ''}, see https://toml.io"

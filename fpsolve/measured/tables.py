@@ -9,6 +9,7 @@ import csv
 import io
 import math
 import re
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -340,7 +341,8 @@ def _of_netcdf(path: Path) -> Table:
         else:
             engine = "scipy"
         options: dict[str, Any] = {"decode_times": False, "decode_timedelta": False}
-        with xr.open_dataset(io.BytesIO(content), engine=engine, **options) as found:
+        source = io.BytesIO(content)
+        with warnings.catch_warnings(action="ignore"), xr.open_dataset(source, engine=engine, **options) as found:
             found = found.squeeze(drop=True)
             wide = [str(name) for name, each in found.data_vars.items() if each.ndim > 1]
             vectors = {str(name): each for name, each in found.variables.items() if each.ndim == 1}

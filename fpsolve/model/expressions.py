@@ -160,6 +160,13 @@ FUNCTIONS: Mapping[str, Callable[[Series], Series]] = {
     "sqrt": lambda series: _real_power(series, 0.5),
 }
 RESERVED = (*CONSTANTS, *FUNCTIONS)
+_WAVE = (
+    'no rate may depend on the time t: state cos(nu*t) as a noise of the kind "bounded" with sigma = 0, and write its '
+    "name; of sin(x) write the first terms of its series, x - x**3/6; of parameters write the value"
+)
+_SMALL = "rates are of small amplitudes: sums of terms of degree 1, or of degree 3 in two variables"
+_REMEDIES = {"sin": _WAVE, "cos": _WAVE, "tan": _WAVE, "abs": _SMALL, "sign": _SMALL, "min": _SMALL, "max": _SMALL}
+_REMEDIES |= {"tanh": _SMALL, "log": "write its value as a parameter", "ln": "write its value as a parameter"}
 _STEPS: Mapping[str, Callable[[Form, Form], Form]] = {
     "Add": Form.plus,
     "Sub": lambda total, form: total.plus(form, -1.0),
@@ -251,8 +258,8 @@ class _Reader(ast.NodeVisitor):
 
     def visit_Constant(self, node: ast.Constant) -> _Node:
         try:
-            number = float(repr(node.value))
-        except ValueError:  # as of True and 1j
+            number = float(self._line[node.col_offset : node.end_col_offset])
+        except ValueError:  # as of True, 1j and 0x10
             return self.generic_visit(node)
         return _Node(self._written(node), lambda walk: constant(number, *walk.rest), number)
 
@@ -298,7 +305,8 @@ class _Reader(ast.NodeVisitor):
     def visit_Call(self, node: ast.Call) -> _Node:
         name = self._written(node.func)
         if name not in FUNCTIONS:
-            remedy = f"the functions are {' and '.join(FUNCTIONS)}; write * for products"
+            known = f"the functions are {' and '.join(FUNCTIONS)}"
+            remedy = _REMEDIES.get(name.lower(), f"{known}; write * for products")
             raise ExpressionError(f"has {self._written(node)}, which calls no known function; {remedy}")
         if len(node.args) != 1:
             raise ExpressionError(f"has {self._written(node)}, but {name} takes one number; write {name}(...)")

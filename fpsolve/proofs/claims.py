@@ -194,6 +194,13 @@ class Claims(Record):
         """How many numbers are bounded."""
         return sum(each.lower is not None for curve in self.curves for each in curve.claims.values())
 
+    @property
+    def labels(self) -> list[str]:
+        """The keys of parameters of which no certificate knows the meaning, as it states matrices or rates itself."""
+        bounds = [each for curve in self.curves for claim in curve.claims.values() for each in claim.bounds]
+        known = [each.certificate.statement for each in bounds if each.certificate is not None]
+        return [*dict.fromkeys(key for each in known for key in each.labels)]
+
     def objections(self) -> Iterator[str]:
         """What does not follow, after the place where it stands."""
         for i, curve in enumerate(self.curves):

@@ -56,6 +56,12 @@ class Statement:
     motion: MotionRecord | None = None
     chain: ChainRecord | None = None
 
+    @property
+    def labels(self) -> list[str]:
+        """The keys of the parameters that are labels."""
+        told = [half.section for half, own in ((System, self.motion), (Noise, self.chain)) if own is not None]
+        return [key for key in self.parameters if _section(key) in told]
+
 
 @dataclass(frozen=True)
 class Cylinder:

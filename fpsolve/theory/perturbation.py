@@ -13,7 +13,7 @@ Ornstein-Uhlenbeck reduction, as in the paper. The mean of a noise is put into t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -269,7 +269,7 @@ def scale_of(problem: Problem) -> Scale:
     sizes = Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
     theory = second_order_or_none(problem)
     found = theory.scale if theory and theory.scale.moment(2.0) <= sizes.moment(2.0) else sizes
-    return found if found.moment(1.0) else Scale(angular_frequency(system), 0.0)  # nothing grows
+    return replace(found, linear=found.linear or found.quadratic or angular_frequency(system))  # λ may be 0 exactly
 
 
 def _growth(matrix: Any, frame: FloatArray) -> Harmonics:

@@ -60,6 +60,25 @@ def test_certificates_of_a_curve_are_of_one_system(tmp_path):
     assert list(claims_from(json.dumps(data)).objections()) == ["curves.0.its certificates are of several systems"]
 
 
+@pytest.mark.parametrize(
+    ("text", "labels"),
+    [(TELEGRAPH, "system.omega, system.zeta"), (CHAIN, "system.omega, system.zeta")],
+    ids=["telegraph", "chain"],
+)
+def test_the_check_names_the_labels(text, labels, tmp_path, capsys):
+    """Another ω changes no bound, as certificates state matrices."""
+    data, path = proof_of(text, tmp_path)
+    altered = json.dumps(data).replace('"system.omega": 1.0', '"system.omega": 2.0')
+    altered = altered.replace('"system.omega": "1.0"', '"system.omega": "2.0"')
+    for each in (json.dumps(data), altered):
+        path.write_text(each, encoding="utf-8")
+        capsys.readouterr()
+        assert main(["prove", "--check", str(path)]) == 0
+        said = capsys.readouterr().out
+        assert "accepted: " in said
+        assert f"note: {labels} were not verified: they are labels" in said
+
+
 TURNED = """
 title = "beam"
 [system]

@@ -32,7 +32,7 @@ from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_
 from fpsolve.model.quantity import AMPLITUDE, JOINT_DENSITY, Quantity
 
 EPSILON = "epsilon"
-MOST_VARIABLES = 4
+MOST_VARIABLES, MOST_PARAMETERS = 4, 200
 _LAW = 1e-12
 """How near to 1 a wall's R is for a coefficient of restitution of 1."""
 _NEWTON = 60
@@ -193,6 +193,9 @@ class EquationSystem(System):
                 raise TableError(f"got {shown(value)}; must be a finite number", "parameters", name) from None
             if name == EPSILON and not value > 0:
                 raise TableError(f"got {value:g}; must be > 0; epsilon = 1 is the unscaled system", "parameters", name)
+        if len(self.named) > MOST_PARAMETERS:
+            text = f"got {len(self.named)} parameters; must be at most {MOST_PARAMETERS}; state those that rates have"
+            raise TableError(text, "parameters")
         if not self.noises:
             raise TableError("got no noise; must be one at least; write one into drift and name it here", "noises")
         sections = [section for _, section in self.noises]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -22,7 +23,9 @@ NoiseMatrix = Matrix | Mapping[str, Matrix]
 _Row = Annotated[tuple[Entry, ...], Field(strict=False, min_length=1, max_length=2)]
 _Stated = Annotated[tuple[_Row, ...], Field(strict=False, min_length=1, max_length=2)]
 SINGULAR = 1e12
-"""Condition of a mass matrix from which on it counts as singular."""
+"""Condition of a mass matrix, its rows and columns of the size 1, from which on it counts as singular."""
+SMALLEST = 1e-300
+"""Of masses."""
 _SKEW = 1e-12
 
 
@@ -103,8 +106,8 @@ class ModalSystem(EquationSystem):
             TableError: with the matrix, the place in it, and what it must be.
         """
         still = {"mass": mass, "stiffness": stiffness, "damping": damping}
-        still |= {"gyroscopic": gyroscopic, "circulatory": circulatory}
-        driven = {"stiffness_noise": stiffness_noise, "damping_noise": damping_noise}
+        still = _listed({**still, "gyroscopic": gyroscopic, "circulatory": circulatory})
+        driven = _listed({"stiffness_noise": stiffness_noise, "damping_noise": damping_noise})
         named, sections = dict(parameters or {}), dict(noises or {"xi": "noise"})
         variables, drift = _Rates(still, driven, tuple(modes), named, sections).written()
         try:
@@ -113,7 +116,7 @@ class ModalSystem(EquationSystem):
             if error.path[:1] == ("variables",):
                 raise TableError(error.text, "modes") from None
             if error.path[:1] == ("drift",):
-                raise TableError(f"with the other matrices: {error.text}", "stiffness") from None
+                raise TableError(f"with the other matrices: {error.text}", *_longest(still | driven)) from None
             raise
 
     @classmethod
@@ -233,8 +236,11 @@ class _Rates:
     def _inverse(self, mass: list[list[Entry]]) -> list[list[Entry]]:
         """Of the masses, as text where they have names."""
         values = self._numbers(mass)
-        if not np.linalg.cond(values) < SINGULAR:
-            raise TableError(f"got {shown(values.tolist())}; must have an inverse; change its entries", "mass")
+        scaled = values / np.maximum(np.max(np.abs(values), axis=1, keepdims=True), SMALLEST)
+        scaled = scaled / np.maximum(np.max(np.abs(scaled), axis=0), SMALLEST)  # whatever the units of the modes
+        if not (np.linalg.cond(scaled) < SINGULAR and np.all(np.max(np.abs(values), axis=1) > SMALLEST)):
+            must = f"must have an inverse, and an entry beyond ±{SMALLEST:g} in each row"
+            raise TableError(f"got {shown(values.tolist())}; {must}; change its entries", "mass")
         if not any(isinstance(entry, str) for row in mass for entry in row):
             found: list[list[Entry]] = np.linalg.inv(values).tolist()
             return found
@@ -246,6 +252,28 @@ class _Rates:
         det = f"(({a})*({d}) - ({b})*({c}))"
         minus = [[0.0 if each == 0.0 else f"-({each})/{det}" for each in row] for row in mass]
         return [[f"({d})/{det}", minus[0][1]], [minus[1][0], f"({a})/{det}"]]
+
+
+def _listed(given: Any) -> Any:
+    """Arrays of NumPy as lists."""
+    if isinstance(given, Mapping):
+        return {key: _listed(each) for key, each in given.items()}
+    if isinstance(given, np.ndarray | np.generic):
+        return given.tolist()
+    return type(given)(map(_listed, given)) if isinstance(given, list | tuple) else given
+
+
+def _longest(matrices: Mapping[str, Any]) -> Sequence[str | int]:
+    """Where the longest text of some matrices stands."""
+
+    def texts(given: Any, place: tuple[str | int, ...]) -> Iterator[tuple[int, tuple[str | int, ...]]]:
+        if isinstance(given, str):
+            yield len(given), place
+        elif isinstance(given, Mapping | list | tuple):
+            for key, each in given.items() if isinstance(given, Mapping) else enumerate(given):
+                yield from texts(each, (*place, key))
+
+    return max(texts(matrices, ()), key=itemgetter(0), default=(0, ("stiffness",)))[1]
 
 
 def _product(a: Entry, b: Entry) -> str:
