@@ -206,7 +206,8 @@ class Directions:
     @cached_property
     def _map(self) -> FloatArray:
         """R = S⁻¹D."""
-        coordinates = np.array(self.pair.generator.chosen.phase.coordinates)
+        coordinates, frame = np.array(self.pair.generator.chosen.phase.coordinates), self.pair.generator.problem.frame
+        coordinates = coordinates if frame is None else np.array(frame.matrix) @ coordinates
         scales = np.ones(len(coordinates))
         for q, size in oscillators(self.pair.generator.problem).items():
             scales[q + 1] = size

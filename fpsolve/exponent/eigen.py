@@ -34,7 +34,8 @@ from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import eigenvalues_at, frozen_noise
 
-BACKWARD_ERROR_GOAL = 1e-14
+BACKWARD_ERROR_GOAL, BACKWARD_ERROR_OF_RATE = 1e-14, 1e-7
+"""Of the norm of L, and of ω."""
 BACKWARD_ERROR_LIMIT = 1e-11
 POSITIVE = 1e-2
 """T, or T*, is taken for positive where no more than this share of it has the wrong sign, the least of all found."""
@@ -132,7 +133,7 @@ def principal_pair(
     tangents, found = _tangents(generator.problem, p, pairs), list[PrincipalPair]()
 
     def solved(x: FloatArray, y: FloatArray) -> PrincipalPair:
-        pair = _pair(generator, pencil, rayleigh_iteration(pencil, x, y))
+        pair = _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.unit_rate))
         if pair.residual <= BACKWARD_ERROR_LIMIT:
             found.append(pair)
         return pair
@@ -225,7 +226,7 @@ def rightmost_pair(generator: Generator, p: float) -> PrincipalPair:
     best = int(np.argmax(values.real))
     x, y = (scipy.linalg.solve_triangular(root, each[:, best].real, lower=True, trans="T") for each in (right, left))
     pencil = generator.at(p)
-    return _pair(generator, pencil, rayleigh_iteration(pencil, x, y))
+    return _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.unit_rate))
 
 
 def _standard(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
@@ -315,12 +316,16 @@ class Iterate(NamedTuple):
 
 
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # a start may be useless, as its residual tells then
-def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> Iterate:
-    """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling."""
+def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray, rate: float = math.inf) -> Iterate:
+    """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling.
+
+    It is small where it is so beside the norm of L, which fast noise makes large, and beside a rate of the system.
+    """
     space, operator = pencil.space, pencil.matrix
     mx = space.weighed(x)
     best = Iterate(float(y @ (operator @ x) / (y @ mx)), math.inf, x, y, mx, space.weighed(y))
     size, stalls = operator.norm, 0
+    goal = min(BACKWARD_ERROR_GOAL, BACKWARD_ERROR_OF_RATE * rate / size)
     for _ in range(MAX_ITERATIONS):
         shift, last = best.value, best.residual
         factor: Any = None  # there is room for the next ones
@@ -330,11 +335,11 @@ def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray) -> Iterate:
             if not new.residual < 0.5 * best.residual:
                 break
             is_slow, best = new.residual > SLOW * best.residual, new
-            if is_slow or best.residual <= BACKWARD_ERROR_GOAL:
+            if is_slow or best.residual <= goal:
                 break
         stalls = stalls + 1 if best.residual > 0.5 * last else 0
         may_stall = int(best.residual > BACKWARD_ERROR_LIMIT)
-        if best.residual <= BACKWARD_ERROR_GOAL or stalls > may_stall or not math.isfinite(best.value):
+        if best.residual <= goal or stalls > may_stall or not math.isfinite(best.value):
             break
     # the value from the forcing is linear in the error of T, which residuals show beside the largest rates only
     return _improved(factor, space, shift, size, best)

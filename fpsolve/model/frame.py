@@ -11,12 +11,14 @@ and ρ(φ) = |S⁻¹e(φ)|,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import solve_triangular
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import (
@@ -25,6 +27,7 @@ from fpsolve.model.plane import (
     Impulse,
     ImpulseDerivative,
     LinearMotion,
+    Matrix,
     System,
     affine,
     combined,
@@ -33,10 +36,12 @@ from fpsolve.model.plane import (
 )
 
 MOST_PARTS = 1000
-HARDLY = 1.5
+HARDLY = 2.0
 """How many times larger the rates may be in a frame that is preferred."""
 BARELY = 0.99
-"""The share of the rates with which the search ends: μ changes by powers of two in it, so that nothing is rounded."""
+"""The share of the rates at which their search ends. S changes by powers of two in it: hardly anything is rounded."""
+MOST_STEPS = 400
+"""Of this search: some 60 for each variable and unit of 1e18."""
 ROUNDED = 1e-14
 """Of the terms of an entry of S⁻¹AS."""
 T = TypeVar("T", Impulse, ImpulseDerivative)
@@ -44,13 +49,13 @@ T = TypeVar("T", Impulse, ImpulseDerivative)
 
 @dataclass(frozen=True)
 class Frame:
-    """S, a lower triangular matrix with a positive diagonal: x₁ = 0 where y₁ = 0, and ψ grows with φ.
+    """S, a lower triangular matrix with a positive diagonal: x₁ = 0 where y₁ = 0, and in the plane ψ grows with φ.
 
     Attributes:
         matrix: S.
     """
 
-    matrix: tuple[tuple[float, float], tuple[float, float]]
+    matrix: Matrix
 
     @cached_property
     def _array(self) -> FloatArray:
@@ -58,7 +63,7 @@ class Frame:
 
     @cached_property
     def _inverse(self) -> FloatArray:
-        return np.asarray(np.linalg.inv(self._array))
+        return np.asarray(solve_triangular(self._array, np.eye(len(self._array)), lower=True))
 
     def term(self, term: CoefficientMatrix) -> CoefficientMatrix:
         """The same term for y, S⁻¹AS."""
@@ -77,12 +82,13 @@ class Frame:
     def motion(self, system: System) -> System:
         """The same system for y, the terms of order 0 that no noise drives as one; a rotation is one exactly."""
         others = [self.term(term) for term in system.terms if not is_free(term)]
-        free = np.reshape(_free(system.terms), (2, 2))
+        free = sum(
+            (float(each.g(0.0)) * np.array(each.matrix) for each in system.terms if is_free(each)), 0.0 * self._array
+        )
         a = self._inverse @ free @ self._array
-        growth, speed = 0.5 * (a[0, 0] + a[1, 1]), 0.5 * (a[0, 1] - a[1, 0])
-        turned = np.array([[growth, speed], [-speed, growth]])
+        turned = 0.5 * (np.trace(a) * np.eye(len(a)) + a - a.T)
         is_turn = np.all(abs(a - turned) <= ROUNDED * (abs(self._inverse) @ abs(free) @ abs(self._array)))
-        steady = CoefficientMatrix(0, (turned if is_turn else a).tolist())
+        steady = CoefficientMatrix(0, (turned if is_turn and len(a) == 2 else a).tolist())
         jumps = [replace(jump, phase=float(self.phase(np.array(jump.phase)))) for jump in system.jumps]
         return LinearMotion(system.epsilon, (steady, *others), tuple(jumps))
 
@@ -95,7 +101,7 @@ class Frame:
         """ψ(φ), which is φ at odd multiples of π/2."""
         return _turned(self._inverse, phi)
 
-    def own_phase(self, psi: FloatArray) -> FloatArray:
+    def own_phase(self, psi: ArrayLike) -> FloatArray:
         """φ(ψ)."""
         return _turned(self._array, psi)
 
@@ -137,48 +143,50 @@ def own_frame(
         epsilon: ε.
         spread: by the name of a noise the standard deviation of ξ and about how long it remembers its value.
     """
-    parts = dict[str | None, list[tuple[float, CoefficientMatrix]]]()
+    n = len(drift[0].matrix)
+    sums = dict[str | None, FloatArray]()
     for term in drift:
         for name, c in zip((None, term.noise), affine(term.g) or (0.0, 1.0), strict=True):
-            parts.setdefault(name, []).append((c * epsilon**term.order, term))
-    steady = combined(parts.pop(None, ()))
-    driven = [(matrix, *spread(name or "")) for name, terms in parts.items() if any(matrix := combined(terms))]
-    white = [combined([(epsilon**each.order, each)]) for each in diffusions]
-    struck = [(each.rate, (*each.exponent[0], *each.exponent[1])) for each in impulses]
-    rotating = rotating_coordinates(np.reshape(_free(drift), (2, 2)))
-    if rotating is None and not (driven or white or struck):
-        return None  # what is nilpotent is as small as one likes
+            if c:
+                sums[name] = sums.get(name, 0.0) + c * epsilon**term.order * np.array(term.matrix)
+    parts = [(sums.pop(None, np.zeros((n, n))), 1.0, 0.0, 0.0, 0.0)]
+    parts += [(epsilon**each.order * np.array(each.matrix), 0.0, 1.0, 0.0, 0.0) for each in diffusions]
+    parts += [(np.array(each.exponent), each.rate, 0.0, 0.0, 0.0) for each in impulses]
+    parts += [(each, 0.0, 0.0, *spread(name or "")) for name, each in sums.items() if np.any(each)]
+    matrices = np.array([each for each, *_ in parts])
+    linear, square, deviations, times = np.array([numbers for _, *numbers in parts]).T
 
-    def size(row: tuple[float, float]) -> float:
-        total = _norm(steady, row) + sum((norm := _norm(each, row)) * norm for each in white)
-        total += sum(rate * _norm(each, row) for rate, each in struck)
-        for each, deviation, time in driven:
-            strength = deviation * _norm(each, row)
-            total += strength * min(1.0, strength * time)
-        return total
+    def size(frame: FloatArray) -> float:
+        turned = np.linalg.inv(frame) @ matrices @ frame
+        norms = np.sqrt(np.einsum("kij,kij->k", turned, turned))
+        strengths = deviations * norms
+        return float(linear @ norms + square @ norms**2 + strengths @ np.minimum(1.0, strengths * times))
 
-    own = best = 0.0, 1.0
-    least = size(own)
-    while True:
-        slant, ratio = best
-        near = (slant, 2 * ratio), (slant, ratio / 2), (slant + ratio / 2, ratio), (slant - ratio / 2, ratio)
-        found = min((size(row), row) for row in near)
-        if not found[0] < BARELY * least:
+    own = best = np.eye(n)
+    least, steps = size(own), [own + step for step in _steps(n)]
+    for _ in range(MOST_STEPS):
+        found, number = min((size(best @ step), k) for k, step in enumerate(steps))
+        if not found < BARELY * least:
             break
-        least, best = found
+        least, best = found, best @ steps[number]
+    else:  # as what is nilpotent, which is as small as one likes
+        least, best = size(own), own
     choice = [own, best]
-    if rotating is not None:
-        (first, _), (lower, last) = rotating.tolist()
-        choice.insert(0, (lower / first, last / abs(first)))
-    chosen = next((row for row in choice if size(row) <= HARDLY * least), own)
-    return None if chosen == own else Frame(((1.0, 0.0), chosen))
+    if n == 2 and (rotating := rotating_coordinates(np.reshape(_free(drift), (2, 2)))) is not None:
+        (first, _), (lower, last) = rotating
+        choice.insert(0, np.array([[1.0, 0.0], [lower / first, last / abs(first)]]))
+    chosen = next((each for each in choice if size(each) <= HARDLY * least), own)
+    return None if np.array_equal(chosen, own) else Frame(tuple(map(tuple, chosen.tolist())))
 
 
-def _norm(matrix: Sequence[float], row: tuple[float, float]) -> float:
-    """‖S⁻¹AS‖ of A row by row and S of the rows (1, 0) and (l, μ)."""
-    (a, b, c, d), (slant, ratio) = matrix, row
-    first = a + b * slant
-    return math.hypot(first, b * ratio, (c + d * slant - slant * first) / ratio, d - slant * b)
+def _steps(n: int) -> Iterator[FloatArray]:
+    """What is added to 1 for the factors of S that are tried: y_i twice or half, or with half of y_j more or less."""
+    for i in range(1, n):
+        for j in range(i + 1):
+            for size in (1.0, -0.5) if i == j else (0.5, -0.5):
+                step = np.zeros((n, n))
+                step[i, j] = size
+                yield step
 
 
 def _free(terms: Sequence[CoefficientMatrix]) -> tuple[float, float, float, float]:
@@ -191,8 +199,8 @@ def _unit(phi: FloatArray) -> FloatArray:
     return np.stack([np.cos(phi), -np.sin(phi)])
 
 
-def _turned(matrix: FloatArray, phi: Any) -> FloatArray:
+def _turned(matrix: FloatArray, phi: ArrayLike) -> FloatArray:
     """The phase of a matrix times e(φ), in the same half turn."""
     half_turns = math.pi * np.round(np.asarray(phi) / math.pi)
-    x = matrix @ _unit(np.ravel(phi - half_turns))
+    x = matrix @ _unit(np.ravel(np.asarray(phi) - half_turns))
     return np.asarray(np.arctan2(-x[1], x[0]).reshape(np.shape(phi)) + half_turns)

@@ -228,9 +228,7 @@ class Problem:
 
     @cached_property
     def frame(self) -> Frame | None:
-        """The coordinates that it is solved in where these are not x itself; None beyond the plane."""
-        if self.dimension > 2:
-            return None
+        """The coordinates that it is solved in where these are not x itself."""
         drift, diffusions = self._moved
         return own_frame(
             drift.terms,
@@ -264,9 +262,9 @@ class Problem:
 
     @cached_property
     def invariant_rays(self) -> tuple[float, ...]:
-        """φ of rays that the phase never leaves, nor reaches, whatever the noise does; 0 alone where all rays are."""
-        rays = np.array(self._resting)
-        return tuple((rays if self.frame is None else self.frame.own_phase(rays) % math.pi).tolist())
+        """φ of rays that the phase never leaves, nor reaches, whatever the noise does; one alone where all rays are."""
+        rays = self._resting
+        return rays if self.frame is None or not rays else tuple((self.frame.own_phase(rays) % math.pi).tolist())
 
     @cached_property
     def _resting(self) -> tuple[float, ...]:
@@ -337,7 +335,10 @@ class Problem:
                 self.system.states,
             )
             if len(groups) == 1:
-                basis, groups, rounded = hidden_blocks(matrices)
+                basis = basis if self.frame is None else np.array(self.frame.matrix)
+                inverse = np.linalg.inv(basis)
+                own, groups, rounded = hidden_blocks([inverse @ each @ basis for each in matrices])
+                basis = basis @ own
                 names = [f"y{'₁₂₃₄'[k]}" for k in range(n)]
             return subsystems(self.system, basis, groups, names, rounded) if len(groups) > 1 else ()
         if not (rays := self._resting):

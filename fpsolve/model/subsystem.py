@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import FloatArray
@@ -156,10 +155,7 @@ def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[FloatArray, list[tupl
     What is invariant for all matrices is so for sums of their products. Such a sum with coefficients at random has
     different eigenvalues unless two blocks are alike, and then what is invariant is spanned by its eigenvectors.
     """
-    size = np.sum(np.abs(matrices), axis=0)
-    _, (scales, _) = scipy.linalg.matrix_balance(size, permute=False, separate=True)
-    scaled = [a * scales / scales[:, None] for a in matrices]
-    scaled = [a / norm for a in scaled if (norm := np.linalg.norm(a))]
+    scaled = [a / norm for a in matrices if (norm := np.linalg.norm(a))]
     words = [*scaled, *(a @ b for a in scaled for b in scaled)]
     mixed = np.tensordot(np.random.default_rng(0).standard_normal(len(words)), words, 1)
     values, vectors = np.linalg.eig(mixed)
@@ -170,7 +166,7 @@ def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[FloatArray, list[tupl
     ]
     basis, sizes = np.column_stack([column for each in parts for column in each]), [len(each) for each in parts]
     if not (condition := float(np.linalg.cond(basis))) < WORST_CONDITION:
-        return np.eye(len(size)), [(*range(len(size)),)], 0.0
+        return np.eye(len(basis)), [(*range(len(basis)),)], 0.0
     least = ROUNDED * condition
     inside = [np.linalg.solve(basis, a @ basis) for a in scaled]
     pattern = np.any([np.abs(a) > least * np.linalg.norm(a) for a in inside], axis=0)
@@ -178,4 +174,4 @@ def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[FloatArray, list[tupl
     groups = components(pattern | of_mode.T @ of_mode)
     order = [k for group in groups for k in group]
     places = [tuple(order.index(k) for k in group) for group in groups]
-    return scales[:, None] * basis[:, order], places, least
+    return basis[:, order], places, least
