@@ -5,9 +5,8 @@ errors they state together; at the end how many numbers are given, beyond one an
 refused in random units alone. It exits with 1 if there is one of these, or one beyond.
 
 A system of its own units has rates of about 1, and is one of two to four variables under any noise. In others its state
-is Px, P a matrix of few binary digits, so that nothing is rounded, its time is longer by a factor of 1e-9 to 1e12, and
-the noise stronger by one of 1e-3 to 1e3. Oscillators and modes as engineers write them, of (x, ẋ), have coordinates
-that change with the unit of time.
+is Px, P a matrix of few binary digits, so that P A P⁻¹ is exact, its time is longer by a factor of 1e-9 to 1e12, and noise stronger by one of 1e-3 to 1e3. Half of the states of positions and velocities change with the unit of time,
+too.
 """
 
 from __future__ import annotations
@@ -114,7 +113,7 @@ def some_noise(kind: str, rng: np.random.Generator) -> Callable[[Units], Noise]:
             case "bounded":
                 return Bounded(math.sqrt(2.0) * c, 2 * r, math.sqrt(2 * share * r / memory))
             case "filter":
-                return Filter(2 * r, share, 5 * math.sqrt(share) * c * r**1.5, 1.0, share / r)
+                return Filter(2 * r, share, 5 * math.sqrt(share) * c * r**0.75, r**0.75, share * r**-0.25)
             case "poisson":
                 return Poisson(r / memory, (c / r * np.array([-0.9, 0.4, 1.0])).tolist())
         return NonGaussianNoise(c**2 * memory / r, memory / r, share)
@@ -132,7 +131,7 @@ def drawn(seed: int) -> tuple[str, Callable[[Units], Problem], Units]:
     noise, size = some_noise(of_noise, rng), math.exp(rng.uniform(math.log(0.1), math.log(1.5)))
     rate, strength = 10 ** rng.uniform(-9, 12), 10 ** rng.uniform(-3, 3)
     steady, driven, jumps = rng.uniform(-1, 1, (n, n)), size * rng.uniform(-1, 1, (n, n)), list[Jump]()
-    basis = some_basis(rng, n)
+    basis, power = some_basis(rng, n), 2.0 ** round(math.log2(rate))
     damping = rng.uniform(0.01, 0.4)
     if kind in ("oscillator", "wall", "parametric"):
         steady, driven = np.array([[0.0, 1.0], [-1.0, -2 * damping]]), np.array([[0.0, 0.0], [-0.5 * size, 0.0]])
@@ -149,6 +148,8 @@ def drawn(seed: int) -> tuple[str, Callable[[Units], Problem], Units]:
         steady, driven = np.zeros((n, n)), 0.5 * driven
         steady[:2, :2] = [[0.0, 1.0], [-1.0, -2 * damping]]
         steady[2:, 2:] = [[-0.5]] if n == 3 else [[0.0, omega], [-omega, -damping]]
+    if n != 3 and rng.integers(2):  # positions and velocities
+        basis[1::2] *= power
     steady, driven = few_digits(steady), few_digits(driven)
     name = f"{kind}, {of_noise}"
     if kind == "parametric":  # ẍ + 2bẋ + (1 + ξ)x = 0, in the range of its parameters
@@ -204,9 +205,11 @@ class Comparison:
     Attributes:
         name: what it is.
         own, other: numbers with their errors, or why there are none.
+        doubt: what the rounding of the entries of P A P⁻¹ changes.
     """
 
     name: str
+    doubt: float
     own: list[tuple[float, float] | str]
     other: list[tuple[float, float] | str]
 
@@ -214,7 +217,7 @@ class Comparison:
     def apart(self) -> list[float]:
         """How far the numbers that both give are apart, over what is stated."""
         pairs = [pair for pair in zip(self.own, self.other, strict=True) if not any(isinstance(e, str) for e in pair)]
-        return [abs(own[0] - other[0]) / (own[1] + other[1]) for own, other in pairs]
+        return [abs(own[0] - other[0]) / (own[1] + other[1] + self.doubt) for own, other in pairs]
 
     @property
     def refused(self) -> list[str]:
@@ -232,11 +235,12 @@ def compared(seed: int) -> Comparison:
     name, problem, units = drawn(seed)
     own = Units(1.0, 1.0, np.eye(len(units.basis)))
     others = numbers_of(problem(own), 1.0, OWN_SECONDS), numbers_of(problem(units), units.rate, SECONDS)
-    return Comparison(name, *others)
+    scaled = units.basis / np.max(np.abs(units.basis), axis=1, keepdims=True)
+    return Comparison(name, sys.float_info.epsilon * float(np.linalg.cond(scaled)), *others)
 
 
 def main(first: int = 0, last: int = SYSTEMS - 1) -> int:
-    """Print a line for each system, and how many numbers are given, beyond and refused; 1 where there is one of these."""
+    """Print a line for each system, and how many numbers are given, beyond and refused; 1 where one of these is."""
     given = beyond = lost = refused = 0
     for seed in range(first, last + 1):
         started = time.process_time()

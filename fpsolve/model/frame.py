@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -195,8 +195,8 @@ def _free(terms: Sequence[CoefficientMatrix]) -> tuple[float, float, float, floa
 
 
 def _unit(phi: FloatArray) -> FloatArray:
-    """e(φ), shape (2, n)."""
-    return np.stack([np.cos(phi), -np.sin(phi)])
+    """e(φ), shape (2, n), of which the first is exactly 0 at π/2: the other one may be small beside it."""
+    return np.stack([np.sin(math.pi / 2 - np.abs(phi)), -np.sin(phi)])
 
 
 def _turned(matrix: FloatArray, phi: ArrayLike) -> FloatArray:

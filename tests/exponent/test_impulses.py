@@ -54,7 +54,18 @@ def test_impulses_over_a_wall_and_too_large_ones_are_refused():
     with pytest.raises(ValueError, match="poisson noise moves the phase across the ray of a jump"):
         of(even(), [WALL], driven=[[0.0, 1.0], [0.0, 0.0]])
     with pytest.raises(ValueError, match="use smaller sizes"):
-        of(even(1e3))
+        of(even(1e3), driven=[[0.0, 0.0], [0.0, 1.0]])
+
+
+def test_large_impulses_that_are_no_power():
+    """The velocity jumps by ±1000x, so that x is multiplied by a polynomial."""
+    noise = even(1e3)
+    right = [
+        moment_hierarchy.impulses_exponent(FREE, STIFFNESS, noise.rate, noise.sizes, noise.shares, p) for p in (2, 4)
+    ]
+    found = moment_lyapunov(of(noise), [2.0, 4.0])
+    assert np.all(np.abs(found.value - right) <= found.error_estimate)
+    assert np.all(found.error_estimate <= 1e-8 * found.value)
 
 
 @pytest.mark.parametrize("noise", [even(), Poisson(rate=0.7, sizes=(1.5, -0.3, 0.2), weights=(1.0, 2.0, 3.0))])

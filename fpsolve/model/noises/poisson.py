@@ -128,7 +128,7 @@ class Poisson(Memoryless):
         _, driven = split_by_noise(system, system.terms)
         if not driven.any():
             return ()
-        if float(np.linalg.norm(driven, 2)) * max(map(abs, self.sizes)) > LARGEST:
+        if float(np.max(np.abs(np.linalg.eigvals(driven)))) * max(map(abs, self.sizes)) > LARGEST:
             raise ValueError(f"an impulse multiplies the state by up to e^{LARGEST:g} or more; use smaller sizes")
         return [
             Impulse(self.rate * float(share), (size * driven).tolist())
