@@ -5,8 +5,8 @@ errors they state together; at the end how many numbers are given, beyond one an
 refused in random units alone. It exits with 1 if there is one of these, or one beyond.
 
 A system of its own units has rates of about 1, and is one of two to four variables under any noise. In others its state
-is Px, P a matrix of few binary digits, so that P A P⁻¹ is exact, its time is longer by a factor of 1e-9 to 1e12, and noise stronger by one of 1e-3 to 1e3. Half of the states of positions and velocities change with the unit of time,
-too.
+is Px, P a matrix of few binary digits, so that P A P⁻¹ is exact, its time is longer by a factor of 1e-9 to 1e12, the
+noise stronger by one of 1e-3 to 1e3. Half of the states of positions and velocities change with the unit of time, too.
 """
 
 from __future__ import annotations
