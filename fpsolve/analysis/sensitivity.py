@@ -31,7 +31,7 @@ from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, widened
 from fpsolve.exponent.eigen import Bordered
-from fpsolve.exponent.error import Estimate, MissingModes, Solution, SumOfSolutions
+from fpsolve.exponent.error import Estimate, MissingModes, Solution
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.axis import KroneckerSum
@@ -345,7 +345,7 @@ class Gradient:
         around = Bordered(solution.pair)
         changed = _changed(around, along)
         values = {key: each.value for key, each in changed.items()}
-        if modes_tell(solution):
+        if solution.modes_tell:
             errors = changes_of_errors(solution, around, changed)
             return _with_errors(values, {key: float(np.sum(np.abs(each))) for key, each in errors.items()})
         finer = solver.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
@@ -357,7 +357,7 @@ class Gradient:
         solver, along = held_by(self._solver, 0.0, self._along)
         near = solver.near.near_zero(0.0)
         values = {key: each.slope for key, each in self._at_zero.items()}
-        if not modes_tell(near):
+        if not near.modes_tell:
             return _compared(values, {key: each.slope for key, each in self._finer_at_zero.items()})
         around = Bordered(near.pair)
         errors = changes_of_errors(near, around, _changed(around, along))
@@ -409,12 +409,6 @@ class Gradient:
 
 def _changed(around: Bordered, along: Mapping[str, ParameterDerivative]) -> dict[str, Changed]:
     return {key: Changed(around, by) for key, by in along.items()}
-
-
-def modes_tell(solution: Solution) -> bool:
-    """Whether the error of a pair is that by its highest modes."""
-    is_whole = solution.measured is None and solution.finer is None and not isinstance(solution, SumOfSolutions)
-    return is_whole and not solution.pair.generator.chosen.noise.lines.size
 
 
 def changes_of_errors(solution: Solution, around: Bordered, changed: Mapping[str, Changed]) -> dict[str, list[float]]:

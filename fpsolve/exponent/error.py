@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -21,7 +21,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.eigen import Bordered, PrincipalPair, slope_rounding
 from fpsolve.fem.axis import KroneckerSum, TensorSpace, along
 from fpsolve.fem.discretisation import ModeEffects
 from fpsolve.messages import Code, Message, Remedy
@@ -169,6 +169,12 @@ class Solution:
             return abs(self.finer.value - self.pair.value) + self._other
         return self.error_by_modes
 
+    @property
+    def modes_tell(self) -> bool:
+        """Whether the error is that by the highest modes."""
+        is_whole = self.measured is None and self.finer is None
+        return is_whole and not self.pair.generator.chosen.noise.lines.size
+
     @cached_property
     def error_by_modes(self) -> float:
         """The same from the highest modes alone."""
@@ -189,6 +195,8 @@ class SumOfSolutions(Solution):
     """
 
     parts: tuple[Solution, ...] = ()
+
+    modes_tell = False
 
     @cached_property
     def error(self) -> float:
@@ -249,21 +257,47 @@ def sides(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
 
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     """The effects along every direction of every axis; None along one that has states."""
-    space, norm = pair.space, pair.left @ pair.space.weighed(pair.right)
     smooth, rough, operator = sides(pair)
-    tables, found = (space.table(smooth), space.table(rough)), list[ModeEffects | None]()
+    return _effects(pair, [(smooth, rough, operator)])
+
+
+def slope_error(pair: PrincipalPair) -> float:
+    """Estimate of |error of Λ′(p)|, from the derivatives by p of the effects of the highest modes.
+
+    These are the effects on ⟨T*, LT⟩ of T′ beside T*, of T beside T*′, and of both beside L′. A space that has T to the
+    last digit, as for even p, may lack T* and T′.
+    """
+    smooth, rough, operator = sides(pair)
+    around, slope = Bordered(pair), pair.generator.matrix(pair.p, derivative=1).shifted(pair.derivative)
+    by_p, slope = (
+        ((around.adjoint_by_p, around.by_p), slope.T) if pair.p < -1 else ((around.by_p, around.adjoint_by_p), slope)
+    )
+    found = _effects(pair, [(by_p[0], rough, operator), (smooth, by_p[1], operator), (smooth, rough, slope)])
+    return sum(each.error for each in found if each) + slope_rounding(pair)
+
+
+def _effects(
+    pair: PrincipalPair, products: Sequence[tuple[FloatArray, FloatArray, KroneckerSum]]
+) -> tuple[ModeEffects | None, ...]:
+    """Those of the highest modes on the sum of some ⟨rough, operator smooth⟩ over ⟨T*, T⟩."""
+    space, found = pair.space, list[ModeEffects | None]()
+    norm = abs(float(pair.left @ space.weighed(pair.right)))
+    tables = [(space.table(smooth), space.table(rough), operator) for smooth, rough, operator in products]
     for ladder in ladders(space):
         if ladder is None:
             found.append(None)
             continue
-        first, last = (along(ladder.nested, table) for table in tables)
         height = ladder.degrees[ladder.cells] - ladder.modes  # 0 for the highest mode of a cell
         masks = (ladder.cells >= 0) & (height == np.arange(DEPTH)[:, None])
-        images = np.cumsum(operator.images(first * np.stack([ladder.along(mask) for mask in masks])), axis=0)
+        kept = np.stack([ladder.along(mask) for mask in masks])
         others = tuple(1 + k for k in range(len(space.axes)) if k != ladder.at)
-        shares = np.abs(last * images).sum(axis=others) * np.cumsum(masks, axis=0)
+        shares: Any = 0.0
+        for smooth, rough, operator in tables:
+            first, last = (along(ladder.nested, table) for table in (smooth, rough))
+            images = np.cumsum(operator.images(first * kept), axis=0)
+            shares = shares + np.abs(last * images).sum(axis=others) * np.cumsum(masks, axis=0)
         inside = np.flatnonzero(ladder.cells >= 0)
-        effects = [np.bincount(ladder.cells[inside], each[inside], ladder.degrees.size) / abs(norm) for each in shares]
+        effects = [np.bincount(ladder.cells[inside], each[inside], ladder.degrees.size) / norm for each in shares]
         found.append(ModeEffects(ladder.degrees, np.array(effects), ladder.slowest))
     return tuple(found)
 

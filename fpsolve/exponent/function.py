@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,6 @@ from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_array, real_numbers
-from fpsolve.budget import one_number
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget, Tolerance, misplaced
@@ -107,7 +106,9 @@ class MomentLyapunovFunction(Result):
                 break
         self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
         value, slope = (np.array([getattr(pair, name) for pair in self._pairs]) for name in ("value", "derivative"))
-        if obstacle := broken_convexity(self.nodes, value, slope, np.abs(self.nodes) * self._errors):
+        if obstacle := broken_convexity(
+            self.nodes, value, slope, np.abs(self.nodes) * self._errors, lambda: self._slope_errors
+        ):
             raise NotConverged(obstacle, remedy=self.solver.near.refinement)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
@@ -134,6 +135,24 @@ class MomentLyapunovFunction(Result):
         at_nodes = np.max(self._errors) if self.solver.mesh is None else np.interp(p, self.nodes, self._errors)
         return np.abs(p) * (self.interpolation_error + at_nodes)
 
+    @cached_property
+    def _slope_errors(self) -> FloatArray:
+        """Estimate of |error of Λ′| at the nodes."""
+        return np.array([self.solver.slope_error(float(p)) for p in self.nodes])
+
+    def derivative_error(self, p: ArrayLike) -> FloatArray:
+        """Estimate of |error of Λ′(p)|, of the shape of p: that of the interpolation and that of the nodes.
+
+        The slope of what a polynomial of the degree n lacks of Λ(p)/p is at most min(n², n/√(1 − x²)) times as large,
+        x = ±1 at the ends of the interval (Markov, Bernstein).
+        """
+        p = self._inside(p)
+        half = 0.5 * (self.interval[1] - self.interval[0])
+        x, n = (p - self.interval[0]) / half - 1, self._series.degree()
+        steepness = np.minimum(n**2, n / np.sqrt(np.maximum(1 - x**2, 1e-300))) / half
+        of_ratio = self.interpolation_error + float(np.max(self._errors))
+        return np.asarray(of_ratio * (1 + np.abs(p) * steepness) + np.max(self._slope_errors))
+
     def moments(self, p: ArrayLike) -> MomentLyapunov:
         """Λ(p) at several p; the residual is the largest of the nodes."""
         points = checked_moments(p, self.solver.problem)
@@ -151,6 +170,7 @@ class MomentLyapunovFunction(Result):
             residual=np.full(points.size, max(pair.residual for pair in self._pairs)),
             solver=self.solver,
             warnings=(*missed(self.solver, points, value, error), *misplaced(self.solver.mesh, self._pairs)),
+            function=self,
             root=self.root(),
             notes=of_the_start(self.solver, points),
         )
@@ -181,6 +201,7 @@ class MomentLyapunovFunction(Result):
             MOMENT: self(p),
             MOMENT.error(): self.error_estimate(p),
             DERIVATIVE: self.derivative(p),
+            DERIVATIVE.error(): self.derivative_error(p),
             SECOND_DERIVATIVE: self.second_derivative(p),
         }
         method, values = "finite elements and interpolation", self.solver.problem.values
@@ -251,20 +272,28 @@ def _nodes(count: int, interval: tuple[float, float], among: FloatArray | None) 
     return np.interp(nodes, interval, (-1.0, 1.0)), nodes
 
 
-def broken_convexity(p: FloatArray, value: FloatArray, slope: FloatArray, errors: FloatArray) -> Message | None:
-    """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex."""
+def broken_convexity(
+    p: FloatArray, value: FloatArray, slope: FloatArray, errors: FloatArray, slope_errors: Callable[[], FloatArray]
+) -> Message | None:
+    """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex.
+
+    The errors of the slopes are asked for where those of the values do not suffice.
+    """
     if not p.size:
         return None
     value = np.where(p == 0, 0.0, value)  # but for rounding
-    above = np.append(value, 0.0)[None] - (value[:, None] + slope[:, None] * (np.append(p, 0.0)[None] - p[:, None]))
-    slack = 10 * (errors[:, None] + np.append(errors, 0.0)[None]) + 1e-6 * np.abs(np.append(value, 0.0)[None])
+    others, away = np.append(value, 0.0), np.append(p, 0.0)[None] - p[:, None]
+    above = others[None] - (value[:, None] + slope[:, None] * away)
+    slack = 10 * (errors[:, None] + np.append(errors, 0.0)[None]) + 1e-6 * np.abs(others[None])
+    if np.any(above < -slack):
+        steep = np.nan_to_num(slope_errors(), nan=0.0, posinf=1e300)
+        slack += 3 * steep[:, None] * np.abs(away)
     i, j = np.unravel_index(np.argmin(above + slack), above.shape)
     if not above[i, j] < -slack[i, j]:
         return None
     return Message(Code.NOT_CONVEX, p=p[i], other=np.append(p, 0.0)[j])
 
 
-@one_number("δ_p")
 def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
 ) -> Estimate | Absent:
@@ -407,7 +436,7 @@ def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], No
     """Λ(0) = 0 needs no solve; where its eigenpair failed, Λ′ and residual are NaN."""
     result = solver.moments(p, progress=progress)
     columns = result.p, result.value, result.derivative, result.error_estimate
-    obstacle = None if result.failures else broken_convexity(*columns)
+    obstacle = None if result.failures else broken_convexity(*columns, lambda: result.derivative_error)
     if obstacle:
         return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.near.refinement)),))
     failures = tuple(failure for failure in result.failures if failure.p != 0)

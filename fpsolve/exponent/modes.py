@@ -46,6 +46,8 @@ WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 BEYOND = (10.0, 1.5, 1.0)
 """What is left after the correction by a change, over this change, by how many spaces agree: one, two, and more."""
+SETTLED_SLOPE = 3e-3
+"""Share of Λ′ by which it may change from one level to the next."""
 LEFT = 0.5
 """The same, over what two degrees more changed in the corrected value, or will change in the other, see `left_of`."""
 MEASURED = 3.0
@@ -222,10 +224,16 @@ class SpherePlace(NearPlace):
             self._begin(Discretisation(self.cells or first_cells(self.problem), parts))
         steps = list[PrincipalPair]()
         pair: PrincipalPair | None = None
+        enough: Solution | None = None
         level = 0
         while True:
             chosen = self._chosen(level)
-            search.check(chosen)
+            try:
+                search.check(chosen)
+            except NotConverged:
+                if enough is None:
+                    raise
+                return enough
             try:
                 pair = self._pair(level, search, pair)
             except (NotConverged, SingularMatrix, MeshError) as failure:
@@ -249,9 +257,14 @@ class SpherePlace(NearPlace):
                 uncorrected = left_of(waves, [each.eigenvalue for each in steps])
                 step, beyond = abs(pair.value - steps[-2].value), left_of(waves, [each.value for each in steps])
                 left = max(left, beyond, LEFT * step, LEFT * uncorrected)
+            if enough is not None:  # of Λ, not of Λ′
+                left = min(left, enough.search + abs(pair.value - enough.pair.value))
             solution = Solution(pair, search=left, measured=sum(errors))
             if solution.error <= allowed:
-                return solution
+                slopes = [each.derivative for each in steps[-2:]]
+                if self.is_alone or (len(slopes) > 1 and np.ptp(slopes) <= SETTLED_SLOPE * abs(slopes[-1])):
+                    return solution
+                enough = enough or solution
             search.note(solution, solution.error, allowed)
 
     def _change(self, pair: PrincipalPair, level: int) -> float:

@@ -30,9 +30,10 @@ from fpsolve.exponent.adapt import (
     widened,
 )
 from fpsolve.exponent.eigen import Bordered, PrincipalPair, second_derivative, slope_rounding
-from fpsolve.exponent.error import Estimate, Failure, Solution, checked
+from fpsolve.exponent.error import Estimate, Failure, Solution, checked, slope_error
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.joint import joint_solution
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
@@ -97,6 +98,7 @@ class MomentLyapunov(Result):
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
         solver: what solved them.
         warnings: on the p where `error_estimate` exceeds rtol.
+        function: of which these are values; None where each p was solved.
         root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
         failures: why some p are missing, or none is to be trusted.
         rare: the p at which rare paths, far out in the algebraic tails of the noise, carry the moment, shape (k,).
@@ -110,6 +112,7 @@ class MomentLyapunov(Result):
     residual: FloatArray
     solver: ExponentSolver
     warnings: tuple[Message, ...] = ()
+    function: Any = field(default=None, repr=False)
     root: float | None = None
     failures: tuple[Failure, ...] = ()
     rare: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -118,6 +121,14 @@ class MomentLyapunov(Result):
     def __post_init__(self) -> None:
         least = 0.5 * np.spacing(np.abs(self.value))
         object.__setattr__(self, "error_estimate", np.maximum(self.error_estimate, least))
+
+    @cached_property
+    def derivative_error(self) -> FloatArray:
+        """Estimate of |error of `derivative`|, shape (n,), which takes some solves; NaN where `derivative` is."""
+        if self.function is not None:
+            return np.asarray(self.function.derivative_error(self.p))
+        known = zip(self.p.tolist(), np.isfinite(self.derivative).tolist(), strict=True)
+        return np.array([self.solver.slope_error(p) if is_known else math.nan for p, is_known in known])
 
     @property
     def pairs(self) -> tuple[PrincipalPair, ...]:
@@ -131,7 +142,7 @@ class MomentLyapunov(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p), Λ′(p), their errors and residuals over p."""
-        columns = ("value", "error_estimate", "derivative", "residual")
+        columns = ("value", "error_estimate", "derivative", "derivative_error", "residual")
         numbers = {quantity.MOMENTS[name]: getattr(self, name) for name in columns}
         numbers[quantity.RARE] = np.isin(self.p, self.rare)
         failures, values = [each.reason for each in self.failures], self.solver.problem.values
@@ -356,6 +367,27 @@ class ExponentSolver:
         return Estimate(solution.pair.value, solution.error, self.scale(p), quantity=quantity.moment_at(p))
 
     @one_number("λ")
+    def slope_error(self, p: float) -> float:
+        """Estimate of |error of Λ′(p)|; infinite where it could not be told.
+
+        It is from the highest modes, see `error.slope_error`; where these do not tell, twice what a finer
+        discretisation changes.
+        """
+        if p == 0:
+            return self.ratio_alone(0.0)[1]
+        if self.classes:
+            return max(each.slope_error(p) for each in self.classes)
+        solution = self.solution(p)
+        pair = solution.pair
+        with one_thread():
+            if solution.modes_tell:
+                return slope_error(pair)
+            try:
+                finer = self.near.finer_pair(pair, widened(pair.generator).enriched())
+            except NotConverged:
+                return math.inf
+        return 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
+
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
         value, error = self.ratio_alone(0.0)

@@ -238,6 +238,7 @@ MOMENTS: Mapping[str, Quantity] = {
     "p": P,
     "value": MOMENT,
     "derivative": DERIVATIVE,
+    "derivative_error": DERIVATIVE.error(),
     "perturbation": MOMENT.perturbation,
     "error_estimate": MOMENT.error(),
     "residual": RESIDUAL,
@@ -247,6 +248,7 @@ STORED_MOMENTS = {
     "value": MOMENT,
     "error_estimate": MOMENT.error(),
     "derivative": replace(DERIVATIVE, name="moment_derivative"),
+    "derivative_error": replace(DERIVATIVE, name="moment_derivative").error(),
     "perturbation": MOMENT.perturbation,
 }
 """Those of them that results.nc holds, by the same names, as they are called there."""

@@ -37,7 +37,7 @@ class MomentColumns:
 
     Attributes:
         p: the moments.
-        value, derivative, error_estimate, residual: as in `MomentLyapunov`.
+        value, derivative, error_estimate, derivative_error, residual: as in `MomentLyapunov`.
         perturbation: Eq. (37) at the same p.
         rare: the p at which rare paths carry the moment, shape (k,).
     """
@@ -46,6 +46,7 @@ class MomentColumns:
     value: FloatArray
     derivative: FloatArray
     error_estimate: FloatArray
+    derivative_error: FloatArray
     residual: FloatArray
     perturbation: FloatArray
     rare: FloatArray
@@ -151,7 +152,7 @@ class CurveResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
         found = self.moments
-        columns = ("value", "error_estimate", "derivative", "perturbation")
+        columns = ("value", "error_estimate", "derivative", "derivative_error", "perturbation")
         numbers: dict[Quantity, Any] = {MOMENTS[name]: getattr(found, name) for name in columns}
         for name, each in self.estimates.items():
             if each:

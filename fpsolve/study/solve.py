@@ -232,7 +232,14 @@ def solve_curve(
     result = CurveResult(
         curve=curve,
         moments=MomentColumns(
-            found.p, found.value, found.derivative, found.error_estimate, found.residual, theory, found.rare
+            p=found.p,
+            value=found.value,
+            derivative=found.derivative,
+            error_estimate=found.error_estimate,
+            derivative_error=found.derivative_error,
+            residual=found.residual,
+            perturbation=theory,
+            rare=found.rare,
         ),
         estimates=estimates,
         discretisation=_discretisation(solver),
@@ -529,7 +536,7 @@ def _fault(failure: Exception) -> Message:
 def failed(curve: Curve, reason: str) -> CurveResult:
     nothing = np.zeros(0)
     failures = (Failure(None, message_of(reason)),)
-    return CurveResult(curve, MomentColumns(*[nothing] * 7), dict.fromkeys(INDICES), failures=failures)
+    return CurveResult(curve, MomentColumns(*[nothing] * 8), dict.fromkeys(INDICES), failures=failures)
 
 
 def lost(curve: Curve) -> CurveResult:
