@@ -362,6 +362,8 @@ class _Search:
         except OverBudget as failure:
             if failure.countdown is not self.countdown:
                 raise
+            if self.best is not None and self.share <= 1:  # within the tolerance, but for its slope
+                return self.best
             return self.stop(failure.reason)
 
     def sought(self) -> Solution:

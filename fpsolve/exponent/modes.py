@@ -46,8 +46,8 @@ WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 BEYOND = (10.0, 1.5, 1.0)
 """What is left after the correction by a change, over this change, by how many spaces agree: one, two, and more."""
-SETTLED_SLOPE = 3e-3
-"""Share of Λ′ by which it may change from one level to the next."""
+SETTLED_SLOPE, MOST_FOR_SLOPES = 3e-3, 4
+"""Share of Λ′ by which it may change from one level to the next, and levels that may be added for it."""
 LEFT = 0.5
 """The same, over what two degrees more changed in the corrected value, or will change in the other, see `left_of`."""
 MEASURED = 3.0
@@ -225,7 +225,7 @@ class SpherePlace(NearPlace):
         steps = list[PrincipalPair]()
         pair: PrincipalPair | None = None
         enough: Solution | None = None
-        level = 0
+        level, more = 0, MOST_FOR_SLOPES
         while True:
             chosen = self._chosen(level)
             try:
@@ -261,10 +261,10 @@ class SpherePlace(NearPlace):
                 left = min(left, enough.search + abs(pair.value - enough.pair.value))
             solution = Solution(pair, search=left, measured=sum(errors))
             if solution.error <= allowed:
-                slopes = [each.derivative for each in steps[-2:]]
-                if self.is_alone or (len(slopes) > 1 and np.ptp(slopes) <= SETTLED_SLOPE * abs(slopes[-1])):
+                slopes, enough, more = [each.derivative for each in steps[-2:]], enough or solution, more - 1
+                is_settled = len(slopes) > 1 and np.ptp(slopes) <= SETTLED_SLOPE * abs(slopes[-1])
+                if self.is_alone or self.cells or is_settled or not more:
                     return solution
-                enough = enough or solution
             search.note(solution, solution.error, allowed)
 
     def _change(self, pair: PrincipalPair, level: int) -> float:
