@@ -6,6 +6,7 @@ import math
 import os
 import re
 import sys
+import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -107,6 +108,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     SIGHUP and SIGTERM interrupt it too; the exit code is then 128 and the number of the signal.
     """
+    if argv is None and not sys.warnoptions:  # errors of the numbers tell what NumPy warns of
+        warnings.simplefilter("ignore", RuntimeWarning)
+        os.environ["PYTHONWARNINGS"] = "ignore::RuntimeWarning"  # of workers
     with ended_by_signals() as received:
         code = _run(argv)
     return 128 + received[0] if received else code

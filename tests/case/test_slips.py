@@ -145,6 +145,25 @@ def test_libraries_do_not_warn_of_a_spectrum(tmp_path, recwarn):
     assert not [str(each.message) for each in recwarn]
 
 
+WARNS = """
+import subprocess, sys, warnings
+from fpsolve import cli
+loud = "import numpy as np; np.float64(1.0) / np.float64(0.0)"
+def called(_):
+    exec(loud)
+    return subprocess.run([sys.executable, "-c", loud]).returncode
+cli._called = called
+sys.exit(cli.main())
+"""
+
+
+@pytest.mark.parametrize("options", [(), ("-W", "always")])
+def test_what_numpy_warns_of_is_shown_where_it_is_asked_for(options):
+    """Neither of the command itself nor of its workers; the errors of the numbers tell."""
+    found = subprocess.run([sys.executable, *options, "-c", WARNS], capture_output=True, text=True, check=True)
+    assert ("RuntimeWarning" in found.stderr) == bool(options)
+
+
 @pytest.mark.slow
 def test_standard_error_is_empty(tmp_path):
     (tmp_path / "mine.toml").write_text(CASE, encoding="utf-8")

@@ -109,6 +109,16 @@ def test_modes_whose_noise_has_a_strength_of_zero():
     check(Problem(system, NOISES["OU"]), -0.1)
 
 
+def test_an_exponent_that_is_zero_exactly():
+    """ẋ = ξx, v̇ = ξv: λ = 0, whose error has a meaning, and Λ(p) = ½s²p²."""
+    one = CoefficientMatrix(1, ((1.0, 0.0), (0.0, 1.0)), identity)
+    for noise, square in ((NOISES["white"], 0.25), (NOISES["OU"], 1.0)):
+        problem = Problem(PlaneSystem([CoefficientMatrix(0, ((0.0, 0.0), (0.0, 0.0))), one]), noise)
+        exponent, found = ExponentSolver(problem).lyapunov_exponent(), moment_lyapunov(problem, [1.0, 2.0])
+        assert abs(exponent.value) <= exponent.error_estimate < 1e-10
+        assert np.all(np.abs(found.value - 0.5 * square * found.p**2) <= found.error_estimate)
+
+
 def test_the_slope_by_the_strength():
     """∂Λ/∂g at g = 0 is that of the mean of the noise: of ẍ + 0.2ẋ + (1 + gm)x, whose growth rate m does not change."""
     chain = MarkovChain((0.5, 1.5), ((0, 1.0), (1.0, 0)))
