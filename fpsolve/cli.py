@@ -26,7 +26,7 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import CaseError, FpsolveError, NotConverged
 from fpsolve.messages import Severity, escaped, message_of
 from fpsolve.output.letters import HANDLER
-from fpsolve.signals import ended_by_signals
+from fpsolve.signals import INTERRUPTED, ended_by_signals
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from fpsolve.pool import Pool
     from fpsolve.workflow.progress import Watch
 
-CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED, CLOSED_PIPE = 1, 2, 3, 130, 141
+CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, CLOSED_PIPE = 1, 2, 3, 141
 
 app = App(
     name="fpsolve",

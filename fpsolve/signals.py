@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import copy_context
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn, TypeVar
 
 ENDING = ("SIGHUP", "SIGTERM")
 REPEAT_SECONDS = 0.02
 """After which an interrupt that Python lost comes again."""
+LOOK_SECONDS = 0.1
+"""How often a main thread looks for signals that waits for another one, where the system does not wake it."""
+INTERRUPTED = 130
+"""The exit code after Ctrl-C."""
+Result = TypeVar("Result")
+_left: list[threading.Thread] = []
 
 
 @contextmanager
@@ -100,3 +109,47 @@ def _interrupts_repeated(received: list[int]) -> Iterator[None]:
         for timer in timers:
             timer.cancel()
             timer.join()  # what it has sent already still meets the handlers of the body
+
+
+def left_at_signals(function: Callable[[], Result]) -> Result:
+    """What a long call of a library returns; a signal that ends work leaves it, as libraries obey none.
+
+    It is made in a thread that nobody waits for then; it must release the lock of Python, and change nothing. Threads
+    other than the main one, which alone receives signals, call it themselves.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return function()
+    found, failures, done, context = list[Result](), list[BaseException](), threading.Event(), copy_context()
+
+    def call() -> None:
+        try:
+            found.append(context.run(function))
+        except BaseException as failure:
+            failures.append(failure)
+        finally:
+            done.set()
+
+    thread = threading.Thread(target=call, daemon=True)
+    thread.start()
+    try:
+        while not done.wait(LOOK_SECONDS):
+            pass
+    except BaseException:
+        _left.append(thread)
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
+        raise
+    if failures:
+        raise failures.pop()
+    return found.pop()
+
+
+def end_process(code: int) -> NoReturn:
+    """End this process; at once after an interrupt, as calls that are left would crash as their library is unloaded.
+
+    Python would also make another end of one that has passed through `eval`.
+    """
+    if code == INTERRUPTED or any(thread.is_alive() for thread in _left):
+        for stream in filter(None, (sys.stdout, sys.stderr)):
+            stream.flush()
+        os._exit(code)
+    sys.exit(code)

@@ -23,6 +23,7 @@ from fpsolve.fem.axis import KroneckerSum, on_one_pattern
 from fpsolve.fem.dense import DenseFactors, Factors
 from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import Ring, RingFactors, ring_gigabytes, ring_seconds
+from fpsolve.signals import left_at_signals
 
 MAX_DENSE_UNKNOWNS = 350
 """Below it one dense matrix is the fastest."""
@@ -32,6 +33,8 @@ MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 MAX_LEVEL = 0.2
 """Share of the functions of the last axis that one level may have."""
+LONG = 0.5
+"""Seconds of a factorisation from which on it runs where it can be left."""
 SPARSE_SECONDS, SPARSE_BYTES = 2e-10, 24.0
 """Of SuperLU, for an unknown times the square of the width of a front, and times the width."""
 SECONDS_PER_OPERATION = 5e-11
@@ -91,7 +94,7 @@ def factorised(
 
 def _made(plan: Plan, operator: KroneckerSum) -> Factors:
     charge(plan.seconds, plan.gigabytes, operator.size)
-    return plan.factorise()
+    return left_at_signals(plan.factorise) if plan.seconds > LONG else plan.factorise()
 
 
 def plans(

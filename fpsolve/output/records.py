@@ -247,13 +247,8 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
         p=wanted.p.tolist(),
         wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated, wanted.is_stated, wanted.start],
         response=[wanted.response, wanted.grid],
-        numerics=[
-            numerics.rtol,
-            budget.unknowns,
-            budget.seconds,
-            budget.memory,
-            mesh and codec(CylinderMesh).plain(mesh),
-        ],
+        numerics=[numerics.rtol, mesh and codec(CylinderMesh).plain(mesh)],
+        budget=[budget.unknowns, budget.seconds, budget.memory],
     )
 
 
