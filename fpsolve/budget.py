@@ -20,7 +20,9 @@ from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message, Remedy
 
 OVERHEAD_SECONDS = 1e-3
-"""Of what goes with a factorisation: the matrix, and the vectors that are solved for."""
+"""Of what goes with a factorisation."""
+SOLVE_SECONDS = 1.0
+"""Of some twenty solves with factors of one gigabyte."""
 SMALL = 0.02
 """Gigabytes that are not worth to ask what the process has already."""
 UNKNOWN_MACHINE = 8.0
@@ -123,7 +125,8 @@ def charge(seconds: float, gigabytes: float = 0.0, unknowns: int = 0) -> None:
     """Count what comes next for every number under way. Raises `OverBudget` where it is too much for one of them."""
     if not (running := _running.get()):
         return
-    seconds, peak = seconds + OVERHEAD_SECONDS, gigabytes + (resident() if gigabytes > SMALL else 0.0)
+    seconds += OVERHEAD_SECONDS + SOLVE_SECONDS * gigabytes
+    peak = gigabytes + (resident() if gigabytes > SMALL else 0.0)
     for each in running:
         if peak > each.memory:
             raise OverBudget(each, Message(Code.MEMORY_SPENT, size=peak, most=each.memory))

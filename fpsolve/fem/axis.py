@@ -168,6 +168,16 @@ class KroneckerSum:
         product = scipy.sparse.kron if self.is_sparse else np.kron
         return [(reduce(product, term[:-1]), term[-1]) for term in self.terms]
 
+    @cached_property
+    def patterns(self) -> Sequence[tuple[csc_matrix, FloatArray]]:
+        """Where any of the factors of either side of `pairs` has an entry, and their entries there, a row for each."""
+        return [_on_one_pattern([pair[side] for pair in self.pairs]) for side in (0, 1)]
+
+    @property
+    def entries(self) -> int:
+        """Of the sparse matrix."""
+        return math.prod(pattern.nnz for pattern, _ in self.patterns)
+
     @property
     def halves(self) -> tuple[int, int]:
         """The number of functions along the last axis, after that of all others."""
@@ -199,7 +209,7 @@ class KroneckerSum:
     def tocsc(self) -> csc_matrix:
         """The sparse matrix, with an entry wherever factors of both sides may have one; column by column of φ."""
         m, n = self.halves
-        (before, befores), (last, lasts) = (on_one_pattern([pair[side] for pair in self.pairs]) for side in (0, 1))
+        (before, befores), (last, lasts) = self.patterns
         counts, last_counts = np.diff(before.indptr), np.diff(last.indptr)
         last_columns = np.repeat(np.arange(n), last_counts)
         orders = {count: np.argsort(np.tile(last_columns, count), kind="stable") for count in set(counts.tolist())}
@@ -212,7 +222,7 @@ class KroneckerSum:
         return csc_matrix((np.concatenate(values), np.concatenate(rows), starts), shape=(m * n, m * n))
 
 
-def on_one_pattern(matrices: Sequence[Any]) -> tuple[csc_matrix, FloatArray]:
+def _on_one_pattern(matrices: Sequence[Any]) -> tuple[csc_matrix, FloatArray]:
     """Where any of some matrices has an entry, and the entries of each of them there, one row for each."""
     columnwise = [csc_matrix(matrix) for matrix in matrices]
     pattern = csc_matrix(sum(abs(matrix) for matrix in columnwise))

@@ -19,7 +19,7 @@ from threadpoolctl import ThreadpoolController
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import charge
 from fpsolve.errors import SingularMatrix
-from fpsolve.fem.axis import KroneckerSum, on_one_pattern
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import DenseFactors, Factors
 from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import Ring, RingFactors, ring_gigabytes, ring_seconds
@@ -35,10 +35,14 @@ MAX_LEVEL = 0.2
 """Share of the functions of the last axis that one level may have."""
 LONG = 0.5
 """Seconds of a factorisation from which on it runs where it can be left."""
-SPARSE_SECONDS, SPARSE_BYTES = 2e-10, 24.0
-"""Of SuperLU, for an unknown times the square of the width of a front, and times the width."""
+PLANE_SECONDS, PLANE_BYTES = 3e-7, 90.0
+"""Of SuperLU for two axes, for an entry of the matrix."""
+FRONT_SECONDS, FRONT_BYTES = 3.5e-10, 24.0
+"""The same for more, for an unknown times the square of the width of a front, and times this width."""
 SECONDS_PER_OPERATION = 5e-11
 """Of large dense matrices."""
+SECONDS_PER_ENTRY, BYTES_PER_ENTRY = 1e-7, 40
+"""Of a sparse matrix that is made and put in another order."""
 ROUGH_COST = 5e9
 """Operations of an elimination from which on single precision, with its refinements, is faster."""
 LARGEST_GROWTH = 1e3
@@ -183,19 +187,27 @@ def _by_levels(operator: KroneckerSum, levels: Sequence[Any], rough_cost: float 
     sizes = [level.size for level in levels]
     cost = sum(_dense_cost(size) for size in sizes) + sum(2 * a**2 * b for a, b in pairwise(reversed(sizes)))
     numbers, largest = sum(size**2 for size in sizes), max(sizes) ** 2
-    seconds, gigabytes = SECONDS_PER_OPERATION * cost, 1e-9 * (8 * numbers + 40 * largest)
+    seconds = SECONDS_PER_OPERATION * cost
+    more = SECONDS_PER_ENTRY * operator.entries + 2e-3 * len(sizes), 1e-9 * BYTES_PER_ENTRY * operator.entries
+    gigabytes = 1e-9 * (8 * numbers + 40 * largest)
     if cost < rough_cost:
-        return Plan(seconds, gigabytes, lambda: LevelFactors(operator, levels))
-    return Plan(seconds, 0.5 * gigabytes, lambda: RefinedFactors(operator, LevelFactors(operator, levels, np.float32)))
+        return Plan(seconds + more[0], gigabytes + more[1], lambda: LevelFactors(operator, levels))
+    factorise = lambda: RefinedFactors(operator, LevelFactors(operator, levels, np.float32))  # noqa: E731
+    return Plan(0.5 * seconds + more[0], 0.5 * gigabytes + more[1], factorise)
 
 
 def sparse_cost(operator: KroneckerSum) -> tuple[float, float]:
-    """Seconds and gigabytes of SuperLU, which is as good as an elimination along the axis that makes narrow fronts."""
-    (m, n), size = operator.halves, operator.size
-    (first, _), (last, _) = (on_one_pattern([pair[side] for pair in operator.pairs]) for side in (0, 1))
+    """Seconds and gigabytes of SuperLU.
+
+    Of two axes it fills in little. Of more it is as good as an elimination along the axis that makes narrow fronts.
+    """
+    (m, n), size, entries = operator.halves, operator.size, operator.entries
+    if len(operator.shape) == 2:
+        return PLANE_SECONDS * entries, 1e-9 * PLANE_BYTES * entries
+    (first, _), (last, _) = operator.patterns
     width = min(bandwidth(first) * n, bandwidth(last) * m, size)
-    entries = first.nnz * last.nnz
-    return SPARSE_SECONDS * size * width**2, 1e-9 * (SPARSE_BYTES * size * width + 40 * entries)
+    gigabytes = 1e-9 * (FRONT_BYTES * size * width + BYTES_PER_ENTRY * entries)
+    return FRONT_SECONDS * size * width**2 + SECONDS_PER_ENTRY * entries, gigabytes
 
 
 def bandwidth(pattern: Any) -> int:
