@@ -23,7 +23,7 @@ OVERHEAD_SECONDS = 1e-3
 """Of what goes with a factorisation."""
 SOLVE_SECONDS = 1.0
 """Of some twenty solves with factors of one gigabyte."""
-SMALL = 0.02
+SMALL = 0.002
 """Gigabytes that are not worth to ask what the process has already."""
 UNKNOWN_MACHINE = 8.0
 """Gigabytes of memory of a machine that does not tell."""

@@ -25,6 +25,7 @@ from types import ModuleType
 from typing import Any, Generic, TypeVar
 
 from fpsolve.arrays import is_whole, shown
+from fpsolve.budget import share_memory
 from fpsolve.errors import FpsolveError
 
 Item = TypeVar("Item")
@@ -356,12 +357,13 @@ def _in_turn(task: Callable[[Item], Result], item: Item) -> Result:
 def _processes(count: int, *counters: Any) -> Executor:
     """New processes, in which nothing of this one is copied, neither its locks nor its threads."""
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker, initargs=counters)
+    return ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker, initargs=(count, *counters))
 
 
-def _begin_worker(*counters: Any) -> None:
-    """A worker has one processor, and ends when the process that started it does, however that ends."""
+def _begin_worker(count: int, *counters: Any) -> None:
+    """A worker has one processor, one share of the memory, and ends when what started it does, however that ends."""
     limit_processors(1)
+    share_memory(count)
     _counters[:] = counters
     parent = multiprocessing.parent_process()
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +32,7 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
+from fpsolve.signals import left_at_signals
 from fpsolve.theory.frozen import eigenvalues_at, frozen_noise
 
 BACKWARD_ERROR_GOAL, BACKWARD_ERROR_OF_RATE = 1e-14, 1e-7
@@ -222,9 +223,12 @@ def rightmost_pair(generator: Generator, p: float) -> PrincipalPair:
     """The pair of the rightmost eigenvalue, for spaces in which no other lies further to the right than Λ(p)."""
     charge(SECONDS_OF_CUBE * generator.size**3, 64e-9 * generator.size**2, generator.size)
     root, matrix = _standard(generator, p)
-    values, left, right = scipy.linalg.eig(matrix, left=True)
+    values, vectors = left_at_signals(partial(np.linalg.eig, matrix))  # that of SciPy holds the lock of Python
     best = int(np.argmax(values.real))
-    x, y = (scipy.linalg.solve_triangular(root, each[:, best].real, lower=True, trans="T") for each in (right, left))
+    right = vectors[:, best].real
+    shifted = matrix.T - (values[best].real + 1e-6 * generator.unit_rate) * np.eye(right.size)
+    left = np.linalg.solve(shifted, right / np.linalg.norm(right))
+    x, y = (scipy.linalg.solve_triangular(root, each, lower=True, trans="T") for each in (right, left))
     pencil = generator.at(p)
     return _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.unit_rate))
 

@@ -33,14 +33,15 @@ MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 MAX_LEVEL = 0.2
 """Share of the functions of the last axis that one level may have."""
-LONG = 0.5
-"""Seconds of a factorisation from which on it runs where it can be left."""
+LONG, MANY_ENTRIES = 0.5, 1e6
+"""Seconds of a factorisation, and entries of a sparse matrix, from which on it runs where it can be left."""
 PLANE_SECONDS, PLANE_BYTES = 3e-7, 90.0
 """Of SuperLU for two axes, for an entry of the matrix."""
 FRONT_SECONDS, FRONT_BYTES = 3.5e-10, 24.0
 """The same for more, for an unknown times the square of the width of a front, and times this width."""
 SECONDS_PER_OPERATION = 5e-11
 """Of large dense matrices."""
+SECONDS_PER_LEVEL = 2e-3
 SECONDS_PER_ENTRY, BYTES_PER_ENTRY = 1e-7, 40
 """Of a sparse matrix that is made and put in another order."""
 ROUGH_COST = 5e9
@@ -61,8 +62,9 @@ def _pools() -> ThreadpoolController:
 
 def sparse_lu(matrix: Any, **options: Any) -> Any:
     """SuperLU's factors, ordered for a symmetric pattern. Raises `SingularMatrix`."""
+    factorise = partial(splu, matrix, permc_spec="MMD_AT_PLUS_A", **options)
     try:
-        return splu(matrix, permc_spec="MMD_AT_PLUS_A", **options)
+        return left_at_signals(factorise) if matrix.nnz > MANY_ENTRIES else factorise()
     except RuntimeError as failure:
         raise SingularMatrix(*failure.args) from failure
 
@@ -125,7 +127,7 @@ def plans(
     if own is not None and m <= MAX_BLOCK:
         own = own or levels_of(operator)
         if max(level.size for level in own) <= MAX_LEVEL * n:
-            found = [_by_levels(operator, along_last(operator, each), math.inf) for each in (own, paired(own))]
+            found = [_by_levels(operator, along_last(operator, each), math.inf)[1] for each in (own, paired(own))]
     return [*found, _sparse(operator)]
 
 
@@ -149,7 +151,7 @@ def _of_plane(operator: KroneckerSum, ring: Ring | None) -> list[Plan]:
 def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> list[Plan]:
     """By levels of the first axis or of the last one, by blocks, or dense: what takes the fewest operations."""
     (m, n), band = operator.halves, operator.band
-    found = [_dense(operator)]
+    found = [(_dense_cost(operator.size), _dense(operator))]
     if n > 2 and levels and levels[-1] is not None:
         found.append(_by_levels(operator, along_last(operator, levels[-1] or levels_of(operator))))
     elif 2 * band < n:
@@ -158,10 +160,10 @@ def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> list[Plan]:
             groups = np.split(np.arange(n), range(max(band, 1), n, max(band, 1)))
             found.append(_by_levels(operator, along_last(operator, groups)))
         else:
-            found.append(_by_blocks(operator)._replace(seconds=SECONDS_PER_OPERATION * cost))
+            found.append((cost, _by_blocks(operator)))
     if levels and levels[0] is not None:
         found.append(_by_levels(operator, along_first(operator, levels[0])))
-    return sorted(found, key=lambda plan: plan.seconds)
+    return [plan for _, plan in sorted(found, key=lambda choice: choice[0])]
 
 
 def _dense(operator: KroneckerSum) -> Plan:
@@ -182,18 +184,18 @@ def _sparse(operator: KroneckerSum) -> Plan:
     return Plan(seconds, gigabytes, lambda: SparseFactors(operator))
 
 
-def _by_levels(operator: KroneckerSum, levels: Sequence[Any], rough_cost: float = ROUGH_COST) -> Plan:
-    """An elimination by levels, in single precision from a number of operations on."""
-    sizes = [level.size for level in levels]
+def _by_levels(operator: KroneckerSum, levels: Sequence[Any], rough_cost: float = ROUGH_COST) -> tuple[float, Plan]:
+    """Operations of an elimination by levels, in single precision from a number of them on."""
+    sizes, entries = [level.size for level in levels], operator.entries
     cost = sum(_dense_cost(size) for size in sizes) + sum(2 * a**2 * b for a, b in pairwise(reversed(sizes)))
-    numbers, largest = sum(size**2 for size in sizes), max(sizes) ** 2
-    seconds = SECONDS_PER_OPERATION * cost
-    more = SECONDS_PER_ENTRY * operator.entries + 2e-3 * len(sizes), 1e-9 * BYTES_PER_ENTRY * operator.entries
-    gigabytes = 1e-9 * (8 * numbers + 40 * largest)
+    share = 1.0 if cost < rough_cost else 0.5
+    seconds = share * SECONDS_PER_OPERATION * cost + SECONDS_PER_ENTRY * entries + SECONDS_PER_LEVEL * len(sizes)
+    numbers = share * (sum(size**2 for size in sizes) + 5 * max(sizes) ** 2)
+    gigabytes = 1e-9 * (8 * numbers + BYTES_PER_ENTRY * entries)
     if cost < rough_cost:
-        return Plan(seconds + more[0], gigabytes + more[1], lambda: LevelFactors(operator, levels))
-    factorise = lambda: RefinedFactors(operator, LevelFactors(operator, levels, np.float32))  # noqa: E731
-    return Plan(0.5 * seconds + more[0], 0.5 * gigabytes + more[1], factorise)
+        return cost, Plan(seconds, gigabytes, lambda: LevelFactors(operator, levels))
+    rough = partial(LevelFactors, operator, levels, np.float32)
+    return cost, Plan(seconds, gigabytes, lambda: RefinedFactors(operator, rough()))
 
 
 def sparse_cost(operator: KroneckerSum) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.messages import Code, Message
 from fpsolve.nonlinear.elimination import Solution, Tail, mean_damping, solved, solved_tail
 from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
+from fpsolve.signals import left_at_signals
 
 SHARE = 0.2
 """Of the tolerance that one direction may lack."""
@@ -195,7 +196,7 @@ class Search:
                 plane = Plane(self.flow, self._circle(choice.phi_degree), choice.part)
                 self._planes[levels[:2]] = plane, solved_tail(plane, self.index)
             plane, tail = self._planes[levels[:2]]
-            return solved(plane, Height(choice.lines, choice.degree), tail)
+            return left_at_signals(partial(solved, plane, Height(choice.lines, choice.degree), tail))
 
 
 @dataclass(frozen=True, eq=False)

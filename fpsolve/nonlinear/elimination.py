@@ -19,6 +19,7 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve, solve
 
 from fpsolve.arrays import FloatArray, one
+from fpsolve.budget import charge
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import BlockFactors
 from fpsolve.nonlinear.operator import Circle, Height, Plane
@@ -27,6 +28,7 @@ TAIL_TERMS = 8
 """Of the series in e^{2u}."""
 STEPS = 30
 """Of the iteration for κ."""
+SECONDS_PER_OPERATION = 1e-10
 Tables = Sequence[FloatArray]
 
 
@@ -67,6 +69,7 @@ class Tail:
 
 def solved_tail(plane: Plane, guess: float) -> Tail:
     """The tail whose exponent is closest to a guess, −δ_p."""
+    charge(SECONDS_PER_OPERATION * TAIL_TERMS * plane.size**3, 48e-9 * plane.size**2, plane.size)
     rise, turn, steep, bend = map(plane.whole, (plane.rise, plane.turn, plane.steep, plane.bend))
     factors = lu_factor(turn - guess * rise)
     psi, kappa = plane.constant.copy(), guess
@@ -244,7 +247,10 @@ def solved(plane: Plane, height: Height, tail: Tail) -> Solution:
         element = Element(own, noise, plane.circle)
         matrix = element.between
         matrix[:size, :size] += front
-        columns = np.zeros((len(matrix) - size, size + 1))
+        inner = len(matrix) - size
+        gigabytes = 16e-9 * (len(matrix) ** 2 + inner * size)
+        charge(2 * SECONDS_PER_OPERATION * inner**2 * (inner + 2 * size), gigabytes, height.size * size)
+        columns = np.zeros((inner, size + 1))
         columns[:, :-1] = matrix[:-size, -size:]
         columns[:size, -1] = right
         columns = solve(matrix[:-size, :-size], columns, overwrite_b=True, check_finite=False)

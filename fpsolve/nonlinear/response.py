@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, is_whole, one, shown
+from fpsolve.budget import counted
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import lyapunov_exponent, stability_index
 from fpsolve.messages import Code, Message
@@ -207,23 +209,26 @@ class StationaryResponse(Result, NearRest):
 
 
 @of_problem
-def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryResponse:
+def stationary_response(problem: Problem, *, rtol: float = 1e-6, budget: Budget | None = None) -> StationaryResponse:
     """Solve the Fokker-Planck equation of a system with cubic terms, as of an oscillator with c₂ or c₃ > 0, and λ > 0.
 
     Args:
         oscillator, noise: the system and its noise; or one `Problem` of both, in their place or as `problem`.
         rtol: how large the error estimate of every mean may be, relative to the mean, 1e-10 to 0.1.
+        budget: what it may cost, and λ and δ_p of the linear system before it.
 
     Raises:
         FpsolveError: there is no stationary response, or none that is computed; the message says why.
-        NotConverged: the means do not settle within the memory.
+        NotConverged: the means do not settle within the budget.
         ValueError: rtol is out of its range.
     """
     if not 1e-10 <= rtol <= 0.1:
         raise ValueError(f"got rtol = {rtol!r}; must be from 1e-10 to 0.1")
-    rate, index = _linear(problem)
+    budget = budget or Budget()
+    rate, index = _linear(problem, budget)
     search = Search(Flow(problem), -index, rate, _numbers, rtol)
-    settled, found, errors = search.settled()
+    with counted(budget.countdown("the stationary response")):
+        settled, found, errors = search.settled()
     scales = np.append(np.abs(found[:-1]), rate)
     errors[-1] *= AT_ONE_PHASE
     estimates = list(map(Estimate, found.tolist(), errors.tolist(), scales.tolist()))
@@ -235,7 +240,7 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6) -> StationaryRe
     )  # fmt: skip
 
 
-def _linear(problem: Problem) -> tuple[float, float]:
+def _linear(problem: Problem, budget: Budget) -> tuple[float, float]:
     """λ and δ_p of the linear system. Raises `FpsolveError` where there is no stationary response."""
     reason = no_response(problem)
     if reason is None and problem.coloured.has_algebraic_tails:
@@ -244,10 +249,10 @@ def _linear(problem: Problem) -> tuple[float, float]:
         reason = Message(Code.RESPONSE_RAYS, phase=rays[0])
     if reason is not None:
         raise FpsolveError(reason)
-    rate = lyapunov_exponent(problem)
+    rate = lyapunov_exponent(problem, budget=budget)
     if not rate.value > rate.error_estimate:
         raise FpsolveError(Message(Code.RESPONSE_DIES, value=rate.value, error=rate.error_estimate))
-    index = stability_index(problem)
+    index = stability_index(problem, budget=budget)
     if not index:
         raise FpsolveError(Message(Code.RESPONSE_NO_INDEX, reason=index.reason))
     return rate.value, index.value

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
@@ -79,11 +80,11 @@ class CurveResponse(NearRest):
         return {**self.means, **({} if self.impact_rate is None else {"impact_rate": self.impact_rate})}
 
 
-def solve_response(problem: Problem, rtol: float, grid: Grid | None) -> CurveResponse:
+def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Budget) -> CurveResponse:
     """The stationary response, with its density if a grid is given. Raises as `stationary_response`."""
     from fpsolve.nonlinear.response import stationary_response  # which takes a while to import
 
-    found = stationary_response(problem, rtol=rtol)
+    found = stationary_response(problem, rtol=rtol, budget=budget)
     return CurveResponse(
         found.means,
         found.impact_rate,

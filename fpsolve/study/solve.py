@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from time import thread_time
+from time import process_time
 from typing import Any, TypeVar
 
 import numpy as np
@@ -24,6 +24,7 @@ from fpsolve.analysis.directions import SettledDirections, negative_part, settle
 from fpsolve.analysis.excursions import SYMBOL, Excursion, Start, StartOfNoise, solve_excursion
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
 from fpsolve.arrays import FloatArray
+from fpsolve.budget import counted
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.kinds import varying
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES, Varied
@@ -164,7 +165,7 @@ def solve_curve(
         numerics: how it is solved.
         progress: called after each moment.
     """
-    started = thread_time()
+    started = process_time()
     solver = numerics.solver(curve)
     found = solve_moments(solver, wanted.p, progress=progress)
     tries = {name: (INDICES[name].symbol, partial(INDICES[name].solve, solver, found.root)) for name in wanted.indices}
@@ -174,12 +175,13 @@ def solve_curve(
     missing = [each for each in missing if wanted.is_stated or not each.tells_of(Code.NOT_ONE_RAY)] + more
     rare, told_of_it = _solve_excursion(solver, wanted, found, estimates[STABILITY_INDEX.name])
     missing += told_of_it
-    response, told_of_it = _solve_response(curve.problem, wanted, found)
+    response, told_of_it = _solve_response(curve.problem, wanted, numerics.budget, found)
     missing += told_of_it
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
     pairs, stationary, undrawn = _functions(solver, without_failed(wanted, found.failures))
-    directions = _directions(solver, without_failed(wanted, found.failures))
+    directions, unsettled = _directions(solver, without_failed(wanted, found.failures))
+    undrawn += unsettled
     slopes, refused = None, list[Message]()
     if wanted.differentiated is not None:
         try:
@@ -251,7 +253,7 @@ def solve_curve(
         response=response,
         notes=tuple(note for note in notes if note is not None),
         failures=found.failures or tuple(Failure(None, message) for message in of[Severity.FAILURE]),
-        seconds=thread_time() - started,
+        seconds=process_time() - started,
     )
     told = (*(failure.reason for failure in result.failures), *result.warnings, *result.notes)
     is_passing = any(each.tells_of(code) for each in told for code in (Code.NO_MEMORY, Code.FAULT))
@@ -290,15 +292,20 @@ def _functions(
     return pairs, stationary, []
 
 
-def _directions(solver: ExponentSolver, wanted: Wanted) -> tuple[SettledDirections, ...]:
-    """Of more than two variables what is wanted over directions, of the p that converge."""
-    if solver.problem.dimension == 2:
-        return ()
-    found = list[SettledDirections]()
-    for p in sorted({*wanted.shown, 0.0} if wanted.density else wanted.shown):
-        with suppress(NotConverged):
-            found.append(settled_directions(solver.pair(p)))
-    return tuple(found)
+def _directions(solver: ExponentSolver, wanted: Wanted) -> tuple[tuple[SettledDirections, ...], list[Message]]:
+    """Of more than two variables what is wanted over directions, of the p that converge; what is beyond the budget."""
+    found, missing = list[SettledDirections](), list[Message]()
+    for p in sorted({*wanted.shown, 0.0} if wanted.density else wanted.shown) if solver.problem.dimension > 2 else ():
+        try:
+            pair = solver.pair(p)
+        except NotConverged:
+            continue
+        try:
+            with counted(solver.budget.countdown(f"the density of directions at p = {p:g}")):
+                found.append(settled_directions(pair))
+        except NotConverged as failure:
+            missing.append(Message(Code.INDEX_MISSING, symbols=["density of directions"], reason=failure.message))
+    return tuple(found), missing
 
 
 def _unclear(found: SettledDirections) -> Iterator[Message]:
@@ -367,13 +374,13 @@ def _solve_excursion(
 
 
 def _solve_response(
-    problem: Problem, wanted: Wanted, moments: MomentLyapunov
+    problem: Problem, wanted: Wanted, budget: Budget, moments: MomentLyapunov
 ) -> tuple[CurveResponse | None, list[Message]]:
     """The stationary response, or why there is none; nothing where it is not wanted."""
     if wanted.response is None:
         return None, []
     try:
-        return solve_response(problem, wanted.response, wanted.grid), []
+        return solve_response(problem, wanted.response, wanted.grid, budget), []
     except FpsolveError as failure:
         reason = failure.message
     except MemoryError:
@@ -509,7 +516,7 @@ def solved(curve: Curve, order: Order, numerics: Numerics, progress: Callable[[]
         try:
             solver = numerics.solver(curve)
             pairs, stationary, _ = _functions(solver, wanted)
-            return Solved(None, pairs, stationary, directions=_directions(solver, wanted))
+            return Solved(None, pairs, stationary, directions=_directions(solver, wanted)[0])
         except OSError:
             raise
         except Exception:  # its numbers stay as they are
