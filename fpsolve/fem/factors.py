@@ -37,7 +37,7 @@ LONG, MANY_ENTRIES = 0.5, 1e6
 """Seconds of a factorisation, and entries of a sparse matrix, from which on it runs where it can be left."""
 PLANE_SECONDS, PLANE_BYTES = 3e-7, 90.0
 """Of SuperLU for two axes, for an entry of the matrix."""
-FRONT_SECONDS, FRONT_BYTES = 3.5e-10, 24.0
+FRONT_SECONDS, FRONT_BYTES = 2.5e-10, 24.0
 """The same for more, for an unknown times the square of the width of a front, and times this width."""
 SECONDS_PER_OPERATION = 5e-11
 """Of large dense matrices."""
@@ -123,12 +123,12 @@ def plans(
     own = levels[-1] if levels else None
     if own is None and m <= MAX_THICK_BLOCK and operator.band <= MAX_BAND < n:
         return [_by_blocks(operator)]
-    found = []
-    if own is not None and m <= MAX_BLOCK:
+    found, sparse = list[Plan](), _sparse(operator)
+    if own is not None and m <= MAX_THICK_BLOCK:
         own = own or levels_of(operator)
         if max(level.size for level in own) <= MAX_LEVEL * n:
             found = [_by_levels(operator, along_last(operator, each), math.inf)[1] for each in (own, paired(own))]
-    return [*found, _sparse(operator)]
+    return [*(plan for plan in found if m <= MAX_BLOCK or plan.seconds < sparse.seconds), sparse]
 
 
 def _of_plane(operator: KroneckerSum, ring: Ring | None) -> list[Plan]:
