@@ -21,8 +21,8 @@ from fpsolve.messages import Code, Message, Remedy
 
 OVERHEAD_SECONDS = 1e-3
 """Of what goes with a factorisation."""
-SOLVE_SECONDS = 1.0
-"""Of some twenty solves with factors of one gigabyte."""
+SOLVE_SECONDS = 2.0
+"""Of some forty solves with factors of one gigabyte."""
 SMALL = 0.002
 """Gigabytes that are not worth to ask what the process has already."""
 UNKNOWN_MACHINE = 8.0

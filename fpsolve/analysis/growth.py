@@ -32,7 +32,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 from scipy.stats import norm
 
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
-from fpsolve.budget import counted
+from fpsolve.budget import counted, one_number
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, widened
@@ -317,17 +317,17 @@ class Slopes:
         low, high = (real_number(each, "interval") for each in interval)
         if not low < 0 < high:
             raise ValueError(f"got interval = {shown(interval)}; must be two numbers, one below 0 and one above")
-        self.solver = solver
+        self.solver, self.budget = solver, solver.budget
         self.low, self.high = np.clip([low, high], *solver.problem.moments).tolist()
         self._known: dict[float, Slope] = {}
 
+    @one_number("Λ″({:g})")
     def at(self, p: float) -> Slope:
         """Λ at p. Raises `NotConverged`, `NoSuchExponent`."""
         if p not in self._known:
             ratio, ratio_slope, error = self.solver.ratio(p)
             pair = (self.solver.near if abs(p) < TINY_P else self.solver).solution(p).pair
-            with counted(self.solver.budget.countdown(f"Λ″({p:g})")):
-                self._known[p] = Slope(p, ratio, ratio_slope, abs(p) * error, second_derivative(pair), pair)
+            self._known[p] = Slope(p, ratio, ratio_slope, abs(p) * error, second_derivative(pair), pair)
         return self._known[p]
 
     def end(self, side: int) -> Slope:

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray
-from fpsolve.budget import charge
+from fpsolve.budget import SOLVE_SECONDS, charge
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import DenseFactors, Factors
@@ -174,7 +174,8 @@ def _dense(operator: KroneckerSum) -> Plan:
 def _by_blocks(operator: KroneckerSum) -> Plan:
     """Of the factors there are 1 + 2 band blocks for each function, and the lower ones twice for a while."""
     (m, n), band = operator.halves, max(operator.band, 1)
-    seconds = 1.4 * n * (1.5e-5 + 4e-6 * band**2 + 5e-11 * (1 + band) ** 2 * m**3)
+    cube = 7e-11 if m <= MAX_BLOCK else 3.5e-11  # large blocks are faster
+    seconds = n * (2.1e-5 + 5.6e-6 * band**2 + cube * (1 + band) ** 2 * m**3)
     gigabytes = 8e-9 * m**2 * (n * (1 + 3 * band) + 2 * len(operator.terms))
     return Plan(seconds, gigabytes, lambda: BlockFactors(operator.with_dense_first()))
 
@@ -195,7 +196,8 @@ def _by_levels(operator: KroneckerSum, levels: Sequence[Any], rough_cost: float 
     if cost < rough_cost:
         return cost, Plan(seconds, gigabytes, lambda: LevelFactors(operator, levels))
     rough = partial(LevelFactors, operator, levels, np.float32)
-    return cost, Plan(seconds, gigabytes, lambda: RefinedFactors(operator, rough()))
+    solves = 4 * SOLVE_SECONDS * gigabytes  # each of which is refined
+    return cost, Plan(seconds + solves, gigabytes, lambda: RefinedFactors(operator, rough()))
 
 
 def sparse_cost(operator: KroneckerSum) -> tuple[float, float]:
