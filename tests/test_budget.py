@@ -137,7 +137,7 @@ def ou(alpha, sigma):
 CLOCK = Bounded(mu=0.15, nu=2.0, sigma=0.0)
 WALL = ({"at": "x = 0", "restitution": 0.95},)
 LARGE = {
-    "clock, OU and wall": (lambda: plane(CLOCK, ou(1.0, 0.3), WALL), 2.0, 1e-8),
+    "clock, OU and wall": (lambda: plane(CLOCK, ou(1.0, 0.3), WALL), 2.0, 1e-7),
     "filter, two modes": (lambda: modes(Filter(2.0, 0.2, 0.3)), 1.0, 1e-3),
     "chain and OU": (lambda: plane(chain(20), ou(1.0, 0.5)), 2.0, 1e-7),
     "slow strong OU": (lambda: Problem(replace(FIG1, epsilon=3.0), ou(0.05, 0.5)), -3.0, 1e-6),

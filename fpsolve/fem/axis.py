@@ -169,14 +169,14 @@ class KroneckerSum:
         return [(reduce(product, term[:-1]), term[-1]) for term in self.terms]
 
     @cached_property
-    def patterns(self) -> Sequence[tuple[csc_matrix, FloatArray]]:
-        """Where any of the factors of either side of `pairs` has an entry, and their entries there, a row for each."""
-        return [_on_one_pattern([pair[side] for pair in self.pairs]) for side in (0, 1)]
+    def patterns(self) -> Sequence[csc_matrix]:
+        """For each axis where any of its factors has an entry."""
+        return [csc_matrix(sum(abs(csc_matrix(each)) for each in of_axis)) for of_axis in zip(*self.terms, strict=True)]
 
     @property
     def entries(self) -> int:
-        """Of the sparse matrix."""
-        return math.prod(pattern.nnz for pattern, _ in self.patterns)
+        """Of the sparse matrix, at most."""
+        return math.prod(pattern.nnz for pattern in self.patterns)
 
     @property
     def halves(self) -> tuple[int, int]:
@@ -209,7 +209,7 @@ class KroneckerSum:
     def tocsc(self) -> csc_matrix:
         """The sparse matrix, with an entry wherever factors of both sides may have one; column by column of φ."""
         m, n = self.halves
-        (before, befores), (last, lasts) = self.patterns
+        (before, befores), (last, lasts) = (_on_one_pattern([pair[side] for pair in self.pairs]) for side in (0, 1))
         counts, last_counts = np.diff(before.indptr), np.diff(last.indptr)
         last_columns = np.repeat(np.arange(n), last_counts)
         orders = {count: np.argsort(np.tile(last_columns, count), kind="stable") for count in set(counts.tolist())}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dgemm
-from scipy.sparse import csr_matrix, identity
+from scipy.sparse import identity
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee, shortest_path
 from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
@@ -192,7 +192,7 @@ def _by_levels(operator: KroneckerSum, levels: Sequence[Any], rough_cost: float 
     share = 1.0 if cost < rough_cost else 0.5
     seconds = share * SECONDS_PER_OPERATION * cost + SECONDS_PER_ENTRY * entries + SECONDS_PER_LEVEL * len(sizes)
     numbers = share * (sum(size**2 for size in sizes) + 5 * max(sizes) ** 2)
-    gigabytes = 1e-9 * (8 * numbers + BYTES_PER_ENTRY * entries)
+    gigabytes = 1e-9 * (8 * numbers + BYTES_PER_ENTRY * entries) + pair_gigabytes(operator)
     if cost < rough_cost:
         return cost, Plan(seconds, gigabytes, lambda: LevelFactors(operator, levels))
     rough = partial(LevelFactors, operator, levels, np.float32)
@@ -205,13 +205,18 @@ def sparse_cost(operator: KroneckerSum) -> tuple[float, float]:
 
     Of two axes it fills in little. Of more it is as good as an elimination along the axis that makes narrow fronts.
     """
-    (m, n), size, entries = operator.halves, operator.size, operator.entries
+    size, entries = operator.size, operator.entries
     if len(operator.shape) == 2:
         return PLANE_SECONDS * entries, 1e-9 * PLANE_BYTES * entries
-    (first, _), (last, _) = operator.patterns
-    width = min(bandwidth(first) * n, bandwidth(last) * m, size)
-    gigabytes = 1e-9 * (FRONT_BYTES * size * width + BYTES_PER_ENTRY * entries)
+    width = min(bandwidth(each) * size // each.shape[0] for each in operator.patterns)
+    gigabytes = 1e-9 * (FRONT_BYTES * size * width + BYTES_PER_ENTRY * entries) + pair_gigabytes(operator)
     return FRONT_SECONDS * size * width**2 + SECONDS_PER_ENTRY * entries, gigabytes
+
+
+def pair_gigabytes(operator: KroneckerSum) -> float:
+    """What `pairs` takes of more than two axes, as arrays and as sparse matrices."""
+    is_of_arrays = len(operator.shape) > 2 and not operator.is_sparse
+    return 12e-9 * operator.halves[0] ** 2 * len(operator.terms) * is_of_arrays
 
 
 def bandwidth(pattern: Any) -> int:
@@ -338,7 +343,7 @@ def along_last(operator: KroneckerSum, levels: Sequence[Any]) -> list[Any]:
 
 def levels_of(operator: KroneckerSum) -> list[Any]:
     """The functions of the last axis by how many of its couplings lead to the first one, or one of each part."""
-    pattern = sum(abs(csr_matrix(last)) for _, last in operator.pairs)
+    pattern = operator.patterns[-1]
     starts = np.unique(connected_components(pattern)[1], return_index=True)[1]
     distance = np.min(shortest_path(pattern + pattern.T, method="D", unweighted=True, indices=starts), axis=0)
     return [np.flatnonzero(distance == d) for d in range(int(distance.max()) + 1)]
