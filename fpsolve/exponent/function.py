@@ -16,6 +16,7 @@ from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_array, real_numbers
+from fpsolve.budget import one_number
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget, Tolerance, misplaced
@@ -294,6 +295,7 @@ def broken_convexity(
     return Message(Code.NOT_CONVEX, p=p[i], other=np.append(p, 0.0)[j])
 
 
+@one_number("δ_p")
 def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
 ) -> Estimate | Absent:

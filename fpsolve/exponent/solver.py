@@ -366,7 +366,6 @@ class ExponentSolver:
         p = solution.pair.p
         return Estimate(solution.pair.value, solution.error, self.scale(p), quantity=quantity.moment_at(p))
 
-    @one_number("λ")
     def slope_error(self, p: float) -> float:
         """Estimate of |error of Λ′(p)|; infinite where it could not be told.
 
@@ -388,6 +387,7 @@ class ExponentSolver:
                 return math.inf
         return 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
 
+    @one_number("λ")
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
         value, error = self.ratio_alone(0.0)
