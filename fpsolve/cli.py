@@ -417,7 +417,7 @@ def check(
         bool,
         Parameter(
             help="Compare Λ of the even p of [moments] with the moment hierarchy instead, the equations of moments; "
-            "for two variables without walls under white noise, chains and impulses.",
+            "without walls, under all noise but that with algebraic tails.",
             negative="",
         ),
     ] = False,

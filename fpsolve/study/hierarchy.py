@@ -11,7 +11,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.sections import Expectation
 from fpsolve.errors import FpsolveError, NoHierarchy
 from fpsolve.study.results import Comparison, CurveResult
-from fpsolve.theory.hierarchy import hierarchy_exponent, refuse_open_hierarchy
+from fpsolve.theory.moments import hierarchy_exponent, refuse_open_hierarchy
 
 SOURCE = "moment hierarchy; ± the stated error"
 

@@ -1,4 +1,4 @@
-"""What paper and pencil know: perturbation theory, noise that stands still, where either is valid."""
+"""What paper and pencil know: perturbation theory, still noise, equations of even moments, where valid."""
 
 import lazy_loader
 

@@ -12,7 +12,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Jump, Poisson, White, noise_kind
 from fpsolve.model.systems.parametric import ParametricOscillator
 from fpsolve.simulation.coefficients import coefficients
-from fpsolve.theory.hierarchy import hierarchy_exponent
+from fpsolve.theory.moments import hierarchy_exponent
 from tests.oracles import moment_hierarchy, phase_circle
 
 FREE, STIFFNESS = [[0.0, 1.0], [-1.0, -0.4]], [[0.0, 0.0], [-1.0, 0.0]]

@@ -15,7 +15,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model import CoefficientMatrix, Jump, Noises, Poisson, SineWiener, Telegraph, White
 from fpsolve.proofs.statement import statement_of
-from fpsolve.theory.hierarchy import hierarchy_exponent
+from fpsolve.theory.moments import hierarchy_exponent
 from fpsolve.theory.perturbation import second_order
 from tests.oracles.moment_hierarchy import chain, gaussian, rates_of_monomials, several_exponent, struck_rates
 from tests.random_several import compared, drawn

@@ -1,0 +1,498 @@
+"""Λ(p) for even p without directions: the moments of order p of the state obey a closed set of linear equations.
+
+Without walls the functions √(p!/α!) x^α, |α| = p, are moved by ẋ = Ax with a matrix K(A), the symmetric power of A,
+linear in A and skew-symmetric for a rotation. For functions f_k of noise, g f_k = Σ Ξ_lk f_l, L_ξ f_k = Σ G_lk f_l,
+
+    H = Σ K(A) ⊗ Ξᵀ + (½ ΣK(B)² + Σ ν (exp K(C) − 1)) ⊗ 1 + 1 ⊗ Gᵀ
+
+moves E[x^α f_k], for terms g(ξ)A, white noises Bx ∘ dW and impulses exp(C) at the rates ν. Λ(p) is its rightmost
+eigenvalue. The right vector is of moments, the left one of T, a polynomial of the degree p in x. As moments stay
+moments, no eigenvalue is nearer to a real σ > Λ than Λ: the search begins at a bound by the rows of H, from the right.
+The functions of the noise end somewhere; what the next ones change, to first order, is added, and is the error.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import combinations_with_replacement
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.linalg
+from scipy import sparse
+from scipy.linalg import eigh_tridiagonal
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
+
+from fpsolve.arrays import Coefficient, FloatArray, dense, one
+from fpsolve.errors import NoHierarchy
+from fpsolve.model.noise import Noise
+from fpsolve.model.problem import Problem
+
+MOST, MOST_MOMENTS = 20_000, 1000
+"""Equations at most, and moments for each function of the noise."""
+FIRST, NEXT, GROWTH = 4, 2, 1.4
+"""Degrees of the functions of each noise to begin with, those that tell the error, and the factor to more of them."""
+TOLERANCE, ROUNDING = 1e-13, 10 * sys.float_info.epsilon
+"""Of the terms that Λ is the sum of: the error that is wanted where none is named, and that of rounding."""
+MEANINGLESS = 1e-3
+"""Of the same, from which on an error leaves nothing of a value."""
+NEARER, NEAREST, SETTLED, MOST_STEPS, MOST_POLISHES = 0.15, 1e-3, 1e-7, 60, 5
+"""The share of σ − Λ that the next σ keeps, and the last one; what Λ may still change, over it; steps at most."""
+KRYLOV, ROUGH, MOST_RESTARTS = 16, 1e-2, 200
+"""Vectors of one search by Arnoldi's method, its tolerance, and how often it begins again at most."""
+NEGATIVE = 1e-6
+"""Of the largest number, by which one may be negative that should not be."""
+MOST_DEGREES = 160
+"""Of functions of one noise: with twice as many points the weights of a rule underflow."""
+REMEDY = "compare with `fpsolve simulate`"
+MORE_POINTS = 16
+"""Of a quadrature rule, beyond two for each function."""
+PURE = 1e-9
+"""By which the logarithm of a density may differ from that of Gauss or Gegenbauer."""
+
+
+class Functions(NamedTuple):
+    """Functions f_k of a noise, nested by their degree.
+
+    Attributes:
+        degrees: of each, shape (n,).
+        generator: G, shape (n, n).
+        mass: Ξ of a coefficient g.
+        unit: the coefficients of 1, shape (n,).
+        law: E f_k, shape (n,).
+    """
+
+    degrees: Any
+    generator: Any
+    mass: Callable[[Coefficient], Any]
+    unit: FloatArray
+    law: FloatArray
+
+
+def _polynomials(noise: Noise, count: int) -> Functions:
+    """Those orthonormal in P_s, by a rule of Gauss for e^(−z²/2), or for (1 − z²)^a on a bounded support."""
+    is_bounded = math.isfinite(noise.half_width)
+    size, middle = (noise.half_width, 0.0) if is_bounded else (noise.standard_deviation, noise.mean)
+    k = np.arange(1.0, 2 * count + MORE_POINTS)
+    if is_bounded:
+        c = noise.end_exponent + 0.5
+        b = np.append(
+            math.sqrt(0.5 / (1 + c)), 0.5 * np.sqrt(k[1:] * (k[1:] + 2 * c - 1) / ((k[1:] - 1 + c) * (k[1:] + c)))
+        )
+    else:
+        b = np.sqrt(k)
+    z = eigh_tridiagonal(np.zeros(b.size + 1), b, eigvals_only=True)
+    values, slopes = np.zeros((2, b.size + 1, z.size))
+    values[0] = 1.0
+    for i in range(b.size):
+        back = (b[i - 1] * values[i - 1], b[i - 1] * slopes[i - 1]) if i else (0.0, 0.0)
+        values[i + 1] = (z * values[i] - back[0]) / b[i]
+        slopes[i + 1] = (values[i] + z * slopes[i] - back[1]) / b[i]
+    weights = 1 / np.sum(values**2, axis=0)
+    values, slopes, xi = values[:count].T, slopes[:count].T, middle + size * z
+    logs = noise.log_density(xi) - (noise.end_exponent * np.log1p(-(z**2)) if is_bounded else -0.5 * z**2)
+    if np.ptp(logs) > PURE:
+        weights = weights * np.exp(logs - logs.max())
+        weights /= weights.sum()
+        _, r = np.linalg.qr(np.sqrt(weights)[:, None] * values)
+        values, slopes = (np.linalg.solve((np.sign(np.diag(r))[:, None] * r).T, each.T).T for each in (values, slopes))
+    rates = 0.5 * weights * noise.squared_diffusion(xi) / size**2
+    start = np.eye(1, count)[0]
+    return Functions(
+        np.arange(count),
+        -slopes.T @ (rates[:, None] * slopes),
+        lambda g: values.T @ ((weights * g(xi))[:, None] * values),
+        start,
+        start,
+    )
+
+
+def _states(noise: Any, count: int) -> Functions:
+    """1 in one state each; of these there are never more."""
+    states = np.array(noise.states)
+    rates = np.array(noise.rates)
+    return Functions(
+        np.zeros(states.size), rates, lambda g: np.diag(g(states)), np.ones(states.size), noise.probabilities
+    )
+
+
+def _waves(noise: Any, count: int) -> Functions:
+    """1, √2 cos kθ, √2 sin kθ of the angle dθ = ν dt + σ dW, k < count."""
+    k = (np.arange(2 * count - 1) + 1) // 2
+    theta = np.arange(4 * count + 4 * MORE_POINTS) * (2 * np.pi / (4 * count + 4 * MORE_POINTS))
+    waves = np.exp(1j * np.outer(theta, k))
+    values = np.sqrt(2 - (k == 0)) * np.where(np.arange(k.size) % 2, waves.real, waves.imag)
+    values[:, 0] = 1.0
+    turn = np.where(np.arange(k.size - 1) % 2, k[1:], 0)  # (sin kθ)′ = k cos kθ
+    generator = np.diag(-0.5 * noise.sigma**2 * k**2) + noise.nu * (np.diag(turn, 1) - np.diag(turn, -1))
+    xi, start = noise.of_angle(theta), np.eye(1, k.size)[0]
+    return Functions(k, generator, lambda g: values.T @ (g(xi)[:, None] * values) / theta.size, start, start)
+
+
+def _pairs(noise: Any, count: int) -> Functions:
+    """He_i(u₁) He_j(u₂), i + j < count, with du = −Mu dt + N dW: L = −Σ M_ij a_j† a_i, a the lowering of degrees."""
+    degrees, second = np.tril_indices(count)
+    first = degrees - second
+    lower = []
+    for power, less in ((first, degrees), (second, degrees + 1)):
+        at = np.flatnonzero(power)
+        lower.append(sparse.csr_array((np.sqrt(power[at]), (at - less[at], at)), shape=2 * (degrees.size,)))
+    generator = -sum(noise.drift_matrix[i, j] * (lower[j].T @ lower[i]) for i, j in np.ndindex(2, 2))
+    start = np.eye(1, degrees.size)[0]
+
+    def mass(g: Coefficient) -> Any:
+        b = np.sqrt(np.arange(1.0, 2 * count + MORE_POINTS))
+        u, vectors = eigh_tridiagonal(np.zeros(b.size + 1), b)
+        table = vectors[:count] * np.sign(vectors[0])  # He_k at the points, times the roots of the weights
+        matrix = (table * g(noise.standard_deviation * u)) @ table.T
+        return np.where(np.equal.outer(second, second), matrix[np.ix_(first, first)], 0.0)
+
+    return Functions(degrees, generator, mass, start, start)
+
+
+FUNCTIONS = {"polynomials": _polynomials, "states": _states, "waves": _waves, "pairs": _pairs}
+
+
+@lru_cache(maxsize=32)
+def _ladder(n: int, p: int) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """All α, shape (N, n), and row, column, i, j and √(α_i(α_j + 1)) of what A_ij adds to K(A)."""
+    alphas = np.array([np.bincount(each, minlength=n) for each in combinations_with_replacement(range(n), p)])
+    places = {tuple(each): k for k, each in enumerate(alphas.tolist())}
+    found = []
+    for k, alpha in enumerate(alphas.tolist()):
+        for i, j in np.ndindex(n, n):
+            if alpha[i]:
+                to = list(alpha)
+                to[i] -= 1
+                found.append((k, places[(*to[:j], to[j] + 1, *to[j + 1 :])], i, j, math.sqrt(alpha[i] * (to[j] + 1))))
+    return alphas, tuple(np.array(each) for each in zip(*found, strict=True))
+
+
+def moved(matrix: Any, p: int) -> Any:
+    """K(A), sparse."""
+    a = np.asarray(matrix, dtype=float)
+    alphas, (rows, columns, i, j, sizes) = _ladder(len(a), p)
+    return sparse.csr_array((sizes * a[i, j], (rows, columns)), shape=2 * (len(alphas),))
+
+
+class EvenMoment(NamedTuple):
+    """Λ(p) of an even p.
+
+    Attributes:
+        value, error: of Λ(p).
+        size: number of the equations.
+        moments: of √(p!/α!) x^α, the right vector in the mean over the noise, in the order of α of `_ladder`.
+        polynomial: the coefficients of T at the same, in the mean over the noise.
+    """
+
+    value: float
+    error: float
+    size: int
+    moments: FloatArray
+    polynomial: FloatArray
+
+
+def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
+    """Λ(p) of an even p by the equations of the moments, and its error.
+
+    Raises:
+        NoHierarchy: the equations do not close for this problem and this p, or are too many.
+    """
+    found = even_moment(problem, p)
+    return found.value, found.error
+
+
+def even_moment(problem: Problem, p: float, tolerance: float | None = None, most: int = MOST) -> EvenMoment:
+    """Λ(p) of an even p, its error within a tolerance if there is one, by so many equations at most.
+
+    Raises:
+        NoHierarchy: the equations do not close for this problem and this p, or are too many.
+    """
+    refuse_open_hierarchy(problem, p)
+    equations = _Equations(problem, int(p))
+    counts, before = [FIRST] * len(equations.noises), None
+    while True:
+        level = equations.at(counts, most)
+        if level is None:
+            break
+        allowed = TOLERANCE * level.size if tolerance is None else tolerance
+        truncation = sum(map(abs, level.effects))
+        is_settled = not any(level.effects) or (
+            before and abs(before.value - level.value) <= before.error + level.error
+        )
+        if is_settled and level.is_positive and truncation + level.rounding <= max(allowed, 2 * level.rounding):
+            return level.moment
+        before = level
+        worst = max(map(abs, level.effects), default=0.0)
+        counts = [
+            math.ceil(GROWTH * count) if abs(effect) >= 0.1 * worst else count
+            for count, effect in zip(counts, level.effects, strict=True)
+        ]
+        if not worst:
+            break
+    if before is None or tolerance is not None or not before.is_positive or before.error > MEANINGLESS * before.size:
+        raise NoHierarchy(
+            f"got p = {p:g}; {most} equations, or {MOST_DEGREES} functions of each noise, are too few for moments "
+            f"under noise so strong or slow; use a smaller p, or {REMEDY}"
+        )
+    return before.moment
+
+
+def refuse_open_hierarchy(problem: Problem, p: float) -> None:
+    """Refuse a problem whose moments of order p do not close, or are too many. Raises `NoHierarchy`."""
+    if not (p > 0 and p % 2 == 0):
+        raise NoHierarchy(f"got p = {p:g}; the equations of the moments close for even p > 0 only; choose p = 2, 4, …")
+    for noise in problem.coloured.parts.values():
+        if noise.basis not in FUNCTIONS:
+            raise NoHierarchy(
+                f"moments of even order are infinite under {noise.kind} noise with algebraic tails; take r0 <= 1"
+            )
+    if any(jump.log_factor for jump in problem.system.jumps):
+        raise NoHierarchy(
+            "the equations of the moments do not close where a wall changes the state, as that happens at one phase; "
+            f"{REMEDY}, or remove the wall"
+        )
+    moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
+    count = moments * math.prod(  # type: ignore[misc]
+        len(noise.states) if noise.has_states else FIRST  # type: ignore[attr-defined]
+        for noise in problem.coloured.parts.values()
+    )
+    for number, what, limit in ((moments, "moments", MOST_MOMENTS), (count, "equations", MOST)):
+        if number > limit:
+            raise NoHierarchy(f"got p = {p:g}; its {number:.12g} {what} are more than {limit}; use a smaller p")
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """The rightmost eigenpair with some functions of the noises.
+
+    Attributes:
+        eigenvalue: without the next functions.
+        effects: what the next functions of each noise change in it.
+        size: of the terms that it is the sum of.
+        right, left: in the mean over the noise.
+    """
+
+    problem: Problem
+    p: int
+    eigenvalue: float
+    effects: Sequence[float]
+    size: float
+    count: int
+    right: FloatArray
+    left: FloatArray
+
+    @property
+    def value(self) -> float:
+        return self.eigenvalue + sum(self.effects)
+
+    @property
+    def rounding(self) -> float:
+        return ROUNDING * self.size
+
+    @property
+    def error(self) -> float:
+        return sum(map(abs, self.effects)) + self.rounding
+
+    @property
+    def moment(self) -> EvenMoment:
+        return EvenMoment(self.value, self.error, self.count, self.right, self.left)
+
+    @cached_property
+    def is_positive(self) -> bool:
+        """Whether E x^α are moments, and T is positive, as far as it is seen: both but for a common sign."""
+        form, t = _moment_form(self.right, self.problem.dimension, self.p), self._polynomial_values()
+        return _has_one_sign(np.asarray(np.linalg.eigvalsh(form))) and _has_one_sign(t)
+
+    def _polynomial_values(self) -> FloatArray:
+        """T at some directions; of p = 2 the eigenvalues of its matrix."""
+        n = self.problem.dimension
+        if self.p == 2:
+            return np.asarray(np.linalg.eigvalsh(_moment_form(self.left, n, 2)))
+        x = np.random.default_rng(0).standard_normal((200, n))
+        x /= np.linalg.norm(x, axis=1)[:, None]
+        alphas, _ = _ladder(n, self.p)
+        return np.prod(x[:, None] ** alphas, axis=2) @ (self.left * np.sqrt(_multinomials(alphas)))
+
+
+def _has_one_sign(values: FloatArray) -> bool:
+    values = values * np.sign(values[np.argmax(np.abs(values))])
+    return bool(values.min() >= -NEGATIVE * values.max())
+
+
+def _multinomials(alphas: Any) -> FloatArray:
+    """p!/α!."""
+    from scipy.special import gammaln
+
+    return np.asarray(np.exp(gammaln(alphas.sum(axis=1) + 1) - gammaln(alphas + 1).sum(axis=1)))
+
+
+def _moment_form(moments: FloatArray, n: int, p: int) -> FloatArray:
+    """E x^(α + β), |α| = |β| = p/2, in the units of the functions of order p/2."""
+    alphas, _ = _ladder(n, p)
+    halves, _ = _ladder(n, p // 2)
+    places = {tuple(each): k for k, each in enumerate(alphas.tolist())}
+    at = np.array([[places[tuple(each)] for each in (half + halves).tolist()] for half in halves])
+    sizes = np.sqrt(_multinomials(halves))
+    return np.asarray((moments / np.sqrt(_multinomials(alphas)))[at] * np.outer(sizes, sizes))
+
+
+class _Equations:
+    """H of a problem and an even p, with any number of functions of each noise."""
+
+    def __init__(self, problem: Problem, p: int) -> None:
+        self.problem, self.p = problem, p
+        self.named = problem.coloured.parts
+        self.noises = list(self.named.values())
+        motion = problem.motion
+        names = list(self.named)
+        self.terms = []
+        for term in motion.terms:
+            at = names.index(term.noise) if term.noise in self.named else 0
+            self.terms.append((moved(motion.epsilon**term.order * np.array(term.matrix), p), term.g, at))
+        self.rest = 0.0 * moved(np.eye(problem.dimension), p)
+        for each in problem.diffusions:
+            k = moved(motion.epsilon**each.order * np.array(each.matrix), p)
+            self.rest = self.rest + 0.5 * k @ k
+        for impulse in problem.impulses:
+            gain = scipy.linalg.expm(moved(np.array(impulse.exponent), p).toarray())
+            self.rest = self.rest + sparse.csr_array(impulse.rate * (gain - np.eye(len(gain))))
+        total = abs(self.rest).toarray()
+        for k, g, at in self.terms:
+            xi = self.noises[at].reached
+            size = min(self.noises[at].standard_deviation, xi.max() - xi.min())
+            total += abs(k).toarray() * float(
+                np.max(np.abs(g(self.noises[at].mean + size * np.array([-1.0, 0.0, 1.0]))))
+            )
+        _, (self.scale, _) = scipy.linalg.matrix_balance(total, permute=False, separate=True)
+        down, up = sparse.diags_array(1 / self.scale), sparse.diags_array(self.scale)
+        self.terms = [(down @ k @ up, g, at) for k, g, at in self.terms]
+        self.rest = down @ self.rest @ up
+
+    def at(self, counts: Sequence[int], most: int) -> _Level | None:
+        """With functions of degrees below these; None where they are too many."""
+        if max(counts) > MOST_DEGREES:
+            return None
+        axes = [FUNCTIONS[noise.basis](noise, count + NEXT) for noise, count in zip(self.noises, counts, strict=True)]
+        shape = [each.degrees.size for each in axes]
+        n = self.rest.shape[0]
+        is_old = [each.degrees < count for each, count in zip(axes, counts, strict=True)]
+        if n * math.prod(int(each.sum()) for each in is_old) > most:
+            return None
+        ones = [sparse.eye_array(size) for size in shape]
+
+        def product(of_state: Any, of_noise: Any = None, at: int = 0) -> Any:
+            for k, each in enumerate(ones):
+                of_state = sparse.kron(
+                    of_state, each if of_noise is None or k != at else _sparse(of_noise).T, format="csr"
+                )
+            return of_state
+
+        h = product(self.rest)
+        for k, axis in enumerate(axes):
+            h = h + product(sparse.eye_array(n), axis.generator, k)
+        for k, g, at in self.terms:
+            h = h + product(k, axes[at].mass(g) if g != one else None, at)
+        old = np.flatnonzero(_outer([np.ones(n, dtype=bool), *is_old]))
+        new = [
+            np.flatnonzero(
+                _outer([np.ones(n, dtype=bool), *(~each if k == j else each for k, each in enumerate(is_old))])
+            )
+            for j in range(len(axes))
+        ]
+        own = h[old][:, old].tocsc()
+        mean, law = (
+            _outer([np.ones(1), *(getattr(axis, name)[each] for axis, each in zip(axes, is_old, strict=True))])
+            for name in ("unit", "law")
+        )
+        form = _start(self.problem.dimension, self.p)
+        eigenvalue, x, y = _rightmost(own, np.kron(form / self.scale, law), np.kron(form * self.scale, mean))
+        weight = float(y @ x)
+        effects = []
+        for each in new:
+            if not each.size:
+                effects.append(0.0)
+                continue
+            here = h[each]
+            factors = splu((eigenvalue * sparse.eye_array(each.size) - here[:, each]).tocsc())
+            effects.append(float((h[old][:, each].T @ y) @ factors.solve(here[:, old] @ x)) / weight)
+        size = float(np.abs(y) @ (abs(own) @ np.abs(x))) / abs(weight) if weight else math.inf
+        right, left = x.reshape(n, -1) @ mean * self.scale, y.reshape(n, -1) @ law / self.scale
+        return _Level(self.problem, self.p, eigenvalue, effects, size, len(old), right, left)
+
+
+def _outer(factors: Sequence[Any]) -> Any:
+    """The product of all combinations, in one row."""
+    found = np.ones(1, dtype=factors[0].dtype)
+    for each in factors:
+        found = np.multiply.outer(found, each).ravel()
+    return found
+
+
+def _sparse(matrix: Any) -> Any:
+    """Without what rounding leaves of zeros."""
+    full = dense(matrix)
+    return sparse.csr_array(np.where(np.abs(full) > 1e-15 * np.max(np.abs(full), initial=0.0), full, 0.0))
+
+
+@lru_cache(maxsize=32)
+def _start(n: int, p: int) -> FloatArray:
+    """The moments of a vector of independent Gaussian numbers."""
+    alphas, _ = _ladder(n, p)
+    from scipy.special import gammaln
+
+    logs = np.sum(gammaln(alphas + 1) - gammaln(alphas / 2 + 1) - 0.5 * alphas * math.log(2), axis=1)
+    found = np.where(np.all(alphas % 2 == 0, axis=1), np.exp(logs) * np.sqrt(_multinomials(alphas)), 0.0)
+    return np.asarray(found / np.linalg.norm(found))
+
+
+def _rightmost(h: Any, *starts: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """The rightmost eigenvalue of a generator of positive forms, and its right and left vectors, from positive ones."""
+    unit, diagonal = sparse.eye_array(h.shape[0], format="csc"), h.diagonal()
+    beside = abs(h - sparse.diags_array(diagonal))
+    bound = min(float(np.max(diagonal + beside.sum(axis=axis))) for axis in (0, 1))
+    sigma = bound + 0.1 * max(float(np.max(np.abs(h.data), initial=0.0)) * 1e-3, abs(bound), sys.float_info.min)
+    value = -math.inf
+    x = starts[0]
+    for _ in range(MOST_STEPS):
+        last, (share, x) = value, _largest(splu(sigma * unit - h).solve, x)
+        value = sigma - 1 / share
+        if abs(value - last) <= SETTLED * (sigma - value):
+            break
+        sigma = value + NEARER * (sigma - value)
+    x, y, sigma = *starts, value + NEAREST * (sigma - value)
+    for _ in range(MOST_POLISHES):
+        try:
+            factors = splu(sigma * unit - h)
+        except RuntimeError:  # it is an eigenvalue to the last digit
+            break
+        for _ in range(2):
+            x, y = factors.solve(x), factors.solve(y, "T")
+            x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+        last, value = value, float(y @ (h @ x)) / float(y @ x)
+        rounding = ROUNDING * float(np.abs(y) @ (abs(h) @ np.abs(x))) / abs(float(y @ x))
+        if abs(value - last) <= 0.1 * rounding:
+            break
+        sigma = value + 1e-3 * rounding
+    return value, x, y
+
+
+def _largest(solve: Callable[[FloatArray], FloatArray], x: FloatArray) -> tuple[float, FloatArray]:
+    """The eigenvalue of the largest real part of a positive map, roughly, and its vector, from a positive one."""
+    if x.size <= KRYLOV:
+        values, vectors = np.linalg.eig(solve(np.eye(x.size)))
+    else:
+        shape = 2 * (x.size,)
+        operator = LinearOperator(shape, matvec=solve, dtype=float)
+        try:
+            values, vectors = eigs(operator, 1, which="LR", v0=x, tol=ROUGH, ncv=KRYLOV, maxiter=MOST_RESTARTS)
+        except ArpackNoConvergence as failure:
+            raise NoHierarchy(
+                f"no rightmost eigenvalue is found among those of {x.size} equations; {REMEDY}"
+            ) from failure
+    at = int(np.argmax(values.real))
+    return float(values[at].real), vectors[:, at].real

@@ -1,0 +1,249 @@
+"""The equations of even moments of fpsolve against those of the oracles, and the command that compares with them."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve.arrays import identity
+from fpsolve.cli import BAD_INPUT, CHECK_FAILED, main
+from fpsolve.errors import NoHierarchy
+from fpsolve.model import (
+    Bounded,
+    CoefficientMatrix,
+    Filter,
+    LinearSystem,
+    MarkovChain,
+    NonGaussianNoise,
+    ParametricOscillator,
+    Poisson,
+    SineWiener,
+    Telegraph,
+    White,
+)
+from fpsolve.theory.moments import even_moment, hierarchy_exponent
+from tests.oracles import filtered, moment_hierarchy, two_noises
+
+FREE, STIFFNESS = [[0.0, 1.0], [-1.0, -0.1]], [[0.0, 0.0], [-1.0, 0.0]]
+SADDLE = ((-1.0115024817178828, 0.027976596819670015), (3.2543543385618436, -2.1504180261123937))
+NODE = ((-0.5727022764659979, 0.03844029130717129), (-0.38124973260501926, 0.4070870137016061))
+NODE_NOISE = ((0.4281962803847412, -0.8337860010391915), (-0.25061621100201587, -0.24215772694411056))
+NODE_FILTER = (1.4957362099052074, 0.3305436240665941, 0.05885385917131965, 2.237226809621595, 0.9888121349393983)
+
+
+def driven(free, matrix, noise):
+    kind = PlaneSystem if len(free) == 2 else LinearSystem
+    return Problem(kind([CoefficientMatrix(0, free), CoefficientMatrix(0, matrix, identity)]), noise)
+
+
+def second_moment(free, white=(), matrix=None, alpha=1.0, deviation=0.0, count=1):
+    """Λ(2) by E xxᵀ He_k(ξ/std) as vectors of n² numbers, with Stratonovich's white noises."""
+    unit, ladder = np.eye(len(free)), np.diag(np.sqrt(np.arange(1.0, count)), 1)
+
+    def both(a):
+        return np.kron(a, unit) + np.kron(unit, a)
+
+    steady = both(np.array(free)) + sum(0.5 * both(np.array(b)) @ both(np.array(b)) for b in white)
+    total = np.kron(np.eye(count), steady) - np.kron(alpha * np.diag(np.arange(float(count))), np.eye(len(steady)))
+    if matrix is not None:
+        total += deviation * np.kron(ladder + ladder.T, both(np.array(matrix)))
+    return float(np.max(np.linalg.eigvals(total).real))
+
+
+@pytest.mark.parametrize(
+    ("noise", "p", "expected"),
+    [
+        (noise, p, expected(p))
+        for p in (2, 4)
+        for noise, expected in (
+            (
+                OrnsteinUhlenbeck(1.0, 3.0),
+                lambda p: moment_hierarchy.ornstein_uhlenbeck_exponent(FREE, STIFFNESS, 1.0, 3 / math.sqrt(2), p, 60),
+            ),
+            (
+                SineWiener(0.8, 1.0),
+                lambda p: moment_hierarchy.sine_wiener_exponent(FREE, STIFFNESS, 0.8, 1.0, p, 20),
+            ),
+            (
+                Bounded(0.4, 2.0, 0.3),
+                lambda p: moment_hierarchy.bounded_exponent(FREE, STIFFNESS, 0.4, 2.0, 0.3, p, 20),
+            ),
+            (
+                Poisson(rate=1.0, sizes=(-0.5, 0.7), weights=(0.3, 0.7)),
+                lambda p: moment_hierarchy.impulses_exponent(FREE, STIFFNESS, 1.0, (-0.5, 0.7), (0.3, 0.7), p),
+            ),
+            (
+                Filter(1.5, 0.2, 0.4, 1.0, 0.3),
+                lambda p: filtered.moment_lyapunov(FREE, STIFFNESS, (1.5, 0.2, 0.4, 1.0, 0.3), p, 16),
+            ),
+        )
+    ],
+)
+def test_every_noise(noise, p, expected):
+    value, error = hierarchy_exponent(driven(FREE, STIFFNESS, noise), p)
+    assert value == pytest.approx(expected, abs=5e-13)
+    assert error < 1e-11
+
+
+def test_noise_of_eq_7():
+    """By elements, and where it is all but Gaussian by the hierarchy of that."""
+    for r0 in (0.9, -2.0):
+        problem = driven(FREE, STIFFNESS, NonGaussianNoise(0.3, 0.7, r0))
+        assert hierarchy_exponent(problem, 2)[0] == pytest.approx(
+            ExponentSolver(problem).moments(2.0).value[0], abs=1e-9
+        )
+    near = driven(FREE, STIFFNESS, NonGaussianNoise(0.3, 0.7, 1 - 1e-11))
+    gaussian = moment_hierarchy.ornstein_uhlenbeck_exponent(FREE, STIFFNESS, 1 / 0.7, math.sqrt(0.3 / 0.7), 4, 40)
+    assert hierarchy_exponent(near, 4)[0] == pytest.approx(gaussian, abs=1e-9)
+
+
+def test_a_harmonic_load_beside_noise():
+    """By the multipliers of the periodic equations; the spectrum is Λ + ikν, and cut off it comes to lie right of Λ."""
+    terms = [CoefficientMatrix(0, STIFFNESS, identity, name) for name in ("load", "noise")]
+    system = PlaneSystem([CoefficientMatrix(0, FREE), *terms])
+    problem = Problem(system, {"load": Bounded(0.4, 2.0, 0.0), "noise": White(0.3)})
+    for p in (2, 4):
+        expected = moment_hierarchy.harmonic_exponent(FREE, STIFFNESS, 0.4, 2.0, p, 0.3 * np.array(STIFFNESS))
+        assert hierarchy_exponent(problem, p)[0] == pytest.approx(expected, abs=1e-11)
+
+
+def test_the_eigenvalue_is_the_rightmost():
+    """Saddles and nodes under two noises and a filter, where |x|^(p − k) |v|^k is nearly an eigenfunction, too."""
+    laws = (37.431388258716034, 32.74906196496099), (32.63567554169098, 8.536346218849552)
+    terms = [
+        CoefficientMatrix(0, matrix, identity, name)
+        for matrix, name in ((((0, 0), (1, 0)), "a"), (((0, 0), (0, 1)), "b"))
+    ]
+    noises = {name: OrnsteinUhlenbeck(*law) for name, law in zip("ab", laws, strict=True)}
+    saddle = Problem(PlaneSystem([CoefficientMatrix(0, SADDLE), *terms]), noises)
+    matrices, deviations = (SADDLE, ((0, 0), (1, 0)), ((0, 0), (0, 1))), [s / math.sqrt(2 * a) for a, s in laws]
+    for p in (2, 4, 6):
+        expected = two_noises.moment_lyapunov(matrices, [a for a, _ in laws], deviations, p, 6)
+        assert hierarchy_exponent(saddle, p)[0] == pytest.approx(expected, abs=1e-9)
+    assert hierarchy_exponent(saddle, 4)[0] == pytest.approx(-3.734143931469, abs=1e-12)
+    node = driven(NODE, NODE_NOISE, Filter(*NODE_FILTER))
+    for p, expected in ((2, 0.78527655968609), (4, 1.57063217231938)):
+        assert hierarchy_exponent(node, p)[0] == pytest.approx(expected, abs=1e-13)
+        assert filtered.moment_lyapunov(NODE, NODE_NOISE, NODE_FILTER, p, 8) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("n", [3, 4])
+def test_more_variables(rng, n):
+    free, matrix = rng.standard_normal((2, n, n))
+    white = driven(free, matrix, White(s=0.7, interpretation="stratonovich"))
+    found = even_moment(white, 2)
+    assert found.value == pytest.approx(second_moment(free, [0.7 * matrix]), abs=1e-11)
+    assert hierarchy_exponent(driven(free, matrix, OrnsteinUhlenbeck(2.0, 0.8)), 2)[0] == pytest.approx(
+        second_moment(free, (), matrix, 2.0, 0.4, 14), abs=1e-10
+    )
+    steady = driven(free, 1e-9 * matrix, White(s=1.0))  # p times the largest real part
+    assert hierarchy_exponent(steady, 6)[0] == pytest.approx(6 * np.linalg.eigvals(free).real.max(), abs=1e-11)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e6])
+def test_the_unit_of_time_and_of_the_state(rng, unit):
+    """Λ is that of the system in units of its own, over the unit of time, to the stated error."""
+    free, matrix = rng.standard_normal((2, 4, 4))
+    own = hierarchy_exponent(driven(free, matrix, OrnsteinUhlenbeck(1.0, 0.5)), 2)
+    scale = np.diag(unit ** np.array([0.0, 1.0, -0.5, 0.3]))
+    other, load = (scale @ each @ np.linalg.inv(scale) / unit for each in (free, matrix))
+    value, error = hierarchy_exponent(driven(other, load, OrnsteinUhlenbeck(1 / unit, 0.5 / math.sqrt(unit))), 2)
+    assert abs(value * unit - own[0]) <= 10 * (own[1] + error * unit)
+    assert error * unit < 1e-10
+
+
+def test_the_error_is_met(rng):
+    """That of few functions, against many; it is no more than a few hundred times too large."""
+    for _ in range(3):
+        problem = driven(*rng.standard_normal((2, 2, 2)), OrnsteinUhlenbeck(1.0, 1.0))
+        exact = even_moment(problem, 4).value
+        for tolerance in (1e-2, 1e-7):
+            found = even_moment(problem, 4, tolerance)
+            assert abs(found.value - exact) <= found.error <= tolerance
+
+
+@pytest.mark.parametrize("p", [2, 4, 10])
+def test_any_matrices_with_any_chain(rng, p):
+    steady, driven = rng.uniform(-1, 1, (2, 2, 2))
+    states, rates = rng.uniform(-1, 1, 3), rng.uniform(0.2, 2, (3, 3))
+    chain = MarkovChain(states, rates - np.diag(np.diagonal(rates)))
+    terms = [CoefficientMatrix(0, steady), CoefficientMatrix(1, driven, identity)]
+    expected = moment_hierarchy.moment_lyapunov([steady + 0.4 * xi * driven for xi in states], chain.rates, p)
+    value, error = hierarchy_exponent(Problem(PlaneSystem(terms, epsilon=0.4), chain), p)
+    assert abs(value - expected) <= error + 1e-14 * abs(expected)
+    assert error < 1e-10
+
+
+@pytest.mark.parametrize("sense", ["stratonovich", "ito"])
+def test_any_matrices_with_white_noise(rng, sense):
+    steady, driven = rng.uniform(-1, 1, (2, 2, 2))
+    terms = [CoefficientMatrix(0, steady), CoefficientMatrix(1, driven, identity)]
+    problem = Problem(PlaneSystem(terms, epsilon=0.4), White(s=1.3, interpretation=sense))
+    for p in (2, 6):
+        expected = moment_hierarchy.white_noise_exponent(steady, [0.4 * 1.3 * driven], p, sense)
+        assert hierarchy_exponent(problem, p)[0] == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("system", "noise", "p", "words"),
+    [
+        (ParametricOscillator(1.0, 0.1), White(0.5), 3.0, "even p > 0 only"),
+        (ParametricOscillator(1.0, 0.1), White(0.5), 0.0, "even p > 0 only"),
+        (ParametricOscillator(1.0, 0.1, 0.9), White(0.5), 2.0, "where a wall changes the state"),
+        (ParametricOscillator(1.0, 0.1), NonGaussianNoise(1.0, 1.0, 1.2), 2.0, "algebraic tails; take r0 <= 1"),
+        (ParametricOscillator(1.0, 0.1), Telegraph(0.5, 1.0), 1e6, "1000001 moments are more than 1000"),
+        (ParametricOscillator(1.0, 0.1), OrnsteinUhlenbeck(1e-3, 1.0), 4.0, "noise so strong or slow"),
+    ],
+)
+def test_what_does_not_close_is_refused(system, noise, p, words):
+    with pytest.raises(NoHierarchy, match=words):
+        hierarchy_exponent(Problem(system, noise), p)
+
+
+CASE = """\
+title = "hierarchy"
+[system]
+kind = "parametric"
+stiffness = 1.0
+damping = 0.05
+[noise]
+kind = "telegraph"
+a = 0.5
+k = 1.0
+[moments]
+p = [-1.0, 1.0, 2.0, 4.0]
+[vary]
+"noise.k" = [0.5, 1.0]
+"""
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "hierarchy.toml"
+    path.write_text(CASE, encoding="utf-8")
+    command = ["check", "--hierarchy", str(path), "--jobs", "1"]
+    assert main(command) == 0
+    said = capsys.readouterr().out
+    assert "4 of 4 ok" in said
+    assert "moment, p = 4" in said
+    assert "-0.0332610990213" in said
+    monkeypatch.setattr("fpsolve.study.hierarchy.hierarchy_exponent", lambda problem, p: (0.1, 1e-12))
+    assert main([*command, "--quiet"]) == CHECK_FAILED
+    assert capsys.readouterr().out == "hierarchy: 0 of 4 ok\n"
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("system.restitution=0.9", "with noise.k = 0.5: the equations of the moments do not close where a wall"),
+        ("moments.p=[1.0, 3.0]", "moments.p: has no even p > 0, and the hierarchy is for these; add 2.0"),
+    ],
+)
+def test_the_command_refuses_what_does_not_close(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], override: str, words: str
+) -> None:
+    path = tmp_path / "hierarchy.toml"
+    path.write_text(CASE, encoding="utf-8")
+    assert main(["check", "--hierarchy", str(path), "--set", override]) == BAD_INPUT
+    assert words in " ".join(capsys.readouterr().err.split())
