@@ -257,10 +257,9 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
             f"{REMEDY}, or remove the wall"
         )
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
-    count = moments * math.prod(  # type: ignore[misc]
-        len(noise.states) if noise.has_states else FIRST  # type: ignore[attr-defined]
-        for noise in problem.coloured.parts.values()
-    )
+    count = moments
+    for noise in problem.coloured.parts.values():
+        count *= len(noise.states) if noise.has_states else FIRST  # type: ignore[attr-defined]
     for number, what, limit in ((moments, "moments", MOST_MOMENTS), (count, "equations", MOST)):
         if number > limit:
             raise NoHierarchy(f"got p = {p:g}; its {number:.12g} {what} are more than {limit}; use a smaller p")
