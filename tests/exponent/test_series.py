@@ -213,7 +213,11 @@ def test_a_result_is_labelled_and_drawn():
     [
         ([CoefficientMatrix(0, ((1.0, 0.0), (0.0, -1.0)))], UNIT, "that rotate without noise"),
         ([CoefficientMatrix(0, ((0, 1), (-1, 0)), identity)], UNIT, "a term of order 0 is driven by noise"),
-        ([CoefficientMatrix(0, ((0, 1), (-1, 0)))], NonGaussianNoise(D0=1.0, tau0=0.5, r0=1.1), "algebraic tails"),
+        (
+            [CoefficientMatrix(0, ((0, 1), (-1, 0))), CoefficientMatrix(1, ((0, 0), (1, 0)), identity)],
+            NonGaussianNoise(D0=1.0, tau0=0.5, r0=1.1),
+            "algebraic tails",
+        ),
         (
             [CoefficientMatrix(0, ((0, 1), (-1, 0))), CoefficientMatrix(1, ((0, 0), (1, 0)), identity)],
             Poisson(rate=1.0, sizes=(1.0,), weights=(1.0,)),
