@@ -138,7 +138,10 @@ class Problem:
             if any(affine(term.g) is None for term in driven):
                 xi = np.array(noise.states) if noise.has_states else noise.standard_deviation * SUPPORT  # type: ignore[attr-defined]
                 xi = np.unique(np.clip(xi, -noise.half_width, noise.half_width))
-            if driven and moves_phase(self.system, driven, jump.phase, xi):
+            phase = jump.phase
+            if driven and self.frame is not None:  # in which all rates are of one size, whatever the units of x
+                driven, phase = [self.frame.term(term) for term in driven], float(self.frame.phase(np.array(phase)))
+            if driven and moves_phase(self.system, driven, phase, xi):
                 which = f'the noise "{name}"' if name else f"{noise.kind} noise"
                 raise ValueError(
                     f"{which} moves the phase across the ray of a jump, phi = {jump.phase:.6g}, which it does over no "

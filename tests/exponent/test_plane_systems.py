@@ -181,6 +181,21 @@ def test_a_wall_is_a_ray_that_no_noise_turns(g, matrix, noise, log):
         Problem(PlaneSystem(named, [Jump(math.pi / 2, log)]), {"gust": noise, "sea": TELEGRAPH})
 
 
+def test_the_unit_of_time_does_not_matter_at_a_wall():
+    """ẋ = (1 + aξ²)v, v̇ = −ω²x − 0.2ωv − ω²ξx − 0.1ωξv: refused for a = 1e-6 alone."""
+    found = []
+    for omega in (1e-6, 1.0, 1e7):
+        free = CoefficientMatrix(0, ((0.0, 1.0), (-(omega**2), -0.2 * omega)))
+        driven = CoefficientMatrix(1, ((0.0, 0.0), (-(omega**2), -0.1 * omega)), identity)
+        bent = CoefficientMatrix(1, ((0.0, 1e-6), (0.0, 0.0)), np.square)
+        noise, wall = OrnsteinUhlenbeck(alpha=omega, sigma=0.5 * math.sqrt(omega)), [Jump(math.pi / 2, -0.2)]
+        solver = ExponentSolver(Problem(PlaneSystem([free, driven], wall), noise))
+        found.append(solver.solution(2.0).pair.value / omega)
+        with pytest.raises(ValueError, match="moves the phase across the ray"):
+            Problem(PlaneSystem([free, driven, bent], wall), noise)
+    assert found == pytest.approx([found[1]] * 3, rel=1e-8)
+
+
 @pytest.mark.parametrize("second", [((0.0, -0.3), (0.0, -0.1)), ((0.0, 0.0), (-0.5, 0.0))])
 def test_a_function_that_a_noise_does_not_change_leaves_a_wall_alone(second):
     """ξ² is 1 in both states, and what two terms of one noise do to x = 0 together is nothing: λ = λ₀ + N ln R."""
