@@ -1,0 +1,321 @@
+"""Λ(p) and λ of linear systems in the plane under one or two noises of any kind: Fourier series in φ times functions of
+each noise.
+
+With x = a (cos φ, −sin φ) a matrix A moves a^p T(φ) by X = h ∂φ + p q, h = e′ᵀA e, q = eᵀA e. On exp(2inφ), |n| ≤ M, the
+generator is X₀ + ½ Σ X_k² + rate ⟨exp(w X) − 1⟩ + Σ ξ_k X_k + Σ L_k, with ξ_k and L_k on functions that are orthonormal
+in the stationary law of a noise. For even p the 2M + 1 = p + 1 functions a^p exp(2inφ), |n| ≤ p/2, are the homogeneous
+polynomials of degree p, on which all of it is closed: the equations of the moments of even order. Λ(p) is the rightmost
+eigenvalue, of small matrices that of all, of large ones that nearest to a shift on the right of the spectrum.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg, sparse
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, eigsh, splu
+
+DENSE = 350
+"""Functions up to which all eigenvalues are computed."""
+MOST = 14_000
+"""Functions beyond which no larger size is tried."""
+CLOSE = 1e-11
+"""Of the size of Λ: where two sizes differ by less, the larger one counts."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A noise that has a value: (L, ξ) on a number of functions of it that grows with the size, or on its states."""
+
+    made: Callable
+    grows: bool = True
+
+
+def ornstein_uhlenbeck(alpha, deviation):
+    """dξ = −αξ dt + √(2α) deviation dW, by normalised Hermite polynomials."""
+
+    def made(size):
+        root = deviation * np.sqrt(np.arange(1.0, size))
+        return np.diag(-alpha * np.arange(float(size))), np.diag(root, 1) + np.diag(root, -1)
+
+    return Law(made)
+
+
+def between_ends(D0, tau0, r0):
+    """Eq. (7) with r₀ < 1: polynomials orthonormal under (1 − z²)^a, z = ξ/ξ_s, a = 1/(1 − r₀).
+
+    L u = D₀/τ₀² (P_s u′)′/P_s, so that L = −D₀/(τ₀ξ_s)² ∫ P_s u′v′, by Gauss's points of that weight.
+    """
+    a = 1 / (1 - r0)
+    end = math.sqrt(2 * D0 * a / tau0)
+
+    def made(size):
+        k = np.arange(1.0, size + 1)
+        beta = np.sqrt(k * (k + 2 * a) / ((2 * k + 2 * a + 1) * (2 * k + 2 * a - 1)))
+        z, vectors = np.linalg.eigh(np.diag(beta[:-1], 1) + np.diag(beta[:-1], -1))
+        value, slope = np.ones((size, size)), np.zeros((size, size))  # polynomial, point
+        for m in range(size - 1):
+            below, less = (value[m - 1], slope[m - 1]) if m else (0.0, 0.0)
+            back = beta[m - 1] if m else 0.0
+            value[m + 1] = (z * value[m] - back * below) / beta[m]
+            slope[m + 1] = (value[m] + z * slope[m] - back * less) / beta[m]
+        weighed = slope * np.abs(vectors[0])
+        ladder = np.diag(beta[: size - 1], 1) + np.diag(beta[: size - 1], -1)
+        return -D0 / (tau0 * end) ** 2 * weighed @ weighed.T, end * ladder
+
+    return Law(made)
+
+
+def chain(states, rates):
+    """Jumps from state i to j at rates[i][j], on functions of the state."""
+    rates = np.array(rates, dtype=float)
+    np.fill_diagonal(rates, 0.0)
+    generator = rates - np.diag(rates.sum(axis=1))
+    weight = np.sqrt(np.abs(linalg.null_space(generator.T)[:, 0]))  # so that they are orthonormal in the law
+    return Law(lambda _: (weight[:, None] * generator / weight, np.diag(np.asarray(states, dtype=float))), grows=False)
+
+
+def circle(amplitude, nu, sigma):
+    """ξ = amplitude cos θ, dθ = ν dt + σ dW, by 1, √2 cos kθ, √2 sin kθ."""
+
+    def made(size):
+        decay, turn, up = np.zeros(2 * size + 1), np.zeros((2 * size + 1,) * 2), np.zeros((2 * size + 1,) * 2)
+        for k in range(1, size + 1):
+            c, s = 2 * k - 1, 2 * k
+            decay[[c, s]] = -0.5 * (sigma * k) ** 2
+            turn[s, c], turn[c, s] = -nu * k, nu * k
+            if k < size:
+                up[c + 2, c] = up[s + 2, s] = 0.5
+        up[1, 0] = math.sqrt(0.5)
+        return np.diag(decay) + turn, amplitude * (up + up.T)
+
+    return Law(made)
+
+
+def filtered(omega, zeta, s, c0, c1):
+    """ξ = c₀y + c₁y′ of y″ + 2ζωy′ + ω²y = sẆ, by normalised He_j(u) He_k(w), j + k < size.
+
+    u and w are y and y′ over their standard deviations: u′ = ωw and dw = −(ωu + 2ζωw) dt + 2√(ζω) dW.
+    """
+    deviation = s / math.sqrt(4 * zeta * omega**3)
+
+    def made(size):
+        lower = sparse.diags_array(np.sqrt(np.arange(1.0, size + 1)), offsets=1)
+        raised, one = lower + lower.T, sparse.eye_array(size + 1)
+        u, w, by_u, by_w = (
+            sparse.csr_array(sparse.kron(*each)) for each in ((raised, one), (one, raised), (lower, one), (one, lower))
+        )
+        moved = omega * (w @ by_u - u @ by_w) - 2 * zeta * omega * (w @ by_w - by_w @ by_w)
+        j, k = np.divmod(np.arange((size + 1) ** 2), size + 1)
+        kept = np.flatnonzero(j + k < size)
+        return tuple(sparse.csr_array(each)[kept][:, kept] for each in (moved, deviation * (c0 * u + c1 * omega * w)))
+
+    return Law(made)
+
+
+@dataclass(frozen=True)
+class Planar:
+    """dx = (A₀ + Σ ξ_k A_k) x dt + Σ B_k x∘dW_k, and x → exp(wC) x at random times.
+
+    Args:
+        drift: A₀.
+        coloured: pairs (A_k, `Law`).
+        white: the B_k; Itô's sense is for the caller to turn into this one.
+        impulses: (C, rate, the w, how likely each is).
+    """
+
+    drift: np.ndarray
+    coloured: tuple = ()
+    white: tuple = ()
+    impulses: tuple = ()
+
+    def balanced(self):
+        """In the coordinates (x, y/μ) in which the rates are least."""
+
+        def change(matrix, mu):
+            return np.array(matrix, dtype=float) * [[1.0, mu], [1 / mu, 1.0]]
+
+        def size(mu):
+            own = np.linalg.norm(change(self.drift, mu))
+            for matrix, law in self.coloured:
+                own += np.linalg.norm(change(matrix, mu)) * float(np.abs(law.made(4)[1]).max())
+            own += sum(np.linalg.norm(change(matrix, mu)) ** 2 for matrix in self.white)
+            return own + sum(np.linalg.norm(change(c, mu)) * rate * max(map(abs, w)) for c, rate, w, _ in self.impulses)
+
+        mu = min(2.0 ** np.arange(-20, 21), key=size)
+        return Planar(
+            change(self.drift, mu),
+            tuple((change(matrix, mu), law) for matrix, law in self.coloured),
+            tuple(change(matrix, mu) for matrix in self.white),
+            tuple((change(c, mu), *rest) for c, *rest in self.impulses),
+        )
+
+    def moved(self, p, modes):
+        """What no coloured noise has a part in: its matrix and that of ∂/∂p on the phases."""
+        total, slope = phases(self.drift, p, modes)
+        for matrix in self.white:
+            x, dx = phases(matrix, p, modes)
+            total, slope = total + 0.5 * x @ x, slope + 0.5 * (x @ dx + dx @ x)
+        for matrix, rate, sizes, shares in self.impulses:
+            struck, longer = jumps(matrix, sizes, shares, p, modes)
+            total, slope = total + rate * (struck - np.eye(2 * modes + 1)), slope + rate * longer
+        return sparse.csr_array(total), sparse.csr_array(slope)
+
+    def generator(self, p, modes, size):
+        """L(p), ∂L/∂p and the constant function; phases are slow, functions of the noises fast."""
+        laws = [law.made(size) for _, law in self.coloured]
+        counts = [own[0].shape[0] for own in laws]
+
+        def of_noises(place, matrix):
+            before, after = math.prod(counts[:place]), math.prod(counts[place + 1 :])
+            return sparse.kron(sparse.kron(sparse.eye_array(before), matrix), sparse.eye_array(after))
+
+        one, ones = sparse.eye_array(2 * modes + 1), sparse.eye_array(math.prod(counts))
+        total, slope = (sparse.kron(each, ones) for each in self.moved(p, modes))
+        constant = np.ones(1)
+        for place, ((matrix, law), (own, xi)) in enumerate(zip(self.coloured, laws, strict=True)):
+            x, dx = phases(matrix, p, modes)
+            lifted = of_noises(place, xi)
+            total = total + sparse.kron(x, lifted) + sparse.kron(one, of_noises(place, own))
+            slope = slope + sparse.kron(dx, lifted)
+            first = np.eye(1, counts[place])[0] if law.grows else np.abs(linalg.null_space(own.T)[:, 0])
+            constant = np.kron(constant, first)
+        middle = np.eye(1, 2 * modes + 1)[0]
+        return sparse.csc_array(total), sparse.csc_array(slope), np.kron(middle, constant)
+
+
+def phases(matrix, p, modes):
+    """X of A and its ∂/∂p on 1, √2 cos 2nφ, √2 sin 2nφ, n ≤ modes."""
+    (a, b), (c, d) = np.asarray(matrix, dtype=float)
+    count = 2 * modes + 1
+    derivative, up, over = np.zeros((count, count)), np.zeros((count, count)), np.zeros((count, count))
+    n = np.arange(1, modes + 1)
+    derivative[2 * n, 2 * n - 1], derivative[2 * n - 1, 2 * n] = -2.0 * n, 2.0 * n
+    n = n[:-1]
+    up[2 * n + 1, 2 * n - 1] = up[2 * n + 2, 2 * n] = 0.5  # of cos 2φ: cos → cos, sin → sin
+    over[2 * n + 2, 2 * n - 1], over[2 * n + 1, 2 * n] = 0.5, -0.5  # of sin 2φ: cos → sin, sin → −cos
+    if modes:
+        up[1, 0] = over[2, 0] = math.sqrt(0.5)
+    one, cosine, sine = np.eye(count), up + up.T, over + over.T
+    h = 0.5 * ((b - c) * one - (b + c) * cosine + (d - a) * sine)
+    q = 0.5 * ((a + d) * one + (a - d) * cosine - (b + c) * sine)
+    # at the highest mode h ∂ + p q leaves these functions but for even p = 2·modes
+    return sparse.csr_array(h @ derivative + p * q), sparse.csr_array(q)
+
+
+def jumps(matrix, sizes, shares, p, modes):
+    """⟨|Me|^p u(ψ)⟩, M = exp(wC), and its ∂/∂p, by values at as many even points of φ as there are functions."""
+    count = 2 * modes + 1
+    phi = math.pi * (np.arange(count) + 0.25) / count
+
+    def values(at):
+        n = np.arange(1, modes + 1)
+        found = np.ones((at.size, count))
+        found[:, 1::2], found[:, 2::2] = (math.sqrt(2) * f(2 * np.outer(at, n)) for f in (np.cos, np.sin))
+        return found
+
+    back, total, slope = values(phi).T / count, 0.0, 0.0
+    for size, share in zip(sizes, shares, strict=True):
+        x, y = linalg.expm(size * np.asarray(matrix, dtype=float)) @ [np.cos(phi), -np.sin(phi)]
+        logs, moved = np.log(np.hypot(x, y)), values(np.arctan2(-y, x))
+        total = total + share * back @ (np.exp(p * logs)[:, None] * moved)
+        slope = slope + share * back @ ((logs * np.exp(p * logs))[:, None] * moved)
+    return total, slope
+
+
+def rightmost(matrix, near=None):
+    """The rightmost eigenvalue, complex, and about its rounding; `near` is that of fewer functions."""
+    count = matrix.shape[0]
+    norm = float(np.abs(matrix).sum(axis=0).max())
+    if count <= DENSE:
+        values, left, right = linalg.eig(matrix.toarray(), left=True)
+        k = int(np.argmax(values.real))
+        angle = abs(left[:, k].conj() @ right[:, k])
+        return complex(values[k]), 2e-16 * norm / max(angle, 1e-16)
+    start = np.random.default_rng(0).standard_normal(count)
+    half = 0.5 * (matrix + matrix.T)
+    bound = float(eigsh(half, 1, which="LA", v0=start, tol=1e-3, return_eigenvectors=False)[0])
+    bound += 1e-2 * abs(bound)
+    shift = bound if near is None else min(bound, near + 0.05 * (bound - near))
+    for _ in range(12):
+        factors = splu((matrix - shift * sparse.eye_array(count)).tocsc())
+        inverse = LinearOperator(matrix.shape, factors.solve, dtype=float)
+        # to the right of the spectrum the nearest eigenvalue is the rightmost: all others have a smaller real part
+        values, right = eigs(inverse, min(6, count - 2), v0=start, tol=1e-12)
+        values = shift + 1 / values
+        k = int(np.argmax(values.real))
+        if values[k].real >= shift:
+            shift = min(bound, values[k].real + max(0.5 * (values[k].real - shift), 1e-3 * abs(bound)))
+            continue
+        nearest = float(np.min(np.abs(values - shift)))
+        if shift - values[k].real <= nearest * (1 + 1e-6) or shift == bound:
+            break
+        shift = bound
+    transposed = LinearOperator(matrix.shape, lambda x: factors.solve(x, trans="T"), dtype=float)
+    other, left = eigs(transposed, 2, v0=start, tol=1e-8)
+    j = int(np.argmin(np.abs(shift + 1 / other - values[k])))
+    angle = abs(left[:, j] @ right[:, k])
+    return complex(values[k]), 2e-16 * norm / max(float(angle), 1e-16)
+
+
+SIZES = {0: (1,), 1: (10, 20, 40, 80, 160), 2: (6, 9, 14, 21, 32, 44)}
+"""Functions of a noise, by how many dimensions all noises have together."""
+MODES = (16, 32, 64, 128, 256, 512)
+FEWER = {0: (1,), 1: (8, 12, 18, 26, 38, 54), 2: (5, 7, 10, 14)}
+"""Beside the modes of a Fourier series."""
+
+
+def moment_exponent(system: Planar, p, dimensions):
+    """Λ(p) for even p > 0, and how far it may be off; `dimensions` of the noises whose functions grow in number."""
+    return _settled(system.balanced(), p, [(int(p) // 2, size) for size in SIZES[dimensions]])
+
+
+def fourier_exponent(system: Planar, p, dimensions):
+    """Λ(p) for any p > −1, and how far it may be off."""
+    sizes = FEWER[dimensions]
+    return _settled(system.balanced(), p, [(m, sizes[min(i, len(sizes) - 1)]) for i, m in enumerate(MODES)])
+
+
+def lyapunov_exponent(system: Planar, dimensions):
+    """λ = ⟨u*, (dL/dp) 1⟩ with u*L(0) = 0, ⟨u*, 1⟩ = 1, and how far it may be off."""
+    system, sizes = system.balanced(), FEWER[dimensions]
+    last, found, off = math.nan, math.nan, math.inf
+    for i, modes in enumerate(MODES):
+        total, slope, one = system.generator(0.0, modes, sizes[min(i, len(sizes) - 1)])
+        if total.shape[0] > MOST:
+            break
+        at = int(np.argmax(np.abs(one)))
+        rows = total.T.tolil()
+        rows[at] = one[None, :] * float(np.abs(total).max())
+        right = np.zeros(one.size)
+        right[at] = float(np.abs(total).max())
+        found = float(splu(rows.tocsc()).solve(right) @ (slope @ one))
+        size = abs(found) + 1e-3 * float(np.linalg.norm(system.drift))
+        off = abs(found - last) + 1e-14 * size
+        if off <= CLOSE * size:
+            break
+        last = found
+    return found, off
+
+
+def _settled(system, p, sizes):
+    """Λ(p) by larger and larger sizes until two agree, and their difference with the rounding."""
+    last, value, off = math.nan, math.nan, math.inf
+    for modes, size in sizes:
+        matrix, _, _ = system.generator(p, modes, size)
+        if matrix.shape[0] > MOST:
+            break
+        try:
+            found, rounding = rightmost(matrix, None if math.isnan(last) else last)
+        except (ArpackError, RuntimeError):
+            continue
+        if abs(found.imag) > 1e-7 * (abs(found) + float(np.linalg.norm(system.drift))):
+            continue  # too few functions yet: Λ is real
+        value = found.real
+        unit = abs(value) + 1e-3 * float(np.linalg.norm(system.drift))
+        off = (abs(value - last) if len(sizes) > 1 else 0.0) + 10 * rounding
+        if off - 10 * rounding <= CLOSE * unit:
+            break
+        last = value
+    return value, off
