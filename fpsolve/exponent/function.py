@@ -287,7 +287,7 @@ def broken_convexity(
     above = others[None] - (value[:, None] + slope[:, None] * away)
     slack = 10 * (errors[:, None] + np.append(errors, 0.0)[None]) + 1e-6 * np.abs(others[None])
     if np.any(above < -slack):
-        steep = np.nan_to_num(slope_errors(), nan=0.0, posinf=1e300)
+        steep = np.nan_to_num(slope_errors(), nan=1e300)
         slack += 3 * steep[:, None] * np.abs(away)
     i, j = np.unravel_index(np.argmin(above + slack), above.shape)
     if not above[i, j] < -slack[i, j]:

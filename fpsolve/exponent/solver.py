@@ -124,7 +124,7 @@ class MomentLyapunov(Result):
 
     @cached_property
     def derivative_error(self) -> FloatArray:
-        """Estimate of |error of `derivative`|, shape (n,), which takes some solves; NaN where `derivative` is."""
+        """Estimate of |error of `derivative`|, shape (n,), which takes some solves; NaN where none is known."""
         if self.function is not None:
             return np.asarray(self.function.derivative_error(self.p))
         known = zip(self.p.tolist(), np.isfinite(self.derivative).tolist(), strict=True)
@@ -367,7 +367,7 @@ class ExponentSolver:
         return Estimate(solution.pair.value, solution.error, self.scale(p), quantity=quantity.moment_at(p))
 
     def slope_error(self, p: float) -> float:
-        """Estimate of |error of Λ′(p)|; infinite where it could not be told.
+        """Estimate of |error of Λ′(p)|; NaN where none is known.
 
         It is from the highest modes, see `error.slope_error`; where these do not tell, twice what a finer
         discretisation changes.
@@ -375,7 +375,7 @@ class ExponentSolver:
         if p == 0:
             return self.ratio_alone(0.0)[1]
         if self.classes:
-            return max(each.slope_error(p) for each in self.classes)
+            return float(np.max([each.slope_error(p) for each in self.classes]))
         solution = self.solution(p)
         pair = solution.pair
         with one_thread():
@@ -384,7 +384,7 @@ class ExponentSolver:
             try:
                 finer = self.near.finer_pair(pair, widened(pair.generator).enriched())
             except NotConverged:
-                return math.inf
+                return math.nan
         return 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
 
     @one_number("λ")
