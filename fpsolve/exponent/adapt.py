@@ -74,6 +74,8 @@ MARGIN = 0.6
 WIDER = 4.0
 COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
+SURELY_SEEN = 1e-6
+"""A tolerance below which cells are small enough for their highest modes to show what is in them."""
 A_THIRD_MORE = 4 / 3
 """What a budget may be exceeded by."""
 Tolerance = Callable[[float, float], float]
@@ -378,8 +380,28 @@ class _Search:
         for attempt in (self.from_start, self.from_nearest):
             start = attempt() or start
             if start is not None and self.place.meets(start, self.tolerance) and other_center(start.pair) is None:
-                return start
-        return self.place.searched(self, start)
+                return self.confirmed(start)
+        return self.confirmed(self.place.searched(self, start))
+
+    def confirmed(self, found: Solution) -> Solution:
+        """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
+
+        At a coarse tolerance a thin layer, as where T is only Hölder continuous, may lie within a cell that is so large
+        that no mode of it shows it.
+        """
+        chosen = found.pair.generator.chosen
+        if self.place.rtol < SURELY_SEEN or not isinstance(chosen.phase, PhaseCells):
+            return found
+        halved = replace(chosen, phase=chosen.phase.doubled())
+        if halved.size > self.place.budget.unknowns:
+            return found
+        finer = Solution(principal_pair(Generator(self.place.problem, halved), self.p, start=found.pair))
+        change = abs(finer.pair.value - found.pair.value)
+        if change <= found.error:
+            return found
+        if change + finer.error <= self.tolerance(self.p, finer.pair.value):
+            return replace(finer, search=finer.search + change)
+        return self.confirmed(finer)
 
     def from_start(self) -> Solution | None:
         """The solution with what was chosen for this p in the problem close by, or None."""

@@ -28,6 +28,8 @@ HALVING = 2 * math.log(2)
 """By how much more the logarithm of an effect falls with each degree in half a cell."""
 MAX_POLYNOMIALS = 200
 LEAST_DEGREE, SPLIT_DEGREE, MOST_DEGREE = 4, 6, 14
+STILL = 3 / 7
+"""Ratio of the effects of two and of four modes from which on no fall is seen: what is left may be 3 times the first."""
 SPARE = 1.0
 """Degrees beyond what seems to be enough that a cell keeps where none should be made coarser."""
 LITTLE = 1e-2
@@ -68,8 +70,13 @@ class ModeEffects:
 
     @property
     def of_cells(self) -> FloatArray:
-        """Estimate of what each cell lacks, half way from the effect of two modes to what its slower fall predicts."""
-        return self.two * np.clip(np.sqrt(self._left_by_two), self.slowest, 1.0)
+        """Estimate of what each cell lacks, half way from the effect of two modes to what its slower fall predicts.
+
+        Where e falls slowly, by r with two degrees, effects are its differences, (1/r − 1)e and (1/r² − 1)e of two and
+        four modes: of their ratio q is r = q/(1 − q), and e is q/(1 − 2q) times the effect of two.
+        """
+        of_two = np.minimum(self.two / np.maximum(self.highest[3], 1e-300), STILL)
+        return self.two * np.maximum(np.clip(np.sqrt(self._left_by_two), self.slowest, 1.0), of_two / (1 - 2 * of_two))
 
     @property
     def error(self) -> float:
