@@ -62,42 +62,44 @@ def drawn(seed: int) -> Drawn:
         driven = np.array([[0.0, 0.0], [-1.0, 0.0] if rng.random() < 0.6 else [0.0, -1.0]])
     size, rate = (float(each) for each in np.exp(rng.uniform((-1.2, -1.6), (1.6, 1.6))))
     terms = [CoefficientMatrix(0, steady), CoefficientMatrix(1, driven, identity, "first")]
-    jumps, law, made, moment = [], None, None, None
+    jumps, law, made, moment = [], None, None, None  # the last two are second methods, functions of a number of waves
+    plain, order = (steady, driven), int(p)
     if noise == "impulses":
         weights = (size * rng.uniform(-1.5, 1.5, int(rng.integers(1, 4)))).tolist()
-        law = Poisson(rate=rate, sizes=weights)
-        own = steady, driven, rate, weights, [1 / len(weights)] * len(weights)
-        made = lambda _: phase_circle.impulses(*own)  # noqa: E731
-        moment = lambda _: moment_hierarchy.impulses_exponent(*own, int(p))  # noqa: E731
+        law, own = Poisson(rate=rate, sizes=weights), (*plain, rate, weights, [1 / len(weights)] * len(weights))
+        made, moment = (
+            lambda _: phase_circle.impulses(*own),
+            lambda _: moment_hierarchy.impulses_exponent(*own, order),
+        )
     elif noise in ("ornstein-uhlenbeck", "wall"):
-        law = OrnsteinUhlenbeck(alpha=rate, sigma=size * math.sqrt(2 * rate))
-        made = lambda count: phase_circle.ornstein_uhlenbeck(steady, driven, rate, size, count)  # noqa: E731
-        moment = lambda count: moment_hierarchy.ornstein_uhlenbeck_exponent(  # noqa: E731
-            steady, driven, rate, size, int(p), 2 * count
+        law, own = OrnsteinUhlenbeck(alpha=rate, sigma=size * math.sqrt(2 * rate)), (*plain, rate, size)
+        made, moment = (
+            lambda count: phase_circle.ornstein_uhlenbeck(*own, count),
+            lambda count: moment_hierarchy.ornstein_uhlenbeck_exponent(*own, order, 2 * count),
         )
         if noise == "wall":
             jumps, moment = [Jump(math.pi / 2, math.log(rng.uniform(0.5, 0.95)))], None
     elif noise == "white":
-        law = White(s=size)
-        made = lambda _: phase_circle.white(steady, [size * driven])  # noqa: E731
-        moment = lambda _: moment_hierarchy.white_noise_exponent(steady, [size * driven], int(p))  # noqa: E731
-    elif noise == "sine-wiener":
-        law = SineWiener(amplitude=size, sigma=math.sqrt(2 * rate))
-        made = lambda count: phase_circle.bounded(steady, driven, size, 0.0, law.sigma, count)  # noqa: E731
-        moment = lambda count: moment_hierarchy.sine_wiener_exponent(  # noqa: E731
-            steady, driven, size, law.sigma, int(p), count
+        law, own = White(s=size), (steady, [size * driven])
+        made, moment = (
+            lambda _: phase_circle.white(*own),
+            lambda _: moment_hierarchy.white_noise_exponent(*own, order),
         )
-    elif noise == "bounded":
-        law = Bounded(mu=size, nu=rate, sigma=float(rng.uniform(0.2, 1.2)))
-        made = lambda count: phase_circle.bounded(steady, driven, size, rate, law.sigma, count)  # noqa: E731
-        moment = lambda count: moment_hierarchy.bounded_exponent(  # noqa: E731
-            steady, driven, size, rate, law.sigma, int(p), count
+    elif noise in ("sine-wiener", "bounded"):
+        nu, sigma = (0.0, math.sqrt(2 * rate)) if noise == "sine-wiener" else (rate, float(rng.uniform(0.2, 1.2)))
+        law = Bounded(mu=size, nu=nu, sigma=sigma) if nu else SineWiener(amplitude=size, sigma=sigma)
+        own = *plain, size, nu, sigma
+        made, moment = (
+            lambda count: phase_circle.bounded(*own, count),
+            lambda count: moment_hierarchy.bounded_exponent(*own, order, count),
         )
     elif noise == "telegraph":
         law = Telegraph(a=size, k=rate)
         own = [steady + xi * driven for xi in law.states], law.rates
-        made = lambda _: phase_circle.chain(*own)  # noqa: E731
-        moment = lambda _: moment_hierarchy.moment_lyapunov(*own, int(p))  # noqa: E731
+        made, moment = (
+            lambda _: phase_circle.chain(*own),
+            lambda _: moment_hierarchy.moment_lyapunov(*own, order),
+        )
     elif noise == "Eq. (7)":
         r0 = float(rng.uniform(0.5, 0.95))
         law = NonGaussianNoise(D0=0.5 * size**2 / rate * (5 - 3 * r0), tau0=1 / rate, r0=r0)
@@ -108,15 +110,14 @@ def drawn(seed: int) -> Drawn:
     factor = math.exp(jumps[0].log_factor) if jumps else 1.0
 
     def second(harmonics: int, count: int, near: float) -> float:
+        if moment is not None and p == 2:
+            return moment(count)
         if p == 0:
             return phase_circle.lyapunov_exponent(made(count), harmonics, factor)
         return phase_circle.moment_exponent(made(count), p, harmonics, factor, near)
 
-    if moment is not None and p == 2:
-        second = lambda _, count, near: moment(count)  # noqa: E731
-    elif made is None or seed % 4:
-        second = None
-    return Drawn(f"{kind}, {noise}", problem, p, rtol, second)
+    is_asked = made is not None and (seed % 4 == 0 or (moment is not None and p == 2))
+    return Drawn(f"{kind}, {noise}", problem, p, rtol, second if is_asked else None)
 
 
 @dataclass(frozen=True)
@@ -182,9 +183,7 @@ def compared(seed: int) -> Outcome:
         coarse, last = (case.second(harmonics, harmonics // 2, known + 1e-6) for harmonics in sizes)
         if abs(last - coarse) < 0.3 * stated:
             other, other_doubt = abs(value - last), abs(last - coarse)
-    return Outcome(
-        case.kind, case.p, case.rtol, value, stated, abs(value - known), doubt, other, other_doubt, seconds
-    )
+    return Outcome(case.kind, case.p, case.rtol, value, stated, abs(value - known), doubt, other, other_doubt, seconds)
 
 
 def main(first: int = 1, last: int = 2000) -> int:

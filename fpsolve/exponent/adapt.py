@@ -386,11 +386,12 @@ class _Search:
     def confirmed(self, found: Solution) -> Solution:
         """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
 
-        At a coarse tolerance a thin layer, as where T is only Hölder continuous, may lie within a cell that is so large
-        that no mode of it shows it.
+        At a coarse tolerance a thin layer of T, where that is not analytic, may lie within a cell that is so large that
+        none of its modes shows it.
         """
-        chosen = found.pair.generator.chosen
-        if self.place.rtol < SURELY_SEEN or not isinstance(chosen.phase, PhaseCells):
+        generator = found.pair.generator
+        chosen, is_planar = generator.chosen, isinstance(generator.chosen.phase, PhaseCells)
+        if self.place.rtol < SURELY_SEEN or not (is_planar and generator.phi.slowest):
             return found
         halved = replace(chosen, phase=chosen.phase.doubled())
         if halved.size > self.place.budget.unknowns:

@@ -29,7 +29,7 @@ HALVING = 2 * math.log(2)
 MAX_POLYNOMIALS = 200
 LEAST_DEGREE, SPLIT_DEGREE, MOST_DEGREE = 4, 6, 14
 STILL = 3 / 7
-"""Ratio of the effects of two and of four modes from which on no fall is seen: what is left may be 3 times the first."""
+"""Ratio of the effects of two and of four modes where no fall is seen: then thrice the first may be left."""
 SPARE = 1.0
 """Degrees beyond what seems to be enough that a cell keeps where none should be made coarser."""
 LITTLE = 1e-2
