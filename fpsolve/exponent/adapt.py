@@ -396,7 +396,7 @@ class _Search:
         halved = replace(chosen, phase=chosen.phase.doubled())
         if halved.size > self.place.budget.unknowns:
             return found
-        finer = Solution(principal_pair(Generator(self.place.problem, halved), self.p, start=found.pair))
+        finer = Solution(self.place.pair_on(Generator(self.place.problem, halved), self.p, found.pair))
         change = abs(finer.pair.value - found.pair.value)
         if change <= found.error:
             return found
