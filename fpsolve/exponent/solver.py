@@ -372,22 +372,19 @@ class ExponentSolver:
         It is from the highest modes, see `error.slope_error`; where these do not tell, twice what a finer
         discretisation changes.
         """
-        if p == 0:
-            return self.ratio_alone(0.0)[1]
-        if self.classes:
-            return float(np.max([each.slope_error(p) for each in self.classes]))
-        solution = self.solution(p)
-        pair = solution.pair
-        with one_thread():
-            if solution.modes_tell:
-                return slope_error(pair)
-            try:
-                finer = self.near.finer_pair(pair, widened(pair.generator).enriched())
-            except NotConverged:
-                return math.nan
-        return 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
+        with suppress(NotConverged):
+            if p == 0:
+                return self.ratio_alone(0.0)[1]
+            if self.classes:
+                return float(np.max([each.slope_error(p) for each in self.classes]))
+            solution = self.solution(p)
+            with one_thread():
+                if solution.modes_tell:
+                    return slope_error(solution.pair)
+                finer = self.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
+                return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair)
+        return math.nan
 
-    @one_number("λ")
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
         value, error = self.ratio_alone(0.0)
