@@ -9,7 +9,8 @@ stated error and the doubt of the second method together, or than 4 standard err
 
 The drift is that of an oscillator, a saddle, a node, an overdamped or free motion, one whose matrix is far from normal,
 or nilpotent; noise is weak to strong and slow to fast; the unit of time is 1e-4 to 1e4, and half of the systems are
-stated in (x, dx/dt) of that unit. Two of three systems are under one noise. Half of them are solved for all p at once, the others for each p alone.
+stated in (x, dx/dt) of that unit. Two of three systems are under one noise. Half of them are solved for all p at once,
+the others for each p alone.
 """
 
 from __future__ import annotations
@@ -232,10 +233,12 @@ def _between(low: float, high: float, rng: np.random.Generator) -> float:
     return float(np.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def solved(
-    problem: Problem, orders: tuple[float, ...], is_joint: bool, rtol: float
-) -> Iterator[tuple[float, float, float, str]]:
-    """Λ(p) by fpsolve, at all p at once or at each alone, the error, the seconds, and why it is refused."""
+Found = tuple[float, float, float, str]
+"""A number by fpsolve, its error, the seconds, and why it is refused."""
+
+
+def solved(problem: Problem, orders: tuple[float, ...], is_joint: bool, rtol: float) -> Iterator[Found]:
+    """Λ(p), at all p at once or at each alone."""
     for group in [orders] if is_joint else [(p,) for p in orders]:
         started, reason = time.process_time(), ""
         try:
@@ -245,12 +248,13 @@ def solved(
         except FpsolveError as failure:
             found, reason = None, str(failure)
         seconds = (time.process_time() - started) / len(group)
-        given = (
-            {} if found is None else dict(zip(found.p.tolist(), zip(found.value, found.error_estimate), strict=True))
-        )
+        given = [] if found is None else found.p.tolist()
         for p in group:
-            value, error = given.get(p, (math.nan, math.nan))
-            yield float(value), float(error), seconds, "" if p in given else _own(reason, p) or "not given"
+            if p in given:
+                at = given.index(p)
+                yield float(found.value[at]), float(found.error_estimate[at]), seconds, ""
+            else:
+                yield math.nan, math.nan, seconds, _own(reason, p) or "not given"
 
 
 def _own(reason: str, p: float) -> str:
@@ -259,8 +263,8 @@ def _own(reason: str, p: float) -> str:
     return lines[0] if lines else ""
 
 
-def growth(problem: Problem, rtol: float) -> tuple[float, float, float, str]:
-    """λ by fpsolve, the error, the seconds, and why it is refused."""
+def growth(problem: Problem, rtol: float) -> Found:
+    """λ."""
     started, value, error, reason = time.process_time(), math.nan, math.nan, ""
     try:
         found = lyapunov_exponent(problem, rtol=rtol, budget=Budget(seconds=SECONDS))
@@ -287,11 +291,9 @@ def numbers(system: Drawn, seed: int, *, is_simulated: bool = True, has_others: 
         truth, doubt = planar.lyapunov_exponent(system.known, system.dimensions)
         yield _number("λ", rate, truth / system.unit, doubt / system.unit, "Fourier")
     elif is_simulated:
-        values = simulated(system.problem)
-        for name, own, pair in zip(
-            (*(f"Λ({p:g})" for p in OTHERS), "λ"), (*map(found.get, OTHERS), rate), values, strict=True
-        ):
-            yield _number(name, own, *pair, "simulation", DEVIATIONS)
+        names, own = (*(f"Λ({p:g})" for p in OTHERS), "λ"), (*map(found.get, OTHERS), rate)
+        for name, each, pair in zip(names, own, simulated(system.problem), strict=True):
+            yield _number(name, each, *pair, "simulation", DEVIATIONS)
 
 
 def _number(name, found, truth, doubt, method, deviations=1.0) -> Number:
@@ -337,9 +339,7 @@ def main() -> int:
             seconds.append(each.seconds)
             wrong[each.method] += each.is_wrong
             refused[each.method] += bool(each.reason)
-            unknown[each.method] += (
-                not each.doubt < 1e-3 * (abs(each.truth) + each.stated) and each.method != "simulation"
-            )
+            unknown[each.method] += not each.doubt < (1e-3 if each.method != "simulation" else 1.0) * abs(each.truth)
             if each.is_wrong or each.reason:
                 print(f"{seed} {system.name}: {each}", flush=True)
         oracle += time.process_time() - started

@@ -33,7 +33,8 @@ def test_moments_of_two_noises_are_those_of_three_sizes():
         ),
     )
     value, doubt = planar.moment_exponent(known, 4, 2)
-    assert value == pytest.approx(-3.734143931469, abs=1e-11) and doubt < 1e-10
+    assert value == pytest.approx(-3.734143931469, abs=1e-11)
+    assert doubt < 1e-10
 
 
 @pytest.mark.parametrize("p", [2, 4, 6])
@@ -51,7 +52,8 @@ def test_moments_are_those_of_monomials(p):
     for dimensions, kinds in coloured.items():
         for noise, other, more in kinds:
             found, doubt = planar.moment_exponent(planar.Planar(STEADY, ((DRIVEN, noise),)), p, dimensions)
-            assert found == pytest.approx(other(STEADY, DRIVEN, *more), abs=1e-9) and doubt < 1e-9
+            assert found == pytest.approx(other(STEADY, DRIVEN, *more), abs=1e-9)
+            assert doubt < 1e-9
     jumping = planar.Planar(STEADY, ((DRIVEN, planar.chain(states, rates)),))
     expected = moment_hierarchy.moment_lyapunov([STEADY + xi * DRIVEN for xi in states], generator, p)
     assert planar.moment_exponent(jumping, p, 0)[0] == pytest.approx(expected, abs=1e-11)

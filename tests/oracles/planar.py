@@ -1,11 +1,11 @@
-"""Λ(p) and λ of linear systems in the plane under one or two noises of any kind: Fourier series in φ times functions of
-each noise.
+"""Λ(p) and λ of linear systems in the plane under one or two noises of any kind, by Fourier series in φ times functions.
 
-With x = a (cos φ, −sin φ) a matrix A moves a^p T(φ) by X = h ∂φ + p q, h = e′ᵀA e, q = eᵀA e. On exp(2inφ), |n| ≤ M, the
-generator is X₀ + ½ Σ X_k² + rate ⟨exp(w X) − 1⟩ + Σ ξ_k X_k + Σ L_k, with ξ_k and L_k on functions that are orthonormal
-in the stationary law of a noise. For even p the 2M + 1 = p + 1 functions a^p exp(2inφ), |n| ≤ p/2, are the homogeneous
-polynomials of degree p, on which all of it is closed: the equations of the moments of even order. Λ(p) is the rightmost
-eigenvalue, of small matrices that of all, of large ones that nearest to a shift on the right of the spectrum.
+With x = a (cos φ, −sin φ) a matrix A moves a^p T(φ) by X = h ∂φ + p q, h = e′ᵀA e, q = eᵀA e. On exp(2inφ), |n| ≤ M,
+the generator is X₀ + ½ Σ X_k² + rate ⟨exp(w X) − 1⟩ + Σ ξ_k X_k + Σ L_k, with ξ_k and L_k on functions that are
+orthonormal in the stationary law of a noise. For even p the 2M + 1 = p + 1 functions a^p exp(2inφ), |n| ≤ p/2, are the
+homogeneous polynomials of degree p, on which all of it is closed: the equations of the moments of even order. Λ(p) is
+the rightmost eigenvalue, of small matrices that of all, of large ones that nearest to a shift on the right of the
+spectrum.
 """
 
 import math
