@@ -40,7 +40,7 @@ from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, rea
 from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import STRICT, parameter
-from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, Problem
+from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, Problem
 from fpsolve.model.quantity import RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
@@ -59,7 +59,10 @@ QUANTITY_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS, RESPONSE, RATE_FUN
 EVERYTHING = "all"
 """What stands for all of these."""
 _LARGEST = 1e30
-WANTED = f"wanted relative error; if omitted {RTOL_BEYOND_PLANE:g} for more than two variables"
+WANTED = (
+    f"wanted relative error; if omitted {RTOL_OF_SEVERAL:g} under two noises that are not white, "
+    f"{RTOL_BEYOND_PLANE:g} for more than two variables"
+)
 _APART = 1e-9
 """How far the ends of an axis are from each other at least, relative to their size."""
 MOST_NAMED = 8

@@ -59,8 +59,8 @@ class MomentLyapunovFunction(Result):
         oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
         interval: the smallest and the largest p.
         mesh: a mesh for all p; None chooses one for each p that meets rtol.
-        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, for more than two
-            variables 1e-5.
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, under two noises
+            that are not white 1e-6, for more than two variables 1e-5.
         budget: what the choice of a mesh may cost for one p; None for the default one.
         among: p to choose the nodes from, so that those solved are of use; None for the best ones.
         solver: one of the same problem, to go on with; it decides the mesh, rtol and the budget.
@@ -376,8 +376,8 @@ def moment_lyapunov(
     Args:
         oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
         p: one moment, or an array of shape (n,).
-        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, for more than two
-            variables 1e-5.
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, under two noises
+            that are not white 1e-6, for more than two variables 1e-5.
         mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
         budget: what the choice of a mesh may cost; None for the default one.
 

@@ -48,8 +48,8 @@ RATE = "1/time"
 """The unit of ξ for which those of parameters of noises are stated."""
 PHASES = 360
 """At which it is seen which way the phase passes them."""
-RTOL, RTOL_BEYOND_PLANE = 1e-8, 1e-5
-"""The relative error that is wanted where a case names none: of two variables, and of more."""
+RTOL, RTOL_OF_SEVERAL, RTOL_BEYOND_PLANE = 1e-8, 1e-6, 1e-5
+"""The relative error wanted where a case names none: of two variables, the same under two noises, and of more."""
 EVERY_RAY = (0.0,)
 """What stands for all rays."""
 SUPPORT = np.linspace(-12, 12, 2401)
@@ -157,7 +157,9 @@ class Problem:
     @property
     def usual_rtol(self) -> float:
         """The relative error that is wanted where none is named."""
-        return RTOL if self.dimension == 2 else RTOL_BEYOND_PLANE
+        if self.dimension > 2:
+            return RTOL_BEYOND_PLANE
+        return RTOL_OF_SEVERAL if len(self.coloured.parts) > 1 else RTOL
 
     def wanted(self, rtol: float | None) -> float:
         """A relative error that is given, or the usual one."""
