@@ -76,6 +76,8 @@ COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
 SURELY_SEEN = 1e-6
 """A tolerance below which cells are small enough for their highest modes to show what is in them."""
+MOST_HALVED = 20_000
+"""Unknowns of a system on halved cells that is solved for that: beyond, cells are many, and it takes long."""
 A_THIRD_MORE = 4 / 3
 """What a budget may be exceeded by."""
 Tolerance = Callable[[float, float], float]
@@ -386,15 +388,14 @@ class _Search:
     def confirmed(self, found: Solution) -> Solution:
         """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
 
-        At a coarse tolerance a thin layer of T, where that is not analytic, may lie within a cell that is so large that
+        At a coarse tolerance a thin layer of T, as where the phase rests, may lie within a cell that is so large that
         none of its modes shows it.
         """
-        generator = found.pair.generator
-        chosen, is_planar = generator.chosen, isinstance(generator.chosen.phase, PhaseCells)
-        if self.place.rtol < SURELY_SEEN or not (is_planar and generator.phi.slowest):
+        chosen = found.pair.generator.chosen
+        if self.place.rtol < SURELY_SEEN or not isinstance(chosen.phase, PhaseCells):
             return found
         halved = replace(chosen, phase=chosen.phase.doubled())
-        if halved.size > self.place.budget.unknowns:
+        if halved.size > min(MOST_HALVED, self.place.budget.unknowns):
             return found
         finer = Solution(self.place.pair_on(Generator(self.place.problem, halved), self.p, found.pair))
         change = abs(finer.pair.value - found.pair.value)

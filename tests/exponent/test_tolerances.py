@@ -8,9 +8,9 @@ from tests.conftest import sampled
 from tests.random_tolerances import MOST, compared
 
 
-@pytest.mark.parametrize("seed", sampled(272, 380, 1486, 2, 12, 31, 50, keep=3))
+@pytest.mark.parametrize("seed", sampled(272, 380, 1486, 491, 2, 12, 31, 50, keep=4))
 def test_random_tolerances(seed):
-    """Many more: `python -m tests.random_tolerances`. In the first three a layer of T lay within a cell of φ."""
+    """Many more: `python -m tests.random_tolerances`. In the first four a layer of T lay within a cell of φ."""
     assert (found := compared(seed)).share <= MOST, found
 
 
