@@ -13,8 +13,8 @@ from scipy import sparse
 from tests.oracles.moment_hierarchy import rates_of_monomials
 
 
-def equations(steady, driven, law, p, count):
-    """Their sparse matrix with j + k < count, monomials fastest; `law` is (ω, ζ, s, c₀, c₁)."""
+def equations(steady, driven, law, p, count, rates=rates_of_monomials):
+    """Their sparse matrix with j + k < count, monomials fastest; `law` is (ω, ζ, s, c₀, c₁), `rates` K of a matrix."""
     omega, zeta, s, c0, c1 = law
     deviation = s / math.sqrt(4 * zeta * omega**3)
     lower = sparse.diags_array(np.sqrt(np.arange(1.0, count)), offsets=1)  # He_j′ = √j He_(j−1)
@@ -25,15 +25,29 @@ def equations(steady, driven, law, p, count):
     j, k = np.divmod(np.arange(count**2), count)
     kept = np.flatnonzero(j + k < count)
     xi, filtered = (sparse.csr_array(m)[kept][:, kept] for m in (deviation * (c0 * u + c1 * omega * w), filtered))
-    resting, moving = rates_of_monomials(steady, p), rates_of_monomials(driven, p)
+    resting, moving = rates(steady, p), rates(driven, p)
     one = sparse.eye_array(kept.size)
     # E[m h] for all h, the transpose of what moves h
-    return sparse.kron(one, resting) + sparse.kron(xi.T, moving) + sparse.kron(filtered.T, sparse.eye_array(p + 1))
+    return (
+        sparse.kron(one, resting) + sparse.kron(xi.T, moving) + sparse.kron(filtered.T, sparse.eye_array(len(resting)))
+    )
 
 
 def moment_lyapunov(steady, driven, law, p, count):
     """Λ(p): the rightmost eigenvalue."""
     return float(np.max(np.linalg.eigvals(equations(steady, driven, law, p, count).toarray()).real))
+
+
+def products(matrix, _):
+    """K for all xᵢxⱼ of any number of variables."""
+    one = np.eye(len(matrix))
+    return np.kron(matrix, one) + np.kron(one, matrix)
+
+
+def second_moment(steady, driven, law, count):
+    """Λ(2) for any number of variables."""
+    total = equations(np.array(steady), np.array(driven), law, 2, count, products).toarray()
+    return float(np.max(np.linalg.eigvals(total).real))
 
 
 def strength(omega, zeta, c0, c1, deviation):
