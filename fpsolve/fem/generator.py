@@ -22,7 +22,6 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.rings import Ring
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.plane import (
-    angular_frequency,
     phase_speed,
 )
 from fpsolve.model.problem import ParameterDerivative, Problem
@@ -207,7 +206,7 @@ class Generator:
     @property
     def unit_rate(self) -> float:
         """The system's own unit of rates, ω."""
-        return angular_frequency(self.problem.motion)
+        return self.problem.unit_rate
 
     @cached_property
     def loss(self) -> float:

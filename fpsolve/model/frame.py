@@ -125,25 +125,26 @@ def is_free(term: CoefficientMatrix) -> bool:
 
 
 def own_frame(
+    n: int,
     drift: Sequence[CoefficientMatrix],
     diffusions: Sequence[CoefficientMatrix],
     impulses: Sequence[Impulse],
     epsilon: float,
     spread: Callable[[str], tuple[float, float]],
-) -> Frame | None:
-    """The frame in which a motion is small; None where x itself is hardly worse.
+) -> tuple[Frame | None, float]:
+    """The frame in which a motion is small, None where x itself is hardly worse; and its size there, a rate.
 
-    Its size is ‖A‖ + Σ‖B‖² + Σ r‖C‖ + Σ min(s‖D‖, τs²‖D‖²), A all that no noise drives, B of white noise, C of impulses
+    That is ‖A‖ + Σ‖B‖² + Σ r‖C‖ + Σ min(s‖D‖, τs²‖D‖²), A all that no noise drives, B of white noise, C of impulses
     at the rate r, D of noise with the standard deviation s and the correlation time τ: what the rates of growth and of
     the phase may be. In a frame in which the order 0 is growth and a uniform rotation the phase is the smoothest, so
-    that this one is taken where there is one and the size hardly larger.
+    that this one is taken where there is one and the size hardly larger; else other scales if these suffice.
 
     Args:
+        n: the dimension of the state.
         drift, diffusions, impulses: what moves the state along a path of ξ, by white noise, and at random times.
         epsilon: ε.
         spread: by the name of a noise the standard deviation of ξ and about how long it remembers its value.
     """
-    n = len(drift[0].matrix)
     sums = dict[str | None, FloatArray]()
     for term in drift:
         for name, c in zip((None, term.noise), affine(term.g) or (0.0, 1.0), strict=True):
@@ -163,26 +164,28 @@ def own_frame(
         return float(linear @ norms + square @ norms**2 + strengths @ np.minimum(1.0, strengths * times))
 
     own = best = np.eye(n)
-    least, steps = size(own), [own + step for step in _steps(n)]
-    for _ in range(MOST_STEPS):
-        found, number = min((size(best @ step), k) for k, step in enumerate(steps))
-        if not found < BARELY * least:
-            break
-        least, best = found, best @ steps[number]
-    else:  # as what is nilpotent, which is as small as one likes
-        least, best = size(own), own
-    choice = [own, best]
+    least, choice = size(own), [own]
+    for is_scaling in (True, False):
+        steps = [own + step for step in _steps(n, is_scaling)]
+        for _ in range(MOST_STEPS):
+            found, number = min((size(best @ step), k) for k, step in enumerate(steps))
+            if not found < BARELY * least:
+                break
+            least, best = found, best @ steps[number]
+        else:  # as what is nilpotent, which is as small as one likes
+            least, best = size(own), own
+        choice.append(best)
     if n == 2 and (rotating := rotating_coordinates(np.reshape(_free(drift), (2, 2)))) is not None:
         (first, _), (lower, last) = rotating
         choice.insert(0, np.array([[1.0, 0.0], [lower / first, last / abs(first)]]))
     chosen = next((each for each in choice if size(each) <= HARDLY * least), own)
-    return None if np.array_equal(chosen, own) else Frame(tuple(map(tuple, chosen.tolist())))
+    return None if np.array_equal(chosen, own) else Frame(tuple(map(tuple, chosen.tolist()))), least
 
 
-def _steps(n: int) -> Iterator[FloatArray]:
-    """What is added to 1 for the factors of S that are tried: y_i twice or half, or with half of y_j more or less."""
+def _steps(n: int, is_scaling: bool) -> Iterator[FloatArray]:
+    """What is added to 1 for the factors of S that are tried: y_i twice or half, and with half of y_j more or less."""
     for i in range(1, n):
-        for j in range(i + 1):
+        for j in range(i if is_scaling else 0, i + 1):
             for size in (1.0, -0.5) if i == j else (0.5, -0.5):
                 step = np.zeros((n, n))
                 step[i, j] = size

@@ -26,6 +26,7 @@ from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import Parameter, Parametrised
 from fpsolve.model.plane import (
     CoefficientMatrix,
+    Harmonics,
     Impulse,
     ImpulseDerivative,
     Jump,
@@ -33,14 +34,16 @@ from fpsolve.model.plane import (
     System,
     Xi,
     affine,
+    angular_frequency,
     combined,
     is_driven,
+    matrix_at,
     moves_phase,
     phase_speed,
     turning,
 )
 from fpsolve.model.quantity import NOISE, Quantity
-from fpsolve.model.subsystem import ROUNDED, TURN, Subsystem, components, couplings, hidden_blocks, reached, subsystems
+from fpsolve.model.subsystem import ROUNDED, Subsystem, components, couplings, hidden_blocks, reached, subsystems
 
 P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
@@ -50,8 +53,6 @@ PHASES = 360
 """At which it is seen which way the phase passes them."""
 RTOL, RTOL_OF_SEVERAL, RTOL_BEYOND_PLANE = 1e-8, 1e-6, 1e-5
 """The relative error wanted where a case names none: of two variables, the same under two noises, and of more."""
-EVERY_RAY = (0.0,)
-"""What stands for all rays."""
 SUPPORT = np.linspace(-12, 12, 2401)
 """In standard deviations, where a coefficient of noise is looked at."""
 LINE = 90
@@ -234,8 +235,18 @@ class Problem:
     @cached_property
     def frame(self) -> Frame | None:
         """The coordinates that it is solved in where these are not x itself."""
+        return self._own[0]
+
+    @property
+    def size(self) -> float:
+        """How fast it moves there at most, about, by all that moves it."""
+        return self._own[1]
+
+    @cached_property
+    def _own(self) -> tuple[Frame | None, float]:
         drift, diffusions = self._moved
         return own_frame(
+            self.dimension,
             drift.terms,
             diffusions,
             self._struck,
@@ -271,6 +282,12 @@ class Problem:
         rays = self._resting
         return rays if self.frame is None or not rays else tuple((self.frame.own_phase(rays) % math.pi).tolist())
 
+    @property
+    def unit_rate(self) -> float:
+        """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
+        has_own = np.any(matrix_at(self.motion, 0.0, slice(0, 1)))
+        return angular_frequency(self.motion) if has_own else self.size or 1.0
+
     @cached_property
     def _resting(self) -> tuple[float, ...]:
         """The phases of the `invariant_rays` in the coordinates of `frame`."""
@@ -286,13 +303,8 @@ class Problem:
             )
             if abs(b - c) > math.hypot(a - d, b + c) * (1 + 1e-12):
                 return ()
-        jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
-        matrices = [*map(np.array, jolts), *self._by_noise(terms)]
-        limits = [ROUNDED * float(np.linalg.norm(each)) for each in matrices]
-        pairs = zip(map(turning, matrices), limits, strict=True)
-        turns = [(speed, limit) for speed, limit in pairs if abs(speed.mean) + speed.amplitude > limit]
-        if not turns:
-            return EVERY_RAY
+        if not (turns := self._turns):
+            return (0.0,)
         first, _ = turns[0]
         if abs(first.mean) > first.amplitude * (1 + 1e-12):
             return ()
@@ -300,6 +312,14 @@ class Problem:
         away = math.acos(min(max(-first.mean / first.amplitude, -1.0), 1.0))
         found = {0.5 * (middle + away) % math.pi, 0.5 * (middle - away) % math.pi}
         return tuple(phi for phi in sorted(found) if all(abs(float(speed(phi))) <= limit for speed, limit in turns))
+
+    @cached_property
+    def _turns(self) -> list[tuple[Harmonics, float]]:
+        """The speeds of the phase by all that moves it at all, and what is rounding in each, in these coordinates."""
+        jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
+        matrices = [*map(np.array, jolts), *self._by_noise(self.motion.terms)]
+        pairs = [(turning(each), ROUNDED * float(np.linalg.norm(each))) for each in matrices]
+        return [(speed, limit) for speed, limit in pairs if abs(speed.mean) + speed.amplitude > limit]
 
     @cached_property
     def has_cones(self) -> bool:
@@ -345,14 +365,14 @@ class Problem:
                 own, groups, rounded = hidden_blocks([inverse @ each @ basis for each in matrices])
                 basis = basis @ own
                 names = [f"y{'₁₂₃₄'[k]}" for k in range(n)]
-            return subsystems(self.system, basis, groups, names, rounded) if len(groups) > 1 else ()
+            return subsystems(self.system, basis, groups, names, rounded, self.size) if len(groups) > 1 else ()
         if not (rays := self._resting):
             return ()
         phases = np.array(rays if len(rays) == 2 else (rays[0], rays[0] + math.pi / 2))
         basis = np.stack([np.cos(phases), -np.sin(phases)])
         basis = basis if self.frame is None else np.array(self.frame.matrix) @ basis
-        found = subsystems(self.system, basis, [(0,), (1,)], ("", ""), ROUNDED)
-        return found[:1] if rays == EVERY_RAY else found
+        found = subsystems(self.system, basis, [(0,), (1,)], ("", ""), ROUNDED, self.size)
+        return found if self._turns else found[:1]
 
     @cached_property
     def classes(self) -> tuple[Problem, ...]:
@@ -409,7 +429,7 @@ class Problem:
 
         As for these the system is ẋ = (θ a₁ + (1 − θ) a₂ + J) x, J a uniform rotation.
         """
-        terms, pairs = [TURN], ((share, first), (1 - share, second))
+        terms, pairs = [first.system.terms[0]], ((share, first), (1 - share, second))
         for size, each in pairs:
             terms += [replace(term, matrix=(size * np.array(term.matrix)).tolist()) for term in each.system.terms[1:]]
         system = LinearMotion(self.system.epsilon, tuple(terms))

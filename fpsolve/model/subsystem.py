@@ -6,6 +6,7 @@ Where all matrices of a system are block triangular in coordinates x = Σ V_k y_
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,8 +23,6 @@ ROUNDED = 1e-12
 """Share of a matrix that is rounding, in the coordinates of rays, and for eigenvectors times their condition."""
 WORST_CONDITION = 100.0
 """Of eigenvectors in which blocks are looked for."""
-TURN = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0)))
-"""A uniform rotation, which leaves ‖x‖ alone."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +35,7 @@ class Subsystem(System):
         own: the columns that are V_k.
         names: what its coordinates are called.
         rounded: share of a matrix in these coordinates that is rounding: 0 where they are variables of the system.
+        size: about how fast the system moves, the speed of that rotation is a power of four below it.
     """
 
     whole: System
@@ -43,6 +43,7 @@ class Subsystem(System):
     own: tuple[int, ...]
     names: tuple[str, ...]
     rounded: float = 0.0
+    size: float = 1.0
 
     @property
     def is_scalar(self) -> bool:
@@ -55,7 +56,10 @@ class Subsystem(System):
 
     @cached_property
     def terms(self) -> Sequence[CoefficientMatrix]:  # type: ignore[override]
-        return (*[TURN] * self.is_scalar, *self.part(self.whole.terms))
+        if not self.is_scalar:
+            return self.part(self.whole.terms)
+        speed = 4.0 ** math.floor(math.log(self.size or 1.0, 4))
+        return CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0))), *self.part(self.whole.terms)
 
     @property
     def jumps(self) -> Sequence[Jump]:  # type: ignore[override]
@@ -116,11 +120,16 @@ class Subsystem(System):
 
 
 def subsystems(
-    whole: System, basis: FloatArray, groups: Sequence[tuple[int, ...]], names: Sequence[str], rounded: float = 0.0
+    whole: System,
+    basis: FloatArray,
+    groups: Sequence[tuple[int, ...]],
+    names: Sequence[str],
+    rounded: float,
+    size: float,
 ) -> tuple[Subsystem, ...]:
     """The blocks of a system in coordinates x = Σ V_k y_k, from groups of columns of a basis, and the names of all."""
     sides = tuple(map(tuple, basis.tolist()))
-    return tuple(Subsystem(whole, sides, own, tuple(names[k] for k in own), rounded) for own in groups)
+    return tuple(Subsystem(whole, sides, own, tuple(names[k] for k in own), rounded, size) for own in groups)
 
 
 def couplings(blocks: Sequence[Subsystem], matrices: Sequence[FloatArray]) -> NDArray[np.bool_]:

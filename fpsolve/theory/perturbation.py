@@ -25,7 +25,6 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.plane import (
     Harmonics,
     affine,
-    angular_frequency,
     matrix_at,
     rotating_coordinates,
     squared_frequency,
@@ -258,7 +257,7 @@ def scale_of(problem: Problem) -> Scale:
             typical = np.asarray(term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
             driven = size * float(np.sqrt(np.mean(typical**2)))
         of_noises[term.noise] = of_noises.get(term.noise, 0.0) + driven
-    jumps = sum(abs(jump.log_factor) for jump in system.jumps) * angular_frequency(system) / math.pi
+    jumps = sum(abs(jump.log_factor) for jump in system.jumps) * problem.unit_rate / math.pi
     driven = 0.0
     for name, size in of_noises.items():
         driven += size * min(1.0, size * problem.named_noise(name).correlation_time) if size else 0.0
@@ -269,7 +268,7 @@ def scale_of(problem: Problem) -> Scale:
     sizes = Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
     theory = second_order_or_none(problem)
     found = theory.scale if theory and theory.scale.moment(2.0) <= sizes.moment(2.0) else sizes
-    return replace(found, linear=found.linear or found.quadratic or angular_frequency(system))  # λ may be 0 exactly
+    return replace(found, linear=found.linear or found.quadratic or problem.unit_rate)  # λ may be 0 exactly
 
 
 def _growth(matrix: Any, frame: FloatArray) -> Harmonics:
