@@ -1,4 +1,4 @@
-"""Λ(p) and λ of linear systems in the plane under one or two noises of any kind, by Fourier series in φ times functions.
+"""Λ(p) and λ of linear systems in the plane under noises of any kind, by Fourier series in φ times functions.
 
 With x = a (cos φ, −sin φ) a matrix A moves a^p T(φ) by X = h ∂φ + p q, h = e′ᵀA e, q = eᵀA e. On exp(2inφ), |n| ≤ M,
 the generator is X₀ + ½ Σ X_k² + rate ⟨exp(w X) − 1⟩ + Σ ξ_k X_k + Σ L_k, with ξ_k and L_k on functions that are
@@ -80,6 +80,7 @@ def circle(amplitude, nu, sigma):
     """ξ = amplitude cos θ, dθ = ν dt + σ dW, by 1, √2 cos kθ, √2 sin kθ."""
 
     def made(size):
+        size = 2 + size // 2
         decay, turn, up = np.zeros(2 * size + 1), np.zeros((2 * size + 1,) * 2), np.zeros((2 * size + 1,) * 2)
         for k in range(1, size + 1):
             c, s = 2 * k - 1, 2 * k
@@ -188,20 +189,24 @@ class Planar:
 def phases(matrix, p, modes):
     """X of A and its ∂/∂p on 1, √2 cos 2nφ, √2 sin 2nφ, n ≤ modes."""
     (a, b), (c, d) = np.asarray(matrix, dtype=float)
-    count = 2 * modes + 1
-    derivative, up, over = np.zeros((count, count)), np.zeros((count, count)), np.zeros((count, count))
-    n = np.arange(1, modes + 1)
-    derivative[2 * n, 2 * n - 1], derivative[2 * n - 1, 2 * n] = -2.0 * n, 2.0 * n
-    n = n[:-1]
-    up[2 * n + 1, 2 * n - 1] = up[2 * n + 2, 2 * n] = 0.5  # of cos 2φ: cos → cos, sin → sin
-    over[2 * n + 2, 2 * n - 1], over[2 * n + 1, 2 * n] = 0.5, -0.5  # of sin 2φ: cos → sin, sin → −cos
-    if modes:
-        up[1, 0] = over[2, 0] = math.sqrt(0.5)
-    one, cosine, sine = np.eye(count), up + up.T, over + over.T
+    count, n = 2 * modes + 1, np.arange(1, modes + 1)
+    derivative = _entries(count, [(2 * n, 2 * n - 1, -2.0 * n), (2 * n - 1, 2 * n, 2.0 * n)])
+    n, root = n[:-1], math.sqrt(0.5) * np.ones(min(modes, 1))
+    first, zero, half = np.ones_like(root, dtype=int), np.zeros_like(root, dtype=int), 0.5 * np.ones(n.size)
+    # times cos 2φ cos goes to cos and sin to sin, times sin 2φ cos goes to sin and sin to −cos
+    up = _entries(count, [(2 * n + 1, 2 * n - 1, half), (2 * n + 2, 2 * n, half), (first, zero, root)])
+    over = _entries(count, [(2 * n + 2, 2 * n - 1, half), (2 * n + 1, 2 * n, -half), (2 * first, zero, root)])
+    one, cosine, sine = sparse.eye_array(count, format="csr"), up + up.T, over + over.T
     h = 0.5 * ((b - c) * one - (b + c) * cosine + (d - a) * sine)
     q = 0.5 * ((a + d) * one + (a - d) * cosine - (b + c) * sine)
     # at the highest mode h ∂ + p q leaves these functions but for even p = 2·modes
     return sparse.csr_array(h @ derivative + p * q), sparse.csr_array(q)
+
+
+def _entries(count, parts):
+    """A sparse matrix of rows, columns and values."""
+    rows, columns, values = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return sparse.csr_array((values, (rows, columns)), shape=(count, count))
 
 
 def jumps(matrix, sizes, shares, p, modes):
@@ -225,7 +230,11 @@ def jumps(matrix, sizes, shares, p, modes):
 
 
 def rightmost(matrix, near=None):
-    """The rightmost eigenvalue, complex, and about its rounding; `near` is that of fewer functions."""
+    """The rightmost eigenvalue, complex, and about its rounding; `near` is that of fewer functions.
+
+    To the right of the spectrum the nearest eigenvalue is the rightmost, as no other has a larger real part. A shift
+    that is not to the right shows by an eigenvalue there, or by one that is nearer than the rightmost.
+    """
     count = matrix.shape[0]
     norm = float(np.abs(matrix).sum(axis=0).max())
     if count <= DENSE:
@@ -233,25 +242,23 @@ def rightmost(matrix, near=None):
         k = int(np.argmax(values.real))
         angle = abs(left[:, k].conj() @ right[:, k])
         return complex(values[k]), 2e-16 * norm / max(angle, 1e-16)
-    start = np.random.default_rng(0).standard_normal(count)
-    half = 0.5 * (matrix + matrix.T)
-    bound = float(eigsh(half, 1, which="LA", v0=start, tol=1e-3, return_eigenvectors=False)[0])
-    bound += 1e-2 * abs(bound)
-    shift = bound if near is None else min(bound, near + 0.05 * (bound - near))
-    for _ in range(12):
-        factors = splu((matrix - shift * sparse.eye_array(count)).tocsc())
+    rows, columns = matrix.nonzero()
+    # phases are slow: Fourier series have a narrow band, moments have few phases and no band
+    order = "NATURAL" if np.max(np.abs(rows - columns)) < 0.1 * count else "COLAMD"
+    start, half = np.random.default_rng(0).standard_normal(count), 0.5 * (matrix + matrix.T)
+    if near is None:  # the largest eigenvalue of the symmetric part is a bound
+        shift = 1e-2 + 1.05 * float(eigsh(half, 1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0])
+    else:
+        shift = near + 0.05 * (1 + abs(near))
+    while True:
+        factors = splu((matrix - shift * sparse.eye_array(count)).tocsc(), permc_spec=order)
         inverse = LinearOperator(matrix.shape, factors.solve, dtype=float)
-        # to the right of the spectrum the nearest eigenvalue is the rightmost: all others have a smaller real part
-        values, right = eigs(inverse, min(6, count - 2), v0=start, tol=1e-12)
-        values = shift + 1 / values
+        found, right = eigs(inverse, 6, v0=start, tol=1e-12)
+        values = shift + 1 / found
         k = int(np.argmax(values.real))
-        if values[k].real >= shift:
-            shift = min(bound, values[k].real + max(0.5 * (values[k].real - shift), 1e-3 * abs(bound)))
-            continue
-        nearest = float(np.min(np.abs(values - shift)))
-        if shift - values[k].real <= nearest * (1 + 1e-6) or shift == bound:
+        if values[k].real < shift and abs(values[k] - shift) <= np.min(np.abs(values - shift)) * (1 + 1e-9):
             break
-        shift = bound
+        shift = max(shift, values[k].real) + 0.5 * (1 + abs(shift))
     transposed = LinearOperator(matrix.shape, lambda x: factors.solve(x, trans="T"), dtype=float)
     other, left = eigs(transposed, 2, v0=start, tol=1e-8)
     j = int(np.argmin(np.abs(shift + 1 / other - values[k])))
@@ -261,8 +268,8 @@ def rightmost(matrix, near=None):
 
 SIZES = {0: (1,), 1: (10, 20, 40, 80, 160), 2: (6, 9, 14, 21, 32, 44)}
 """Functions of a noise, by how many dimensions all noises have together."""
-MODES = (16, 32, 64, 128, 256, 512)
-FEWER = {0: (1,), 1: (8, 12, 18, 26, 38, 54), 2: (5, 7, 10, 14)}
+MODES = (16, 32, 64, 96, 128, 256)
+FEWER = {0: (1,), 1: (8, 16, 28, 44, 64), 2: (5, 8, 12, 16)}
 """Beside the modes of a Fourier series."""
 
 
@@ -285,12 +292,13 @@ def lyapunov_exponent(system: Planar, dimensions):
         total, slope, one = system.generator(0.0, modes, sizes[min(i, len(sizes) - 1)])
         if total.shape[0] > MOST:
             break
-        at = int(np.argmax(np.abs(one)))
-        rows = total.T.tolil()
-        rows[at] = one[None, :] * float(np.abs(total).max())
+        at, size_of = int(np.argmax(np.abs(one))), float(np.abs(total).max())
+        kept = sparse.diags_array((np.arange(one.size) != at).astype(float))
+        last_row = sparse.csr_array((one * size_of, (np.full(one.size, at), np.arange(one.size))), shape=total.shape)
+        rows = kept @ total.T + last_row
         right = np.zeros(one.size)
-        right[at] = float(np.abs(total).max())
-        found = float(splu(rows.tocsc()).solve(right) @ (slope @ one))
+        right[at] = size_of
+        found = float(splu(sparse.csc_array(rows)).solve(right) @ (slope @ one))
         size = abs(found) + 1e-3 * float(np.linalg.norm(system.drift))
         off = abs(found - last) + 1e-14 * size
         if off <= CLOSE * size:
@@ -308,7 +316,7 @@ def _settled(system, p, sizes):
             break
         try:
             found, rounding = rightmost(matrix, None if math.isnan(last) else last)
-        except (ArpackError, RuntimeError):
+        except (ArpackError, RuntimeError):  # not found, or singular
             continue
         if abs(found.imag) > 1e-7 * (abs(found) + float(np.linalg.norm(system.drift))):
             continue  # too few functions yet: Λ is real
