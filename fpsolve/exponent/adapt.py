@@ -75,7 +75,7 @@ WIDER = 4.0
 COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
 SURELY_SEEN = 1e-6
-"""A tolerance below which cells are small enough for their highest modes to show what is in them."""
+"""A tolerance down from which cells are small enough for their highest modes to show what is in them."""
 MOST_HALVED = 20_000
 """Unknowns of a system on halved cells that is solved for that: beyond, cells are many, and it takes long."""
 A_THIRD_MORE = 4 / 3
@@ -392,7 +392,7 @@ class _Search:
         none of its modes shows it.
         """
         chosen = found.pair.generator.chosen
-        if self.place.rtol < SURELY_SEEN or not isinstance(chosen.phase, PhaseCells):
+        if self.place.rtol <= SURELY_SEEN or not isinstance(chosen.phase, PhaseCells):
             return found
         halved = replace(chosen, phase=chosen.phase.doubled())
         if halved.size > min(MOST_HALVED, self.place.budget.unknowns):
