@@ -194,7 +194,7 @@ class Case(Section):
         """The system."""
         return self.system
 
-    @property
+    @cached_property
     def problem(self) -> Problem:
         """What is solved where nothing is varied."""
         return Problem(self.system, self.noise)
@@ -207,6 +207,13 @@ class Case(Section):
     def about(self, key: str) -> Quantity:
         """What a parameter is, in the time unit of [units]."""
         return self.parameters[key].quantity.timed(self.units.time)
+
+    def model_copy(self, **changes: Any) -> Case:
+        """A copy with other values, without what follows from the old ones."""
+        made = super().model_copy(**changes)
+        for name in made.__dict__.keys() - type(made).model_fields.keys():
+            del made.__dict__[name]
+        return made
 
     @property
     def path(self) -> Path:
@@ -237,7 +244,7 @@ class Case(Section):
         """The relative error wanted of Λ(p), as the case states it, or else the `usual_rtol` of its problem."""
         return self.moments.rtol if "rtol" in self.moments.model_fields_set else self.problem.usual_rtol
 
-    @property
+    @cached_property
     def asked(self) -> tuple[str, ...]:
         """The names of what is computed: those of [output], or else what is cheap and what other sections name."""
         if self.output.names is not None:
@@ -297,7 +304,7 @@ class Case(Section):
         """Whether it is not, as there are too many curves and nobody names it."""
         return RESPONSE in self.asked and not (self.response.off or self.has_response) and self.is_nonlinear
 
-    @property
+    @cached_property
     def is_nonlinear(self) -> bool:
         """Whether some of the first curves are."""
         problem = varying(self.problem)
